@@ -1,0 +1,12 @@
+"""Angles on the circle."""
+
+from __future__ import annotations
+
+import math
+
+TURN = 2.0 * math.pi
+
+
+def wrapped(angle: float) -> float:
+    """Return the same direction in (-pi, pi]; an angle that is already there comes back bit for bit."""
+    return angle - TURN * math.ceil((angle - math.pi) / TURN)

@@ -1,0 +1,64 @@
+"""Collective thrust that holds the height."""
+
+from __future__ import annotations
+
+import math
+
+from quadvis.block import Block, In, Out, Param, ParameterError
+from quadvis_blocks.control._saturation import saturated
+
+
+class Altitude(Block):
+    """Collective thrust that brings the height to its reference, whatever the tilt.
+
+    ``thrust = (r1 + m g) / max(cos(roll) cos(pitch), tilt_floor)`` with the proportional-derivative law ``r1
+    = -a1 (climb - climb_reference) - a2 (height - height_reference)``, a force, held to ``force_limit``. The
+    gains follow from the bandwidth, a1 = 2 m lambda and a2 = m lambda^2, two poles at -lambda; ``gains``
+    other than zero override them.
+
+    Source: equations (17) and (18). Error: a force error d leaves a height error of d / a2.
+    """
+
+    bandwidth = Param(1.0, unit="rad/s", above=0.0, tune=True, doc="lambda, the place of the two poles")
+    gains = Param(
+        (0.0, 0.0), type="float64[2]", unit="N*s/m N/m", min=0.0, tune=True,
+        doc="a1, a2 of equation (18); both zero: from the bandwidth",
+    )  # fmt: skip
+    mass = Param(0.5, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
+    gravity = Param(9.81, unit="m/s^2", above=0.0, doc="g")
+    force_limit = Param(2.0, unit="N", above=0.0, tune=True, doc="greatest |r1|")
+    tilt_floor = Param(0.5, above=0.0, max=1.0, tune=True, doc="least cos(roll) cos(pitch) to divide by")
+    height = In(unit="m", doc="height h, up")
+    climb = In(unit="m/s", doc="rate of change of the height")
+    roll = In(unit="rad", doc="roll angle")
+    pitch = In(unit="rad", doc="pitch angle")
+    height_reference = In(unit="m", doc="height to hold")
+    climb_reference = In(unit="m/s", default=0.0, doc="rate of change of the reference")
+    feedforward = In(unit="N", default=0.0, doc="upward force that balances a known disturbance")
+    thrust = Out(unit="N", doc="collective thrust u, the sum over the rotors")
+
+    def check(self) -> None:
+        """Refuse one gain without the other."""
+        if (self.gains[0] > 0.0) != (self.gains[1] > 0.0):
+            problem = "gains must both be above 0, or both 0 to take them from the bandwidth"
+            raise ParameterError("gains", f"{problem}, got {self.gains[0]:g}, {self.gains[1]:g}")
+
+    def output(
+        self,
+        height: float,
+        climb: float,
+        roll: float,
+        pitch: float,
+        height_reference: float,
+        climb_reference: float,
+        feedforward: float,
+    ) -> float:
+        """Return the collective thrust."""
+        damping, stiffness = self.gains[0], self.gains[1]
+        if stiffness == 0.0:
+            damping = 2.0 * self.mass * self.bandwidth
+            stiffness = self.mass * self.bandwidth * self.bandwidth
+        force = -damping * (climb - climb_reference) - stiffness * (height - height_reference)
+        lift: float = saturated(force, self.force_limit) + feedforward + self.mass * self.gravity
+        upright: float = max(math.cos(pitch) * math.cos(roll), self.tilt_floor)
+        return lift / upright

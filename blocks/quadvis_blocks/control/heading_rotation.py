@@ -1,0 +1,43 @@
+"""Position and velocity errors as the craft sees them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from quadvis.block import Block, In, Out, Param
+
+
+class HeadingRotation(Block):
+    """Horizontal position and velocity relative to a reference, turned into the frame of the craft's heading.
+
+    ``forward = cos(psi) dx + sin(psi) dy``, ``right = -sin(psi) dx + cos(psi) dy``, likewise the velocities.
+    The paper's laws assume psi = 0: without this rotation its loop is unstable from 43.55 deg of yaw on. The
+    outputs are errors; feed them to ``control.nested_saturation`` without a reference of its own.
+    """
+
+    enabled = Param(True, type="bool", tune=True, doc="false to give the errors unturned, as in the paper")
+    position = In("float64[3]", unit="m", doc="x, y, h")
+    velocity = In("float64[3]", unit="m/s", doc="rate of change of the position")
+    heading = In(unit="rad", doc="yaw angle psi, clockwise from above")
+    position_reference = In("float64[3]", unit="m", default=(0.0, 0.0, 0.0), doc="where to go: x, y, h")
+    velocity_reference = In(
+        "float64[3]", unit="m/s", default=(0.0, 0.0, 0.0), doc="rate of change of the reference"
+    )
+    forward = Out(unit="m", doc="how far the craft is ahead of the reference")
+    right = Out(unit="m", doc="how far it is to the right")
+    forward_velocity = Out(unit="m/s", doc="rate of change of forward at a constant heading")
+    right_velocity = Out(unit="m/s", doc="rate of change of right at a constant heading")
+
+    def output(
+        self, position: Any, velocity: Any, heading: float, position_reference: Any, velocity_reference: Any
+    ) -> tuple[float, float, float, float]:
+        """Return the errors: forward, right and their rates."""
+        if not self.enabled:
+            heading = 0.0
+        cosine, sine = math.cos(heading), math.sin(heading)
+        x = float(position[0] - position_reference[0])
+        y = float(position[1] - position_reference[1])
+        vx = float(velocity[0] - velocity_reference[0])
+        vy = float(velocity[1] - velocity_reference[1])
+        return cosine * x + sine * y, cosine * y - sine * x, cosine * vx + sine * vy, cosine * vy - sine * vx

@@ -1,0 +1,77 @@
+"""From collective thrust and torques to the thrusts of four rotors."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, In, Out, Param, ParameterError
+
+ROUNDING = 1e-12  # N; a demand right at a limit is not called saturated
+
+
+class Mixer(Block):
+    """Thrust of each rotor that gives the wanted collective thrust and torques, within the rotors' limits.
+
+    Rotors: 0 front, 1 right, 2 rear, 3 left; front and rear turn counterclockwise seen from above. Within the
+    limits it is the exact inverse of u = f0 + f1 + f2 + f3, Ix roll = l (f3 - f1), Iy pitch = l (f0 - f2),
+    Iz yaw = c (f0 + f2 - f1 - f3). Beyond them yaw gives way first (to the other side if need be), then the
+    collective, each by as little as possible; roll and pitch last and in proportion to each other.
+    Whatever the inputs, every thrust lies within the limits.
+
+    Source: section 3 in words; the numbering and the order of giving way are additions.
+    """
+
+    arm = Param(0.24, unit="m", above=0.0, doc="l, from the centre to each rotor; default Draganfly IV")
+    inertia = Param(
+        (5e-3, 5e-3, 9e-3), type="float64[3]", unit="kg*m^2", above=0.0, doc="about roll, pitch and yaw axis"
+    )
+    torque_ratio = Param(0.016, unit="m", above=0.0, doc="c, a rotor's drag torque over its thrust")
+    thrust_min = Param(0.0, unit="N", min=0.0, doc="least thrust of a rotor")
+    thrust_max = Param(2.0, unit="N", above=0.0, doc="greatest thrust of a rotor")
+    collective = In(unit="N", doc="collective thrust u")
+    roll = In(unit="rad/s^2", doc="roll torque divided by inertia")
+    pitch = In(unit="rad/s^2", doc="pitch torque divided by inertia")
+    yaw = In(unit="rad/s^2", doc="yaw torque divided by inertia")
+    thrust = Out("float64[4]", unit="N", doc="thrust of each rotor: front, right, rear, left")
+    saturated = Out("bool", doc="whether something had to give way")
+
+    def check(self) -> None:
+        """Refuse limits that leave nothing between them."""
+        if self.thrust_min >= self.thrust_max:
+            problem = f"thrust_min must be below thrust_max, {self.thrust_max:g} N, got {self.thrust_min:g} N"
+            raise ParameterError("thrust_min", problem)
+
+    def output(self, collective: float, roll: float, pitch: float, yaw: float) -> tuple[Any, bool]:
+        """Return the four thrusts, and whether they give less than was wanted."""
+        least, most, inertia = self.thrust_min, self.thrust_max, self.inertia
+        side = 0.5 * inertia[0] * roll / self.arm
+        front = 0.5 * inertia[1] * pitch / self.arm
+        turn = 0.25 * inertia[2] * yaw / self.torque_ratio
+        mean = 0.25 * collective
+        reach = max(abs(side), abs(front))
+        half = 0.5 * (most - least)
+        limited = reach > half
+        if limited:
+            side, front = side * half / reach, front * half / reach
+        # With yaw free to choose, opposite rotors share what roll and pitch leave them.
+        room = half - 0.5 * (abs(side) + abs(front))
+        allowed = _within(mean, least + half - room, least + half + room)
+        lowest = max(least + abs(front) - allowed, allowed + abs(side) - most)
+        highest = min(most - abs(front) - allowed, allowed - abs(side) - least)
+        turned = _within(turn, lowest, highest)
+        limited = limited or abs(allowed - mean) > ROUNDING or abs(turned - turn) > ROUNDING
+        thrusts = np.array(
+            (
+                allowed + front + turned,
+                allowed - side - turned,
+                allowed - front + turned,
+                allowed + side - turned,
+            )
+        )
+        return np.minimum(np.maximum(thrusts, least), most), limited
+
+
+def _within(value: float, lower: float, upper: float) -> float:
+    return min(max(value, lower), upper)

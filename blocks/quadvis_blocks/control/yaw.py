@@ -1,0 +1,62 @@
+"""Yaw torque that holds the heading."""
+
+from __future__ import annotations
+
+from quadvis.block import Block, In, Out, Param, ParameterError
+from quadvis_blocks._angles import wrapped
+from quadvis_blocks.control._saturation import saturated
+
+
+class Yaw(Block):
+    """Yaw torque that turns the craft to its heading, the short way round.
+
+    ``torque = -a1 (angular_rate - angular_rate_reference) - a2 (angle - angle_reference) + feedforward``, the
+    angle error wrapped to (-pi, pi], the sum held to ``torque_limit``. The gains follow from the bandwidth,
+    a1 = 2 lambda and a2 = lambda^2, two poles at -lambda; ``gains`` other than zero override them.
+
+    Source: equation (19). Error: a torque error d leaves a heading error of d / a2.
+    """
+
+    bandwidth = Param(1.0, unit="rad/s", above=0.0, tune=True, doc="lambda, the place of the two poles")
+    gains = Param(
+        (0.0, 0.0), type="float64[2]", unit="1/s 1/s^2", min=0.0, tune=True,
+        doc="a1, a2 of equation (19); both zero: from the bandwidth",
+    )  # fmt: skip
+    torque_limit = Param(
+        5.0,
+        unit="rad/s^2",
+        above=0.0,
+        tune=True,
+        doc="greatest |torque|; the rotors have the least authority here",
+    )
+    angle = In(unit="rad", doc="yaw angle psi, clockwise from above")
+    angular_rate = In(unit="rad/s", doc="rate of change of the angle")
+    angle_reference = In(unit="rad", default=0.0, doc="heading to hold")
+    angular_rate_reference = In(unit="rad/s", default=0.0, doc="rate of change of the reference")
+    feedforward = In(unit="rad/s^2", default=0.0, doc="torque that balances a known disturbance")
+    torque = Out(unit="rad/s^2", doc="torque divided by inertia: the angular acceleration wanted")
+
+    def check(self) -> None:
+        """Refuse one gain without the other."""
+        if (self.gains[0] > 0.0) != (self.gains[1] > 0.0):
+            problem = "gains must both be above 0, or both 0 to take them from the bandwidth"
+            raise ParameterError("gains", f"{problem}, got {self.gains[0]:g}, {self.gains[1]:g}")
+
+    def output(
+        self,
+        angle: float,
+        angular_rate: float,
+        angle_reference: float,
+        angular_rate_reference: float,
+        feedforward: float,
+    ) -> float:
+        """Return the yaw torque."""
+        damping, stiffness = self.gains[0], self.gains[1]
+        if stiffness == 0.0:
+            damping = 2.0 * self.bandwidth
+            stiffness = self.bandwidth * self.bandwidth
+        error = wrapped(angle - angle_reference)
+        return saturated(
+            -damping * (angular_rate - angular_rate_reference) - stiffness * error + feedforward,
+            self.torque_limit,
+        )

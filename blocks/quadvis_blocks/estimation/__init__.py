@@ -1,0 +1,1 @@
+"""From measurements to the quantities that the control laws need."""

@@ -1,0 +1,168 @@
+"""The four-rotor craft: thrust commands in, motion out."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, In, Out, Param, ParameterError, State
+from quadvis_blocks._angles import wrapped
+
+PAPER, RIGID_BODY = range(2)
+
+
+class Rotorcraft(Block):
+    """A four-rotor craft near hover: rotors with lag and limits, rigid body, linear drag against the wind.
+
+    World: x forward, y right, h up; roll > 0 right side down, pitch > 0 nose up, yaw > 0 clockwise from
+    above. Rotors: 0 front, 1 right, 2 rear, 3 left; front and rear turn counterclockwise seen from above.
+    Each thrust follows its command, held to the limits, with a first-order lag; u is their sum, and the
+    torques over inertia are l (f3 - f1) / Ix, l (f0 - f2) / Iy, c (f0 + f2 - f1 - f3) / Iz, each plus its
+    ``torque_bias``.
+
+    Model ``paper``, equations (11)-(16): m x'' = -u sin(pitch), m y'' = u cos(pitch) sin(roll), m h'' = u
+    cos(pitch) cos(roll) - m g, and the angles are double integrals of the torques (14 with its missing dots).
+    It does not know yaw: x and y are then axes that turn with the craft. Model ``rigid_body``: Newton-Euler
+    with 3-2-1 angles; rates are those of the body axes. To first order in the tilt, at yaw 0, the two are the
+    same.
+
+    The start is a trimmed hover: every rotor carries a quarter of the weight. Yaw is wrapped to (-pi, pi] at
+    the output only; the states go on turning, so that no solver step jumps. Error: pitch of +-90 deg is
+    singular in ``rigid_body``.
+    """
+
+    model = Param("paper", choices=("paper", "rigid_body"), doc="equations of motion")
+    mass = Param(0.5, unit="kg", above=0.0, tune=True, doc="mass; default Draganfly IV")
+    arm = Param(0.24, unit="m", above=0.0, doc="l, from the centre to each rotor; default Draganfly IV")
+    inertia = Param(
+        (5e-3, 5e-3, 9e-3), type="float64[3]", unit="kg*m^2", above=0.0, doc="about roll, pitch and yaw axis"
+    )
+    torque_ratio = Param(0.016, unit="m", above=0.0, doc="c, a rotor's drag torque over its thrust")
+    lag = Param(0.08, unit="s", above=0.0, tune=True, doc="time constant of a motor")
+    thrust_min = Param(0.0, unit="N", min=0.0, doc="least thrust of a rotor")
+    thrust_max = Param(2.0, unit="N", above=0.0, doc="greatest thrust of a rotor")
+    drag = Param(0.1, unit="N*s/m", min=0.0, tune=True, doc="force per speed through the air")
+    torque_bias = Param(
+        (0.0, 0.0, 0.0),
+        type="float64[3]",
+        unit="rad/s^2",
+        tune=True,
+        doc="trim error about roll, pitch and yaw axis",
+    )
+    gravity = Param(9.81, unit="m/s^2", above=0.0, doc="g")
+    initial_position = Param((0.0, 0.0, 0.0), type="float64[3]", unit="m", doc="x, y, h at the start")
+    initial_velocity = Param((0.0, 0.0, 0.0), type="float64[3]", unit="m/s", doc="velocity at the start")
+    initial_attitude = Param(
+        (0.0, 0.0, 0.0), type="float64[3]", unit="rad", doc="roll, pitch, yaw at the start"
+    )
+    thrust = In("float64[4]", unit="N", doc="commanded thrust of each rotor: front, right, rear, left")
+    wind = In("float64[3]", unit="m/s", default=(0.0, 0.0, 0.0), doc="velocity of the air along x, y, h")
+    position = Out("float64[3]", unit="m", doc="x, y, h")
+    velocity = Out("float64[3]", unit="m/s", doc="rate of change of the position")
+    attitude = Out("float64[3]", unit="rad", doc="roll, pitch, yaw; yaw in (-pi, pi]")
+    rates = Out("float64[3]", unit="rad/s", doc="about roll, pitch and yaw axis, as a gyro sees them")
+
+    # Scalars, because the solver visits them four times a step and a float costs a tenth of a small array.
+    front = State(unit="N", continuous=True)
+    right = State(unit="N", continuous=True)
+    rear = State(unit="N", continuous=True)
+    left = State(unit="N", continuous=True)
+    x = State(unit="m", continuous=True)
+    y = State(unit="m", continuous=True)
+    h = State(unit="m", continuous=True)
+    vx = State(unit="m/s", continuous=True)
+    vy = State(unit="m/s", continuous=True)
+    vh = State(unit="m/s", continuous=True)
+    roll = State(unit="rad", continuous=True)
+    pitch = State(unit="rad", continuous=True)
+    yaw = State(unit="rad", continuous=True)
+    p = State(unit="rad/s", continuous=True)
+    q = State(unit="rad/s", continuous=True)
+    r = State(unit="rad/s", continuous=True)
+
+    def check(self) -> None:
+        """Refuse limits that leave nothing between them."""
+        if self.thrust_min >= self.thrust_max:
+            problem = f"thrust_min must be below thrust_max, {self.thrust_max:g} N, got {self.thrust_min:g} N"
+            raise ParameterError("thrust_min", problem)
+
+    def start(self) -> None:
+        """Begin in a trimmed hover at the initial position, velocity and attitude."""
+        hover = 0.25 * self.mass * self.gravity
+        self.front, self.right, self.rear, self.left = hover, hover, hover, hover
+        position, velocity, attitude = self.initial_position, self.initial_velocity, self.initial_attitude
+        self.x, self.y, self.h = position[0], position[1], position[2]
+        self.vx, self.vy, self.vh = velocity[0], velocity[1], velocity[2]
+        self.roll, self.pitch, self.yaw = attitude[0], attitude[1], attitude[2]
+        self.p, self.q, self.r = 0.0, 0.0, 0.0
+
+    def output(self) -> tuple[Any, Any, Any, Any]:
+        """Return position, velocity, attitude and rates."""
+        return (
+            np.array((self.x, self.y, self.h)),
+            np.array((self.vx, self.vy, self.vh)),
+            np.array((self.roll, self.pitch, wrapped(self.yaw))),
+            np.array((self.p, self.q, self.r)),
+        )
+
+    def deriv(self, thrust: Any, wind: Any) -> tuple[float, ...]:
+        """Return the rates of change of rotors, position, velocity, attitude and rates."""
+        front, right, rear, left = self.front, self.right, self.rear, self.left
+        roll, pitch, p, q, r = self.roll, self.pitch, self.p, self.q, self.r
+        vx, vy, vh = self.vx, self.vy, self.vh
+        least, most, lag = self.thrust_min, self.thrust_max, self.lag
+        arm, inertia, bias = self.arm, self.inertia, self.torque_bias
+        ix, iy, iz = float(inertia[0]), float(inertia[1]), float(inertia[2])
+        p_rate = arm * (left - right) / ix + float(bias[0])
+        q_rate = arm * (front - rear) / iy + float(bias[1])
+        r_rate = self.torque_ratio * (front + rear - right - left) / iz + float(bias[2])
+        if self.model == PAPER:
+            roll_rate, pitch_rate, yaw_rate = p, q, r
+            forward, rightward, upward = _paper_lift(roll, pitch)
+        else:
+            p_rate += (iy - iz) / ix * q * r
+            q_rate += (iz - ix) / iy * p * r
+            r_rate += (ix - iy) / iz * p * q
+            roll_rate, pitch_rate, yaw_rate = _angle_rates(roll, pitch, p, q, r)
+            forward, rightward, upward = _lift(roll, pitch, self.yaw)
+        lift, drag = (front + right + rear + left) / self.mass, self.drag / self.mass
+        return (
+            (_within(float(thrust[0]), least, most) - front) / lag,
+            (_within(float(thrust[1]), least, most) - right) / lag,
+            (_within(float(thrust[2]), least, most) - rear) / lag,
+            (_within(float(thrust[3]), least, most) - left) / lag,
+            vx, vy, vh,
+            lift * forward + drag * (float(wind[0]) - vx),
+            lift * rightward + drag * (float(wind[1]) - vy),
+            lift * upward + drag * (float(wind[2]) - vh) - self.gravity,
+            roll_rate, pitch_rate, yaw_rate,
+            p_rate, q_rate, r_rate,
+        )  # fmt: skip
+
+
+def _within(command: float, least: float, most: float) -> float:
+    if command < least:
+        return least
+    return most if command > most else command
+
+
+def _paper_lift(roll: float, pitch: float) -> tuple[float, float, float]:
+    """Return the direction of the thrust along x, y, h by equations (11)-(13)."""
+    cosine = math.cos(pitch)
+    return -math.sin(pitch), cosine * math.sin(roll), cosine * math.cos(roll)
+
+
+def _lift(roll: float, pitch: float, yaw: float) -> tuple[float, float, float]:
+    """Return the direction of the thrust: minus the third column of Rz(yaw) Ry(pitch) Rx(roll), h up."""
+    across, along = math.sin(roll), math.cos(roll) * math.sin(pitch)
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    return -along * cosine - across * sine, across * cosine - along * sine, math.cos(roll) * math.cos(pitch)
+
+
+def _angle_rates(roll: float, pitch: float, p: float, q: float, r: float) -> tuple[float, float, float]:
+    """Return the rates of change of roll, pitch and yaw for given rates about the body axes."""
+    cosine, sine = math.cos(roll), math.sin(roll)
+    turn = (q * sine + r * cosine) / math.cos(pitch)
+    return p + turn * math.sin(pitch), q * cosine - r * sine, turn

@@ -1,0 +1,1 @@
+"""Models of the instruments on board, for simulation."""

@@ -1,0 +1,1 @@
+"""Blocks that shape signals: arithmetic, delays, holds, filters, integrals and derivatives."""

@@ -1,0 +1,32 @@
+"""Element-wise mathematics that is the same for a float and for an array, interpreted and compiled."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+
+def clip(value: Any, lower: float, upper: float) -> Any:
+    """Return ``value`` held between the limits, element by element; NaN stays NaN."""
+    if isinstance(value, float):
+        if value < lower:
+            return lower
+        return upper if value > upper else value
+    return np.minimum(np.maximum(value, lower), upper)
+
+
+def all_finite(value: Any) -> bool:
+    """Return whether no element is NaN or infinite."""
+    if isinstance(value, float):
+        return math.isfinite(value)
+    return bool(np.all(np.isfinite(value)))
+
+
+def inward(slope: Any, value: Any, lower: float, upper: float) -> Any:
+    """Return ``slope``, with zero for every element of ``value`` at a limit that it would lead beyond."""
+    if isinstance(value, float):
+        return 0.0 if (value >= upper and slope > 0.0) or (value <= lower and slope < 0.0) else slope
+    outward = ((value >= upper) & (slope > 0.0)) | ((value <= lower) & (slope < 0.0))
+    return np.where(outward, 0.0, slope)

@@ -1,0 +1,69 @@
+"""Rate of change by backward difference."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks.signal._elements import all_finite
+
+INSTANT = 1e-9  # s
+
+
+class Derivative(Block):
+    """Rate of change of a sampled signal by backward difference: ``rate = (u_t - u_{t-T}) / T``.
+
+    T is the true time between the two samples, from their stamps; without stamps it is the time between
+    ticks. A repeated frame (a stamp not newer than the last) and a sample that is not valid keep the last
+    rate, so the block may run faster than the camera. A value with NaN counts as not valid. The rate is 0 and
+    ``ok`` false until there are two samples, and again after a gap: when two stamps, or the arrivals of two
+    samples, are further apart than ``gap_reset``. Successive ticks are never a gap.
+
+    Source: section 6.2. Error: at most ``M T / 2`` for a signal with ``|u''| <= M``; noise of standard
+    deviation s in the signal becomes ``s sqrt(2) / T`` in the rate.
+    """
+
+    gap_reset = Param(
+        0.4, unit="s", above=0.0, tune=True, doc="longest gap (inclusive) that a difference may span"
+    )
+    u = In("float64[*]", unit="a", doc="the signal; NaN where it is missing")
+    stamp = In(unit="s", default=math.nan, doc="instant at which u was measured; NaN for now")
+    valid = In("bool", default=True, doc="whether u is good")
+    rate = Out("float64[*]", unit="a/s", doc="rate of change")
+    ok = Out("bool", doc="whether it comes from two samples without a gap")
+    last = State("float64[*]")
+    last_rate = State("float64[*]")
+    last_ok = State("bool")
+    measured = State(unit="s")
+    arrived = State(unit="s")
+
+    def start(self) -> None:
+        """Forget all samples."""
+        self.measured = -math.inf
+        self.arrived = -math.inf
+
+    def output(self, u: Any, stamp: float, valid: bool, time: float) -> tuple[Any, bool]:
+        """Return the rate, and whether it means anything."""
+        longest = max(self.gap_reset, 1.5 * self.period) + INSTANT
+        in_time = time - self.arrived <= longest
+        elapsed = (time if math.isnan(stamp) else stamp) - self.measured
+        if valid and elapsed > 0.0 and all_finite(u):
+            if in_time and elapsed <= longest:
+                return (u - self.last) / elapsed, True
+            return 0.0 * u, False
+        if in_time:
+            return 1.0 * self.last_rate, self.last_ok
+        return 0.0 * self.last_rate, False
+
+    def update(self, u: Any, stamp: float, valid: bool, time: float) -> None:
+        """Keep this sample if it is new and good."""
+        longest = max(self.gap_reset, 1.5 * self.period) + INSTANT
+        measured = time if math.isnan(stamp) else stamp
+        elapsed = measured - self.measured
+        if valid and elapsed > 0.0 and all_finite(u):
+            self.last_ok = time - self.arrived <= longest and elapsed <= longest
+            self.last_rate = (u - self.last) / elapsed if self.last_ok else 0.0 * u
+            self.last = u
+            self.measured = measured
+            self.arrived = time

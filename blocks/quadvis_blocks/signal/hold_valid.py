@@ -1,0 +1,57 @@
+"""The last valid value of a measurement."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks.signal._elements import all_finite
+
+INSTANT = 1e-9  # s
+
+
+class HoldValid(Block):
+    """The last valid value of a measurement, how old it is, and whether that is young enough.
+
+    A value is valid if ``valid`` is true and all its elements are finite, so NaN never passes. The age counts
+    from the value's ``stamp``, or from the tick at which it came if no stamp is connected. Before the first
+    valid value the output is ``initial``, the age counts from the start and ``ok`` is false.
+    """
+
+    max_age = Param(0.25, unit="s", min=0.0, tune=True, doc="greatest age (inclusive) that is ok")
+    initial = Param(0.0, unit="a", doc="every element of the output before the first valid value")
+    value = In("float64[*]", unit="a", doc="the measurement; NaN where it is missing")
+    valid = In("bool", default=True, doc="whether the measurement is good")
+    stamp = In(unit="s", default=math.nan, doc="instant of the measurement; NaN for now")
+    held = Out("float64[*]", unit="a", doc="the last valid value")
+    age = Out(unit="s", doc="time since it was measured")
+    ok = Out("bool", doc="whether there is one, and its age is at most ``max_age``")
+    last = State("float64[*]")
+    measured = State(unit="s")
+    seen = State("bool")
+
+    def start(self) -> None:
+        """Begin without a value."""
+        self.last = self.initial
+
+    def output(self, value: Any, valid: bool, stamp: float, time: float) -> tuple[Any, float, bool]:
+        """Return the value if it is valid, else the last one that was."""
+        if valid and all_finite(value):
+            held, measured, seen = value, _instant(stamp, time), True
+        else:
+            held, measured, seen = 1.0 * self.last, self.measured, self.seen
+        age = max(0.0, time - measured)
+        return held, age, seen and age <= self.max_age + INSTANT
+
+    def update(self, value: Any, valid: bool, stamp: float, time: float) -> None:
+        """Keep the value if it is valid."""
+        if valid and all_finite(value):
+            self.last = value
+            self.measured = _instant(stamp, time)
+            self.seen = True
+
+
+def _instant(stamp: float, time: float) -> float:
+    """Return the stamp, or now if there is none."""
+    return time if math.isnan(stamp) else stamp

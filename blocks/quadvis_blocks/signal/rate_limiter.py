@@ -1,0 +1,34 @@
+"""A signal whose rate of change is limited."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks.signal._elements import clip
+
+
+class RateLimiter(Block):
+    """A signal that follows its input no faster than the limits, element by element.
+
+    ``y[k] = y[k-1] + min(max(u[k] - y[k-1], -falling T), rising T)`` with ``y[-1] = initial``.
+    """
+
+    rising = Param(1.0, unit="a/s", min=0.0, tune=True, doc="fastest rise")
+    falling = Param(1.0, unit="a/s", min=0.0, tune=True, doc="fastest fall, a positive number")
+    initial = Param(0.0, unit="a", doc="every element of the output before the first sample")
+    u = In("float64[*]", unit="a", doc="any signal")
+    y = Out("float64[*]", unit="a", doc="the limited signal")
+    last = State("float64[*]")
+
+    def start(self) -> None:
+        """Begin with the initial value."""
+        self.last = self.initial
+
+    def output(self, u: Any) -> Any:
+        """Return the input, or as near to it as the limits allow."""
+        return self.last + clip(u - self.last, -self.falling * self.period, self.rising * self.period)
+
+    def update(self, u: Any) -> None:
+        """Keep what was given out."""
+        self.last = self.last + clip(u - self.last, -self.falling * self.period, self.rising * self.period)

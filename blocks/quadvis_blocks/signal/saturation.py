@@ -1,0 +1,30 @@
+"""A signal held between limits."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from quadvis.block import Block, In, Out, Param, ParameterError
+from quadvis_blocks.signal._elements import clip
+
+
+class Saturation(Block):
+    """A signal held between two limits, element by element: ``y = min(max(u, lower), upper)``.
+
+    With ``lower = -upper`` it is the sigma of the paper's section 4.
+    """
+
+    lower = Param(-1.0, unit="a", tune=True, doc="smallest value that passes")
+    upper = Param(1.0, unit="a", tune=True, doc="largest value that passes")
+    u = In("float64[*]", unit="a", doc="any signal")
+    y = Out("float64[*]", unit="a", doc="the signal within the limits")
+
+    def check(self) -> None:
+        """Refuse limits that leave nothing between them."""
+        if self.lower > self.upper:
+            problem = f"lower must be at most upper, {self.upper:g}, got {self.lower:g}"
+            raise ParameterError("lower", problem)
+
+    def output(self, u: Any) -> Any:
+        """Return the signal within the limits."""
+        return clip(u, self.lower, self.upper)

@@ -1,0 +1,1 @@
+"""Blocks that make signals out of time, numbers and chance."""

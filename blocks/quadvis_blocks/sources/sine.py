@@ -1,0 +1,22 @@
+"""A sine wave."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from quadvis.block import Block, Out, Param
+
+
+class Sine(Block):
+    """A sine wave: ``y = bias + amplitude * sin(2 pi frequency t + phase)``."""
+
+    amplitude = Param(1.0, unit="a", tune=True, doc="half of the peak-to-peak height")
+    frequency = Param(1.0, unit="Hz", min=0.0, tune=True, doc="cycles per second")
+    phase = Param(0.0, unit="rad", tune=True, doc="phase at t = 0")
+    bias = Param(0.0, unit="a", tune=True, doc="mean value")
+    y = Out(unit="a", doc="the wave")
+
+    def output(self, time: float) -> Any:
+        """Return the value at this time."""
+        return self.bias + self.amplitude * math.sin(2.0 * math.pi * self.frequency * time + self.phase)

@@ -1,0 +1,23 @@
+"""A step in time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from quadvis.block import Block, Out, Param
+
+
+class Step(Block):
+    """One value before an instant, another from it on.
+
+    ``y = before`` for t < at, ``y = after`` for t >= at.
+    """
+
+    before = Param(0.0, unit="a", tune=True, doc="value before the step")
+    after = Param(1.0, unit="a", tune=True, doc="value from the step on")
+    at = Param(1.0, unit="s", tune=True, doc="instant of the step")
+    y = Out(unit="a", doc="the step")
+
+    def output(self, time: float) -> Any:
+        """Return the value on this side of the step."""
+        return self.after if time >= self.at else self.before

@@ -1,0 +1,137 @@
+"""The colours of the four circles, as they look beside the ceiling, and the file that holds them.
+
+A circle's colour is the ratio of its grey levels to the ceiling's, channel by channel: exposure, white
+balance and vignetting change both alike. Source: the colour calibration of section 5.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.document import Node, read_yaml
+from quadvis.errors import Faults, QuadvisError, sentence
+
+Array = NDArray[np.float64]
+Colour = tuple[float, float, float]
+
+NAMES = ("red", "blue", "green", "black")  # of corners 1..4 of the paper's target
+THRESHOLD = 0.74
+
+_DARK = 0.2  # a ratio far below this is as good as black
+_RATIO_MAX = 3.0
+_APART = 0.3  # least distance of two colours: a step of a third in one channel
+
+
+@dataclass(frozen=True, eq=False)
+class ColourCalibration:
+    """Colours of circles 1..4; impossible values raise `QuadvisError`.
+
+    `prototypes` (4, 3) are ratios circle over ceiling, blue-green-red. A pixel may belong to a circle if
+    a channel of it is below `threshold` times the ceiling. `names` serve messages only.
+    """
+
+    prototypes: Array
+    threshold: float = THRESHOLD
+    names: tuple[str, ...] = NAMES
+
+    def __post_init__(self) -> None:
+        """Make the array read-only and check everything."""
+        prototypes = np.array(self.prototypes, dtype=np.float64)
+        if prototypes.shape != (4, 3) or len(self.names) != 4:
+            raise QuadvisError(
+                f"colours have shape {prototypes.shape}; four circles need 4 x 3 ratios and 4 names"
+            )
+        prototypes.flags.writeable = False
+        object.__setattr__(self, "prototypes", prototypes)
+        for _, problem, remedy in _problems(prototypes, self.threshold, self.names):
+            raise QuadvisError(sentence(problem, remedy))
+
+    @classmethod
+    def load(cls, path: str | Path) -> ColourCalibration:
+        """Read a colour file; `DiagramError` with file, line and column of everything that is wrong in it.
+
+        The file is YAML: `threshold: 0.74` and `circles`, a list of four `{colour: red, ratio: [blue,
+        green, red]}` in the order of corners 1 to 4.
+        """
+        fields = read_yaml(str(path)).fields(required={"threshold", "circles"})
+        circles = fields["circles"].items()
+        if len(circles) != 4:
+            raise fields["circles"].wrong("a list of 4 circles", found=f"a list of {len(circles)}")
+        maps = [circle.fields(required={"colour", "ratio"}) for circle in circles]
+        names = tuple(circle["colour"].text() for circle in maps)
+        prototypes = np.array([circle["ratio"].array((3,)) for circle in maps], dtype=np.float64)
+        threshold = fields["threshold"].number()
+        places: list[Node] = [*(circle["ratio"] for circle in maps), fields["threshold"]]
+        faults = Faults()
+        for index, problem, remedy in _problems(prototypes, threshold, names):
+            faults.add(places[index].place, problem, remedy, subject="colours")
+        faults.check()
+        return cls(prototypes, threshold, names)
+
+    def save(self, path: str | Path, comment: str = "") -> None:
+        """Write the colours as YAML so that `load` returns the same numbers; `comment` goes on top."""
+        lines = [f"# {line}" for line in comment.splitlines()]
+        lines += [f"threshold: {float(self.threshold)!r}", "circles:"]
+        for name, ratio in zip(self.names, self.prototypes, strict=True):
+            parts = ", ".join(repr(float(part)) for part in ratio)
+            lines.append(f"  - {{colour: {json.dumps(name)}, ratio: [{parts}]}}")
+        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+    @cached_property
+    def ratios(self) -> tuple[Colour, ...]:
+        """The prototypes as tuples."""
+        return tuple((float(blue), float(green), float(red)) for blue, green, red in self.prototypes)
+
+    def nearest(self, ratio: Colour) -> tuple[int, float]:
+        """Return the index of the circle whose colour is nearest to a ratio, and how far it is.
+
+        The distance is about that of the logarithms, so a factor that all channels share, such as a
+        ceiling that is greyer than the calibrated one, weighs little; differences between dark tones
+        weigh little too.
+        """
+        tone = _tone(ratio)
+        distances = [math.dist(tone, other) for other in self._tones]
+        least = min(distances)
+        return distances.index(least), least
+
+    @cached_property
+    def _tones(self) -> tuple[Colour, ...]:
+        return tuple(_tone(ratio) for ratio in self.ratios)
+
+
+def _tone(ratio: Colour) -> Colour:
+    blue, green, red = ratio
+    return math.log(blue + _DARK), math.log(green + _DARK), math.log(red + _DARK)
+
+
+def _problems(prototypes: Array, threshold: float, names: tuple[str, ...]) -> Iterator[tuple[int, str, str]]:
+    """Give what is wrong: the circle it belongs to (4: the threshold), the problem and the remedy."""
+    if not 0.1 <= threshold <= 0.95:
+        yield 4, f"threshold is {threshold:g}", "it must be from 0.1 to 0.95 of the ceiling's brightness"
+        return
+    good = []
+    for index, (name, ratio) in enumerate(zip(names, prototypes, strict=True)):
+        if not ((ratio >= 0) & (ratio <= _RATIO_MAX)).all():
+            numbers = ", ".join(f"{part:g}" for part in ratio)
+            yield index, f"the ratio of {name} is ({numbers})", f"each must be from 0 to {_RATIO_MAX:g}"
+        elif ratio.min() >= threshold:
+            problem = f"{name} is in no channel below the threshold {threshold:g}, so it cannot be found"
+            yield index, problem, "raise the threshold or take a darker colour"
+        else:
+            good.append(index)
+    for place, later in enumerate(good):
+        for earlier in good[:place]:
+            if math.dist(_tone(tuple(prototypes[later])), _tone(tuple(prototypes[earlier]))) < _APART:
+                yield (
+                    later,
+                    f"{names[later]} cannot be told from {names[earlier]}",
+                    "the four colours must differ",
+                )

@@ -1,0 +1,97 @@
+"""Where the target lies and how the camera sees it: poses, rays and circles.
+
+Axes: world x forward, y right, h up. Target: origin at the middle of the square on the ceiling, x forward, y
+right, z down, so that the camera's position in target axes is (x, y, ceiling - h). Camera: x to the right of
+the picture, y down the picture, z along the optical axis; it looks up, with the top of the picture to the
+body's right. A point of the target appears at X_c = R X_t + t, equation (32).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+# Body axes (forward, right, down) to camera axes: picture right is forward, picture down left, the axis up.
+CAMERA_FROM_BODY: Array = np.diag([1.0, -1.0, -1.0])
+CAMERA_FROM_BODY.flags.writeable = False
+
+SIDE = 1.0  # m, between the centres of neighbouring circles
+RADIUS = 0.12  # m
+
+
+def target_corners(side: float) -> Array:
+    """Return the circle centres (4, 3) in target axes (m): clockwise from upper left in the picture."""
+    half = side / 2
+    return np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
+
+
+def rotation(attitude: ArrayLike) -> Array:
+    """Return the rotation (3, 3) from body (forward, right, down) to level axes, Rz(psi) Ry(theta) Rx(phi).
+
+    `attitude` is (phi, theta, psi) in rad: right side down, nose up and clockwise from above are positive.
+    """
+    phi, theta, psi = (float(angle) for angle in np.asarray(attitude, dtype=np.float64))
+    cr, sr = math.cos(phi), math.sin(phi)
+    cp, sp = math.cos(theta), math.sin(theta)
+    cy, sy = math.cos(psi), math.sin(psi)
+    return np.array([
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ])  # fmt: skip
+
+
+def attitude_of(body_rotation: ArrayLike) -> Array:
+    """Return (phi, theta, psi) in rad of a rotation (3, 3) from body to level axes; inverts `rotation`."""
+    r = np.asarray(body_rotation, dtype=np.float64)
+    theta = math.atan2(-r[2, 0], math.hypot(r[2, 1], r[2, 2]))
+    return np.array([math.atan2(r[2, 1], r[2, 2]), theta, math.atan2(r[1, 0], r[0, 0])])
+
+
+def camera_pose(position: ArrayLike, attitude: ArrayLike, ceiling: float) -> tuple[Array, Array]:
+    """Return (R, t) with X_c = R X_t + t for a vehicle at (x, y, h) in m with (phi, theta, psi) in rad.
+
+    `ceiling` is the height of the target in m. R is (3, 3), t is (3,) in m.
+    """
+    x, y, height = (float(value) for value in np.asarray(position, dtype=np.float64))
+    turn = CAMERA_FROM_BODY @ rotation(attitude).T
+    return turn, -turn @ np.array([x, y, ceiling - height])
+
+
+def vehicle_pose(turn: ArrayLike, shift: ArrayLike, ceiling: float) -> tuple[Array, Array]:
+    """Return position (x, y, h) in m and attitude (phi, theta, psi) in rad: the inverse of `camera_pose`."""
+    r = np.asarray(turn, dtype=np.float64)
+    x, y, z = -r.T @ np.asarray(shift, dtype=np.float64)
+    return np.array([x, y, ceiling - z]), attitude_of(r.T @ CAMERA_FROM_BODY)
+
+
+def plane_homography(turn: Array, shift: Array) -> Array:
+    """Return H = [r1 r2 t] (3, 3), from target points (x, y, 1) in m to normalised image points."""
+    return np.column_stack((turn[:, 0], turn[:, 1], shift))
+
+
+def circle_outline(centre: Sequence[float], radius: float, count: int = 64) -> Array:
+    """Return a polygon (count, 3) in m about the circle on the target; the circle touches its sides."""
+    angle = 2 * math.pi * np.arange(count) / count
+    reach = radius / math.cos(math.pi / count)
+    return np.column_stack(
+        (centre[0] + reach * np.cos(angle), centre[1] + reach * np.sin(angle), np.zeros(count))
+    )
+
+
+def ellipse_centres(homography: Array, centres: Array, radius: float) -> Array:
+    """Return the centres (n, 2) of the ellipses that circles (n, >= 2) in m on the target become, normalised.
+
+    The centre of an ellipse is not the image of the circle's centre: the conic's centre is w H p - r^2 H
+    (h31, h32, 0)' with p = (x, y, 1) and w the depth of p.
+    """
+    points = np.column_stack((centres[:, :2], np.ones(len(centres))))
+    depth = points @ homography[2]
+    bent = homography @ np.array([homography[2, 0], homography[2, 1], 0.0])
+    middle = depth[:, None] * (points @ homography.T) - radius * radius * bent
+    return np.asarray(middle[:, :2] / middle[:, 2:])

@@ -1,0 +1,138 @@
+"""A square's four corners in a picture: which four blobs they are, and how large a circle on each must look.
+
+Corners are numbered 1..4 clockwise from the upper left, as in section 5.1. Points are complex numbers u +
+iv (px, v down), for which a similarity is one multiplication.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+Homography = tuple[float, float, float, float, float, float, float, float, float]
+
+# Corners of the unit square around the origin.
+CORNERS = (complex(-0.5, -0.5), complex(0.5, -0.5), complex(0.5, 0.5), complex(-0.5, 0.5))
+
+# Limits of what is still a square with four equal circles. A tilt of 25 deg seen from 1.6 sides away
+# leaves a similarity by 0.1 side; radii differ from the expected ones by noise, blur and a ratio
+# radius/side that is not well known.
+MISFIT_MAX = 0.2  # of the side, rms
+SIZE_MAX = math.log(1.6)  # of all circles together
+SPREAD_MAX = math.log(1.4)  # of one circle against the others
+OFFSET_MAX = 0.35  # of half a diagonal: how far a corner may be from where the opposite two put it
+
+
+class Blob(NamedTuple):
+    """What may be a circle: `centre` u + iv and `radius` in px, `distance` of its colour from a circle's."""
+
+    centre: complex
+    radius: float
+    distance: float
+
+
+def square_homography(points: Sequence[complex]) -> Homography | None:
+    """Return the homography, row by row, from the unit square (p right, q down, 0..1) to the picture.
+
+    None if the corners are not a convex figure numbered clockwise, so the target seen from behind has none.
+    Source: the closed form for a unit square (Heckbert 1989), up to the scale H33 = 1.
+    """
+    p1, p2, p3, p4 = points
+    up, left, bend = p2 - p3, p4 - p3, p1 - p2 + p3 - p4
+    area = -_cross(up, left)
+    if not area > 0:
+        return None
+    g, h = _cross(left, bend) / area, _cross(bend, up) / area
+    if not (1 + g > 0 and 1 + h > 0 and 1 + g + h > 0):
+        return None
+    if not _cross(p2 - p1, p4 - p1) > 0:
+        return None
+    a, b = p2 - p1 + g * p2, p4 - p1 + h * p4
+    return (a.real, b.real, p1.real, a.imag, b.imag, p1.imag, g, h, 1.0)
+
+
+def expected_radii(points: Sequence[complex], ratio: float) -> tuple[float, float, float, float] | None:
+    """Return the radii (px) of circles on the four corners; `ratio` is their radius over the square's side.
+
+    A small circle becomes an ellipse, scaled in area by the Jacobian determinant det H / w^3 of the
+    homography at its corner; its radius is that of the circle of equal area. None if the points are no
+    square seen from the front.
+    """
+    h = square_homography(points)
+    if h is None:
+        return None
+    across, down = 1 + h[6], 1 + h[7]
+    determinant = _cross(points[1] - points[0], points[3] - points[0]) * across * down
+    r1, r2, r3, r4 = (ratio * math.sqrt(determinant / w**3) for w in (1.0, across, across + down - 1, down))
+    return r1, r2, r3, r4
+
+
+def arrangement_cost(corners: Sequence[Blob], ratio: float) -> float:
+    """Return how badly four blobs fit a square of circles; infinity if they cannot be one."""
+    points = [blob.centre for blob in corners]
+    misfit = _misfit(points)
+    if misfit > MISFIT_MAX:
+        return math.inf
+    expected = expected_radii(points, ratio)
+    if expected is None:
+        return math.inf
+    sizes = [math.log(blob.radius / radius) for blob, radius in zip(corners, expected, strict=True)]
+    mean = sum(sizes) / 4
+    spread = max(abs(size - mean) for size in sizes)
+    if abs(mean) > SIZE_MAX or spread > SPREAD_MAX:
+        return math.inf
+    colour = sum(blob.distance for blob in corners) / 4
+    return misfit / MISFIT_MAX + abs(mean) / SIZE_MAX + spread / SPREAD_MAX + colour
+
+
+def arrange(blobs: Sequence[Sequence[Blob]], ratio: float) -> tuple[Blob, Blob, Blob, Blob] | None:
+    """Choose one blob for each corner out of four lists so that they fit a square best; None if none do."""
+    best, least = None, math.inf
+    for first in blobs[0]:
+        for third in blobs[2]:
+            middle, half = (first.centre + third.centre) / 2, (third.centre - first.centre) / 2
+            if not _sized(first, half, ratio) or not _sized(third, half, ratio):
+                continue
+            seconds = _near(blobs[1], middle - 1j * half, abs(half))
+            fourths = _near(blobs[3], middle + 1j * half, abs(half)) if seconds else []
+            for second in seconds:
+                for fourth in fourths:
+                    corners = (first, second, third, fourth)
+                    cost = arrangement_cost(corners, ratio)
+                    if cost < least:
+                        best, least = corners, cost
+    return best
+
+
+def motion(before: Sequence[complex], after: Sequence[complex]) -> tuple[complex, complex, float]:
+    """Return the similarity `factor * before + shift` nearest to `after`, and the rms distance left (px)."""
+    count = len(before)
+    origin, target = sum(before) / count, sum(after) / count
+    size = sum(abs(p - origin) ** 2 for p in before)
+    if not size > 0:
+        return 1 + 0j, target - origin, math.inf
+    factor = sum((p - origin).conjugate() * (q - target) for p, q in zip(before, after, strict=True)) / size
+    shift = target - factor * origin
+    left = sum(abs(factor * p + shift - q) ** 2 for p, q in zip(before, after, strict=True))
+    return factor, shift, math.sqrt(left / count)
+
+
+def _misfit(points: Sequence[complex]) -> float:
+    """Return the rms distance of the points from the best square, over that square's side."""
+    factor, _, left = motion(CORNERS, points)
+    return left / abs(factor) if factor else math.inf
+
+
+def _sized(blob: Blob, half: complex, ratio: float) -> bool:
+    """Return whether the blob's radius goes with half the diagonal, with room for tilt."""
+    expected = ratio * abs(half) * math.sqrt(2)
+    return expected < 2.2 * blob.radius and blob.radius < 2.2 * expected
+
+
+def _near(blobs: Sequence[Blob], place: complex, half: float) -> list[Blob]:
+    return [blob for blob in blobs if abs(blob.centre - place) < OFFSET_MAX * half]
+
+
+def _cross(a: complex, b: complex) -> float:
+    return a.real * b.imag - a.imag * b.real

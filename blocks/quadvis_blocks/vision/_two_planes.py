@@ -1,0 +1,302 @@
+"""The two-planes calibration of a camera, eq. (1)-(6): pixels to lines in space without a lens model.
+
+Two pictures of points on two parallel planes give a map from pixels to each plane; a pixel then belongs to
+the line through its two images. Vectors are ROWS here, as in the published matrices (36): (x, y, z) = (rho,
+gamma, 1) H. Printed (3) means H = (Q'Q)^-1 Q'G with one point a row of Q and G.
+
+The calibration frame is the paper's: x right, y up, z from the planes toward the camera. The camera's axes (x
+along the rows of the image, y down, z forward) follow from the maps themselves, see
+`TwoPlanesCalibration.pinhole`; for a board parallel to the image and aligned with it that is diag(1, -1, -1).
+
+Two things of the paper are not exact. An affine map (1) holds only for planes parallel to the image plane; a
+board turned by some angle turns every ray by as much, so projective maps are offered. And (5) with the unit
+vectors of (4) is not the pinhole, whose image is linear in v divided by its component along the axis: it
+costs 0.3 to 4 px, grows with the field, and V_R, V_C and the piercing point depend on the pixels they were
+fitted on. Rays use neither.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from quadvis.document import read_yaml
+from quadvis.errors import DiagramError, Fault, QuadvisError
+from quadvis_blocks.vision._calibration import CalibrationError
+from quadvis_blocks.vision._homogeneous import homography, rq
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Floats = NDArray[np.float64]
+
+_SHAPES = {"H1": (3, 3), "H2": (3, 3), "F": (3,), "V_R": (3,), "V_C": (3,)}
+_NUMBERS = ("z1", "z2", "rho_p", "gamma_p")
+_PARALLEL = 1e-9  # relative size below which lines meet nowhere, or a map is singular
+
+
+@dataclass(frozen=True, eq=False)
+class TwoPlanesCalibration:
+    """A camera calibrated on the planes z = z1 and z = z2; impossible values raise `CalibrationError`.
+
+    `z1`, `z2` are heights in the calibration frame, whose unit of length is the user's. The maps `H1`, `H2`
+    (3, 3) are affine, (rho, gamma, 1) H = (x, y, z), or `projective`, (x w, y w, w) with w > 0. The focal
+    point `F` (3,) is nearest to all lines. `V_R`, `V_C` (3,) and the piercing point `rho_p` (to the right),
+    `gamma_p` (downwards) belong to (5) and are in pixels; the printed piercing point of (37) is in the other
+    order.
+    """
+
+    z1: float
+    z2: float
+    H1: Floats
+    H2: Floats
+    F: Floats
+    V_R: Floats
+    V_C: Floats
+    rho_p: float
+    gamma_p: float
+    projective: bool = False
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only and check everything."""
+        for name, shape in _SHAPES.items():
+            array = np.array(getattr(self, name), dtype=float)
+            if array.shape != shape or not np.isfinite(array).all():
+                raise CalibrationError(
+                    name, f"{name} has shape {array.shape} or holds NaN", f"it needs {shape}"
+                )
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+        for name in _NUMBERS:
+            if not np.isfinite(getattr(self, name)):
+                raise CalibrationError(name, f"{name} is not finite", "give an ordinary number")
+        _check(self)
+
+    @classmethod
+    def fit(cls, points: ArrayLike, pixels: ArrayLike, *, projective: bool = False) -> TwoPlanesCalibration:
+        """Return the calibration from points (n, 3), which lie at two heights z, and their pixels (n, 2).
+
+        z1 is the smaller height. F is the point nearest to the lines of all the pixels, of both pictures.
+
+        `QuadvisError` if there are not two heights, too few points at one of them, or points on a line.
+        """
+        g, q = np.asarray(points, dtype=float), np.asarray(pixels, dtype=float)
+        first, second = _split(g)
+        make = projective_map if projective else affine_map
+        maps = [(make(q[plane], g[plane]), float(g[plane, 2].mean())) for plane in (first, second)]
+        focus = focal_point(*(apply(h, z, q, projective=projective) for h, z in maps))
+        v_r, v_c, piercing = image_plane(unit(g - focus), q)
+        (h1, z1), (h2, z2) = maps
+        return cls(z1, z2, h1, h2, focus, v_r, v_c, float(piercing[0]), float(piercing[1]), projective)
+
+    @classmethod
+    def load(cls, path: str | Path) -> TwoPlanesCalibration:
+        """Read a calibration file; `DiagramError` with file, line and column if anything in it is wrong.
+
+        The file is YAML with the keys convention (row), z1, z2, H1, H2, projective, F, V_R, V_C, rho_p,
+        gamma_p.
+        """
+        fields = read_yaml(str(path)).fields(
+            required={"convention", "projective", *_NUMBERS, *_SHAPES}, optional=set()
+        )
+        fields["convention"].choice(("row",))
+        values: dict[str, Any] = {name: fields[name].number() for name in _NUMBERS}
+        values |= {name: fields[name].array(shape) for name, shape in _SHAPES.items()}
+        try:
+            return cls(**values, projective=fields["projective"].boolean())
+        except CalibrationError as error:
+            fault = Fault(fields[error.field].place, "two planes", error.problem, error.remedy)
+            raise DiagramError([fault]) from None
+
+    def save(self, path: str | Path, comment: str = "") -> None:
+        """Write the calibration as YAML so that `load` returns the same numbers; `comment` goes on top."""
+        lines = [f"# {line}" for line in comment.splitlines()]
+        lines += ["convention: row", f"projective: {str(self.projective).lower()}"]
+        lines += [f"{name}: {float(getattr(self, name))!r}" for name in ("z1", "z2")]
+        for name in ("H1", "H2"):
+            lines += [f"{name}:", *(f"  - {_flow(row)}" for row in getattr(self, name))]
+        lines += [f"{name}: {_flow(getattr(self, name))}" for name in ("F", "V_R", "V_C")]
+        lines += [f"{name}: {float(getattr(self, name))!r}" for name in ("rho_p", "gamma_p")]
+        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+    def back_project(self, pixels: ArrayLike) -> tuple[Floats, Floats]:
+        """Return the images (n, 3) of pixels (n, 2) on the first and the second plane, eq. (1)."""
+        first, second = ((self.H1, self.z1), (self.H2, self.z2))
+        return (
+            apply(*first, pixels, projective=self.projective),
+            apply(*second, pixels, projective=self.projective),
+        )
+
+    def rays(self, pixels: ArrayLike) -> Floats:
+        """Return unit vectors (n, 3) from F to what pixels (n, 2) see, eq. (4), in camera axes.
+
+        Camera axes are x along the rows of the image, y down, z forward. Rows with NaN stay NaN.
+        """
+        q = _homogeneous(pixels)
+        return unit(q @ np.linalg.inv(self.pinhole[0]).T)
+
+    @cached_property
+    def pinhole(self) -> tuple[Floats, Floats]:
+        """The exact pinhole of these maps: K (3, 3) in pixels, R (3, 3) from calibration to camera axes.
+
+        Seen from F, either plane makes the direction of a pixel linear in (rho, gamma, 1); the mean over both
+        planes, each scaled to unit distance, is inverse to K R, and RQ takes it apart as in (10). Affine maps
+        always give an optical axis along z, for they know of no tilt.
+        """
+        directions = sum(self._directions(h, z) for h, z in ((self.H1, self.z1), (self.H2, self.z2)))
+        k, rotation = rq(np.linalg.inv(directions))
+        return k / k[2, 2], rotation
+
+    def project(self, points: ArrayLike, *, exact: bool = False) -> Floats:
+        """Return the pixels (n, 2) of points (n, 3) of the calibration frame by eq. (4)-(5).
+
+        With exact they come from `pinhole` instead, and are NaN for points that are not in front of the
+        camera.
+        """
+        rays = np.asarray(points, dtype=float) - self.F
+        if exact:
+            k, rotation = self.pinhole
+            e = rays @ (k @ rotation).T
+            return np.asarray(e[:, :2] / np.where(e[:, 2:] > 0, e[:, 2:], np.nan))
+        plane = np.column_stack([self.V_R, self.V_C])
+        return np.asarray(unit(rays) @ plane + [self.rho_p, self.gamma_p])
+
+    def residuals(self, points: ArrayLike, pixels: ArrayLike) -> Floats:
+        """Return points (n, 3) at z1 or z2 minus the images (n, 3) of their pixels (n, 2)."""
+        g = np.asarray(points, dtype=float)
+        first, second = self.back_project(pixels)
+        upper = np.abs(g[:, 2] - self.z2) < np.abs(g[:, 2] - self.z1)
+        return np.asarray(g - np.where(upper[:, None], second, first))
+
+    def _directions(self, h: Floats, z: float) -> Floats:
+        """Return A (3, 3) with g - F ~ A (rho, gamma, 1)' for the image g on one plane."""
+        x, y, w = _columns(h, self.projective).T
+        scale = np.linalg.norm(w) * abs(self.F[2] - z)
+        rows = [x - self.F[0] * w, y - self.F[1] * w, (z - self.F[2]) * w]
+        return np.asarray(np.stack(rows) / scale)
+
+
+def affine_map(pixels: ArrayLike, points: ArrayLike) -> Floats:
+    """Return H (3, 3) with points (n, 3) ~ (rho, gamma, 1) H, least squares over pixels (n, 2), eq. (3).
+
+    All points have the same z. `QuadvisError` if the pixels are fewer than 3 or lie on a line.
+    """
+    q, g = _homogeneous(pixels), np.asarray(points, dtype=float)
+    if len(q) != len(g) or len(q) < 3:
+        raise QuadvisError(f"{len(g)} points and {len(q)} pixels; a plane needs at least 3, one for each")
+    if not np.isfinite(q).all():
+        raise QuadvisError(
+            "a pixel of a calibration plane is not finite; leave out points that were not seen"
+        )
+    centred = q[:, :2] - q[:, :2].mean(axis=0)
+    extents = np.linalg.svd(centred, compute_uv=False)
+    if not extents[1] > _PARALLEL * extents[0]:
+        raise QuadvisError("the pixels of a calibration plane lie on a line; spread them over the picture")
+    h, *_ = np.linalg.lstsq(q, g, rcond=None)
+    h[:, 2] = (0, 0, g[:, 2].mean())
+    return np.asarray(h)
+
+
+def projective_map(pixels: ArrayLike, points: ArrayLike) -> Floats:
+    """Return H (3, 3) with (x w, y w, w) = (rho, gamma, 1) H for points (n, 3) and pixels (n, 2), n >= 4.
+
+    Its largest element is 1 or -1. `QuadvisError` as for `homography`.
+    """
+    h = homography(pixels, np.asarray(points, dtype=float)[:, :2]).T
+    return np.asarray(h / np.abs(h).max())
+
+
+def apply(h: Floats, z: float, pixels: ArrayLike, *, projective: bool = False) -> Floats:
+    """Return the images (n, 3) of pixels (n, 2) on the plane at height z, eq. (1)."""
+    g = _homogeneous(pixels) @ _columns(h, projective)
+    return np.column_stack([g[:, :2] / g[:, 2:], np.full(len(g), float(z))])
+
+
+def focal_point(g1: ArrayLike, g2: ArrayLike) -> Floats:
+    """Return F (3,), the point nearest to the lines through rows of g1 and g2 (n, 3), least squares.
+
+    F = (sum (I - u u'))^-1 sum (I - u u') g1 over the unit directions u of the lines.
+
+    `QuadvisError` if the lines are parallel.
+    """
+    start, u = np.asarray(g1, dtype=float), unit(np.asarray(g2, dtype=float) - np.asarray(g1, dtype=float))
+    across = np.eye(3) - u[:, :, None] * u[:, None, :]
+    normal = across.sum(axis=0)
+    if not np.linalg.eigvalsh(normal)[0] > _PARALLEL * len(u):
+        raise QuadvisError(
+            "the lines between the planes are parallel; the planes must differ in scale or shape"
+        )
+    return np.asarray(np.linalg.solve(normal, np.einsum("nij,nj->i", across, start)))
+
+
+def image_plane(directions: ArrayLike, pixels: ArrayLike) -> tuple[Floats, Floats, Floats]:
+    """Return V_R (3,), V_C (3,) and the piercing point (rho_p, gamma_p), eq. (5)-(6): X = W+ B.
+
+    directions (n, 3) are the unit vectors of (4), n >= 4. Seen under a small field the fourth column of W is
+    all but a combination of the third, which only the bend of the unit sphere tells apart: conditions of 70
+    to 500 are usual.
+    """
+    v = np.asarray(directions, dtype=float)
+    x, *_ = np.linalg.lstsq(
+        np.column_stack([v, np.ones(len(v))]), np.asarray(pixels, dtype=float), rcond=None
+    )
+    return x[:3, 0], x[:3, 1], x[3]
+
+
+def unit(vectors: Floats) -> Floats:
+    """Return rows (n, 3) at length one."""
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
+
+
+def _homogeneous(pixels: ArrayLike) -> Floats:
+    q = np.asarray(pixels, dtype=float).reshape(-1, 2)
+    return np.column_stack([q, np.ones(len(q))])
+
+
+def _columns(h: Floats, projective: bool) -> Floats:
+    """Return the map to (x w, y w, w); w is 1 everywhere for an affine one."""
+    return np.column_stack([h[:, :2], h[:, 2] if projective else (0.0, 0.0, 1.0)])
+
+
+def _split(points: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which points (n, 3) are at the lower and at the upper of two heights."""
+    if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all() or not len(points):
+        raise QuadvisError(f"points have shape {points.shape} or hold NaN; give rows x, y, z")
+    z = points[:, 2]
+    lower = np.abs(z - z.min()) < np.abs(z - z.max())
+    apart = np.ptp(z)
+    if not apart or any(np.ptp(z[plane]) > 1e-6 * apart for plane in (lower, ~lower)):
+        raise QuadvisError(
+            f"points have z from {z.min():g} to {z.max():g}; two planes have exactly two heights z"
+        )
+    return lower, ~lower
+
+
+def _flow(row: Floats) -> str:
+    return "[" + ", ".join(repr(float(number)) for number in row) + "]"
+
+
+def _check(planes: TwoPlanesCalibration) -> None:
+    z1, z2, height = planes.z1, planes.z2, planes.F[2]
+    if z1 == z2:
+        raise CalibrationError("z2", f"both planes are at z = {z1:g}", "they must be apart")
+    if (height - z1) * (height - z2) <= 0:
+        raise CalibrationError(
+            "F", f"F is at z = {height:g}, not beyond both planes", "check z1, z2 and the maps"
+        )
+    for name, z in (("H1", z1), ("H2", z2)):
+        h = getattr(planes, name)
+        if not planes.projective and not np.allclose(h[:, 2], (0, 0, z), rtol=0, atol=1e-9 * max(1, abs(z))):
+            raise CalibrationError(
+                name, f"the last column of {name} is not (0, 0, {z:g})", "affine maps end so"
+            )
+        sizes = np.linalg.svd(planes._directions(h, z), compute_uv=False)
+        if not sizes[2] > _PARALLEL * sizes[0]:
+            raise CalibrationError(name, f"{name} is singular", "its points must not lie on a line")
+        if np.linalg.det(planes._directions(h, z)) < 0:
+            remedy = "x right, y up, z toward the camera is right-handed"
+            raise CalibrationError(name, f"{name} mirrors the picture", remedy)

@@ -1,0 +1,122 @@
+"""Finds the four coloured circles of the target in a picture."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, Frame, In, Out, Param, ParameterError, State
+from quadvis.errors import QuadvisError
+from quadvis_blocks.vision._circles import Target
+from quadvis_blocks.vision._colours import ColourCalibration
+from quadvis_blocks.vision._detect import (
+    STALE,
+    TWO_CIRCLES,
+    UNUSABLE,
+    Detection,
+    follow,
+    nothing,
+    search,
+    usable,
+)
+from quadvis_blocks.vision._projection import RADIUS, SIDE
+
+FOLLOW_MAX = 0.5  # s between two pictures; after more than that the target is searched for, not followed
+
+
+class CircleDetector(Block, numeric=False):
+    """Where the four coloured circles of the target are in a picture.
+
+    Corners 1 to 4 are clockwise from the upper left of the picture at zero yaw: red, blue, green and
+    black in the paper. To find the target all four circles must be seen; once found, three or two of them
+    keep it. A circle that something hides in part is reported missing. Steps without a new picture repeat
+    the last result with `fresh` false, also its stamp and sequence number. A frame that is not a picture
+    is a target that is not found.
+
+    `status`: 0 four circles, 1 three, 2 two, 3 target not found, 4 four circles that are no square, 5 no
+    picture yet, 7 the frame is not a picture.
+
+    Source: sections 5 (centres of gravity, colour calibration, order of the corners) and 6.
+    """
+
+    frame = In("frame", doc="the newest picture")
+    centres = Out("float64[4,2]", unit="px", nan=True, doc="u, v of circles 1 to 4; NaN rows are missing")
+    quality = Out("float64[4]", nan=True, doc="radius of each circle over what the square makes one expect")
+    status = Out("int64", doc="0, 1, 2: four, three, two circles; 3 and above: no target, see above")
+    found = Out("bool", doc="all four circles")
+    lost = Out("bool", doc="a new frame in which there is no target")
+    stamp = Out(unit="s", nan=True, doc="instant at which the picture was taken")
+    sequence = Out("int64", doc="number of the picture; 0 before the first")
+    fresh = Out("bool", doc="a picture that was not there at the step before")
+
+    colours = Param(type="file", doc="colours of the circles (YAML)")
+    side = Param(SIDE, unit="m", above=0.0, doc="distance between the centres of neighbouring circles")
+    radius = Param(RADIUS, unit="m", above=0.0, doc="radius of the circles")
+    radius_min = Param(2.0, unit="px", min=1.0, doc="smallest radius in the picture")
+    radius_max = Param(80.0, unit="px", above=0.0, doc="largest radius in the picture")
+
+    last_centres = State("float64[4,2]", math.nan)
+    last_quality = State("float64[4]", math.nan)
+    last_status = State("int64", STALE)
+    last_stamp = State("float64", math.nan)
+    last_sequence = State("int64", 0)
+    places = State("float64[4,6]")  # of all four circles, to follow them; see Detection
+
+    def check(self) -> None:
+        """Read the colours, and compare the sizes."""
+        self._load()
+        if 2 * self.radius >= self.side:
+            raise ParameterError(
+                "radius", f"radius must be below half of side ({self.side / 2:g} m), or circles overlap"
+            )
+        if self.radius_max <= self.radius_min:
+            raise ParameterError(
+                "radius_max", f"radius_max must be above radius_min ({self.radius_min:g} px)"
+            )
+
+    def _load(self) -> ColourCalibration:
+        try:
+            return ColourCalibration.load(self.colours)
+        except QuadvisError as error:
+            raise ParameterError("colours", f"colours is not usable: {error}") from None
+
+    def open(self) -> None:
+        """Read the colours."""
+        self._target = Target(self._load(), self.radius / self.side, self.radius_min, self.radius_max)
+        self._key: tuple[Any, ...] = ()
+        self._seen = nothing(STALE)
+
+    def output(self, frame: Frame) -> tuple[Any, ...]:
+        """Return the circles of a new picture, or the last result again."""
+        if not self._is_new(frame):
+            centres, quality, status = self.last_centres, self.last_quality, self.last_status
+            return centres, quality, status, status == 0, False, self.last_stamp, self.last_sequence, False
+        centres, quality, status, _ = self._look(frame)
+        return centres, quality, status, status == 0, status > TWO_CIRCLES, frame.stamp, frame.sequence, True
+
+    def update(self, frame: Frame) -> None:
+        """Keep the result of a new picture."""
+        if self._is_new(frame):
+            seen = self._look(frame)
+            self.last_centres, self.last_quality, self.last_status, self.places = seen
+            self.last_stamp, self.last_sequence = frame.stamp, frame.sequence
+
+    def _is_new(self, frame: Frame) -> bool:
+        return frame.sequence not in (0, self.last_sequence)
+
+    def _look(self, frame: Frame) -> Detection:
+        """Return what the picture shows. `output` and `update` need it both, so the last one is kept."""
+        key = (frame, self.last_status, self.last_stamp, self.places.tobytes())
+        if key != self._key:
+            self._key, self._seen = key, self._detect(frame)
+        return self._seen
+
+    def _detect(self, frame: Frame) -> Detection:
+        if not usable(frame.pixels):
+            return nothing(UNUSABLE)
+        pixels = np.ascontiguousarray(frame.pixels)
+        if self.last_status <= TWO_CIRCLES and 0 < frame.stamp - self.last_stamp <= FOLLOW_MAX:
+            return follow(pixels, self._target, self.places)
+        return search(pixels, self._target)

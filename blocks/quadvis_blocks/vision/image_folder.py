@@ -1,0 +1,102 @@
+"""Pictures from a folder, in place of a camera."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.block import Block, Frame, Out, Param, ParameterError, State
+
+SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png")
+
+
+class ImageFolder(Block, numeric=False):
+    """Plays the pictures of a folder, one at each tick, in the order of the numbers in their names.
+
+    Each picture is stamped with the time of its tick. After the last one it stays on the wire with its stamp
+    and sequence number, and `finished` is true; with `loop` the first one follows, and the sequence numbers
+    go on. A picture that cannot be read, or is cut short, becomes a frame without pixels (0, 0, 3), with
+    stamp and number like any other. The orientation that a file may ask for is ignored: a calibration is
+    about pixels as the sensor gave them.
+
+    Source: section 6.1, the comparison of pose estimates on a recorded sequence.
+    """
+
+    frame = Out("frame", doc="the picture of this tick, or the last one")
+    finished = Out("bool", doc="true when there is no picture left")
+
+    folder = Param(type="file", doc="folder with png, jpg or bmp files")
+    pattern = Param("*", type="str", doc="which files, e.g. left*.jpg")
+    loop = Param(False, type="bool", doc="begin again after the last picture")
+
+    played = State("int64", 0)  # pictures that were on the wire
+    stamp = State("float64")  # of the last one
+
+    def check(self) -> None:
+        """Refuse a folder that is missing or has no picture."""
+        if not Path(self.folder).is_dir():
+            raise ParameterError(
+                "folder", f"folder '{self.folder}' does not exist; name a folder with pictures"
+            )
+        if not self._find():
+            kinds = ", ".join(suffix[1:] for suffix in SUFFIXES)
+            problem = f"no picture in '{self.folder}' matches '{self.pattern}'"
+            raise ParameterError("pattern", f"{problem}; it needs at least one file of {kinds}")
+
+    def _find(self) -> list[Path]:
+        found = Path(self.folder).glob(self.pattern)
+        return sorted((p for p in found if p.suffix.lower() in SUFFIXES and p.is_file()), key=natural_order)
+
+    def open(self) -> None:
+        """List the pictures."""
+        self._paths = self._find()
+        self._last = Frame.none()
+
+    def output(self, time: float) -> tuple[Frame, bool]:
+        """Return the picture of this tick and whether the folder is at its end."""
+        finished = not self.loop and self.played >= len(self._paths)
+        sequence, stamp = (self.played, self.stamp) if finished else (self.played + 1, time)
+        if (self._last.sequence, self._last.stamp) != (sequence, stamp):
+            pixels = read_picture(self._paths[(sequence - 1) % len(self._paths)])
+            self._last = Frame(pixels, stamp, sequence)
+        return self._last, finished
+
+    def update(self, time: float) -> None:
+        """Count the picture that was on the wire."""
+        if self.loop or self.played < len(self._paths):
+            self.played += 1
+            self.stamp = time
+
+
+def natural_order(path: Path) -> tuple[list[tuple[int, int | str]], str]:
+    """Return a key that sorts view2 before view10; names that differ only in case or zeros follow it."""
+    parts = re.split(r"([0-9]+)", path.name.casefold())
+    return [(0, int(part)) if part.isdigit() else (1, part) for part in parts if part], path.name
+
+
+def read_picture(path: Path) -> NDArray[np.uint8]:
+    """Return the picture (height, width, 3) BGR, or one without pixels (0, 0, 3) if the file is not whole."""
+    import cv2
+
+    picture: Any = None
+    try:
+        data = path.read_bytes()
+        if data and not _is_cut(data):
+            flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+            picture = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+    except (OSError, cv2.error):
+        pass
+    return Frame.none().pixels if picture is None else np.asarray(picture, dtype=np.uint8)
+
+
+def _is_cut(data: bytes) -> bool:
+    """Return whether a file ends too early; the decoders would fill up the rest with grey."""
+    if data[:2] == b"\xff\xd8":  # JPEG: an end-of-image marker after the last start of scan
+        return data.rfind(b"\xff\xd9") < data.rfind(b"\xff\xda")
+    if data[:4] == b"\x89PNG":
+        return b"IEND" not in data[-64:]
+    return data[:2] == b"BM" and len(data) < int.from_bytes(data[2:6], "little")

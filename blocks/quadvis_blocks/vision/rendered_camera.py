@@ -1,0 +1,186 @@
+"""A simulated camera that looks up at the target."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.block import Block, Frame, In, Out, Param, ParameterError, Random, State
+from quadvis.errors import QuadvisError
+from quadvis_blocks._random import uniform
+from quadvis_blocks.vision._calibration import CameraCalibration
+from quadvis_blocks.vision._projection import RADIUS, SIDE
+from quadvis_blocks.vision._renderer import Renderer, Scene
+
+QUEUE = 16  # frames that can be on their way at once
+
+# A captured frame as numbers: all that its picture depends on.
+SEQUENCE, STAMP, LIGHT, NOISE = range(4)
+START, END = slice(4, 10), slice(10, 16)  # pose at the beginning and the end of the exposure
+
+Row = NDArray[np.float64]
+
+
+class RenderedCamera(Block, numeric=False):
+    """What a camera on the craft sees of four coloured discs on a light ceiling.
+
+    The camera looks straight up from the craft: picture right is the craft's front, picture top its right
+    side. At zero attitude under the middle of the target, discs 1 to 4 stand clockwise from upper left; they
+    leave the picture where the real ones would. Colours are blue-green-red, as in a `Frame`, and linear in
+    light.
+
+    A frame is exposed up to its tick and stamped with the middle of the exposure. It is delivered at the
+    first tick at or after stamp + latency; until the next one comes, the last frame stays on the wire, with
+    its old sequence number. Frames that are dropped leave a gap in the sequence numbers. Blur follows the
+    straight way from the pose at the tick before.
+
+    Source: pinhole camera of equations (9)-(10) and (38) with OpenCV's lens model; target of sections 5 and
+    6.
+    """
+
+    position = In("float64[3]", unit="m", doc="position of the craft: x forward, y right, h up")
+    attitude = In(
+        "float64[3]", unit="rad", doc="phi right side down, theta nose up, psi clockwise from above"
+    )
+    frame = Out("frame", doc="the newest frame that has arrived")
+
+    calibration = Param(type="file", doc="camera calibration file (YAML)")
+    ceiling = Param(4.5, unit="m", doc="height of the target; 3 m above a hover at 1.5 m")
+    side = Param(SIDE, unit="m", above=0.0, doc="distance between the centres of neighbouring discs")
+    radius = Param(RADIUS, unit="m", above=0.0, doc="radius of the discs")
+    colours = Param(
+        ((45.0, 40.0, 190.0), (165.0, 75.0, 30.0), (65.0, 135.0, 40.0), (35.0, 35.0, 35.0)),
+        type="float64[4,3]",
+        min=0.0,
+        max=255.0,
+        doc="blue-green-red grey levels of discs 1 to 4: red, blue, green, black",
+    )
+    background = Param(
+        (200.0, 207.0, 210.0),
+        type="float64[3]",
+        min=0.0,
+        max=255.0,
+        doc="blue-green-red grey levels of the ceiling",
+    )
+    exposure = Param(1.0, min=0.0, tune=True, doc="brightness of the whole picture")
+    white_balance = Param((1.0, 1.0, 1.0), type="float64[3]", min=0.0, doc="gain of blue, green and red")
+    vignette = Param(
+        0.0, min=0.0, max=1.0, doc="share of the light that is lost in the corners of the picture"
+    )
+    noise = Param(
+        2.0, min=0.0, max=60.0, doc="standard deviation of the sensor's noise in grey levels, added last"
+    )
+    exposure_time = Param(0.0, unit="s", min=0.0, doc="length of the exposure, for motion blur")
+    latency = Param(0.0, unit="s", min=0.0, doc="time from the middle of the exposure to the delivery")
+    drop_rate = Param(0.0, min=0.0, max=1.0, tune=True, doc="probability that a frame is lost")
+
+    stream = Random()
+    draws = State("float64[2]")  # of the coming capture: lost or not, and its noise
+    captured = State("int64", 0)
+    previous = State("float64[6]")  # pose one tick ago
+    pending = State("float64[16,16]")  # captured frames on their way, oldest first
+    waiting = State("int64", 0)  # how many of them there are
+    shown = State("float64[16]")  # the frame on the wire; sequence 0 before the first
+
+    def check(self) -> None:
+        """Read the calibration and compare the sizes of the target."""
+        self._load()
+        if 2 * self.radius >= self.side:
+            raise ParameterError(
+                "radius", f"radius must be below half of side ({self.side / 2:g} m), or discs overlap"
+            )
+
+    def _load(self) -> CameraCalibration:
+        try:
+            return CameraCalibration.load(self.calibration)
+        except QuadvisError as error:
+            raise ParameterError("calibration", f"calibration is not usable: {error}") from None
+
+    def open(self) -> None:
+        """Prepare the renderer; ParameterError if the latency or the exposure does not go with the period."""
+        frames = math.ceil(self.latency / self.period - 1e-6)
+        if frames > QUEUE:
+            longest = f"at most {QUEUE} periods, {QUEUE * self.period:g} s"
+            raise ParameterError("latency", f"latency must be {longest}, got {self.latency:g} s")
+        if self.exposure_time > self.period:
+            longest = f"at most the period, {self.period:g} s"
+            raise ParameterError(
+                "exposure_time", f"exposure_time must be {longest}, got {self.exposure_time:g} s"
+            )
+        scene = Scene(
+            side=self.side,
+            radius=self.radius,
+            ceiling=self.ceiling,
+            colours=np.array(self.colours),
+            background=np.array(self.background),
+            white_balance=np.array(self.white_balance),
+            vignette=self.vignette,
+            noise=self.noise,
+        )
+        self._renderer = Renderer(self._load(), scene)
+        self._last: tuple[bytes, Frame] = (b"", Frame.none())
+
+    def start(self) -> None:
+        """Draw the chances of the first capture."""
+        self._draw()
+
+    def output(self, position: Any, attitude: Any, time: float) -> Frame:
+        """Return the newest frame that has arrived."""
+        return self._picture(self._arrived(self._queue(position, attitude, time), time)[0])
+
+    def update(self, position: Any, attitude: Any, time: float) -> None:
+        """Keep what was captured at this tick, and what is on the wire."""
+        queue = self._queue(position, attitude, time)
+        shown, rest = self._arrived(queue, time)
+        self.shown[:] = shown
+        self.pending[: len(rest)] = np.reshape(rest, (-1, 16))
+        self.waiting = len(rest)
+        self.previous[:] = (*position, *attitude)
+        self.captured += 1
+        self._draw()
+
+    def _draw(self) -> None:
+        self.draws[0] = uniform(self.stream)
+        self.draws[1] = uniform(self.stream)
+
+    def _queue(self, position: Any, attitude: Any, time: float) -> list[Row]:
+        """Return the frames on their way, with the one that is captured now unless it gets lost."""
+        queue = [row.copy() for row in self.pending[: self.waiting]]
+        if self.draws[0] >= self.drop_rate:
+            queue.append(self._capture(np.array([*position, *attitude]), time))
+        return queue
+
+    def _capture(self, pose: Row, time: float) -> Row:
+        """Return the frame that is captured now; its exposure ends at the tick."""
+        row = np.zeros(16)
+        row[[SEQUENCE, STAMP, LIGHT, NOISE]] = (
+            self.captured + 1,
+            time - self.exposure_time / 2,
+            self.exposure,
+            self.draws[1],
+        )
+        way = np.zeros(6)
+        if self.captured and self.exposure_time:
+            way = pose - self.previous
+            way[3:] -= 2 * math.pi * np.round(way[3:] / (2 * math.pi))  # the short way round
+        row[START], row[END] = pose - way * (self.exposure_time / self.period), pose
+        return row
+
+    def _arrived(self, queue: list[Row], time: float) -> tuple[Row, list[Row]]:
+        """Return the frame on the wire at this time and those that are still on their way."""
+        now = time + 1e-6 * self.period  # a sum of decimal times must not miss its tick by a rounding error
+        due = [row for row in queue if row[STAMP] + self.latency <= now]
+        return (due[-1] if due else self.shown.copy()), queue[len(due) :]
+
+    def _picture(self, row: Row) -> Frame:
+        """Return the frame of a row; the last one is kept, since it may stay on the wire."""
+        if not row[SEQUENCE]:
+            return Frame.none()
+        key = row.tobytes()
+        if self._last[0] != key:
+            pixels = self._renderer.render(row[START], row[END], row[LIGHT], row[NOISE])
+            self._last = (key, Frame(pixels, float(row[STAMP]), int(row[SEQUENCE])))
+        return self._last[1]

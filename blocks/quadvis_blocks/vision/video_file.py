@@ -1,0 +1,121 @@
+"""Pictures from a video file, in place of a camera."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.block import Block, Frame, Out, Param, ParameterError, State
+
+
+class VideoFile(Block, numeric=False):
+    """Plays a video file, one frame at each tick whatever the file's own rate, in the order of its frames.
+
+    Each frame is stamped with the time of its tick. After the last one it stays on the wire with its stamp
+    and sequence number, and `finished` is true; with `loop` the first one follows, and the sequence numbers
+    go on. A file that is cut short or damaged ends at its last readable frame.
+
+    After a jump in time (a restored snapshot) the file is decoded again up to the frame: the position that
+    video libraries seek to is not the same for every codec, and replay must give the same bits.
+
+    Source: section 6.1, the comparison of pose estimates on a video sequence.
+    """
+
+    frame = Out("frame", doc="the picture of this tick, or the last one")
+    finished = Out("bool", doc="true when there is no frame left")
+
+    file = Param(type="file", doc="video file, in any format that OpenCV reads")
+    loop = Param(False, type="bool", doc="begin again after the last frame")
+
+    played = State("int64", 0)  # frames that were on the wire
+    stamp = State("float64")  # of the last one
+
+    def check(self) -> None:
+        """Refuse a file that is missing."""
+        if not Path(self.file).is_file():
+            raise ParameterError("file", f"file '{self.file}' does not exist; name a video file")
+
+    def open(self) -> None:
+        """Open the file; ParameterError if it is not a video."""
+        self._video = _Video(self.file)
+        self._last = Frame.none()
+        if self._video.frame(0) is None:
+            raise ParameterError(
+                "file", f"file '{self.file}' is not a video that OpenCV can read; convert it, e.g. to mp4"
+            )
+
+    def close(self) -> None:
+        """Close the file."""
+        self._video.close()
+
+    def output(self, time: float) -> tuple[Frame, bool]:
+        """Return the frame of this tick and whether the file is at its end."""
+        pixels = self._video.frame(self.played, self.loop)
+        finished = pixels is None
+        sequence, stamp = (self.played, self.stamp) if finished else (self.played + 1, time)
+        if pixels is None:
+            pixels = self._video.frame(self.played - 1)
+            assert pixels is not None
+        if (self._last.sequence, self._last.stamp) != (sequence, stamp):
+            self._last = Frame(pixels, stamp, sequence)
+        return self._last, finished
+
+    def update(self, time: float) -> None:
+        """Count the frame that was on the wire."""
+        if self._video.frame(self.played, self.loop) is not None:
+            self.played += 1
+            self.stamp = time
+
+
+class _Video:
+    """A video file by frame number: what it returns depends on the file and the number alone."""
+
+    def __init__(self, path: str) -> None:
+        self._path = path
+        self._capture: Any = None
+        self._next = 0  # the frame that the capture would read now
+        self._length: int | None = None  # known once the end was met
+        self._kept: dict[int, NDArray[np.uint8]] = {}  # the last two frames: the end needs one of them again
+
+    def frame(self, number: int, loop: bool = False) -> NDArray[np.uint8] | None:
+        """Return frame `number` from 0 (height, width, 3) BGR, or None behind the end; `loop` goes round."""
+        if self._length is None and number not in self._kept:
+            self._read(number)
+        if self._length is not None:
+            if self._length == 0 or (number >= self._length and not loop):
+                return None
+            number %= self._length
+        if number not in self._kept:
+            self._read(number)
+        return self._kept.get(number)
+
+    def _read(self, number: int) -> None:
+        """Decode up to a frame and keep it; note the length if the end comes first."""
+        if self._capture is None or number < self._next:
+            self._open()
+        while self._next < number and self._capture.grab():
+            self._next += 1
+        found, picture = self._capture.read() if self._next == number else (False, None)
+        if not found:
+            self._length = self._next
+            return
+        self._kept = {key: kept for key, kept in self._kept.items() if key == number - 1}
+        self._kept[number] = np.asarray(picture, dtype=np.uint8)
+        self._next = number + 1
+
+    def _open(self) -> None:
+        import cv2
+
+        self.close()
+        self._capture = cv2.VideoCapture(self._path)
+        self._capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
+        self._next = 0
+
+    def close(self) -> None:
+        """Let go of the file."""
+        if self._capture is not None:
+            self._capture.release()
+        self._capture = None

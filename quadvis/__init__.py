@@ -1,0 +1,23 @@
+"""quadvis: block diagrams in YAML that fly a four-rotor craft from a camera."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from quadvis.diagram import Diagram, load
+    from quadvis.log import Log, read_log
+
+__version__ = "0.1.0"
+__all__ = ["Diagram", "Log", "load", "read_log"]
+
+_HOMES = {"Diagram": "diagram", "load": "diagram", "Log": "log", "read_log": "log"}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used, so that `quadvis --help` imports nothing of the engine."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'quadvis' has no attribute '{name}'")
+    from importlib import import_module
+
+    return getattr(import_module(f"quadvis.{_HOMES[name]}"), name)

@@ -1,0 +1,146 @@
+"""From the name of a block to its class: no list to edit, nothing imported that a diagram does not use.
+
+``signal.derivative`` is class ``Derivative`` in module ``quadvis_blocks.signal.derivative``. ``acme:slope`` is block
+``slope`` of the library that another distribution registered as ``acme`` in the entry point group
+``quadvis.libraries``. A folder ``blocks`` beside a diagram adds the user's own: ``blocks/wind/fan.py`` is ``wind.fan``.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import pkgutil
+import re
+import sys
+from collections.abc import Iterator
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
+
+from quadvis.block import Block
+from quadvis.errors import QuadvisError, sentence, suggestion
+
+STANDARD = "quadvis_blocks"
+GROUP = "quadvis.libraries"
+NAME = re.compile(r"(?:(?P<library>[a-z]\w*):)?(?P<path>[a-z]\w*(?:\.[a-z]\w*)*)")
+
+
+class CatalogueError(QuadvisError):
+    """A block that cannot be had: ``problem`` and ``remedy`` are the two halves of the sentence."""
+
+    def __init__(self, problem: str, remedy: str = "") -> None:
+        super().__init__(sentence(problem, remedy))
+        self.problem, self.remedy = problem, remedy
+
+
+class Catalogue:
+    """Finds blocks by name; ``folder`` is where the diagram lies."""
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self.own = None if folder is None else folder / "blocks"
+
+    def find(self, name: str) -> type[Block]:
+        """Return the class of a block; CatalogueError says what is wrong with the name or with its module."""
+        match = NAME.fullmatch(name)
+        if match is None:
+            raise CatalogueError(f"'{name}' is not a block name", "write group.block, such as signal.derivative")
+        if match["library"]:
+            return self._in_library(match["library"], match["path"], name)
+        own = self._own_file(match["path"])
+        standard = _exists(f"{STANDARD}.{match['path']}")
+        if own and standard:
+            raise CatalogueError(f"'{name}' is in the standard library and in {own}", "rename the file")
+        if own:
+            return _block_class(_load_file(own, name), name)
+        if not standard:
+            raise CatalogueError(f"there is no block '{name}'", suggestion(name, self.names()) or "quadvis list shows all")
+        return _block_class(_import(f"{STANDARD}.{match['path']}", name), name)
+
+    def names(self) -> list[str]:
+        """Return the names of all blocks: the standard library's, the user's own, then the other libraries'."""
+        found = sorted(_walk(STANDARD))
+        if self.own is not None and self.own.is_dir():
+            files = sorted(self.own.rglob("*.py"))
+            paths = [file.relative_to(self.own).with_suffix("").parts for file in files]
+            found += [".".join(parts) for parts in paths if not any(part.startswith(("_", ".")) for part in parts)]
+        for entry in entry_points(group=GROUP):
+            if entry.value != STANDARD:
+                found += [f"{entry.name}:{path}" for path in sorted(_walk(entry.value))]
+        return found
+
+    def _own_file(self, path: str) -> Path | None:
+        file = self.own.joinpath(*path.split(".")).with_suffix(".py") if self.own else None
+        return file if file and file.is_file() else None
+
+    def _in_library(self, library: str, path: str, name: str) -> type[Block]:
+        packages = {entry.name: entry.value for entry in entry_points(group=GROUP)}
+        if library not in packages:
+            raise CatalogueError(f"there is no library '{library}'", suggestion(library, packages))
+        module = f"{packages[library]}.{path}"
+        if not _exists(module):
+            names = [f"{library}:{known}" for known in _walk(packages[library])]
+            raise CatalogueError(f"there is no block '{name}'", suggestion(name, names))
+        return _block_class(_import(module, name), name)
+
+
+def _exists(module: str) -> bool:
+    """Whether a module is there, found without importing it; one that fails to import does exist."""
+    package, _, _ = module.rpartition(".")
+    try:
+        return importlib.util.find_spec(module) is not None and not _is_package(module)
+    except ModuleNotFoundError as error:
+        if error.name and (package == error.name or package.startswith(error.name + ".")):
+            return False
+        raise
+
+
+def _is_package(module: str) -> bool:
+    spec = importlib.util.find_spec(module)
+    return spec is not None and spec.submodule_search_locations is not None
+
+
+def _walk(package: str, prefix: str = "") -> Iterator[str]:
+    """Yield the paths of a library's blocks; modules that begin with an underscore hold shared mathematics."""
+    spec = importlib.util.find_spec(package)
+    if spec is None or spec.submodule_search_locations is None:
+        raise CatalogueError(f"the library package '{package}' cannot be found", "install it again")
+    for module in pkgutil.iter_modules(spec.submodule_search_locations):
+        if module.name.startswith("_"):
+            continue
+        if module.ispkg:
+            yield from _walk(f"{package}.{module.name}", f"{prefix}{module.name}.")
+        else:
+            yield f"{prefix}{module.name}"
+
+
+def _import(module: str, name: str) -> ModuleType:
+    try:
+        return importlib.import_module(module)
+    except Exception as error:
+        raise CatalogueError(f"block '{name}' cannot be loaded: {type(error).__name__}: {error}") from error
+
+
+def _load_file(file: Path, name: str) -> ModuleType:
+    module_name = "quadvis_own_blocks." + name
+    spec = importlib.util.spec_from_file_location(module_name, file)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[module_name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise CatalogueError(f"block '{name}' cannot be loaded from {file}: {type(error).__name__}: {error}") from error
+    return module
+
+
+def _block_class(module: ModuleType, name: str) -> type[Block]:
+    own = [
+        value
+        for value in vars(module).values()
+        if isinstance(value, type) and issubclass(value, Block) and value.__module__ == module.__name__
+    ]
+    public = [block for block in own if not block.__name__.startswith("_")]
+    if len(public) != 1:
+        found = ", ".join(block.__name__ for block in public) or "none"
+        raise CatalogueError(f"the module of block '{name}' must define one block, it defines {found}")
+    return public[0]

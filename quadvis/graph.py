@@ -1,0 +1,174 @@
+"""A checked diagram: blocks with every name, shape and rate resolved, ready for the engine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, Shape, Sizes
+from quadvis.units import Unit
+
+CROSSINGS = {
+    "sample": "a faster producer is read at the consumer's ticks",
+    "hold": "a slower producer's value is held between its ticks",
+    "delay": "the producer's value of one period ago: the same in every order of execution, and it breaks loops",
+    "newest": "whatever the producer gave last, for rates that do not fit into each other",
+}
+SOLVERS = ("ode1", "ode2", "ode3", "ode4")
+
+Index = tuple[Any, ...]  # integers, then slices, as numpy takes them
+
+
+@dataclass(frozen=True)
+class Task:
+    """Blocks that share a rate. The continuous task runs at every solver step. Times are exact, in seconds."""
+
+    name: str
+    period: Fraction
+    offset: Fraction = Fraction(0)
+    continuous: bool = False
+
+
+@dataclass(frozen=True)
+class Wire:
+    """Where an input comes from: a port of a block, perhaps a part of it, and how it crosses between rates."""
+
+    block: str
+    port: str
+    index: Index = ()
+    crossing: str | None = None
+
+    @property
+    def source(self) -> str:
+        """The wire's source as a diagram writes it, without the index."""
+        return f"{self.block}.{self.port}"
+
+
+@dataclass(frozen=True)
+class Constant:
+    """An input that a diagram sets to a value instead of wiring it."""
+
+    value: Any
+
+
+@dataclass
+class Node:
+    """One block of a checked diagram. ``sizes`` fixes its symbolic shapes."""
+
+    path: str
+    kind: str
+    block: Block
+    task: Task
+    inputs: dict[str, Wire | Constant]
+    sizes: Sizes = field(default_factory=dict)
+    units: dict[str, tuple[Unit, ...]] = field(default_factory=dict)  # of the outputs' elements, variables resolved
+
+    def shape(self, port: str) -> Shape:
+        """Return the shape of an input, output or state."""
+        interface = self.block.interface
+        declared = interface.inputs.get(port) or interface.outputs.get(port) or interface.states[port]
+        return declared.signal.resolve(self.sizes)
+
+    def unit(self, port: str) -> str:
+        """Return an output's unit as text: one for all elements, or one each."""
+        names = [str(unit) for unit in self.units[port]]
+        return names[0] if len(set(names)) == 1 else " ".join(names)
+
+    def wires(self, ports: Iterable[str] | None = None) -> Iterator[tuple[str, Wire]]:
+        """Yield the wired inputs, all of them or those named."""
+        for port, source in self.inputs.items():
+            if isinstance(source, Wire) and (ports is None or port in ports):
+                yield port, source
+
+
+@dataclass
+class Graph:
+    """All blocks in an order in which every output is computed after what it needs, and the exact time base."""
+
+    name: str
+    nodes: list[Node]
+    solver: str = "ode4"
+    step: Fraction | None = None
+
+    def __getitem__(self, path: str) -> Node:
+        return next(node for node in self.nodes if node.path == path)
+
+    @property
+    def tasks(self) -> list[Task]:
+        """The tasks in use, fastest first (rate-monotonic), the continuous one before all."""
+        used = dict.fromkeys(node.task for node in self.nodes)
+        return sorted(used, key=lambda task: (not task.continuous, task.period, task.offset, task.name))
+
+    @property
+    def tick(self) -> Fraction:
+        """The base tick (s): the solver's step, or the largest that divides every period and offset."""
+        if self.step is not None:
+            return self.step
+        times = [time for task in self.tasks for time in (task.period, task.offset) if time]
+        return common_divisor(times) if times else Fraction(1)
+
+
+def common_divisor(times: Sequence[Fraction]) -> Fraction:
+    """Return the largest time that divides each of ``times``."""
+    denominator = math.lcm(*(time.denominator for time in times))
+    return Fraction(math.gcd(*(int(time * denominator) for time in times)), denominator)
+
+
+def selected(shape: Shape, index: Index) -> tuple[int, Shape] | None:
+    """Return the first element and the shape of ``signal[index]``; None if it does not lie in one piece.
+
+    IndexError if the index goes beyond the shape.
+    """
+    part = np.arange(math.prod(shape)).reshape(shape)[index]
+    if part.size == 0 or int(part.flat[-1]) - int(part.flat[0]) + 1 != part.size:
+        return None
+    return int(part.flat[0]), part.shape
+
+
+def execution_order(nodes: Sequence[Node]) -> tuple[list[Node], list[list[tuple[str, str]]]]:
+    """Return the nodes in an order that respects direct feedthrough, and the algebraic loops that forbid one.
+
+    A loop is a list of (block, input) pairs, each input driven by the next block in the list. Blocks keep the
+    diagram's order wherever the wires allow it.
+    """
+    by_path = {node.path: node for node in nodes}
+    done: set[str] = set()
+    order: list[Node] = []
+    loops: list[list[tuple[str, str]]] = []
+    trail: list[tuple[str, str, Iterator[tuple[str, str]]]] = []  # block, input it was reached through, its needs
+    active: dict[str, int] = {}
+
+    def enter(path: str, port: str) -> None:
+        active[path] = len(trail)
+        trail.append((path, port, _needs(by_path[path])))
+
+    for root in nodes:
+        if root.path not in done:
+            enter(root.path, "")
+        while trail:
+            path, _, needs = trail[-1]
+            port, source = next(needs, ("", ""))
+            if not port:
+                trail.pop()
+                del active[path]
+                done.add(path)
+                order.append(by_path[path])
+            elif source in active:
+                loop = trail[active[source] :]
+                inputs = [entered for _, entered, _ in loop[1:]] + [port]
+                loops.append([(entry[0], name) for entry, name in zip(loop, inputs, strict=True)])
+            elif source in by_path and source not in done:
+                enter(source, port)
+    return order, loops
+
+
+def _needs(node: Node) -> Iterator[tuple[str, str]]:
+    """Yield what must be computed before this block: its feedthrough inputs and where they come from."""
+    for port, wire in node.wires(node.block.interface.feedthrough):
+        if wire.crossing != "delay":
+            yield port, wire.block

@@ -1,0 +1,216 @@
+"""The memory that the engine owns: one flat run of 8-byte slots, and blocks bound to their place in it.
+
+Every scalar takes one slot (float64, int64, or a bool in its first byte), so one layout serves the Python tier
+(blocks bound as C structures), numpy (views), the log (rows are slices) and compiled code (``self`` as a record).
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.block import Block, Shape, Sizes
+
+SLOT = 8
+C_TYPES = {"float64": ctypes.c_double, "int64": ctypes.c_int64, "bool": ctypes.c_bool}
+VIEWS = {"float64": "d", "int64": "q", "bool": "?"}
+
+
+@dataclass(frozen=True)
+class Slot:
+    """Where a signal or a field lives: kind, shape and first slot; for ``frame`` the place in the list of frames."""
+
+    scalar: str
+    shape: Shape
+    position: int
+
+    @property
+    def size(self) -> int:
+        """How many elements it has."""
+        return math.prod(self.shape)
+
+    @property
+    def strides(self) -> Shape:
+        """Bytes between neighbours along each axis."""
+        return tuple(SLOT * math.prod(self.shape[axis + 1 :]) for axis in range(len(self.shape)))
+
+
+@dataclass(frozen=True)
+class Field:
+    """One field of a block's record: its offset in slots counts from the start of the record."""
+
+    name: str
+    scalar: str
+    shape: Shape
+    offset: int
+
+
+@dataclass(frozen=True)
+class Record:
+    """The layout of a block's ``self``: the period first, then parameters, then states."""
+
+    fields: tuple[Field, ...]
+    size: int
+
+    @staticmethod
+    def of(block: Block, sizes: Sizes) -> Record:
+        """Lay out a block whose symbolic sizes are known; parameters that are texts stay outside."""
+        fields, offset = [Field("period", "float64", (), 0)], 1
+        for declared in (*block.interface.params.values(), *block.interface.states.values()):
+            if declared.signal.scalar == "str":
+                continue
+            shape = declared.signal.resolve(sizes)
+            fields.append(Field(declared.name, declared.signal.scalar, shape, offset))
+            offset += math.prod(shape)
+        return Record(tuple(fields), offset)
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """The same layout as a numpy record, which is what compiled methods take as ``self``."""
+        return np.dtype({
+            "names": [field.name for field in self.fields],
+            "formats": [(np.dtype(field.scalar), field.shape) for field in self.fields],
+            "offsets": [field.offset * SLOT for field in self.fields],
+            "itemsize": self.size * SLOT,
+        })  # fmt: skip
+
+    def __getitem__(self, name: str) -> Field:
+        """Return the field of that name."""
+        return next(field for field in self.fields if field.name == name)
+
+
+class Memory:
+    """A run's signals, states and parameters: ``size`` slots that start at zero, and a list of frames."""
+
+    def __init__(self, size: int, frames: Sequence[Any] = ()) -> None:
+        self.bytes = bytearray(size * SLOT)
+        self.raw = memoryview(self.bytes)
+        self.floats: NDArray[np.float64] = np.frombuffer(self.bytes, np.float64)
+        self.frames = list(frames)
+        self._scalars = {scalar: self.raw.cast(code) for scalar, code in VIEWS.items()}  # type: ignore[call-overload]
+
+    def view(self, slot: Slot) -> NDArray[Any]:
+        """Return an array over a slot's bytes; writing to it writes to memory."""
+        return np.ndarray(slot.shape, slot.scalar, self.bytes, slot.position * SLOT, slot.strides)
+
+    def read(self, slot: Slot) -> Any:
+        """Return what a slot holds now: a Python scalar, a copy of an array, or a frame."""
+        if slot.scalar == "frame":
+            return self.frames[slot.position]
+        value = self.view(slot)
+        return value.copy() if slot.shape else value.item()
+
+    def write(self, slot: Slot, value: Any) -> None:
+        """Store a value that fits the slot's shape."""
+        if slot.scalar == "frame":
+            self.frames[slot.position] = value
+        else:
+            self.view(slot)[...] = value
+
+    def call(
+        self, method: Callable[..., Any], arguments: Sequence[Slot], targets: Sequence[Slot]
+    ) -> Callable[[], None]:
+        """Return a call of ``method`` from slots to slots, specialised to what they hold.
+
+        A general loop over arguments would cost more than most blocks do.
+        """
+        make = _caller(tuple(map(_kind, arguments)), tuple(map(_kind, targets)))
+        places = [self._place(slot) for slot in (*arguments, *targets)]
+        made: Callable[[], None] = make(method, places, self.frames, *self._scalars.values())
+        return made
+
+    def _place(self, slot: Slot) -> Any:
+        """Return what indexes the slot in its view: arrays have one of their own, bools count bytes."""
+        if slot.shape:
+            return self.view(slot)
+        return slot.position * SLOT if slot.scalar == "bool" else slot.position
+
+    def copy(self, source: Slot, target: Slot) -> Callable[[], None]:
+        """Return a call that copies one slot to another of the same kind."""
+        if source.scalar == "frame":
+            return self.call(lambda frame: frame, [source], [target])
+        size = source.size * SLOT
+        start, end = source.position * SLOT, target.position * SLOT
+
+        def copy(raw: memoryview = self.raw) -> None:
+            raw[end : end + size] = raw[start : start + size]
+
+        return copy
+
+    def bind(self, block: Block, record: Record, position: int, period: float) -> Block:
+        """Return the block as its methods see it: its fields are the bytes from ``position`` on."""
+        kind = _bound_class(type(block), record)
+        bound: Block = kind.from_buffer(self.bytes, position * SLOT)  # type: ignore[attr-defined]
+        for item in record.fields:
+            if item.shape:
+                bound.__dict__[f"_{item.name}"] = self.view(Slot(item.scalar, item.shape, position + item.offset))
+        bound.period = period
+        for name, param in block.interface.params.items():
+            value = getattr(block, name)
+            if param.is_text:
+                bound.__dict__[name] = value
+            else:
+                setattr(bound, name, value)
+        for state in block.interface.states.values():
+            setattr(bound, state.name, state.init)
+        return bound
+
+
+def _kind(slot: Slot) -> str:
+    return slot.scalar if slot.scalar == "frame" or not slot.shape else "array"
+
+
+@functools.cache
+def _caller(arguments: tuple[str, ...], targets: tuple[str, ...]) -> Callable[..., Callable[[], None]]:
+    """Make the maker of calls for one signature; its text is made of the kinds alone, never of a user's input."""
+    patterns = {"frame": "frames[p{}]", "array": "p{}", **{scalar: f"{scalar}[p{{}}]" for scalar in VIEWS}}
+    sources = [patterns[kind].format(index) for index, kind in enumerate(arguments)]
+    sinks = [
+        (patterns[kind] + ("[...]" if kind == "array" else "")).format(index + len(arguments))
+        for index, kind in enumerate(targets)
+    ]
+    places = "".join(f"p{index}, " for index in range(len(arguments) + len(targets)))
+    text = (
+        f"def make(method, places, frames, {', '.join(VIEWS)}):\n"
+        f"    {f'({places}) = places' if places else 'pass'}\n"
+        f"    def call():\n"
+        f"        {', '.join(sinks)}{' = ' if sinks else ''}method({', '.join(sources)})\n"
+        f"    return call\n"
+    )
+    namespace: dict[str, Any] = {}
+    exec(text, namespace)
+    made: Callable[..., Callable[[], None]] = namespace["make"]
+    return made
+
+
+@functools.cache
+def _bound_class(block: type[Block], record: Record) -> type[Block]:
+    """Make the block's class again as a C structure over its record; array fields become views."""
+    fields: list[tuple[str, Any]] = []
+    attributes: dict[str, Any] = {"__init__": object.__init__}
+    for item in record.fields:
+        if item.shape:
+            fields.append((f"_{item.name}_slots", ctypes.c_double * math.prod(item.shape)))
+            attributes[item.name] = _array_property(f"_{item.name}")
+        else:
+            fields.append((item.name, C_TYPES[item.scalar]))
+            if item.scalar == "bool":
+                fields.append((f"_{item.name}_rest", ctypes.c_uint8 * (SLOT - 1)))
+    attributes["_fields_"] = fields
+    metaclass = type(ctypes.Structure)
+    made: type[Block] = metaclass(block.__name__, (block, ctypes.Structure), attributes, bound=True)
+    return made
+
+
+def _array_property(key: str) -> property:
+    def write(block: Any, value: Any) -> None:
+        block.__dict__[key][...] = value
+
+    return property(lambda block: block.__dict__[key], write)

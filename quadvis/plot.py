@@ -1,0 +1,375 @@
+"""Pictures of a run, as its diagram asks for them under `figures:`; without that, one picture per block.
+
+    figures:
+      - title: Position estimate           # in lower case also the name of the file
+        from: 40 s                         # stretch of the run; all of it if absent
+        to: 140 s
+        panels:                            # side by side, three in a row
+          - title: x
+            signals:
+              - plant.position[0]          # a signal, an element [2,1], or elements [0:2]
+              - {signal: "vision/pose.position[0]", label: camera}
+            unit: cm                       # of the axis; the first signal's own if absent
+            reference: 0                   # dashed line from which the RMS in the legend counts
+      - title: Yaw angle                   # a figure of one panel may have the panel's keys
+        signals: plant.attitude[2]
+        unit: deg
+
+A reference is in the unit of the axis, or brings its own ("4 cm"). In YAML's flow style a signal with an
+index needs quotes. Only a title and signals are required.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis import nodes
+from quadvis.errors import DiagramError, Faults, QuadvisError, quoted, suggestion
+from quadvis.units import Unit, UnitError, parse_units
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from quadvis.log import Log
+
+# Okabe and Ito's colours, which colour-blind readers tell apart.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#222222", "#B8A800")
+STYLE: Mapping[Any, Any] = {
+    "axes.edgecolor": "#666666",
+    "axes.grid": True,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlesize": 11,
+    "axes.xmargin": 0.0,
+    "axes.ymargin": 0.08,
+    "figure.titlesize": 13,
+    "figure.titleweight": "bold",
+    "font.size": 10,
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.6,
+    "legend.borderaxespad": 0.0,
+    "legend.borderpad": 0.2,
+    "legend.fontsize": 9,
+    "legend.frameon": False,
+    "legend.handlelength": 1.4,
+    "legend.title_fontsize": 11,
+    "lines.linewidth": 1.0,
+    "text.parse_math": False,
+    "xtick.color": "#444444",
+    "ytick.color": "#444444",
+}
+WIDTHS = (8.0, 10.0, 13.0)  # inches, by the number of columns
+HEIGHT = 3.6  # inches of a row
+LEGEND_ROWS = 4
+MOST_CURVES = 12  # that a legend can name
+FEW_SAMPLES = 40  # that deserve a mark each
+
+_SELECTOR = r"(?:\d{1,9}|\d{0,9}:\d{0,9})"
+_SIGNAL = re.compile(rf"([^\[\]\s.]+\.[^\[\]\s.]+)(?:\[({_SELECTOR}(?:,{_SELECTOR})*)\])?")
+
+
+class Recorded(Protocol):
+    """Recorded signals by name, of a run or of a log: arrays with a leading time axis."""
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """The unit of every signal that there is."""
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """Return the rows of a signal."""
+
+    def times(self, name: str) -> NDArray[np.float64]:
+        """Return the times (s) of its rows."""
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One entry of `signals`, "plant.position" or "detector.centres[2,1]", and what the legend calls it."""
+
+    signal: str
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes; without a unit it shows that of its first signal. The reference is in that unit."""
+
+    traces: tuple[Trace, ...]
+    title: str = ""
+    unit: str = ""
+    reference: float | None = None
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One picture, of the run between `start` and `stop` (s)."""
+
+    title: str
+    panels: tuple[Panel, ...]
+    start: float = -math.inf
+    stop: float = math.inf
+
+
+@dataclass(frozen=True)
+class _Curve:
+    label: str
+    unit: Unit
+    times: NDArray[np.float64]
+    values: NDArray[np.float64]
+    steps: bool
+
+
+def plot_log(log: Log, output: Path | None = None) -> list[Path]:
+    """Draw what the log's diagram asks for; return the PNG files, in `output` or in a folder beside the log.
+
+    DiagramError if `figures:` is wrong, QuadvisError if it names signals that were not logged.
+    """
+    from quadvis.document import parse_yaml
+
+    faults = Faults()
+    root = parse_yaml(log.diagram, f"{log.path}: diagram") if log.diagram.strip() else None
+    declared = root.get("figures") if isinstance(root, nodes.Mapping) else None
+    figures = read_figures(declared, faults) if declared else []
+    faults.check()
+    folder = output or log.path.with_name(f"{log.path.stem}-figures")
+    return plot_figures(log, figures or block_figures(log), folder)
+
+
+def plot_figures(recorded: Recorded, figures: Iterable[Figure], folder: Path) -> list[Path]:
+    """Draw every figure as `<number>-<title>.png` in `folder` and return the files.
+
+    QuadvisError names, before anything is drawn, all signals that are not there or do not fit their panel.
+    """
+    found: list[tuple[Figure, list[list[_Curve]]]] = []
+    problems: list[str] = []
+    for figure in figures:
+        found.append((figure, []))
+        if not figure.panels:
+            problems.append(f"figure {quoted(figure.title)} has no panels; give it signals")
+        for panel in figure.panels:
+            try:
+                found[-1][1].append(_curves(recorded, figure, panel))
+            except QuadvisError as error:
+                problems.append(f"figure {quoted(figure.title)}: {error}")
+    if problems:
+        raise QuadvisError("\n".join(problems))
+    digits = len(str(len(found)))
+    paths = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for number, (figure, curves) in enumerate(found, 1):
+            paths.append(folder / f"{number:0{digits}}-{_file_name(figure.title)}.png")
+            _draw(figure, curves, paths[-1])
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise QuadvisError(f"cannot write figures to '{folder}': {reason}") from error
+    return paths
+
+
+def block_figures(recorded: Recorded) -> list[Figure]:
+    """Return a figure for every block, with a panel for every port, or for every unit in it."""
+    blocks: dict[str, list[Panel]] = {}
+    for name, text in recorded.units.items():
+        block, _, port = name.rpartition(".")
+        panels = blocks.setdefault(block, [])
+        units = parse_units(text)
+        if len(units) == 1:
+            panels.append(Panel((Trace(name, port),), port))
+            continue
+        places = [f"[{','.join(map(str, place))}]" for place in np.ndindex(recorded[name].shape[1:])]
+        for shown in dict.fromkeys(units):
+            chosen = (place for place, unit in zip(places, units, strict=True) if unit == shown)
+            panels.append(Panel(tuple(Trace(name + place, port + place) for place in chosen), port))
+    return [Figure(block, tuple(panels)) for block, panels in blocks.items()]
+
+
+def read_figures(node: nodes.Node, faults: Faults) -> list[Figure]:
+    """Return what stands under `figures:`; what is wrong there is added to the faults."""
+    figures = (faults.collect(_read_figure, entry, faults) for entry in faults.collect(node.items) or [])
+    return [figure for figure in figures if figure]
+
+
+def _read_figure(node: nodes.Node, faults: Faults) -> Figure:
+    single = "panels" not in node.mapping()
+    keys = ("signals", "unit", "reference") if single else ("panels",)
+    entry = node.fields(("title", keys[0]), ("from", "to", *keys[1:]), faults)
+    title = entry.get("title")
+    name = faults.collect(title.text) if title else None
+    panels = [entry] if single else faults.collect(_some, entry["panels"]) or []
+    read = (faults.collect(_read_panel, panel, faults, single) for panel in panels)
+    start = _read_seconds(entry.get("from"), -math.inf, faults)
+    stop = _read_seconds(entry.get("to"), math.inf, faults)
+    if start >= stop:
+        faults.add(entry["to"].place, "'to' must come after 'from'")
+    return Figure(name or "figure", tuple(panel for panel in read if panel), start, stop)
+
+
+def _read_seconds(node: nodes.Node | None, absent: float, faults: Faults) -> float:
+    value = faults.collect(node.quantity, Unit.parse("s"), bare=False) if node else None
+    return absent if value is None else value
+
+
+def _some(node: nodes.Node) -> list[nodes.Node]:
+    """Return the entries of a list that must not be empty."""
+    if not node.items():
+        raise node.fault("the list is empty", "write its entries, or leave the key out")
+    return node.items()
+
+
+def _read_panel(node: nodes.Node, faults: Faults, single: bool) -> Panel:
+    """Read a panel; in a figure of one panel the keys and the title are the figure's."""
+    entry = node.mapping() if single else node.fields(("signals",), ("title", "unit", "reference"), faults)
+    title, signals, unit, reference = map(entry.get, ("title", "signals", "unit", "reference"))
+    entries = _some(signals) if isinstance(signals, nodes.Sequence) else [signals] if signals else []
+    traces = [faults.collect(_read_trace, trace) for trace in entries]
+    shown = faults.collect(_read_unit, unit) if unit else None
+    level = faults.collect(reference.quantity, shown or Unit()) if reference else None
+    name = faults.collect(title.text) if title and not single else None
+    return Panel(tuple(trace for trace in traces if trace), name or "", str(shown) if shown else "", level)
+
+
+def _read_unit(node: nodes.Node) -> Unit:
+    try:
+        return Unit.parse(node.text())
+    except UnitError as error:
+        raise node.fault(error.problem, error.remedy) from None
+
+
+def _read_trace(node: nodes.Node) -> Trace:
+    label = None
+    if isinstance(node, nodes.Mapping):
+        entry = node.fields(("signal",), ("label",))
+        node, label = entry["signal"], entry.get("label")
+    try:
+        split_signal(node.text())
+    except DiagramError:
+        raise
+    except QuadvisError as error:
+        raise node.fault(str(error)) from None
+    return Trace(node.text(), label.text() if label else "")
+
+
+def split_signal(text: str) -> tuple[str, tuple[int | slice, ...]]:
+    """Split "plant.position[0:2]" into the signal's name and an index as numpy takes it."""
+    match = _SIGNAL.fullmatch(text)
+    if match is None:
+        remedy = "write 'block.port', 'block.port[0]' or 'block.port[0:2]'"
+        raise QuadvisError(f"{quoted(text)} is not a signal; {remedy}")
+    return match[1], tuple(_selector(part) for part in match[2].split(",")) if match[2] else ()
+
+
+def _selector(text: str) -> int | slice:
+    if ":" not in text:
+        return int(text)
+    first, last = (int(end) if end else None for end in text.split(":"))
+    return slice(first, last)
+
+
+def _curves(recorded: Recorded, figure: Figure, panel: Panel) -> list[_Curve]:
+    """Return a panel's curves over the figure's stretch of the run, in the unit that the panel shows."""
+    found = [curve for trace in panel.traces for curve in _elements(recorded, trace)]
+    if not found:
+        raise QuadvisError(f"panel {quoted(panel.title)} has no signals; name one")
+    shown = Unit.parse(panel.unit) if panel.unit else found[0].unit
+    curves = []
+    for curve in found:
+        if not curve.unit.dimension_equals(shown):
+            raise QuadvisError(f"{quoted(curve.label)} is in {curve.unit}, which cannot be shown in {shown}")
+        part = (curve.times >= figure.start) & (curve.times <= figure.stop)
+        values = curve.values[part] * (curve.unit.scale / shown.scale)
+        curves.append(_Curve(curve.label, shown, curve.times[part], values, curve.steps))
+    return curves
+
+
+def _elements(recorded: Recorded, trace: Trace) -> Iterator[_Curve]:
+    """Return one curve for every element that a trace selects."""
+    name, index = split_signal(trace.signal)
+    if name not in recorded.units:
+        remedy = suggestion(name, recorded.units) or "the log may leave its block out"
+        raise QuadvisError(f"there is no signal {quoted(name)}; {remedy}")
+    rows, times, units = recorded[name], recorded.times(name), parse_units(recorded.units[name])
+    shape, size = rows.shape[1:], math.prod(rows.shape[1:])
+    try:
+        chosen = np.arange(size).reshape(shape)[index].ravel().tolist()
+    except IndexError:
+        chosen = []
+    if not chosen:
+        extent = f"the shape {list(shape)}" if shape else "one element and takes no index"
+        raise QuadvisError(f"{quoted(trace.signal)} does not exist; {quoted(name)} has {extent}")
+    elements = rows.reshape(len(rows), size)
+    for element in chosen:
+        label = trace.label or name
+        if shape and (len(chosen) > 1 or not trace.label):
+            label += f"[{','.join(map(str, np.unravel_index(element, shape)))}]"
+        values = elements[:, element].astype(np.float64)
+        yield _Curve(label, units[element % len(units)], times, values, rows.dtype.kind != "f")
+
+
+def _file_name(title: str) -> str:
+    return re.sub(r"\W+", "-", title.lower()).strip("-")[:60] or "figure"
+
+
+def _draw(figure: Figure, panels: list[list[_Curve]], path: Path) -> None:
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure as Sheet
+
+    columns = min(len(WIDTHS), len(panels))
+    rows = math.ceil(len(panels) / columns)
+    with mpl.rc_context({**STYLE}):
+        sheet = Sheet(figsize=(WIDTHS[columns - 1], 0.5 + HEIGHT * rows), dpi=120, layout="constrained")
+        FigureCanvasAgg(sheet)
+        sheet.suptitle(figure.title)
+        for number, (panel, curves) in enumerate(zip(figure.panels, panels, strict=True), 1):
+            _draw_panel(sheet.add_subplot(rows, columns, number), figure, panel, curves)
+        sheet.savefig(path, format="png")
+
+
+def _draw_panel(axes: Axes, figure: Figure, panel: Panel, curves: list[_Curve]) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    for curve, colour in zip(curves, itertools.cycle(COLOURS), strict=False):
+        few = np.count_nonzero(np.isfinite(curve.values)) <= FEW_SAMPLES
+        axes.plot(
+            curve.times, curve.values, color=colour, label=_legend(curve, panel.reference),
+            drawstyle="steps-post" if curve.steps else "default", marker="." if few else "",
+        )  # fmt: skip
+    if panel.reference is not None:
+        axes.axhline(panel.reference, color="#555555", linewidth=0.9, linestyle=(0, (5, 3)))
+    if not any(np.isfinite(curve.values).any() for curve in curves):
+        axes.text(0.5, 0.5, "no samples", transform=axes.transAxes, ha="center", color="#777777")
+    if all(curve.steps for curve in curves):
+        axes.yaxis.set_major_locator(MaxNLocator("auto", integer=True))
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel(_pretty(curves[0].unit))
+    axes.set_xlim(*(end if math.isfinite(end) else None for end in (figure.start, figure.stop)))
+    if len(curves) > MOST_CURVES:
+        axes.set_title(panel.title, loc="left")
+    else:
+        # Above the axes, so that it never hides a curve; the panel's title heads it.
+        axes.legend(
+            title=panel.title or None, alignment="left", loc="lower left", bbox_to_anchor=(0.0, 1.0),
+            ncols=math.ceil(len(curves) / LEGEND_ROWS),
+        )  # fmt: skip
+
+
+def _legend(curve: _Curve, reference: float | None) -> str:
+    """Return a curve's name and the RMS of its distance from the reference; counts and truths have none."""
+    distance = curve.values[np.isfinite(curve.values)] - (reference or 0.0)
+    if curve.steps or not distance.size:
+        return curve.label
+    return f"{curve.label}   RMS {np.sqrt(np.mean(distance**2)):.3g} {_pretty(curve.unit)}".rstrip()
+
+
+def _pretty(unit: Unit) -> str:
+    text = str(unit)
+    return "" if text == "1" else text.replace("^2", "²").replace("^3", "³").replace("*", "\u00b7")

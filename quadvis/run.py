@@ -1,0 +1,170 @@
+"""One run of a diagram: engine, recording, log, progress, verdicts."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.engine import Engine
+from quadvis.log import Channel, Field, LogWriter, Recording
+from quadvis.plan import Bound
+from quadvis.verdict import Outcome
+
+if TYPE_CHECKING:
+    from quadvis.diagram import Diagram
+
+Progress = Callable[[float, float], None]  # simulated time reached, wall time spent (s)
+SLICE = 0.2  # s of wall time between two calls of the progress, and the longest wait for Ctrl-C
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a run gave: ``result["plant.position"]`` is an array with a leading time axis, ``times`` has its times.
+
+    ``duration`` is the simulated time (s), ``wall`` the time that took, ``cpu`` the processor time.
+    """
+
+    diagram: Diagram
+    signals: Recording
+    outcome: Outcome
+    duration: float
+    wall: float
+    cpu: float
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self.signals[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.signals.names)
+
+    def times(self, name: str) -> NDArray[np.float64]:
+        """Return the times of a signal's rows (s)."""
+        return self.signals.times(name)
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """The unit of every signal."""
+        return self.signals.units
+
+    @property
+    def passed(self) -> bool:
+        """True if every expectation of the diagram is met."""
+        return self.outcome.passed
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated time by wall time."""
+        return self.duration / self.wall if self.wall else float("inf")
+
+    def facts(self) -> dict[str, Any]:
+        """Return the outcome as plain data: what `quadvis run --json` prints."""
+        return {
+            "diagram": self.diagram.name,
+            "variant": self.diagram.variant,
+            "hash": self.diagram.hash,
+            "seed": self.diagram.seed,
+            "passed": self.passed,
+            "duration_s": self.duration,
+            "wall_s": self.wall,
+            "cpu_s": self.cpu,
+            "real_time_factor": self.real_time_factor,
+            "summary": {label: dict(values) for label, values in self.outcome.summary.items()},
+            "expect": [
+                {"what": str(verdict.expectation), "limit": verdict.expectation.limit, "found": verdict.found,
+                 "met": verdict.met}
+                for verdict in self.outcome.verdicts
+            ],
+        }  # fmt: skip
+
+
+def run(diagram: Diagram, *, log: str | Path | None = None, progress: Progress | None = None) -> Result:
+    """Run a checked diagram to its stop time; RunError if a block fails, with the log readable up to there."""
+    engine = Engine(diagram.graph, diagram.seed)
+    logged = [bound for bound in engine.plan.steps if diagram.logs(bound.node.path) and _fields(bound)]
+    channels = [Channel(f"/{bound.node.path}", _fields(bound), bound.node.task.name) for bound in logged]
+    signals = Recording(channels)
+    wall, cpu = time.perf_counter(), time.process_time()
+    with ExitStack() as stack:
+        writer = stack.enter_context(LogWriter(log, channels, _metadata(diagram))) if log is not None else None
+        for index, bound in enumerate(logged):
+            _record(engine, index, bound, diagram.decimation(bound.node.path), signals, writer)
+        stack.enter_context(engine)
+        _advance(engine, diagram.ticks, progress)
+        outcome = diagram.judge(signals)
+        if writer:
+            writer.close(_closing(outcome))
+    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+    return Result(diagram, signals, outcome, diagram.duration, wall, cpu)
+
+
+def _advance(engine: Engine, ticks: int, progress: Progress | None) -> None:
+    """Run in slices, so that the progress is shown and an interruption is noticed between two ticks."""
+    began = time.perf_counter()
+    count = 1
+    while engine.tick < ticks:
+        start = time.perf_counter()
+        engine.run(min(count, ticks - engine.tick))
+        spent = time.perf_counter() - start
+        count = max(1, min(2 * count, int(count * SLICE / max(spent, 1e-6))))
+        if progress:
+            progress(engine.time, time.perf_counter() - began)
+
+
+def _record(
+    engine: Engine, index: int, bound: Bound, every: int, signals: Recording, writer: LogWriter | None
+) -> None:
+    raw, row = engine.plan.memory.raw, bound.row
+    numerator, denominator = (engine.period * 1_000_000_000).as_integer_ratio()
+    skipped = 0
+
+    def observe(tick: int) -> None:
+        nonlocal skipped
+        skipped += 1
+        if skipped < every:
+            return
+        skipped = 0
+        data = bytes(raw[row])
+        nanoseconds = tick * numerator // denominator
+        signals.append(index, nanoseconds, data)
+        if writer:
+            writer.write(index, nanoseconds, data)
+
+    skipped = every - 1  # the first row is kept
+    engine.observe(bound.node.task.name, observe)
+
+
+def _fields(bound: Bound) -> tuple[Field, ...]:
+    return tuple(
+        Field(name, slot.scalar, slot.shape, bound.node.unit(name))
+        for name, slot in bound.outputs.items()
+        if slot.scalar != "frame"
+    )
+
+
+def _metadata(diagram: Diagram) -> dict[str, str]:
+    from quadvis import __version__
+
+    return {
+        "quadvis": __version__,
+        "name": diagram.name,
+        "variant": diagram.variant or "",
+        "seed": str(diagram.seed),
+        "hash": diagram.hash,
+        "start": datetime.now(UTC).isoformat(timespec="seconds"),
+        "python": platform.python_version(),
+        "diagram": diagram.resolved,
+    }
+
+
+def _closing(outcome: Outcome) -> dict[str, str]:
+    lines = {f"expect {index}": str(verdict) for index, verdict in enumerate(outcome.verdicts, 1)}
+    return {"passed": str(outcome.passed).lower(), **lines}
