@@ -94,11 +94,12 @@ class Views:
 class ChessboardCalibration:
     """A camera from m views of a board.
 
-    `homogeneous` is K, R, C of eq. (7)-(10) from the corners without the lens, in the frame of `bundle`, which
-    has the poses, the lens and the camera that they were found with. `camera` is K of eq. (7)-(10) with that
-    lens, as the file holds it. Corners as `measured` are (m, n, 2) pixels, and `predicted` by `camera` and
-    `homogeneous`; `bundle_rms` is what the bundle itself leaves. `omitted` names terms of the lens that are held
-    at zero: corners that do not go out far enough let the lens fold what lies beyond them.
+    `homogeneous` is K, R, C of eq. (7)-(10) from the corners without the lens, in the frame of `bundle`,
+    which has the poses, the lens and the camera they were found with. `camera` is K of eq. (7)-(10) with that
+    lens, as the file holds it. `measured` corners are (m, n, 2) in pixels, `predicted` ones follow from
+    `camera` and `homogeneous`. `bundle_rms` is what the bundle itself leaves, in pixels. `omitted` names
+    terms of the lens that are held at zero: corners that do not go out far enough let the lens fold what lies
+    beyond them.
     """
 
     homogeneous: HomogeneousCalibration

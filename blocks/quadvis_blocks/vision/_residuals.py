@@ -23,14 +23,14 @@ def rms(residuals: Floats) -> Floats:
 def draw_residuals(
     picture: Picture, measured: Floats, predicted: Floats, magnification: float = 30.0
 ) -> Picture:
-    """Return the picture, faded and twice as large, with arrows from measured to predicted pixels.
+    """Return the picture, faded and enlarged if small, with arrows from measured to predicted pixels.
 
     measured and predicted are (m, n, 2); each view has a colour of its own. Arrows are `magnification` times
     too long.
     """
     import cv2
 
-    zoom = 2
+    zoom = 2 if max(picture.shape) < 1000 else 1
     grey = cv2.resize(picture, None, fx=zoom, fy=zoom, interpolation=cv2.INTER_CUBIC)
     canvas: Any = cv2.cvtColor((160 + 0.35 * grey).clip(0, 255).astype(np.uint8), cv2.COLOR_GRAY2BGR)
     # As many hues as views, at full saturation; OpenCV counts hues to 180.
@@ -38,8 +38,10 @@ def draw_residuals(
     colours = cv2.cvtColor(np.array(wheel, dtype=np.uint8), cv2.COLOR_HSV2BGR)[0].tolist()
     for colour, starts, ends in zip(colours, measured, predicted, strict=True):
         tips = starts + magnification * (ends - starts)
-        for start, tip in zip(_fixed(starts, zoom), _fixed(tips, zoom), strict=True):
-            cv2.arrowedLine(canvas, start, tip, colour, 1, cv2.LINE_AA, _SHIFT, 0.25)
+        lengths = zoom * np.linalg.norm(tips - starts, axis=1)
+        heads = np.minimum(0.3, 8 / np.maximum(np.nan_to_num(lengths), 1))
+        for start, tip, head in zip(_fixed(starts, zoom), _fixed(tips, zoom), heads, strict=True):
+            cv2.arrowedLine(canvas, start, tip, colour, 1, cv2.LINE_AA, _SHIFT, float(head))
     overall = float(rms((predicted - measured).reshape(-1, 2)))
     label = f"measured -> predicted, x {magnification:g}; rms {overall:.3f} px; {len(measured)} views"
     cv2.putText(
