@@ -48,7 +48,11 @@ class ImageFolder(Block, numeric=False):
             raise ParameterError("pattern", f"{problem}; it needs at least one file of {kinds}")
 
     def _find(self) -> list[Path]:
-        found = Path(self.folder).glob(self.pattern)
+        try:
+            found = list(Path(self.folder).glob(self.pattern))
+        except (ValueError, NotImplementedError):
+            problem = f"pattern '{self.pattern}' does not name files in the folder; write e.g. '*.png'"
+            raise ParameterError("pattern", problem) from None
         return sorted((p for p in found if p.suffix.lower() in SUFFIXES and p.is_file()), key=natural_order)
 
     def open(self) -> None:
