@@ -1,0 +1,381 @@
+"""Figures: what the diagram declares is on the axes, in its unit, and what it cannot mean is a sentence."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from quadvis.errors import DiagramError, Faults, QuadvisError
+from quadvis.log import Channel, Field, LogWriter, read_log
+from quadvis.plot import (
+    Figure,
+    Panel,
+    Trace,
+    block_figures,
+    plot_figures,
+    plot_log,
+    read_figures,
+    split_signal,
+)
+
+Sheets = list[Any]
+
+HOVER = """
+quadvis: 1
+name: hover
+figures:
+  - title: Position estimate
+    from: 40 s
+    to: 140 s
+    panels:
+      - title: x
+        signals:
+          - plant.position[0]
+          - {signal: "vision/pose.position[0]", label: camera}
+        unit: cm
+        reference: 0
+      - {title: y, signals: "plant.position[1]", unit: cm, reference: 0 m}
+  - title: Yaw angle
+    from: 40 s
+    signals: plant.yaw
+    unit: deg
+  - title: Control inputs
+    panels:
+      - {title: roll, signals: roll.torque}
+      - {title: yaw, signals: yaw.torque}
+      - {title: pitch, signals: pitch.torque}
+"""
+
+
+class Run:
+    """A recorded run that is no log: sines of known amplitude (m, rad, N*m) over 150 s."""
+
+    def __init__(self) -> None:
+        self.signals: dict[str, tuple[NDArray[np.float64], NDArray[Any], str]] = {}
+        fast, slow = np.arange(0, 150, 0.01), np.arange(0, 150, 0.1)
+        circle = np.stack([0.1 * np.sin(fast), 0.2 * np.cos(fast), 1.5 + 0 * fast], axis=1)
+        self.signals["plant.position"] = fast, circle, "m"
+        self.signals["plant.yaw"] = fast, np.full(len(fast), math.pi / 180), "rad"
+        self.signals["plant.state"] = fast, np.ones((len(fast), 3)), "m m rad"
+        self.signals["vision/pose.position"] = slow, 0.1 * np.sin(slow)[:, None] * np.ones(3), "m"
+        self.signals["vision/detector.found"] = slow, slow > 1, "1"
+        self.signals["vision/detector.centres"] = (
+            slow,
+            np.arange(8.0).reshape(4, 2) + np.zeros((len(slow), 4, 2)),
+            "px",
+        )
+        for axis in ("roll", "yaw", "pitch"):
+            self.signals[f"{axis}.torque"] = slow, 0.02 * np.sin(slow), "N*m"
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of every signal."""
+        return {name: unit for name, (_, _, unit) in self.signals.items()}
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """Return the rows of a signal."""
+        return self.signals[name][1]
+
+    def times(self, name: str) -> NDArray[np.float64]:
+        """Return the times of its rows."""
+        return self.signals[name][0]
+
+    def write(self, path: Path, diagram: str) -> None:
+        """Log the run."""
+        names = list(self.signals)
+        kinds = {"b": "bool", "f": "float64"}
+        channels = []
+        for name in names:
+            block, _, port = name.rpartition(".")
+            kind = kinds[self[name].dtype.kind]
+            channels.append(
+                Channel(f"/{block}", (Field(port, kind, self[name].shape[1:], self.units[name]),))
+            )
+        with LogWriter(path, channels, {"diagram": diagram}) as log:
+            for index, name in enumerate(names):
+                stamps = np.round(self.times(name) * 1e9).astype(np.int64)
+                slot = np.int64 if self[name].dtype == bool else np.float64
+                log.write_rows(index, stamps, self[name].astype(slot).tobytes())
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    """Return a run of 150 s."""
+    return Run()
+
+
+@pytest.fixture
+def sheets(monkeypatch: pytest.MonkeyPatch) -> Sheets:
+    """Collect what matplotlib is asked to save."""
+    figure = pytest.importorskip("matplotlib.figure").Figure
+    found: Sheets = []
+    save: Callable[..., None] = figure.savefig
+
+    def keep(sheet: Any, *arguments: Any, **options: Any) -> None:
+        found.append(sheet)
+        save(sheet, *arguments, **options)
+
+    monkeypatch.setattr(figure, "savefig", keep)
+    return found
+
+
+def legend(axes: Any) -> list[str]:
+    """Return the entries of a legend."""
+    return [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+def test_a_log_is_drawn_as_its_diagram_declares(run: Run, sheets: Sheets, tmp_path: Path) -> None:
+    run.write(tmp_path / "flight.mcap", HOVER)
+    paths = plot_log(read_log(tmp_path / "flight.mcap"), tmp_path / "out")
+    assert [path.name for path in paths] == [
+        "1-position-estimate.png",
+        "2-yaw-angle.png",
+        "3-control-inputs.png",
+    ]
+    position, yaw, control = sheets
+    assert [sheet.get_suptitle() for sheet in sheets] == ["Position estimate", "Yaw angle", "Control inputs"]
+    assert [len(sheet.axes) for sheet in sheets] == [2, 1, 3]
+    x, y = position.axes
+    assert [axes.get_legend().get_title().get_text() for axes in control.axes] == ["roll", "yaw", "pitch"]
+    assert (x.get_xlim(), x.get_xlabel(), x.get_ylabel()) == ((40, 140), "time (s)", "cm")
+    # A sine of 10 cm has an RMS of 10/sqrt(2) cm; what is left of a period changes little.
+    assert [text.split("   RMS ")[0] for text in legend(x)] == ["plant.position[0]", "camera"]
+    assert [float(text.split("RMS ")[1].split(" ")[0]) for text in legend(x)] == pytest.approx(
+        [7.07, 7.07], abs=0.1
+    )
+    plotted = y.get_lines()[0]
+    assert np.allclose(plotted.get_ydata(), 20 * np.cos(plotted.get_xdata()), atol=1e-9)
+    assert plotted.get_xdata()[[0, -1]] == pytest.approx([40, 140], abs=0.011)
+    assert legend(yaw.axes[0]) == ["plant.yaw   RMS 1 deg"]
+    assert control.axes[0].get_ylabel() == "N\u00b7m"
+
+
+def test_pictures_are_png_files_of_a_readable_size(run: Run, tmp_path: Path) -> None:
+    cv2 = pytest.importorskip("cv2")
+    figures = [
+        Figure("One", (Panel((Trace("plant.yaw"),)),)),
+        Figure("Three", (Panel((Trace("plant.yaw"),)),) * 3),
+    ]
+    one, three = (cv2.imread(str(path)) for path in plot_figures(run, figures, tmp_path))
+    assert one.shape[1] >= 900
+    assert three.shape[1] > one.shape[1]
+    assert one.min() < 100
+    assert (one == 255).all(axis=2).mean() > 0.5
+
+
+def test_without_a_folder_pictures_lie_beside_the_log(run: Run, tmp_path: Path) -> None:
+    run.write(tmp_path / "flight.mcap", HOVER)
+    paths = plot_log(read_log(tmp_path / "flight.mcap"))
+    assert {path.parent for path in paths} == {tmp_path / "flight-figures"}
+    assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)
+
+
+def test_without_declared_figures_every_block_is_drawn(run: Run, sheets: Sheets, tmp_path: Path) -> None:
+    run.write(tmp_path / "flight.mcap", "quadvis: 1\nname: hover\n")
+    paths = plot_log(read_log(tmp_path / "flight.mcap"))
+    names = [path.name for path in paths]
+    assert names == [
+        "1-plant.png",
+        "2-vision-pose.png",
+        "3-vision-detector.png",
+        "4-roll.png",
+        "5-yaw.png",
+        "6-pitch.png",
+    ]
+    plant = sheets[0].axes
+    assert [axes.get_legend().get_title().get_text() for axes in plant] == [
+        "position",
+        "yaw",
+        "state",
+        "state",
+    ]
+    assert [axes.get_ylabel() for axes in plant] == ["m", "rad", "m", "rad"]
+    assert [text.split(" ")[0] for text in legend(plant[2])] == ["state[0]", "state[1]"]
+    assert len(sheets[2].axes[1].get_lines()) == 8
+
+
+def test_truth_values_are_steps_without_an_rms(run: Run, sheets: Sheets, tmp_path: Path) -> None:
+    plot_figures(run, [Figure("Found", (Panel((Trace("vision/detector.found"),)),))], tmp_path)
+    (line,) = sheets[0].axes[0].get_lines()
+    assert line.get_drawstyle() == "steps-post"
+    assert legend(sheets[0].axes[0]) == ["vision/detector.found"]
+
+
+def test_the_rms_counts_from_the_reference(run: Run, sheets: Sheets, tmp_path: Path) -> None:
+    panel = Panel((Trace("plant.position[2]", "height"),), unit="cm", reference=147.0)
+    plot_figures(run, [Figure("Height", (panel,))], tmp_path)
+    assert legend(sheets[0].axes[0]) == ["height   RMS 3 cm"]
+    assert sheets[0].axes[0].get_lines()[1].get_ydata() == [147.0, 147.0]
+
+
+def test_a_stretch_of_elements_gives_a_curve_each(run: Run, sheets: Sheets, tmp_path: Path) -> None:
+    traces = (Trace("vision/detector.centres[1:3,1]"), Trace("vision/detector.centres[0,0]", "first"))
+    plot_figures(run, [Figure("Centres", (Panel(traces),))], tmp_path)
+    lines = sheets[0].axes[0].get_lines()
+    assert [line.get_ydata()[0] for line in lines] == [3, 5, 0]
+    assert [line.get_label().split("   ")[0] for line in lines] == [
+        "vision/detector.centres[1,1]",
+        "vision/detector.centres[2,1]",
+        "first",
+    ]
+
+
+def test_a_run_that_ended_early_gives_an_empty_picture(run: Run, sheets: Sheets, tmp_path: Path) -> None:
+    plot_figures(run, [Figure("Late", (Panel((Trace("plant.yaw"),)),), start=200.0, stop=300.0)], tmp_path)
+    assert [text.get_text() for text in sheets[0].axes[0].texts] == ["no samples"]
+
+
+def test_missing_samples_do_not_spoil_the_rms(run: Run, sheets: Sheets, tmp_path: Path) -> None:
+    holes = Run()
+    times = np.arange(10.0)
+    holes.signals["pose.x"] = times, np.where(times % 2 == 0, 3.0, math.nan), "m"
+    plot_figures(holes, [Figure("Holes", (Panel((Trace("pose.x"),)),))], tmp_path)
+    assert legend(sheets[0].axes[0]) == ["pose.x   RMS 3 m"]
+
+
+@pytest.mark.parametrize(
+    ("panel", "sentence"),
+    [
+        (
+            Panel((Trace("plant.positon"),)),
+            "there is no signal 'plant.positon'; did you mean 'plant.position'?",
+        ),
+        (
+            Panel((Trace("plant.position[3]"),)),
+            "'plant.position[3]' does not exist; 'plant.position' has the shape [3]",
+        ),
+        (
+            Panel((Trace("plant.yaw[0]"),)),
+            "'plant.yaw[0]' does not exist; 'plant.yaw' has one element and takes no index",
+        ),
+        (Panel((Trace("plant.yaw"),), unit="cm"), "'plant.yaw' is in rad, which cannot be shown in cm"),
+        (
+            Panel((Trace("plant.yaw"), Trace("roll.torque"))),
+            "'roll.torque' is in N*m, which cannot be shown in rad",
+        ),
+        (Panel(()), "panel '' has no signals; name one"),
+    ],
+)
+def test_what_cannot_be_drawn_is_a_sentence(run: Run, tmp_path: Path, panel: Panel, sentence: str) -> None:
+    with pytest.raises(QuadvisError) as caught:
+        plot_figures(run, [Figure("Yaw", (panel,))], tmp_path / "out")
+    assert str(caught.value) == f"figure 'Yaw': {sentence}"
+    assert not (tmp_path / "out").exists()
+
+
+def test_all_unknown_signals_are_named_at_once(run: Run, tmp_path: Path) -> None:
+    wrong = Panel((Trace("nothing.here"),))
+    with pytest.raises(QuadvisError) as caught:
+        plot_figures(run, [Figure("A", (wrong, wrong)), Figure("B", (wrong,)), Figure("C", ())], tmp_path)
+    lines = str(caught.value).splitlines()
+    assert [line.partition(":")[0] for line in lines[:3]] == ["figure 'A'", "figure 'A'", "figure 'B'"]
+    assert lines[3] == "figure 'C' has no panels; give it signals"
+
+
+def test_a_folder_that_cannot_be_made_is_a_sentence(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(QuadvisError, match=r"cannot write figures to '.*file': file exists"):
+        plot_figures(run, block_figures(run), tmp_path / "file")
+
+
+def read(text: str) -> tuple[list[Figure], list[str]]:
+    """Read the text under `figures:`; return the figures, and the faults without their file."""
+    from quadvis.document import parse_yaml
+
+    faults = Faults()
+    figures = read_figures(parse_yaml(text, "d.yaml"), faults)
+    return figures, [str(fault).removeprefix("d.yaml:") for fault in faults]
+
+
+def test_figures_are_read_with_their_defaults() -> None:
+    text = """
+    - title: Yaw
+      signals: plant.yaw
+    - title: Height
+      to: 20 s
+      panels:
+        - signals: ["plant.position[2]", {signal: guide.height, label: wanted}]
+          unit: cm
+          reference: 1.5 m
+    """
+    figures, faults = read(text)
+    assert not faults
+    assert figures[0] == Figure("Yaw", (Panel((Trace("plant.yaw"),)),))
+    traces = (Trace("plant.position[2]"), Trace("guide.height", "wanted"))
+    assert figures[1] == Figure("Height", (Panel(traces, "", "cm", 150.0),), stop=20.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("[{titel: Yaw, signals: a.b}]", "1:3: key 'titel' is unknown; did you mean 'title'?"),
+        ("[{title: Yaw}]", "1:2: key 'signals' is missing; add 'signals: ...'"),
+        ("[{title: Yaw, signals: []}]", "1:24: the list is empty; write its entries, or leave the key out"),
+        ("[{title: Yaw, panels: []}]", "1:23: the list is empty; write its entries, or leave the key out"),
+        (
+            "[{title: Yaw, signals: yaw}]",
+            "1:24: 'yaw' is not a signal; write 'block.port', 'block.port[0]' or",
+        ),
+        ("[{title: Yaw, signals: ['a.b[x]']}]", "1:25: 'a.b[x]' is not a signal"),
+        ("[{title: Yaw, signals: a.b, unit: dog}]", "1:35: 'dog' is not a unit; did you mean 'deg'?"),
+        (
+            "[{title: Yaw, signals: a.b, unit: deg, reference: 1 m}]",
+            "1:51: 'reference': '1 m' is in m, not in deg",
+        ),
+        ("[{title: Yaw, signals: a.b, from: 40}]", "1:35: 'from': '40' has no unit"),
+        ("[{title: Yaw, signals: a.b, from: 9 s, to: 9 s}]", "1:44: 'to' must come after 'from'"),
+        ("{title: Yaw}", "1:1: this must be a list"),
+        ("[Yaw]", "must be a map"),
+    ],
+)
+def test_wrong_figures_are_located(text: str, fault: str) -> None:
+    _, faults = read(text)
+    assert len(faults) == 1
+    assert fault in faults[0]
+
+
+def test_all_faults_of_the_figures_are_found_at_once() -> None:
+    _, faults = read("[{title: A, signals: a}, {title: B, form: 1 s, panels: [{signals: b}, {signal: c.d}]}]")
+    assert len(faults) == 4
+
+
+def test_a_log_whose_diagram_is_damaged_names_the_place(run: Run, tmp_path: Path) -> None:
+    run.write(tmp_path / "flight.mcap", HOVER.replace("unit: deg", "unit: dog"))
+    with pytest.raises(DiagramError, match=r"flight\.mcap: diagram:19:11: .*did you mean 'deg'"):
+        plot_log(read_log(tmp_path / "flight.mcap"))
+
+
+@given(st.lists(st.one_of(st.integers(0, 99), st.tuples(st.integers(0, 99), st.integers(0, 99))), max_size=3))
+def test_an_index_is_split_as_numpy_would_read_it(index: list[Any]) -> None:
+    parts = [f"{part[0]}:{part[1]}" if isinstance(part, tuple) else str(part) for part in index]
+    text = f"vision/detector.centres[{','.join(parts)}]" if parts else "vision/detector.centres"
+    expected = tuple(slice(*part) if isinstance(part, tuple) else part for part in index)
+    assert split_signal(text) == ("vision/detector.centres", expected)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "plant", "a.b[", "a.b[]", "a.b[-1]", "a.b[1]c", "a.b[1 2]", "[0]", ".b", "a."]
+)
+def test_other_texts_are_no_signals(text: str) -> None:
+    with pytest.raises(QuadvisError, match="is not a signal"):
+        split_signal(text)
+
+
+def test_importing_the_plotter_does_not_import_matplotlib() -> None:
+    code = "import sys, quadvis.plot; print('matplotlib' in sys.modules, 'yaml' in sys.modules)"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    result = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+    )
+    assert result.stdout.split() == ["False", "False"]
