@@ -1,7 +1,7 @@
 """What a run showed: statistics of its signals, and whether it met what the diagram expects.
 
-Parts with several elements count by their length (Euclidean norm), so ``plant.position[0:2]`` is the horizontal
-distance. NaN meets no expectation.
+Parts with several elements count element by element: the RMS of ``craft.position[0:2]`` is over both axes together,
+its maximum the larger of the two. NaN meets no expectation.
 """
 
 from __future__ import annotations
@@ -55,17 +55,12 @@ class Kind:
     holds: Any = None
 
 
-def _length(values: NDArray[np.float64], of: float) -> NDArray[np.float64]:
-    distance = values - of
-    return np.abs(distance[:, 0]) if values.shape[1] == 1 else np.linalg.norm(distance, axis=1)
-
-
 def _rms(values: NDArray[np.float64], of: float = 0.0) -> float:
-    return float(np.sqrt(np.mean(_length(values, of) ** 2)))
+    return float(np.sqrt(np.mean((values - of) ** 2)))
 
 
 def _max(values: NDArray[np.float64], of: float = 0.0) -> float:
-    return float(np.max(_length(values, of)))
+    return float(np.max(np.abs(values - of)))
 
 
 STATISTICS = {
