@@ -1,0 +1,44 @@
+"""A signal given by points in time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, Out, Param, ParameterError
+
+LINEAR, HOLD = range(2)
+
+
+class Table(Block):
+    """A vector that goes from row to row of a table; before the first and after the last it stays at that row.
+
+    ``interpolation: linear`` draws straight lines between the rows, ``hold`` steps from one to the next.
+    """
+
+    times = Param(type="float64[k]", unit="s", doc="instant of each row, increasing")
+    values = Param(type="float64[k,n]", unit="a", doc="one row for each instant")
+    interpolation = Param("linear", choices=("linear", "hold"), doc="what happens between the rows")
+    y = Out("float64[n]", unit="a", doc="the vector")
+
+    def check(self) -> None:
+        """Refuse times that do not increase or that are not one for each row."""
+        if len(self.times) != len(self.values):
+            problem = f"times must have one entry for each of the {len(self.values)} rows of values"
+            raise ParameterError("times", f"{problem}, got {len(self.times)}")
+        if (np.diff(self.times) <= 0.0).any():
+            raise ParameterError("times", "times must increase from row to row")
+
+    def output(self, time: float) -> Any:
+        """Return the vector at this time."""
+        times, values = self.times, self.values
+        after = 0
+        while after < len(times) and times[after] <= time:
+            after += 1
+        if after == 0:
+            return values[0].copy()
+        if after == len(times) or self.interpolation == HOLD:
+            return values[after - 1].copy()
+        share = (time - times[after - 1]) / (times[after] - times[after - 1])
+        return values[after - 1] + share * (values[after] - values[after - 1])

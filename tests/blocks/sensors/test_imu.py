@@ -1,0 +1,67 @@
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from quadvis.block import ParameterError
+from quadvis.testing import Driven, drive
+from quadvis_blocks.sensors.imu import Imu
+
+QUIET = {"angle_noise": 0.0, "drift": 0.0, "rate_noise": 0.0}
+ATTITUDE, RATES = np.array([0.1, -0.2, 3.0]), np.array([0.4, 0.5, -0.6])
+DEGREE = math.pi / 180
+
+
+def measure(steps: int = 1, **parameters: Any) -> Driven:
+    return drive(Imu(**parameters), attitude=ATTITUDE, rates=RATES, rate="100 Hz", steps=steps)
+
+
+def test_without_errors_it_gives_the_truth() -> None:
+    result = measure(steps=3, **QUIET)
+    assert result.roll.tolist() == [0.1] * 3 and result.pitch.tolist() == [-0.2] * 3
+    assert np.array_equal(result.gyro, [RATES] * 3)
+
+
+def test_biases_add_to_angles_and_rates() -> None:
+    result = measure(**QUIET, angle_bias=(0.01, -0.02), rate_bias=(0.1, 0.2, 0.3))
+    assert (result.roll[0], result.pitch[0]) == pytest.approx((0.11, -0.22))
+    assert result.gyro[0] == pytest.approx(np.add(RATES, (0.1, 0.2, 0.3)))
+
+
+def test_white_noise_has_its_deviation_on_each_channel_and_no_memory() -> None:
+    result = measure(steps=10000, drift=0.0)
+    errors = np.column_stack((result.roll - 0.1, result.pitch + 0.2, result.gyro - RATES))
+    expected = np.array([0.1, 0.1, 0.5, 0.5, 0.5]) * DEGREE
+    assert errors.std(axis=0) == pytest.approx(expected, rel=4 / math.sqrt(2 * 10000))
+    assert np.abs(np.corrcoef(errors.T) - np.eye(5)).max() < 4 / 100
+    assert abs(np.corrcoef(errors[1:, 0], errors[:-1, 0])[0, 1]) < 4 / 100
+
+
+def test_the_drift_has_its_deviation_and_correlation_time() -> None:
+    result = measure(steps=100000, angle_noise=0.0, drift_time=2.0)
+    drift = result.roll - 0.1
+    samples = 1000 / (2 * 2.0)
+    assert drift.std() == pytest.approx(0.2 * DEGREE, rel=4 / math.sqrt(2 * samples))
+    lagged = np.corrcoef(drift[200:], drift[:-200])[0, 1]
+    assert lagged == pytest.approx(math.exp(-1.0), abs=4 / math.sqrt(samples))
+    assert abs(np.corrcoef(result.roll, result.pitch)[0, 1]) < 4 / math.sqrt(samples)
+
+
+def test_the_drift_is_there_from_the_first_sample() -> None:
+    first = [measure(angle_noise=0.0, drift=1.0).roll[0] - 0.1]
+    first += [
+        drive(Imu(angle_noise=0.0, drift=1.0), attitude=ATTITUDE, rates=RATES, seed=seed, steps=1).roll[0]
+        - 0.1
+        for seed in range(1, 300)
+    ]
+    assert np.std(first) == pytest.approx(1.0, rel=4 / math.sqrt(600))
+
+
+def test_yaw_is_not_measured() -> None:
+    assert list(Imu.interface.outputs) == ["roll", "pitch", "gyro"]
+
+
+def test_a_negative_noise_is_refused() -> None:
+    with pytest.raises(ParameterError, match="rate_noise must be at least 0 rad/s, got -1 rad/s"):
+        Imu(rate_noise=-1.0)

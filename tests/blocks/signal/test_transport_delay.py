@@ -1,0 +1,77 @@
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from quadvis.block import ParameterError
+from quadvis.engine import Engine
+from quadvis.errors import RunError
+from quadvis.graph import Constant, Graph, Node, Task, Wire
+from quadvis.testing import drive
+from quadvis_blocks.signal.integrator import Integrator
+from quadvis_blocks.signal.transport_delay import TransportDelay
+
+
+def held(values: list[float], ticks: int) -> np.ndarray:
+    """Each value for so many ticks, on two channels with opposite signs."""
+    series = np.repeat(values, ticks)
+    return np.column_stack((series, -series))
+
+
+def test_a_held_signal_arrives_later_by_the_delay() -> None:
+    u = held([1.0, 5.0, 2.0], 50)  # 20 Hz, seen at 1 kHz
+    y = drive(TransportDelay(delay=0.022, initial=9.0), u=u, rate="1 kHz").y
+    assert (y[:22] == 9.0).all()
+    assert np.array_equal(y[22:], u[:-22])
+
+
+def test_a_delay_that_is_no_whole_number_of_ticks_ends_at_the_next_one() -> None:
+    y = drive(TransportDelay(delay=0.0215), u=held([1.0], 30), rate="1 kHz").y
+    assert np.flatnonzero(y[:, 0])[0] == 22
+
+
+def test_a_signal_that_changes_at_every_tick_is_delayed_whole() -> None:
+    u = np.random.default_rng(2).normal(size=(3000, 4))
+    y = drive(TransportDelay(delay=0.4), u=u, rate="1 kHz").y
+    assert np.array_equal(y[400:], u[:-400])
+
+
+def test_inside_a_solver_step_it_changes_within_that_step() -> None:
+    step = Fraction(1, 100)
+    # The solver's formula meets an edge half way through one of its steps: the rest of the run is exact.
+    assert integral_of_a_delayed_one(step, 0.015, continuous=True) == pytest.approx(
+        1.0 - 0.015, abs=float(step) / 2
+    )
+
+
+def test_at_a_discrete_rate_the_solver_sees_no_edge_inside_its_steps() -> None:
+    assert integral_of_a_delayed_one(Fraction(1, 100), 0.02, continuous=False) == pytest.approx(
+        0.98, abs=1e-12
+    )
+
+
+def integral_of_a_delayed_one(step: Fraction, delay: float, *, continuous: bool) -> float:
+    fast = Task("fast", step, continuous=True)
+    link = fast if continuous else Task("link", step)
+    nodes = [
+        Node("delay", "", TransportDelay(delay=delay), link, {"u": Constant(np.ones(1))}, {"n": 1}),
+        Node("integral", "", Integrator(), fast, {"u": Wire("delay", "y", (0,))}, {"*": ()}),
+    ]
+    engine = Engine(Graph("test", nodes, "ode4", step))
+    with engine:
+        engine.run(int(1 / step) + 1)
+        return float(engine.read("integral", "y"))
+
+
+def test_too_many_changes_on_their_way_stop_the_run_with_a_reason() -> None:
+    with pytest.raises(RunError, match="slower rate or a shorter delay"):
+        drive(TransportDelay(delay=1.0), u=np.arange(2000.0)[:, None], rate="1 kHz")
+
+
+def test_it_breaks_loops() -> None:
+    assert TransportDelay.interface.feedthrough == frozenset()
+
+
+def test_a_delay_of_zero_is_refused() -> None:
+    with pytest.raises(ParameterError, match="delay must be above 0 s, got 0 s"):
+        TransportDelay(delay=0.0)
