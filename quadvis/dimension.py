@@ -110,7 +110,7 @@ class Unit:
     def exact_scale(self) -> tuple[Fraction, float]:
         """The scale as an exact ratio, and the irrational rest (pi, roots)."""
         ratio, rest = Fraction(1), 1.0
-        for symbol, exponent in self.exponents:
+        for symbol, exponent in sorted(self.exponents):  # sets differ in order from one process to the next
             if symbol in _PRIMES and exponent.denominator == 1:
                 ratio *= Fraction(_PRIMES[symbol]) ** int(exponent)
             elif symbol in _SCALES:
@@ -137,7 +137,7 @@ class Unit:
             (item for item in self.exponents if item[0] not in bindings),
             (item for item in self.symbols if item[0] not in bindings),
         )
-        for symbol, exponent in self.exponents:
+        for symbol, exponent in sorted(self.exponents):
             if symbol in bindings:
                 result *= bindings[symbol] ** exponent
         return result
@@ -196,7 +196,8 @@ def _parse(text: str) -> Unit:
     if len(plain) > LONGEST:
         raise UnitError(f"{quoted(text)} is too long for a unit")
     if re.search(r"\s", plain):
-        raise UnitError(f"{quoted(text)} holds a space", f"write {quoted('*'.join(plain.split()))} for a product")
+        product = quoted("*".join(plain.split()))
+        raise UnitError(f"{quoted(text)} holds a space", f"write {product} for a product")
     return _Reader(plain, _table()).unit()
 
 

@@ -185,7 +185,7 @@ def _cost(word: str, candidate: str, limit: int) -> int | None:
 
 
 def _distance(a: str, b: str, limit: int) -> int | None:
-    """Return the optimal string alignment distance, or None above the limit or a third of the length."""
+    """Return the optimal string alignment distance, or None above the limit or a third of the first word."""
     if a == b:
         return 0 if limit >= 0 else None
     short, long = sorted((len(a), len(b)))
@@ -193,7 +193,7 @@ def _distance(a: str, b: str, limit: int) -> int | None:
         cost = min(_PREFIX, _EDIT * (long - short))
         return cost if cost <= limit else None
     # A word that shares no letter is another word, however short.
-    limit = min(limit, _EDIT * max(1, (long + 1) // 3), _EDIT * long - 1)
+    limit = min(limit, _EDIT * max(1, (len(a) + 1) // 3), _EDIT * long - 1)
     letters, others = set(a), set(b)
     least = max(long - short, len(letters - others), len(others - letters))
     if least * _EDIT > limit or long > _LONGEST:

@@ -131,7 +131,7 @@ def format_quantity(value: float, unit: Unit, digits: int = 4) -> str:
     """Return an SI value for people: (0.05, s) gives "50 ms", (0.032, m) "3.2 cm", (0.5236, deg) "30 deg"."""
     rounded = float(f"{value:.{digits}g}")
     if unit.scale == 1.0 and rounded and math.isfinite(rounded):
-        for name in reversed(_ladder(unit)):
+        for name in reversed(_ladder(str(unit))):
             step = Unit.parse(name)
             if abs(rounded) >= step.scale * (1 - 1e-12):
                 unit = step
@@ -145,10 +145,10 @@ _LADDERS = ("us ms s", "um mm cm m km", "Hz kHz MHz", "mV V kV", "mA A", "mN N k
 
 
 @lru_cache(maxsize=64)
-def _ladder(unit: Unit) -> tuple[str, ...]:
+def _ladder(unit: str) -> tuple[str, ...]:
     """Return the names to choose from for a unit; none if it is a product of its own."""
     for names in map(str.split, _LADDERS):
-        if any(Unit.parse(name) == unit for name in names):
+        if unit in names:
             return tuple(names)
     return ()
 
@@ -173,7 +173,8 @@ def _require_dimension(text: str, written: Unit, unit: Unit) -> None:
         return
     if not unit.dimension:
         raise UnitError(f"{quoted(text)} has a unit where none belongs", "write a number without unit")
-    choice = " or ".join(name for name in (_ladder(unit) or (str(unit),)) if Unit.parse(name).scale >= 1e-3)
+    usual = [name for name in _ladder(str(unit)) if Unit.parse(name).scale >= 1e-3]
+    choice = " or ".join(usual or [str(unit)])
     raise UnitError(f"{quoted(text)} is in {written}, not in {unit}", f"write it in {choice}")
 
 

@@ -1,0 +1,370 @@
+"""Units and quantities against the definitions of the SI, and against the laws of arithmetic."""
+
+from __future__ import annotations
+
+import math
+from decimal import Decimal
+from fractions import Fraction
+
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from quadvis.errors import QuadvisError
+from quadvis.units import (
+    Unit,
+    UnitError,
+    format_quantity,
+    parse_number,
+    parse_period,
+    parse_quantity,
+    parse_rational,
+    parse_units,
+    read_quantity,
+    require_unit,
+    split_quantity,
+    unify,
+)
+
+# SI brochure (9th edition), tables 2, 4, 7 and 8; rev and rpm by their meaning.
+IN_SI = {
+    "km": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0,
+    "deg": math.pi / 180, "rev": 2 * math.pi, "rpm": 2 * math.pi / 60, "kHz": 1e3, "mV": 1e-3, "%": 0.01,
+    "km/h": 1 / 3.6, "deg/s": math.pi / 180, "mm^2": 1e-6, "1/ms": 1e3, "kW/cm^3": 1e9, "hPa": 100.0,
+}  # fmt: skip
+SAME = [
+    ("Hz", "1/s"), ("N", "kg*m/s^2"), ("J", "N*m"), ("W", "J/s"), ("W", "V*A"), ("Pa", "N/m^2"),
+    ("ohm", "V/A"),
+    ("T", "V*s/m^2"), ("m/s^2", "m/s/s"), ("m*s^-2", "m/s^2"), ("W/(m*K)", "W/m/K"), ("min", "1/(1/min)"),
+    ("Hz^0.5", "1/s^(1/2)"), ("1", "m/m"), ("m·s", "m*s"), ("m²", "m^2"), ("°/s", "deg/s"), ("µs", "us"),
+    ("m / s", "m/s"), ("rev/min", "rpm"), ("mm*km", "m^2"),
+]  # fmt: skip
+NAMES = "m kg s rad px A K N J W V Hz ms min deg rpm % km mV ohm a b c"
+
+exponents = st.fractions(-2, 2, max_denominator=4)
+units = st.lists(st.tuples(st.sampled_from(NAMES.split()), exponents), max_size=3).map(
+    lambda powers: math.prod((Unit.parse(name) ** power for name, power in powers), start=Unit())
+)
+fixed_units = units.filter(lambda unit: not unit.variables)
+
+
+@pytest.mark.parametrize(("text", "scale"), IN_SI.items())
+def test_scales_are_those_of_the_si(text, scale):
+    assert Unit.parse(text).scale == pytest.approx(scale, rel=1e-15)
+
+
+@pytest.mark.parametrize(("one", "other"), SAME)
+def test_equal_units_are_equal_however_written(one, other):
+    assert Unit.parse(one) == Unit.parse(other)
+    assert hash(Unit.parse(one)) == hash(Unit.parse(other))
+
+
+@pytest.mark.parametrize(
+    ("one", "other"), [("Hz", "rad/s"), ("m", "mm"), ("1", "%"), ("rad", "1"), ("px", "1"), ("a", "b"),
+    ("J", "W")],
+)
+def test_different_units_differ(one, other):
+    assert Unit.parse(one) != Unit.parse(other)
+
+
+def test_dimensions_compare_without_the_scale():
+    assert Unit.parse("km/h").dimension_equals(Unit.parse("mm/s"))
+    assert Unit.parse("%").dimension_equals(Unit.parse("1"))
+    assert not Unit.parse("rad").dimension_equals(Unit.parse("1"))
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("kg*m^2/s^3", "kg*m^2/s^3"), ("W/(m*K)", "W/m/K"), ("s^-1", "1/s"), ("m·m", "m^2"), ("m/m", "1"),
+        ("Hz^0.5", "Hz^(1/2)"), ("°/s²", "deg/s^2"), ("1", "1"), ("a / s", "a/s"), ("%", "%"),
+    ],
+)  # fmt: skip
+def test_units_are_shown_as_they_were_written(text, shown):
+    assert str(Unit.parse(text)) == shown
+
+
+@given(units)
+def test_a_shown_unit_reads_back_the_same(unit):
+    assert Unit.parse(str(unit)) == unit
+    assert str(Unit.parse(str(unit))) == str(unit)
+
+
+@given(units, units, units)
+def test_units_multiply_like_numbers(one, two, three):
+    assert one * two == two * one
+    assert (one * two) * three == one * (two * three)
+    assert one / one == Unit()
+    assert (one * two) / two == one
+    assert (one**2) ** Fraction(1, 2) == one
+    assert (one * two).scale == pytest.approx(one.scale * two.scale, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("sec", "'sec' is not a unit; did you mean 's'?"),
+        ("hz", "'hz' is not a unit; did you mean 'Hz'?"),
+        ("Metre/s", "'Metre' is not a unit; did you mean 'm'?"),
+        ("m2", "'m2' is not a unit; did you mean 'm^2'?"),
+        ("N m", "'N m' holds a space; write 'N*m' for a product"),
+        ("g", "'g' is not a unit, since gram and gravity share it; write 'kg' or 'm/s^2'"),
+        ("", "the unit is empty; write '1' for a number without unit"),
+        ("m/", "'m/' is not a unit; a unit is missing at its end"),
+        ("m**2", "'m**2' is not a unit; '*' stands where it cannot"),
+        ("(m", "'(m' lacks a ')'"),
+        ("m^", "'m^' has no exponent after '^'; write such as 's^2' or 's^-1'"),
+        ("m^99", "a unit has an exponent beyond 60"),
+        ("m^(1/0)", "'m^(1/0)' divides by zero"),
+        ("m$", "'m$' is not a unit; '$' is no part of one"),
+        ("xyzzy", "'xyzzy' is not a unit; use m, s, rad, kg, N, V, Hz, px ..."),
+    ],
+)
+def test_what_is_no_unit_is_refused_with_advice(text, message):
+    with pytest.raises(UnitError) as caught:
+        Unit.parse(text)
+    assert str(caught.value) == message
+
+
+def test_a_port_has_one_unit_or_one_for_each_element():
+    assert parse_units("m m m rad") == (*[Unit.parse("m")] * 3, Unit.parse("rad"))
+    assert parse_units("rad / s") == (Unit.parse("rad/s"),)
+    with pytest.raises(UnitError):
+        parse_units("  ")
+
+
+def test_unification_binds_the_variable_that_is_settled():
+    bindings: dict[str, Unit] = {}
+    assert unify(Unit.parse("a/s"), Unit.parse("m/s"), bindings)
+    assert bindings == {"a": Unit.parse("m")}
+    assert unify(Unit.parse("a"), Unit.parse("m"), bindings)
+    assert not unify(Unit.parse("a"), Unit.parse("mm"), bindings)
+    assert unify(Unit.parse("a*b^2"), Unit.parse("m/s"), bindings)
+    assert bindings["b"] == Unit.parse("Hz^0.5")
+
+
+def test_two_unknown_variables_settle_nothing():
+    bindings: dict[str, Unit] = {}
+    assert unify(Unit.parse("a*b"), Unit.parse("N*m"), bindings)
+    assert bindings == {}
+
+
+def test_units_without_variables_unify_only_with_their_equals():
+    assert unify(Unit.parse("Hz"), Unit.parse("1/s"), {})
+    assert not unify(Unit.parse("deg"), Unit.parse("rad"), {})
+
+
+@given(units, fixed_units)
+def test_unification_makes_pattern_and_unit_the_same(pattern, actual):
+    bindings: dict[str, Unit] = {}
+    try:
+        agreed = unify(pattern, actual, bindings)
+    except UnitError:
+        pytest.fail("unify must not raise")
+    if not agreed:
+        assert bindings == {}
+    elif len(pattern.variables) <= 1:
+        assert pattern.substitute(bindings) == actual
+
+
+@given(units, st.fixed_dictionaries({name: fixed_units for name in "abc"}))
+def test_a_pattern_unifies_with_what_it_becomes(pattern, bindings):
+    try:
+        actual = pattern.substitute(bindings)
+    except UnitError:
+        assume(False)
+    first = {name: bindings[name] for name in sorted(pattern.variables)[1:]}
+    assert unify(pattern, actual, first)
+    assert all(first[name] == bindings[name] for name in pattern.variables)
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "unit"),
+    [
+        ("50 ms", 0.05, "ms"), ("33.3 ms", 0.0333, "ms"), ("0.24 m", 0.24, "m"), ("24cm", 0.24, "cm"),
+        ("1e-3", 1e-3, "1"), ("-.5 V", -0.5, "V"), ("1e3 px", 1000.0, "px"), ("2.5 rad/s", 2.5, "rad/s"),
+        ("90 %", 0.9, "%"), ("20 Hz", 20.0, "Hz"), ("180 deg", math.pi, "deg"), ("5/s", 5.0, "1/s"),
+        ("1/30 s", 1 / 30, "s"), ("36 km/h", 10.0, "km/h"), ("60 rpm", 2 * math.pi, "rpm"),
+        ("+3 m", 3.0, "m"),
+    ],
+)  # fmt: skip
+def test_quantities_are_read_in_si_units(text, value, unit):
+    read, written = parse_quantity(text)
+    assert read == pytest.approx(value, rel=1e-15)
+    assert written == Unit.parse(unit)
+
+
+@given(
+    st.decimals(-1_000_000, 1_000_000, places=6),
+    st.sampled_from(["s", "ms", "us", "min", "m", "mm", "kHz"]),
+)
+def test_decimal_quantities_are_rounded_once(number, unit):
+    scale = {"s": 1, "ms": "0.001", "us": "0.000001", "min": 60, "m": 1, "mm": "0.001", "kHz": 1000}[unit]
+    assert parse_quantity(f"{number:f} {unit}")[0] == float(Decimal(scale) * number)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("50 ms", Fraction(1, 20)), ("0.05 s", Fraction(1, 20)), ("10 Hz", Fraction(10)),
+        ("1/30 s", Fraction(1, 30)),
+        ("33.3 ms", Fraction(333, 10_000)), ("2 min", Fraction(120)), ("1e-3 s", Fraction(1, 1000)),
+        ("7", Fraction(7)),
+    ],
+)  # fmt: skip
+def test_rates_and_times_are_exact(text, value):
+    assert parse_rational(text) == value
+
+
+@pytest.mark.parametrize(
+    ("text", "period"), [("10 Hz", "1/10"), ("50 ms", "1/20"), ("1/30 s", "1/30"), ("30 Hz", "1/30"),
+    ("3 kHz", "1/3000")],
+)
+def test_a_rate_and_its_period_are_the_same(text, period):
+    assert parse_period(text) == Fraction(period)
+
+
+@pytest.mark.parametrize(
+    "text", ["0 s", "-1 Hz", "50", "0", "1 m", "1 rad/s", "", "fast", "0 Hz", "30 deg", "1/0 s"]
+)
+def test_what_is_no_rate_is_refused(text):
+    with pytest.raises(UnitError):
+        parse_period(text)
+
+
+def test_exact_values_demand_their_dimension():
+    second = Unit.parse("s")
+    assert parse_rational("50 ms", second) == Fraction(1, 20)
+    assert parse_rational("0", second) == 0
+    with pytest.raises(UnitError, match=r"^'50 Hz' is in Hz, not in s; write it in ms or s$"):
+        parse_rational("50 Hz", second)
+    with pytest.raises(UnitError, match=r"^'30 deg' has no exact value; write it in an SI unit$"):
+        parse_rational("30 deg", Unit.parse("rad"))
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "message"),
+    [
+        ("50", "s", "'50' has no unit; did you mean '50 ms'?"),
+        ("2", "s", "'2' has no unit; did you mean '2 s'?"),
+        ("240", "m", "'240' has no unit; did you mean '240 mm'?"),
+        ("90", "rad", "'90' has no unit; did you mean '90 deg'?"),
+        ("20", "Hz", "'20' has no unit; did you mean '20 Hz'?"),
+        ("3", "m/s", "'3' has no unit; did you mean '3 m/s'?"),
+    ],
+)
+def test_a_missing_unit_is_guessed_from_the_size(text, unit, message):
+    with pytest.raises(UnitError) as caught:
+        require_unit(text, Unit.parse(unit))
+    assert str(caught.value) == message
+
+
+@pytest.mark.parametrize(("text", "unit"), [("0", "s"), ("5", "1"), ("50 %", "1"), ("5 ms", "s")])
+def test_a_unit_is_not_demanded_where_none_is_needed(text, unit):
+    require_unit(text, Unit.parse(unit))
+
+
+def test_a_quantity_is_read_as_a_number_of_the_declared_unit():
+    assert read_quantity("50 ms", Unit.parse("s")) == 0.05
+    assert read_quantity("0.05 s", Unit.parse("ms")) == 50.0
+    assert read_quantity("50", Unit.parse("ms")) == 50.0
+    assert read_quantity("90 %", Unit()) == 0.9
+    assert read_quantity("180 deg", Unit.parse("rad")) == math.pi
+    assert read_quantity("3 cm", Unit.parse("a")) == 0.03
+    assert read_quantity("90 deg", Unit.parse("deg")) == pytest.approx(90, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "message"),
+    [
+        ("50 ms", "m", "'50 ms' is in ms, not in m; write it in mm or cm or m or km"),
+        ("5 m", "1", "'5 m' has a unit where none belongs; write a number without unit"),
+        ("2 rad/s", "rad/s^2", "'2 rad/s' is in rad/s, not in rad/s^2; write it in rad/s^2"),
+        ("2 m", "mm^2", "'2 m' is in m, not in mm^2; write it in mm^2"),
+        ("soon", "s", "'soon' does not begin with a number; write it as in '50 ms'"),
+        ("5 sec", "s", "'sec' is not a unit; did you mean 's'?"),
+        ("1e308 km", "m", "'1e308 km' is outside the range of numbers"),
+    ],
+)
+def test_a_wrong_quantity_is_refused_with_advice(text, unit, message):
+    with pytest.raises(UnitError) as caught:
+        read_quantity(text, Unit.parse(unit))
+    assert str(caught.value) == message
+
+
+def test_a_bare_number_can_be_refused():
+    with pytest.raises(UnitError, match=r"^'50' has no unit; did you mean '50 ms'\?$"):
+        read_quantity("50", Unit.parse("s"), bare=False)
+    assert read_quantity("50", Unit(), bare=False) == 50.0
+
+
+@pytest.mark.parametrize(
+    ("text", "remedy"),
+    [
+        ("010", "write '10'"), ("-007.5", "write '-7.5'"), ("00.5", "write '0.5'"), ("00", "write '0'"),
+        ("1_000", "write '1000'"), ("1,5", "write '1.5'"), ("0x10", "write it as in 0.5, -2 or 1e-3"),
+        ("1:30", "write it as in 0.5, -2 or 1e-3"), ("0o17", "write it as in 0.5, -2 or 1e-3"),
+        ("nan", "write it as in 0.5, -2 or 1e-3"), (".inf", "write it as in 0.5, -2 or 1e-3"),
+        ("1e999", "stay between 1e-300 and 1e300"), ("1e-999", "stay between 1e-300 and 1e300"),
+        ("", "write it as in 0.5, -2 or 1e-3"), ("9" * 400, "write it as in 0.5, -2 or 1e-3"),
+        ("2*3", "write it as in 0.5, -2 or 1e-3"), ("\u0661", "write it as in 0.5, -2 or 1e-3"),
+    ],
+)  # fmt: skip
+def test_only_plain_decimal_numbers_are_numbers(text, remedy):
+    with pytest.raises(UnitError) as caught:
+        parse_number(text)
+    assert caught.value.remedy == remedy
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_every_float_that_python_writes_is_read_back(value):
+    assert parse_number(repr(value)) == value
+
+
+@pytest.mark.parametrize("text", ["1e999999999 s", "1e-999999999 Hz", "9" * 500, "1/" + "9" * 500 + " s"])
+def test_huge_exponents_are_refused_before_they_cost(text):
+    with pytest.raises(UnitError):
+        parse_rational(text)
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "shown"),
+    [
+        (0.05, "s", "50 ms"), (0.032, "m", "3.2 cm"), (0.24, "m", "24 cm"), (1.5, "m", "1.5 m"),
+        (2500, "m", "2.5 km"),
+        (0.004, "m", "4 mm"), (-0.032, "m", "-3.2 cm"), (0.0, "m", "0 m"), (20, "Hz", "20 Hz"),
+        (1e4, "Hz", "10 kHz"),
+        (math.pi / 6, "deg", "30 deg"), (0.9, "%", "90 %"), (2.0, "1", "2"),
+        (5.0, "1/s", "5 1/s"), (9.81, "m/s^2", "9.81 m/s^2"),
+        (0.99999, "s", "1 s"), (0.9996, "s", "999.6 ms"), (math.nan, "s", "nan s"), (math.inf, "m", "inf m"),
+        (0.012, "rad", "0.012 rad"), (1.25e-5, "s", "12.5 us"),
+    ],
+)  # fmt: skip
+def test_quantities_are_shown_for_people(value, unit, shown):
+    assert format_quantity(value, Unit.parse(unit)) == shown
+
+
+@given(
+    st.floats(-1e9, 1e9).filter(lambda value: value == 0 or abs(value) > 1e-9),
+    st.sampled_from(["s", "m", "rad", "deg", "Hz", "1", "%", "m/s", "rad/s^2", "V", "W", "N", "Pa", "km/h"]),
+)
+def test_a_shown_quantity_reads_back_as_the_same(value, name):
+    unit = Unit.parse(name)
+    read, written = parse_quantity(format_quantity(value, unit, digits=17))
+    assert read == pytest.approx(value, rel=1e-14)
+    assert written.dimension_equals(unit)
+
+
+@given(st.one_of(st.text(), st.text("0123456789.eE+-/*^() msradHz%", max_size=20)))
+def test_any_text_is_read_or_refused(text):
+    split_quantity(text)
+    for read in (Unit.parse, parse_units, parse_number, parse_quantity, parse_rational, parse_period):
+        try:
+            read(text)
+        except QuadvisError as error:
+            assert str(error).isprintable()
+    for unit in ("s", "1", "a"):
+        try:
+            read_quantity(text, Unit.parse(unit), bare=False)
+        except QuadvisError as error:
+            assert str(error).isprintable()
