@@ -20,10 +20,10 @@ class HoldValid(Block):
     """
 
     max_age = Param(0.25, unit="s", min=0.0, tune=True, doc="greatest age (inclusive) that is ok")
-    initial = Param(0.0, unit="a", doc="every element of the output before the first valid value")
     value = In("float64[*]", unit="a", doc="the measurement; NaN where it is missing")
     valid = In("bool", default=True, doc="whether the measurement is good")
     stamp = In(unit="s", default=math.nan, doc="instant of the measurement; NaN for now")
+    initial = In("float64[*]", unit="a", default=0.0, doc="the output before the first valid value")
     held = Out("float64[*]", unit="a", doc="the last valid value")
     age = Out(unit="s", doc="time since it was measured")
     ok = Out("bool", doc="whether there is one, and its age is at most ``max_age``")
@@ -31,16 +31,16 @@ class HoldValid(Block):
     measured = State(unit="s")
     seen = State("bool")
 
-    def start(self) -> None:
-        """Begin without a value."""
-        self.last = self.initial
-
-    def output(self, value: Any, valid: bool, stamp: float, time: float) -> tuple[Any, float, bool]:
+    def output(
+        self, value: Any, valid: bool, stamp: float, initial: Any, time: float
+    ) -> tuple[Any, float, bool]:
         """Return the value if it is valid, else the last one that was."""
         if valid and all_finite(value):
-            held, measured, seen = value, _instant(stamp, time), True
+            held, measured, seen = 1.0 * value, _instant(stamp, time), True
+        elif self.seen:
+            held, measured, seen = 1.0 * self.last, self.measured, True
         else:
-            held, measured, seen = 1.0 * self.last, self.measured, self.seen
+            held, measured, seen = 1.0 * initial, 0.0, False
         age = max(0.0, time - measured)
         return held, age, seen and age <= self.max_age + INSTANT
 

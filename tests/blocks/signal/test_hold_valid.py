@@ -23,7 +23,7 @@ def test_the_flag_alone_makes_a_value_invalid() -> None:
 
 
 def test_before_the_first_valid_value_it_gives_the_initial_one_and_is_not_ok() -> None:
-    result = drive(HoldValid(initial=-4.0, max_age=10.0), value=[NAN, NAN, 1.0])
+    result = drive(HoldValid(max_age=10.0), value=[NAN, NAN, 1.0], initial=-4.0)
     assert result.held.tolist() == [-4.0, -4.0, 1.0]
     assert result.age == pytest.approx([0.0, 1.0, 0.0])
     assert result.ok.tolist() == [False, False, True]

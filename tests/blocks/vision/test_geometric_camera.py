@@ -1,0 +1,83 @@
+"""vision.geometric_camera"""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from quadvis.block import ParameterError
+from quadvis.testing import drive
+from quadvis_blocks.vision.geometric_camera import GeometricCamera
+
+CALIBRATION = str(Path(__file__).parents[3] / "diagrams" / "calib" / "camera.yaml")
+K = np.array([[430.0, 2.0, 226.0], [0.0, 438.0, 161.0], [0.0, 0.0, 1.0]])
+HOVER = [0.1, -0.2, 1.4]
+
+
+def camera(**parameters):
+    return GeometricCamera(calibration=CALIBRATION, **{"noise": 0.0, "latency": 0.0, **parameters})
+
+
+def projected(position, attitude, ceiling=4.5, side=1.0):
+    """The corners by OpenCV's own rotation and projection, skew by hand."""
+    roll, pitch, yaw = attitude
+    turns = [cv2.Rodrigues(np.array(axis))[0] for axis in ([roll, 0.0, 0.0], [0.0, pitch, 0.0], [0.0, 0.0, yaw])]
+    body = turns[2] @ turns[1] @ turns[0]
+    rotation = np.diag([1.0, -1.0, -1.0]) @ body.T
+    place = np.array([position[0], position[1], ceiling - position[2]])
+    half = side / 2
+    corners = np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
+    rays, _ = cv2.projectPoints(corners, cv2.Rodrigues(rotation)[0], -rotation @ place, np.eye(3), None)
+    homogeneous = np.column_stack((np.asarray(rays).reshape(-1, 2), np.ones(4)))
+    return (homogeneous @ K.T)[:, :2]
+
+
+@pytest.mark.parametrize("attitude", [[0.0, 0.0, 0.0], [0.05, -0.03, 0.4]])
+def test_without_noise_the_centres_are_the_projected_corners(attitude):
+    seen = drive(camera(), position=HOVER, attitude=attitude, rate="10 Hz", steps=1)
+    assert seen.centres[0] == pytest.approx(projected(HOVER, attitude), abs=1e-6)
+    assert (seen.status[0], seen.found[0], seen.lost[0]) == (0, True, False)
+
+
+def test_noise_has_the_stated_deviation_and_follows_the_seed():
+    blocks = [drive(camera(noise=0.3), position=HOVER, attitude=[0.0] * 3, rate="10 Hz", steps=800, seed=seed)
+              for seed in (1, 1, 2)]  # fmt: skip
+    error = blocks[0].centres - projected(HOVER, [0.0] * 3)
+    assert error.std() == pytest.approx(0.3, rel=0.05)
+    assert abs(error.mean()) < 0.02
+    assert np.array_equal(blocks[0].centres, blocks[1].centres)
+    assert not np.array_equal(blocks[0].centres, blocks[2].centres)
+
+
+def test_a_measurement_arrives_after_the_latency_with_the_stamp_of_its_capture():
+    seen = drive(camera(latency=0.2), position=HOVER, attitude=[0.0] * 3, rate="10 Hz", steps=6)
+    assert seen.status.tolist()[:3] == [5, 5, 0]
+    assert seen.sequence.tolist() == [0, 0, 1, 2, 3, 4]
+    assert seen.stamp[2:] == pytest.approx([0.0, 0.1, 0.2, 0.3])
+
+
+def test_between_two_measurements_the_last_one_stays_and_is_not_fresh():
+    seen = drive(camera(drop_rate=0.5), position=HOVER, attitude=[0.0] * 3, rate="10 Hz", steps=200, seed=3)
+    fresh = np.diff(seen.sequence, prepend=0) != 0
+    assert np.array_equal(seen.fresh, fresh)
+    assert 70 < fresh.sum() < 130
+    assert not seen.lost.any()
+
+
+def test_circles_whose_outline_leaves_the_picture_are_missing():
+    # Flying forward, the camera leaves the target behind: its rear side (corners 1 and 4) goes first.
+    seen = drive(camera(), position=[[x, 0.0, 1.5] for x in (0.0, 1.0, 2.5)], attitude=[0.0] * 3, rate="10 Hz")
+    assert seen.status.tolist() == [0, 2, 3]
+    assert np.isnan(seen.centres[1]).all(axis=1).tolist() == [True, False, False, True]
+    assert seen.lost.tolist() == [False, False, True]
+
+
+def test_a_latency_beyond_the_queue_is_refused():
+    with pytest.raises(ParameterError, match="latency must be at most 16 periods, 1.6 s, got 2 s"):
+        drive(camera(latency=2.0), position=HOVER, attitude=[0.0] * 3, rate="10 Hz", steps=1)
+
+
+def test_a_calibration_that_is_not_there_is_refused():
+    with pytest.raises(ParameterError, match="calibration is not usable"):
+        GeometricCamera(calibration="missing.yaml")
