@@ -87,7 +87,6 @@ _OPTIONS = {
     # the default strategy cut a hover diagram in four places.
     "elk.layered.cycleBreaking.strategy": "DEPTH_FIRST",
     "elk.layered.crossingMinimization.greedySwitchHierarchical.type": "TWO_SIDED",
-    "elk.layered.compaction.postCompaction.strategy": "EDGE_LENGTH",
     "elk.json.shapeCoords": "ROOT",
     "elk.json.edgeCoords": "ROOT",
     "elk.padding": "[top=14,left=14,bottom=14,right=14]",
@@ -337,8 +336,9 @@ def _mark(mark: _Mark, x: float, y: float) -> Iterable[str]:
     yield svg.opening("g", class_="mark")
     yield svg.element("title", mark.text)
     if mark.constant:
+        yield svg.text(mark.shown, x - _ARROW - 3, y + 3.5, _SMALL, anchor="end", fill="#333333")
         yield svg.element("polyline", points=svg.points([(x - _ARROW, y), (x, y)]), stroke="#555555")
     else:
         yield svg.element("rect", **size, rx=7, fill=fill, stroke=line)
-    yield svg.text(mark.shown, left + mark.width / 2, y + 3.5, _SMALL, anchor="middle", fill="#333333")
+        yield svg.text(mark.shown, left + mark.width / 2, y + 3.5, _SMALL, anchor="middle", fill="#333333")
     yield "</g>"
