@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,10 +25,14 @@ SMALLEST = 32  # px: a picture with a shorter edge holds no target
 COLUMNS = 24  # width of the reduced picture that the ceiling is taken from
 WINDOW = 11  # edge of its median filter: nearly half the picture, so that circles stay a minority
 STEP = (0.2, 0.8)  # the soft step, as parts of the contrast between ceiling (0) and circle (1)
+MARGIN = 2.0  # px of ceiling around a circle, and a tenth of its radius for its ellipse
+EDGE = 1.0  # px, half the width of a circle's edge
+PASSES = 4
 CONTRAST_MIN = 10.0  # grey levels between circle and ceiling, as a distance of colours
 COLOUR_MAX = 1.0  # largest distance of a colour from the nearest of the four
 ELONGATION_MAX = 1.3  # moment of inertia over that of a disc with the same area
 BOX_MAX = 2.2  # longer edge of a blob's bounding box over the shorter one
+BLOBS_MAX = 20  # of one colour
 FILL = (0.55, 1.25)  # area of a blob over that of the ellipse in its bounding box
 
 
@@ -96,7 +101,22 @@ def find_blobs(pixels: Pixels, target: Target) -> tuple[Ceiling, list[list[Blob]
         corner, distance = target.colours.nearest(ratio)
         if distance < COLOUR_MAX:
             blobs[corner].append(Blob(centre, 2 * radius, distance))
-    return ceiling, blobs
+    # The time to arrange them grows with the fourth power of their number: the best colours must do.
+    return ceiling, [sorted(some, key=lambda blob: blob.distance)[:BLOBS_MAX] for some in blobs]
+
+
+def locate(pixels: Pixels, ceiling: Ceiling, centre: complex, radius: float) -> Disc | None:
+    """Return the circle near `centre`, measured in a window that holds it whole; None if there is none.
+
+    A window that cuts a circle displaces it, so the window follows until it does not.
+    """
+    for _ in range(PASSES):
+        margin = MARGIN + radius / 10
+        disc = measure(pixels, ceiling, centre, radius, margin)
+        if disc is None or abs(disc.centre - centre) + disc.radius + EDGE <= radius + margin:
+            return disc
+        centre, radius = disc.centre, max(disc.radius, radius)
+    return None
 
 
 def measure(
@@ -107,7 +127,7 @@ def measure(
     margin: float,
     colour: Colour | None = None,
 ) -> Disc | None:
-    """Return the circle near `centre` at full resolution; None if there is nothing round that is whole.
+    """Return what is round in the window around `centre`, at full resolution; None if it is cut or not round.
 
     The window reaches `margin` px beyond the expected `radius`. `colour` is that of the circle (blue,
     green, red); if it is not given, it is the mean around `centre`.
@@ -125,7 +145,11 @@ def measure(
     step = _soft_step(light, dark)
     if step is None:
         return None
-    round_one = _round(cv2.moments(cv2.transform(pixels[top:bottom, left:right], step)))
+    weights = cv2.transform(pixels[top:bottom, left:right], step)
+    if left and top and right < width and bottom < height:
+        # What stands in a corner of the window is no part of the circle.
+        weights = cv2.bitwise_and(weights, _round_window(right - left, bottom - top))
+    round_one = _round(cv2.moments(weights))
     if round_one is None:
         return None
     found, size = round_one[0] + complex(left, top), round_one[1]
@@ -133,6 +157,14 @@ def measure(
     if min(found.real, found.imag, width - 1 - found.real, height - 1 - found.imag) < size - 0.5:
         return None
     return Disc(found, size, _ratio(dark, light))
+
+
+@lru_cache(256)
+def _round_window(width: int, height: int) -> Pixels:
+    """Return a mask (height, width), 255 in the ellipse that it holds and 0 outside."""
+    v, u = np.mgrid[:height, :width]
+    inside = ((2 * u + 1) / width - 1) ** 2 + ((2 * v + 1) / height - 1) ** 2 <= 1
+    return np.where(inside, 255, 0).astype(np.uint8)
 
 
 def _round(moments: Any) -> tuple[complex, float] | None:

@@ -20,6 +20,7 @@ from quadvis_blocks.vision._circles import (
     Pixels,
     Target,
     find_blobs,
+    locate,
     measure,
 )
 from quadvis_blocks.vision._colours import Colour
@@ -33,7 +34,6 @@ calibration; a picture that is empty, too small or not uint8 blue-green-red."""
 
 QUALITY_MIN = 0.9  # of the median: a circle that lost a quarter of its area to something before it has 0.865
 REACH = 8.0  # px, and half a radius: how far a circle may move between two pictures and still be followed
-MARGIN = 3.0  # px of ceiling around a circle whose place is known
 GROWTH_MAX = math.log(1.33)  # of the square from one picture to the next
 TURN_MAX = 0.5  # rad, the same
 BEND_MAX = 0.08  # of the side: how far three circles may leave a motion of the whole square
@@ -83,7 +83,7 @@ def search(pixels: Pixels, target: Target) -> Detection:
     corners = arrange(blobs, target.ratio)
     if corners is None:
         return nothing(INCONSISTENT)
-    discs = [measure(pixels, ceiling, blob.centre, blob.radius, MARGIN) for blob in corners]
+    discs = [locate(pixels, ceiling, blob.centre, blob.radius) for blob in corners]
     return _square(discs, target) or nothing(INCONSISTENT if all(discs) else NOT_FOUND)
 
 
@@ -92,13 +92,19 @@ def follow(pixels: Pixels, target: Target, places: Array) -> Detection:
     ceiling = Ceiling(pixels, pixels.shape[1])
     known = [Place(complex(u, v), radius, (b, g, r)) for u, v, radius, b, g, r in places.tolist()]
     discs = [_followed(pixels, ceiling, target, corner, place) for corner, place in enumerate(known)]
+    moved = _moved(discs, known)
+    if moved is not None:
+        # Those that were seen tell where the others went, which may be further than a circle is followed.
+        for corner, place in enumerate(moved):
+            discs[corner] = discs[corner] or _followed(pixels, ceiling, target, corner, place)
     whole = _square(discs, target)
     if whole is not None:
         return whole
     found = search(pixels, target)
     if found.status <= TWO_CIRCLES:
         return found
-    return _part(discs, known) or found
+    moved = _moved(discs, known)
+    return found if moved is None else _detection(discs, moved) or found
 
 
 def _followed(pixels: Pixels, ceiling: Ceiling, target: Target, corner: int, place: Place) -> Disc | None:
@@ -108,7 +114,7 @@ def _followed(pixels: Pixels, ceiling: Ceiling, target: Target, corner: int, pla
     rough = measure(pixels, ceiling, place.centre, radius, REACH + radius / 2, (blue, green, red))
     if rough is None or abs(math.log(rough.radius / radius)) > RADIUS_MAX:
         return None
-    disc = measure(pixels, ceiling, rough.centre, max(radius, rough.radius), MARGIN)
+    disc = locate(pixels, ceiling, rough.centre, max(radius, rough.radius))
     if disc is None or abs(math.log(disc.radius / radius)) > RADIUS_MAX:
         return None
     return disc if target.colours.nearest(disc.ratio)[0] == corner else None
@@ -128,8 +134,8 @@ def _square(discs: Sequence[Disc | None], target: Target) -> Detection | None:
     return _detection(discs, places)
 
 
-def _part(discs: Sequence[Disc | None], known: Sequence[Place]) -> Detection | None:
-    """Return the detection of three or two circles that moved together since the last picture, or None."""
+def _moved(discs: Sequence[Disc | None], known: Sequence[Place]) -> list[Place] | None:
+    """Return where all circles are, if three or two moved together since the last picture; else None."""
     seen = [(place, disc) for place, disc in zip(known, discs, strict=True) if disc is not None]
     if not 2 <= len(seen) <= 3:
         return None
@@ -140,13 +146,12 @@ def _part(discs: Sequence[Disc | None], known: Sequence[Place]) -> Detection | N
         return None
     if abs(math.atan2(factor.imag, factor.real)) > TURN_MAX:
         return None
-    places = [
-        Place(disc.centre, place.radius * growth, disc.ratio)
-        if disc is not None
-        else Place(factor * place.centre + shift, place.radius * growth, place.ratio)
+    return [
+        Place(factor * place.centre + shift, place.radius * growth, place.ratio)
+        if disc is None
+        else Place(disc.centre, place.radius * growth, disc.ratio)
         for place, disc in zip(known, discs, strict=True)
     ]
-    return _detection(discs, places)
 
 
 def _detection(discs: Sequence[Disc | None], places: Sequence[Place]) -> Detection | None:

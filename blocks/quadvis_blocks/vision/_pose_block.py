@@ -100,4 +100,5 @@ class PoseFromCircles(Block, numeric=False):
         roll, pitch, yaw = attitude_of(pose.rotation.T @ CAMERA_FROM_BODY).tolist()
         error = self._camera.project(corner_points(pose, self.side)) - centres
         residual = math.sqrt(np.vdot(error, error) / 4)
+        yaw = math.pi if yaw <= -math.pi else yaw
         return pose.position, yaw, pose.rotation, roll, pitch, residual, True

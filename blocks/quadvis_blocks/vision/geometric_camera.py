@@ -32,6 +32,7 @@ class GeometricCamera(Block, numeric=False):
     position = In("float64[3]", unit="m", doc="position of the craft: x forward, y right, h up")
     attitude = In("float64[3]", unit="rad", doc="roll, pitch, yaw")
     centres = Out("float64[4,2]", unit="px", nan=True, doc="u, v of circles 1 to 4; NaN rows are missing")
+    quality = Out("float64[4]", nan=True, doc="1 for a circle that is seen")
     status = Out("int64", doc="0, 1, 2: four, three, two circles; 3: target not found; 5: nothing yet")
     found = Out("bool", doc="all four circles")
     lost = Out("bool", doc="a new measurement in which there is no target")
@@ -88,7 +89,17 @@ class GeometricCamera(Block, numeric=False):
         status = 4 - count if count >= 2 else NOT_FOUND
         if sequence == 0:
             status = STALE
-        return centres, status, status == 0, fresh and status > TWO_CIRCLES, row[STAMP], sequence, fresh
+        quality = np.where(np.isfinite(centres[:, 0]), 1.0, math.nan)
+        return (
+            centres,
+            quality,
+            status,
+            status == 0,
+            fresh and status > TWO_CIRCLES,
+            row[STAMP],
+            sequence,
+            fresh,
+        )
 
     def update(self, position: Any, attitude: Any, time: float) -> None:
         """Keep what was measured at this tick, and what has arrived."""
@@ -122,7 +133,9 @@ class GeometricCamera(Block, numeric=False):
             pixels[ahead] = self._camera.project(points[ahead])
         width, height = self._camera.size
         reach = self._camera.matrix[1, 1] * self.radius / np.maximum(points[:, 2], self.radius)
-        inside = (pixels >= reach[:, None]).all(axis=1) & (pixels <= np.array([width - 1, height - 1]) - reach[:, None]).all(axis=1)
+        inside = (pixels >= reach[:, None]).all(axis=1) & (
+            pixels <= np.array([width - 1, height - 1]) - reach[:, None]
+        ).all(axis=1)
         pixels[~inside] = math.nan
         return pixels + self.noise * np.asarray(self.drawn[:8]).reshape(4, 2)
 

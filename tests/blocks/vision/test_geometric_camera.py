@@ -22,7 +22,9 @@ def camera(**parameters):
 def projected(position, attitude, ceiling=4.5, side=1.0):
     """The corners by OpenCV's own rotation and projection, skew by hand."""
     roll, pitch, yaw = attitude
-    turns = [cv2.Rodrigues(np.array(axis))[0] for axis in ([roll, 0.0, 0.0], [0.0, pitch, 0.0], [0.0, 0.0, yaw])]
+    turns = [
+        cv2.Rodrigues(np.array(axis))[0] for axis in ([roll, 0.0, 0.0], [0.0, pitch, 0.0], [0.0, 0.0, yaw])
+    ]
     body = turns[2] @ turns[1] @ turns[0]
     rotation = np.diag([1.0, -1.0, -1.0]) @ body.T
     place = np.array([position[0], position[1], ceiling - position[2]])
@@ -67,7 +69,9 @@ def test_between_two_measurements_the_last_one_stays_and_is_not_fresh():
 
 def test_circles_whose_outline_leaves_the_picture_are_missing():
     # Flying forward, the camera leaves the target behind: its rear side (corners 1 and 4) goes first.
-    seen = drive(camera(), position=[[x, 0.0, 1.5] for x in (0.0, 1.0, 2.5)], attitude=[0.0] * 3, rate="10 Hz")
+    seen = drive(
+        camera(), position=[[x, 0.0, 1.5] for x in (0.0, 1.0, 2.5)], attitude=[0.0] * 3, rate="10 Hz"
+    )
     assert seen.status.tolist() == [0, 2, 3]
     assert np.isnan(seen.centres[1]).all(axis=1).tolist() == [True, False, False, True]
     assert seen.lost.tolist() == [False, False, True]
@@ -81,3 +85,13 @@ def test_a_latency_beyond_the_queue_is_refused():
 def test_a_calibration_that_is_not_there_is_refused():
     with pytest.raises(ParameterError, match="calibration is not usable"):
         GeometricCamera(calibration="missing.yaml")
+
+
+def test_it_can_stand_in_for_camera_and_detector():
+    from quadvis_blocks.vision.circle_detector import CircleDetector
+
+    outputs = [
+        {name: (port.signal, port.units) for name, port in block.interface.outputs.items()}
+        for block in (GeometricCamera, CircleDetector)
+    ]
+    assert outputs[0] == outputs[1]
