@@ -1,7 +1,7 @@
 """The contract of a block: ports, parameters and state declared once, behaviour in plain methods.
 
-A block's direct feedthrough is what its ``output`` asks for by name. Its parameters and states live in
-memory that the engine owns (see ``quadvis.memory``), so snapshot, replay, tuning and scopes need nothing from the author.
+A block's direct feedthrough is what its ``output`` asks for by name. Its parameters and states live in memory
+that the engine owns (see ``quadvis.memory``): snapshot, replay, tuning and scopes ask nothing of the author.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ RESERVED = {"self", "time", "period", "interface", "numeric", "check", "open", "
 
 Shape = tuple[int, ...]
 Sizes = dict[str, Any]  # symbol -> int; "*" -> Shape
+_SIZE = r"(?:[1-9]\d*|[a-z]\w*)"
 
 
 class ParameterError(QuadvisError):
-    """A parameter value that the block cannot accept: ``parameter`` names it, the text says what would be right."""
+    """A value that a parameter cannot take: ``parameter`` names it, the text says what would be right."""
 
     def __init__(self, parameter: str, message: str) -> None:
         super().__init__(message)
@@ -39,8 +40,8 @@ class ParameterError(QuadvisError):
 class Frame:
     """A picture on its way through a diagram. It travels by reference: never write into ``pixels``.
 
-    ``pixels`` is uint8 (height, width, 3), blue-green-red; ``stamp`` the middle of the exposure (s, run time);
-    ``sequence`` counts frames from 1, and 0 means that there is none yet.
+    ``pixels`` is uint8 (height, width, 3), blue-green-red; ``stamp`` is the middle of the exposure (s, run
+    time); ``sequence`` counts frames from 1, and 0 means that there is none yet.
     """
 
     pixels: NDArray[np.uint8]
@@ -58,7 +59,7 @@ NO_FRAME = Frame(np.zeros((0, 0, 3), np.uint8), math.nan, 0)
 
 @dataclass(frozen=True)
 class SignalType:
-    """What a port or state holds: a scalar kind and a shape, e.g. ``float64[4,2]``, ``float64[n]``, ``frame``."""
+    """What a port or state holds, a scalar kind and a shape: ``float64[4,2]``, ``float64[n]``, ``frame``."""
 
     scalar: str
     shape: tuple[int | str, ...]
@@ -68,10 +69,11 @@ class SignalType:
         """Read ``float64``, ``int64[3]``, ``float64[n]``, ``float64[*]`` (any shape) or ``frame``."""
         if text == "frame":
             return SignalType("frame", ())
-        match = re.fullmatch(r"(\w+)(?:\[([\w*, ]+)\])?", text)
+        match = re.fullmatch(rf"(\w+)(?:\[({_SIZE}(?:, *{_SIZE})*|\*)\])?", text)
         if match is None or match[1] not in SCALARS:
-            raise TypeError(f"'{text}' is not a signal type; write float64, int64 or bool, with a shape such as [3] or [4,2]")
-        sizes = [part.strip() for part in match[2].split(",")] if match[2] else []
+            remedy = "write float64, int64 or bool, with a shape such as [3], [4,2], [n] or [*]"
+            raise TypeError(sentence(f"'{text}' is not a signal type", remedy))
+        sizes = re.findall(_SIZE, match[2]) if match[2] and match[2] != "*" else (match[2] or "")
         return SignalType(match[1], tuple(int(size) if size.isdigit() else size for size in sizes))
 
     def resolve(self, sizes: Sizes) -> Shape:
@@ -81,7 +83,7 @@ class SignalType:
         return tuple(sizes.get(size, 1) if isinstance(size, str) else size for size in self.shape)
 
     def unify(self, shape: Shape, sizes: Sizes) -> bool:
-        """Match a concrete shape against this one, adding what it fixes to ``sizes``; False if it cannot be."""
+        """Match a concrete shape, adding what it fixes to ``sizes``; False if it does not fit."""
         if self.shape == ("*",):
             return bool(sizes.setdefault("*", shape) == shape)
         if len(shape) != len(self.shape):
@@ -108,16 +110,17 @@ class Declared:
         self.signal = SignalType.parse(self.type)
         self.units = parse_units(self.unit)
 
-    def __set_name__(self, owner: type, name: str) -> None:
+    def __set_name__(self, owner: Any, name: str) -> None:
         self.name = name
 
-    def __get__(self, block: Any, owner: type | None = None) -> Any:
+    def __get__(self, block: Any, owner: Any = None) -> Any:
         if block is None:
             return self
         try:
             return block.__dict__[self.name]
         except KeyError:
-            raise AttributeError(f"{type(block).__name__}.{self.name} has no value before the block runs") from None
+            problem = f"{type(block).__name__}.{self.name} has no value before the block runs"
+            raise AttributeError(problem) from None
 
     def __set__(self, block: Any, value: Any) -> None:
         block.__dict__[self.name] = value
@@ -150,7 +153,7 @@ class State(Declared):
 
 
 class Random(State):
-    """The state of a random stream (MRG32k3a), seeded by the engine from the run's seed and the block's path."""
+    """A random stream (MRG32k3a), seeded by the engine from the run's seed and the block's path."""
 
     def __init__(self) -> None:
         super().__init__("int64[6]", doc="random stream")
@@ -159,8 +162,8 @@ class Random(State):
 class Param(Declared):
     """A parameter: typed, with unit and bounds (``min``/``max`` inclusive, ``above``/``below`` exclusive).
 
-    Without a default it must be given. ``choices`` makes it a name out of a few, which the methods see as its
-    index. ``tune=True`` lets it change between ticks of a run. Type ``file`` is a path, relative to the diagram.
+    Without a default it must be given. ``choices`` makes it a name out of a few; the methods see its index.
+    ``tune=True`` lets it change between ticks of a run. Type ``file`` is a path relative to the diagram.
     """
 
     def __init__(
@@ -197,16 +200,12 @@ class Param(Declared):
             if not isinstance(value, str):
                 raise ParameterError(self.name, f"{self.name} must be a text, got {value!r}")
             return value
-        try:
-            array = np.array(value, dtype=float)
-        except (TypeError, ValueError):
-            array = np.array(math.nan)
-        if isinstance(value, str | bytes) or np.isnan(array).any():
+        array = _numbers(value)
+        if array is None or not _fits(array, self.signal.scalar):
             raise ParameterError(self.name, f"{self.name} must be {self.wanted()}, got {value!r}")
         if not self.signal.unify(array.shape, {}):
-            raise ParameterError(self.name, f"{self.name} must be {self.wanted()}, got {_shape_text(array.shape)}")
-        if self.signal.scalar != "float64" and (array != np.round(array)).any():
-            raise ParameterError(self.name, f"{self.name} must be a whole number, got {value!r}")
+            found = f"{self.name} must be {self.wanted()}, got {_shape_text(array.shape)}"
+            raise ParameterError(self.name, found)
         self._check_range(array)
         if array.shape:
             return array.astype(self.signal.scalar)
@@ -228,19 +227,48 @@ class Param(Declared):
         ):
             if bound is not None and not holds(array, bound).all():
                 wrong = array[~holds(array, bound)].flat[0] if array.shape else float(array)
-                raise ParameterError(self.name, f"{self.name} must be {words} {bound:g}{unit}, got {wrong:g}{unit}")
+                problem = f"{self.name} must be {words} {bound:g}{unit}, got {wrong:g}{unit}"
+                raise ParameterError(self.name, problem)
 
     def wanted(self) -> str:
         """Say in words what a right value is."""
         if self.choices:
             return "one of " + ", ".join(self.choices)
-        kind = {"float64": "number", "int64": "whole number", "bool": "true or false", "str": "text"}[self.signal.scalar]
+        one, many = _WORDS[self.signal.scalar]
         unit = "" if self.unit == "1" else f" in {self.unit}"
-        return f"{_shape_text(self.signal.shape)} of {kind}s{unit}" if self.signal.shape else f"a {kind}{unit}"
+        if self.signal.shape == ("*",):
+            return f"{one} or an array of {many}{unit}"
+        return f"{_shape_text(self.signal.shape)}, {many}{unit}" if self.signal.shape else f"{one}{unit}"
+
+
+_WORDS = {
+    "float64": ("a number", "numbers"),
+    "int64": ("a whole number", "whole numbers"),
+    "bool": ("true or false", "true or false"),
+    "str": ("a text", "texts"),
+}
+
+
+def _numbers(value: Any) -> NDArray[np.float64] | None:
+    """Return a value as an array of numbers, None if it is something else; NaN is no number."""
+    try:
+        if np.asarray(value).dtype.kind in "SU":
+            return None
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return None if np.isnan(array).any() else array
+
+
+def _fits(array: NDArray[np.float64], scalar: str) -> bool:
+    """Return whether a slot can hold the numbers."""
+    if scalar == "bool":
+        return bool(((array == 0) | (array == 1)).all())
+    return scalar == "float64" or bool(((array == np.round(array)) & (np.abs(array) < 2.0**63)).all())
 
 
 def _shape_text(shape: tuple[int | str, ...]) -> str:
-    return f"{'x'.join(map(str, shape))} values" if shape else "one value"
+    return f"{' x '.join(map(str, shape))} values" if shape else "one value"
 
 
 @dataclass(frozen=True)
@@ -267,8 +295,8 @@ class Interface:
 class Block:
     """One reusable unit of computation or input/output; see the module's docstring for the contract.
 
-    ``Gain(factor=2.0)`` is a block with its parameters chosen; ParameterError if one is unknown, missing or out of
-    range. It runs once the engine has bound it to memory.
+    ``Gain(factor=2.0)`` is a block with its parameters chosen; ParameterError if one is unknown, missing or
+    out of range. It runs once the engine has bound it to memory.
     """
 
     interface: ClassVar[Interface]
@@ -302,7 +330,7 @@ class Block:
         """Acquire what the block needs outside the engine: a file, a port, a device."""
 
     def close(self) -> None:
-        """Release it; hardware outputs go to their safe value first."""
+        """Release it, hardware outputs at their safe value first; called even if ``open`` failed halfway."""
 
 
 def _interface(cls: type[Block]) -> Interface:

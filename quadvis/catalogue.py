@@ -1,8 +1,9 @@
 """From the name of a block to its class: no list to edit, nothing imported that a diagram does not use.
 
-``signal.derivative`` is class ``Derivative`` in module ``quadvis_blocks.signal.derivative``. ``acme:slope`` is block
-``slope`` of the library that another distribution registered as ``acme`` in the entry point group
-``quadvis.libraries``. A folder ``blocks`` beside a diagram adds the user's own: ``blocks/wind/fan.py`` is ``wind.fan``.
+``signal.derivative`` is class ``Derivative`` in module ``quadvis_blocks.signal.derivative``. ``acme:slope``
+is block ``slope`` of the library that another distribution registered as ``acme`` in the entry point group
+``quadvis.libraries``. A folder ``blocks`` beside a diagram adds the user's own: ``blocks/wind/fan.py`` is
+``wind.fan``.
 """
 
 from __future__ import annotations
@@ -13,7 +14,6 @@ import pkgutil
 import re
 import sys
 from collections.abc import Iterator
-from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
 
@@ -37,13 +37,22 @@ class Catalogue:
     """Finds blocks by name; ``folder`` is where the diagram lies."""
 
     def __init__(self, folder: Path | None = None) -> None:
-        self.own = None if folder is None else folder / "blocks"
+        own = None if folder is None else folder / "blocks"
+        # In quadvis's own repository the folder of that name is the standard library's.
+        self.own = None if own is None or (own / STANDARD).is_dir() else own
+        self._found: dict[str, type[Block]] = {}
 
     def find(self, name: str) -> type[Block]:
         """Return the class of a block; CatalogueError says what is wrong with the name or with its module."""
+        if name not in self._found:
+            self._found[name] = self._find(name)
+        return self._found[name]
+
+    def _find(self, name: str) -> type[Block]:
         match = NAME.fullmatch(name)
         if match is None:
-            raise CatalogueError(f"'{name}' is not a block name", "write group.block, such as signal.derivative")
+            remedy = "write group.block, such as signal.derivative"
+            raise CatalogueError(f"'{name}' is not a block name", remedy)
         if match["library"]:
             return self._in_library(match["library"], match["path"], name)
         own = self._own_file(match["path"])
@@ -53,19 +62,20 @@ class Catalogue:
         if own:
             return _block_class(_load_file(own, name), name)
         if not standard:
-            raise CatalogueError(f"there is no block '{name}'", suggestion(name, self.names()) or "quadvis list shows all")
+            remedy = suggestion(name, self.names()) or "quadvis list shows all"
+            raise CatalogueError(f"there is no block '{name}'", remedy)
         return _block_class(_import(f"{STANDARD}.{match['path']}", name), name)
 
     def names(self) -> list[str]:
-        """Return the names of all blocks: the standard library's, the user's own, then the other libraries'."""
+        """Return the names of all blocks: the standard library's, the user's own, other libraries'."""
         found = sorted(_walk(STANDARD))
         if self.own is not None and self.own.is_dir():
             files = sorted(self.own.rglob("*.py"))
             paths = [file.relative_to(self.own).with_suffix("").parts for file in files]
-            found += [".".join(parts) for parts in paths if not any(part.startswith(("_", ".")) for part in parts)]
-        for entry in entry_points(group=GROUP):
-            if entry.value != STANDARD:
-                found += [f"{entry.name}:{path}" for path in sorted(_walk(entry.value))]
+            public = [parts for parts in paths if not any(part.startswith(("_", ".")) for part in parts)]
+            found += [".".join(parts) for parts in public]
+        for library, package in _libraries().items():
+            found += [f"{library}:{path}" for path in sorted(_walk(package))]
         return found
 
     def _own_file(self, path: str) -> Path | None:
@@ -73,7 +83,7 @@ class Catalogue:
         return file if file and file.is_file() else None
 
     def _in_library(self, library: str, path: str, name: str) -> type[Block]:
-        packages = {entry.name: entry.value for entry in entry_points(group=GROUP)}
+        packages = _libraries()
         if library not in packages:
             raise CatalogueError(f"there is no library '{library}'", suggestion(library, packages))
         module = f"{packages[library]}.{path}"
@@ -83,15 +93,22 @@ class Catalogue:
         return _block_class(_import(module, name), name)
 
 
+def _libraries() -> dict[str, str]:
+    """Return the packages of the other libraries, by the names under which they are registered."""
+    from importlib.metadata import entry_points  # takes longer than reading a diagram
+
+    return {entry.name: entry.value for entry in entry_points(group=GROUP) if entry.value != STANDARD}
+
+
 def _exists(module: str) -> bool:
-    """Whether a module is there, found without importing it; one that fails to import does exist."""
+    """Return whether a module is there, without importing it; one whose package fails to import is."""
     package, _, _ = module.rpartition(".")
     try:
         return importlib.util.find_spec(module) is not None and not _is_package(module)
     except ModuleNotFoundError as error:
-        if error.name and (package == error.name or package.startswith(error.name + ".")):
-            return False
-        raise
+        return not (error.name and (package == error.name or package.startswith(error.name + ".")))
+    except Exception:
+        return True
 
 
 def _is_package(module: str) -> bool:
@@ -100,8 +117,12 @@ def _is_package(module: str) -> bool:
 
 
 def _walk(package: str, prefix: str = "") -> Iterator[str]:
-    """Yield the paths of a library's blocks; modules that begin with an underscore hold shared mathematics."""
-    spec = importlib.util.find_spec(package)
+    """Yield the paths of a library's blocks; modules with a leading underscore hold shared mathematics."""
+    try:
+        spec = importlib.util.find_spec(package)
+    except Exception as error:
+        problem = f"the library package '{package}' cannot be loaded: {type(error).__name__}: {error}"
+        raise CatalogueError(problem) from error
     if spec is None or spec.submodule_search_locations is None:
         raise CatalogueError(f"the library package '{package}' cannot be found", "install it again")
     for module in pkgutil.iter_modules(spec.submodule_search_locations):
@@ -129,18 +150,17 @@ def _load_file(file: Path, name: str) -> ModuleType:
     try:
         spec.loader.exec_module(module)
     except Exception as error:
-        raise CatalogueError(f"block '{name}' cannot be loaded from {file}: {type(error).__name__}: {error}") from error
+        del sys.modules[module_name]
+        problem = f"block '{name}' cannot be loaded from {file}: {type(error).__name__}: {error}"
+        raise CatalogueError(problem) from error
     return module
 
 
 def _block_class(module: ModuleType, name: str) -> type[Block]:
-    own = [
-        value
-        for value in vars(module).values()
-        if isinstance(value, type) and issubclass(value, Block) and value.__module__ == module.__name__
-    ]
+    found = dict.fromkeys(value for value in vars(module).values() if isinstance(value, type))
+    own = [kind for kind in found if issubclass(kind, Block) and kind.__module__ == module.__name__]
     public = [block for block in own if not block.__name__.startswith("_")]
     if len(public) != 1:
-        found = ", ".join(block.__name__ for block in public) or "none"
-        raise CatalogueError(f"the module of block '{name}' must define one block, it defines {found}")
+        names = ", ".join(block.__name__ for block in public) or "none"
+        raise CatalogueError(f"the module of block '{name}' must define one block, it defines {names}")
     return public[0]

@@ -1,26 +1,28 @@
 """The engine, Python tier: runs a plan tick by tick, deterministic to the bit.
 
-The life of one tick, at time t = tick * base period:
-delayed copies, outputs of the blocks that are due, observers (log), updates of the same blocks, continuous states to
-t + base period. Blocks that are due together run in one dependency order, whatever their rates.
+The life of one tick, at time t = tick * base period: delayed copies, outputs of the blocks that are due,
+observers (log), updates of the same blocks, continuous states to t + base period. Blocks that are due at one
+tick run in one dependency order, whatever their rates. Between ticks a signal is what it was at its
+block's last one.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain
+from math import isnan
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from quadvis.block import ParameterError
 from quadvis.errors import QuadvisError, RunError
 from quadvis.graph import Graph
 from quadvis.plan import TIME, Bound, Call, Plan, make_plan
-from quadvis.solver import integrate
+from quadvis.solver import Solver, Vector
 
 Observer = Callable[[int], None]  # takes the tick, after the outputs of a step
 
@@ -34,9 +36,18 @@ class Snapshot:
     frames: tuple[Any, ...]
 
 
+@dataclass(frozen=True)
+class _Rhythm:
+    """Something that happens every so many ticks from an offset on: a task, or the observation of one."""
+
+    task: str
+    every: int
+    offset: int
+
+
 @dataclass
 class _Step:
-    """What one combination of due tasks does at a tick."""
+    """What one combination of due rhythms does at a tick."""
 
     delays: list[Call]
     outputs: list[Call]
@@ -58,14 +69,15 @@ class Engine:
         self.plan: Plan = make_plan(graph, seed)
         self.tick = 0
         self.period: Fraction = graph.tick
-        self._observers: list[tuple[str, Observer]] = []
-        self._step_size = float(self.period)
-        self._tasks = [
-            (task, int(task.period / self.period), int(task.offset / self.period)) for task in graph.tasks
-        ]
+        self._tasks = {
+            task.name: _Rhythm(task.name, graph.ticks(task.period), graph.ticks(task.offset))
+            for task in graph.tasks
+        }
+        self._observers: list[tuple[_Rhythm, Observer]] = []
+        self._rhythms = list(self._tasks.values())
         self._steps: dict[tuple[bool, ...], _Step] = {}
         self._opened: list[Bound] = []
-        self._time = self.plan.memory.view(TIME)
+        self._solver = Solver(graph.solver, float(self.period))
 
     @property
     def time(self) -> float:
@@ -73,118 +85,137 @@ class Engine:
         return float(self.tick * self.period)
 
     def __enter__(self) -> Self:
-        for bound in self.plan.steps:
-            self._opened.append(bound)
-            self._guarded(bound, "open")
-        for bound in self.plan.steps:
-            if "start" in bound.node.block.interface.arguments:
-                self._guarded(bound, "start")
+        try:
+            for bound in self.plan.steps:
+                self._opened.append(bound)
+                self._guarded(bound, "open")
+            for bound in self.plan.steps:
+                if "start" in bound.node.block.interface.arguments:
+                    self._guarded(bound, "start")
+        except BaseException as error:
+            self._close(error)
+            raise
         return self
 
-    def __exit__(self, *_: object) -> None:
-        errors = []
-        for bound in reversed(self._opened):
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
+        self._close(error)
+
+    def _close(self, cause: BaseException | None) -> None:
+        """Close every block that was opened; what goes wrong then must not hide what went wrong before."""
+        worst = cause
+        while self._opened:
             try:
-                bound.self.close()
-            except Exception as error:  # noqa: BLE001 - every block must be closed, whatever another one does
-                errors.append(RunError(f"cannot close: {error}", block=bound.node.path, time=self.time))
-        self._opened.clear()
-        if errors:
-            raise errors[0]
+                self._guarded(self._opened.pop(), "close")
+            except BaseException as error:
+                if worst is None:
+                    worst = error
+                else:
+                    worst.add_note(str(error))
+        if worst is not None and worst is not cause:
+            raise worst
 
     def _guarded(self, bound: Bound, method: str) -> None:
         try:
             getattr(bound.self, method)()
-        except QuadvisError:
-            raise
         except Exception as error:
-            raise self._failure(bound, error) from error
+            raise self._failure(bound, error, method) from error
 
-    def observe(self, task: str, observer: Observer) -> None:
-        """Call ``observer(tick)`` at every tick of a task, when the outputs are there and before the updates."""
-        self._observers.append((task, observer))
+    def observe(self, task: str, observer: Observer, every: int = 1) -> None:
+        """Call ``observer(tick)`` at a task's first and then every so many of its ticks.
+
+        It is called when the outputs are there and before the updates. A restored run is observed at the same
+        ticks as the first one.
+        """
+        own = self._tasks[task]
+        rhythm = _Rhythm(task, own.every * every, own.offset)
+        self._observers.append((rhythm, observer))
+        if rhythm not in self._rhythms:
+            self._rhythms.append(rhythm)
         self._steps.clear()
 
+    @np.errstate(all="ignore")  # what is not finite is found here, and told with its block
     def run(self, ticks: int) -> None:
         """Run that many ticks."""
-        memory, end = self._time, self.tick + ticks
-        tasks, continuous = self._tasks, self.plan.continuous.size > 0
-        period, denominator = self.period.numerator, self.period.denominator
+        end = self.tick + ticks
+        floats = self.plan.memory.floats
+        clock = self.plan.memory.raw.cast("d")  # one element costs a third of a numpy array's
+        rhythms = [(rhythm.every, rhythm.offset) for rhythm in self._rhythms]
+        period, denominator = self.period.as_integer_ratio()
+        continuous = self.plan.continuous.size > 0
         while self.tick < end:
             tick = self.tick
-            due = tuple([(tick - offset) % every == 0 and tick >= offset for _, every, offset in tasks])
+            due = tuple([(tick - offset) % every == 0 and tick >= offset for every, offset in rhythms])
             step = self._steps.get(due) or self._prepare(due)
             # An exact product, so that time has no drift; the quotient of integers is rounded once.
-            memory[...] = tick * period / denominator
-            for copy in step.delays:
-                copy()
-            self._perform(step, step.outputs, "output")
-            if step.finite.size and math.isnan(self.plan.memory.floats.take(step.finite).dot(step.zeros)):
+            clock[TIME.position] = tick * period / denominator
+            self._perform(step.delays)
+            self._perform(step.outputs)
+            if isnan(floats.take(step.finite).dot(step.zeros)):
                 raise self._not_finite(step)
             for observe in step.observers:
                 observe(tick)
-            self._perform(step, step.updates, "update")
+            self._perform(step.updates)
             if continuous:
-                self._integrate()
+                self._integrate(clock[TIME.position])
             self.tick = tick + 1
 
-    def _perform(self, step: _Step, calls: list[Call], method: str) -> None:
+    def _perform(self, calls: list[Call]) -> None:
         call = None
         try:
-            for call in calls:  # noqa: B007 - the failing one is looked at below
+            for call in calls:
                 call()
-        except QuadvisError:
-            raise
         except Exception as error:
-            bound = next(bound for bound in step.blocks if getattr(bound, method) is call)
-            raise self._failure(bound, error) from error
+            assert call is not None
+            raise self._failure(self.plan.owner(call), error) from error
 
     def _prepare(self, due: tuple[bool, ...]) -> _Step:
-        tasks = [task for (task, _, _), flag in zip(self._tasks, due, strict=True) if flag]
-        blocks = self.plan.due(tasks)
+        rhythms = [rhythm for rhythm, flag in zip(self._rhythms, due, strict=True) if flag]
+        names = [name for name, rhythm in self._tasks.items() if rhythm in rhythms]
+        blocks = [bound for bound in self.plan.steps if bound.node.task.name in names]
         finite = self.plan.finite(blocks)
         made = _Step(
-            list(chain.from_iterable(self.plan.delays.get(task.name, []) for task in tasks)),
+            list(chain.from_iterable(self.plan.delays.get(name, []) for name in names)),
             [bound.output for bound in blocks if bound.output],
             [bound.update for bound in blocks if bound.update],
             finite,
             np.zeros(finite.size),
-            [observe for name, observe in self._observers if name in {task.name for task in tasks}],
+            [observe for rhythm, observe in self._observers if rhythm in rhythms],
             blocks,
         )
         self._steps[due] = made
         return made
 
-    def _integrate(self) -> None:
-        floats, places = self.plan.memory.floats, self.plan.continuous
-        time = float(self._time)
-        minor, derivatives, slopes = self.plan.minor, self.plan.derivatives, self.plan.slopes
-        first = True
+    def _integrate(self, time: float) -> None:
+        plan = self.plan
+        raw, floats = plan.memory.raw, plan.memory.floats
+        # Minor steps write over time and signals, but delays and readers want those of the tick.
+        held = bytes(raw[plan.held])
+        self._perform(plan.derivatives)
+        state = self._solver.advance(self._rates, time, floats[plan.continuous], floats[plan.slopes])
+        raw[plan.held] = held
+        floats[plan.continuous] = state
+        if not np.isfinite(state).all():
+            raise self._not_finite_state()
 
-        def rates(at: float, state: NDArray[np.float64]) -> NDArray[np.float64]:
-            nonlocal first
-            if not first:
-                floats[places] = state
-                self._time[...] = at
-                for output in minor:
-                    output()
-            first = False
-            for deriv in derivatives:
-                deriv()
-            return slopes.copy()
+    def _rates(self, time: float, state: Vector) -> Vector:
+        """Return the derivative at a minor step."""
+        plan = self.plan
+        floats = plan.memory.floats
+        floats[TIME.position] = time
+        floats[plan.continuous] = state
+        self._perform(plan.minor)
+        self._perform(plan.derivatives)
+        return floats[plan.slopes]
 
-        try:
-            after = integrate(self.graph.solver, rates, time, floats[places], self._step_size)
-        except QuadvisError:
-            raise
-        except Exception as error:
-            raise RunError(f"{type(error).__name__} in a solver step: {error}", time=time) from error
-        floats[places] = after
-        if not np.isfinite(after).all():
-            raise self._not_finite_state(time)
-
-    def _failure(self, bound: Bound, error: Exception) -> RunError:
-        return RunError(f"{type(error).__name__}: {error}", block=bound.node.path, time=self.time)
+    def _failure(self, bound: Bound, error: Exception, method: str = "") -> QuadvisError:
+        """Return an error that says in which block and when another one happened."""
+        path = bound.node.path
+        if isinstance(error, RunError) and error.block:
+            return error
+        if isinstance(error, ParameterError):
+            return ParameterError(error.parameter, f"block '{path}': {error}")
+        reason = str(error) if isinstance(error, QuadvisError) else f"{type(error).__name__}: {error}"
+        return RunError(f"cannot {method}: {reason}" if method else reason, block=path, time=self.time)
 
     def _not_finite(self, step: _Step) -> RunError:
         """Name the first port, in execution order, that is not finite."""
@@ -194,18 +225,16 @@ class Engine:
                     value = self.plan.memory.read(slot)
                     if not np.isfinite(value).all():
                         text = np.array2string(np.asarray(value), precision=4)
-                        return RunError(f"the output became {text}", block=bound.node.path, port=port, time=self.time)
+                        problem = f"the output became {text}"
+                        return RunError(problem, block=bound.node.path, port=port, time=self.time)
         raise AssertionError("a value that is not finite belongs to a port")
 
-    def _not_finite_state(self, time: float) -> RunError:
+    def _not_finite_state(self) -> RunError:
         for bound in self.plan.steps:
             for state in bound.node.block.interface.continuous:
                 if not np.isfinite(self.plan.memory.view(bound.field(state.name))).all():
-                    return RunError(
-                        f"state '{state.name}' left the finite numbers; a smaller solver step may help",
-                        block=bound.node.path,
-                        time=time,
-                    )
+                    problem = f"state '{state.name}' left the finite numbers; a smaller solver step may help"
+                    return RunError(problem, block=bound.node.path, time=self.time)
         raise AssertionError("a state that is not finite belongs to a block")
 
     def snapshot(self) -> Snapshot:
@@ -214,8 +243,11 @@ class Engine:
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot of the same graph; the run from there repeats to the bit."""
-        self.plan.memory.raw[:] = snapshot.memory
-        self.plan.memory.frames[:] = snapshot.frames
+        memory = self.plan.memory
+        if (len(snapshot.memory), len(snapshot.frames)) != (len(memory.raw), len(memory.frames)):
+            raise ValueError("the snapshot is of another graph")
+        memory.raw[:] = snapshot.memory
+        memory.frames[:] = snapshot.frames
         self.tick = snapshot.tick
 
     def read(self, path: str, port: str) -> Any:

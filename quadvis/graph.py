@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from quadvis.units import Unit
 CROSSINGS = {
     "sample": "a faster producer is read at the consumer's ticks",
     "hold": "a slower producer's value is held between its ticks",
-    "delay": "the producer's value of one period ago: the same in every order of execution, and it breaks loops",
+    "delay": "the producer's value of one of its periods ago, which breaks loops",
     "newest": "whatever the producer gave last, for rates that do not fit into each other",
 }
 SOLVERS = ("ode1", "ode2", "ode3", "ode4")
@@ -26,7 +27,7 @@ Index = tuple[Any, ...]  # integers, then slices, as numpy takes them
 
 @dataclass(frozen=True)
 class Task:
-    """Blocks that share a rate. The continuous task runs at every solver step. Times are exact, in seconds."""
+    """Blocks that share a rate. The continuous task runs at every solver step. Times are exact (s)."""
 
     name: str
     period: Fraction
@@ -36,7 +37,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Wire:
-    """Where an input comes from: a port of a block, perhaps a part of it, and how it crosses between rates."""
+    """Where an input comes from: a port of a block, perhaps a part of it; how it crosses between rates."""
 
     block: str
     port: str
@@ -66,7 +67,7 @@ class Node:
     task: Task
     inputs: dict[str, Wire | Constant]
     sizes: Sizes = field(default_factory=dict)
-    units: dict[str, tuple[Unit, ...]] = field(default_factory=dict)  # of the outputs' elements, variables resolved
+    units: dict[str, tuple[Unit, ...]] = field(default_factory=dict)  # of the outputs, element by element
 
     def shape(self, port: str) -> Shape:
         """Return the shape of an input, output or state."""
@@ -88,29 +89,39 @@ class Node:
 
 @dataclass
 class Graph:
-    """All blocks in an order in which every output is computed after what it needs, and the exact time base."""
+    """All blocks, each after the blocks whose outputs its own need, and the exact time base."""
 
     name: str
     nodes: list[Node]
     solver: str = "ode4"
     step: Fraction | None = None
 
-    def __getitem__(self, path: str) -> Node:
-        return next(node for node in self.nodes if node.path == path)
+    def __post_init__(self) -> None:
+        self._by_path = {node.path: node for node in self.nodes}
 
-    @property
+    def __getitem__(self, path: str) -> Node:
+        return self._by_path[path]
+
+    @cached_property
     def tasks(self) -> list[Task]:
         """The tasks in use, fastest first (rate-monotonic), the continuous one before all."""
         used = dict.fromkeys(node.task for node in self.nodes)
         return sorted(used, key=lambda task: (not task.continuous, task.period, task.offset, task.name))
 
-    @property
+    @cached_property
     def tick(self) -> Fraction:
         """The base tick (s): the solver's step, or the largest that divides every period and offset."""
         if self.step is not None:
             return self.step
         times = [time for task in self.tasks for time in (task.period, task.offset) if time]
         return common_divisor(times) if times else Fraction(1)
+
+    def ticks(self, time: Fraction) -> int:
+        """Return a time as a number of base ticks; ValueError if it is not a whole one."""
+        count = time / self.tick
+        if count.denominator != 1:
+            raise ValueError(f"{time} s is not a whole number of ticks of {self.tick} s")
+        return count.numerator
 
 
 def common_divisor(times: Sequence[Fraction]) -> Fraction:
@@ -122,10 +133,13 @@ def common_divisor(times: Sequence[Fraction]) -> Fraction:
 def selected(shape: Shape, index: Index) -> tuple[int, Shape] | None:
     """Return the first element and the shape of ``signal[index]``; None if it does not lie in one piece.
 
-    IndexError if the index goes beyond the shape.
+    IndexError if the index goes beyond the shape or takes nothing: unlike numpy's, a slice is not cut short.
     """
+    for part, length in zip(index, shape, strict=False):
+        if isinstance(part, slice) and ((part.stop or 0) > length or not range(length)[part]):
+            raise IndexError(f"{part.start}:{part.stop} of {length} elements")
     part = np.arange(math.prod(shape)).reshape(shape)[index]
-    if part.size == 0 or int(part.flat[-1]) - int(part.flat[0]) + 1 != part.size:
+    if int(part.flat[-1]) - int(part.flat[0]) + 1 != part.size:
         return None
     return int(part.flat[0]), part.shape
 
@@ -140,7 +154,8 @@ def execution_order(nodes: Sequence[Node]) -> tuple[list[Node], list[list[tuple[
     done: set[str] = set()
     order: list[Node] = []
     loops: list[list[tuple[str, str]]] = []
-    trail: list[tuple[str, str, Iterator[tuple[str, str]]]] = []  # block, input it was reached through, its needs
+    # Each entry: a block, the input through which the search reached it, what it still needs.
+    trail: list[tuple[str, str, Iterator[tuple[str, str]]]] = []
     active: dict[str, int] = {}
 
     def enter(path: str, port: str) -> None:

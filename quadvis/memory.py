@@ -1,7 +1,8 @@
 """The memory that the engine owns: one flat run of 8-byte slots, and blocks bound to their place in it.
 
-Every scalar takes one slot (float64, int64, or a bool in its first byte), so one layout serves the Python tier
-(blocks bound as C structures), numpy (views), the log (rows are slices) and compiled code (``self`` as a record).
+Every scalar takes one slot (float64, int64, or a bool in its first byte, the others zero). One layout serves
+the Python tier (blocks bound as C structures), numpy (views), the log (rows are slices) and compiled code
+(``self`` as a record).
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import math
+import types
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.block import Block, Shape, Sizes
+from quadvis.block import SCALARS, Block, Shape, Sizes
 
 SLOT = 8
 C_TYPES = {"float64": ctypes.c_double, "int64": ctypes.c_int64, "bool": ctypes.c_bool}
@@ -25,7 +27,7 @@ VIEWS = {"float64": "d", "int64": "q", "bool": "?"}
 
 @dataclass(frozen=True)
 class Slot:
-    """Where a signal or a field lives: kind, shape and first slot; for ``frame`` the place in the list of frames."""
+    """Where a signal or field lives: kind, shape, first slot; for ``frame`` its place in a list of frames."""
 
     scalar: str
     shape: Shape
@@ -40,6 +42,11 @@ class Slot:
     def strides(self) -> Shape:
         """Bytes between neighbours along each axis."""
         return tuple(SLOT * math.prod(self.shape[axis + 1 :]) for axis in range(len(self.shape)))
+
+
+def packed(scalar: str, shape: Shape) -> np.dtype[Any]:
+    """Return the type of the elements of a field or signal if they are to fill their slots without gaps."""
+    return np.dtype("int64" if shape and scalar == "bool" else scalar)
 
 
 @dataclass(frozen=True)
@@ -73,10 +80,13 @@ class Record:
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """The same layout as a numpy record, which is what compiled methods take as ``self``."""
+        """The same layout as a numpy record, which is what compiled methods take as ``self``.
+
+        An array of bools is one of int64 here, since numpy cannot say that each takes a slot.
+        """
         return np.dtype({
             "names": [field.name for field in self.fields],
-            "formats": [(np.dtype(field.scalar), field.shape) for field in self.fields],
+            "formats": [(packed(field.scalar, field.shape), field.shape) for field in self.fields],
             "offsets": [field.offset * SLOT for field in self.fields],
             "itemsize": self.size * SLOT,
         })  # fmt: skip
@@ -119,12 +129,14 @@ class Memory:
     ) -> Callable[[], None]:
         """Return a call of ``method`` from slots to slots, specialised to what they hold.
 
-        A general loop over arguments would cost more than most blocks do.
+        A general loop over arguments would cost more than most blocks do. Array arguments are read-only.
         """
         make = _caller(tuple(map(_kind, arguments)), tuple(map(_kind, targets)))
         places = [self._place(slot) for slot in (*arguments, *targets)]
-        made: Callable[[], None] = make(method, places, self.frames, *self._scalars.values())
-        return made
+        for place, slot in zip(places, arguments, strict=False):
+            if slot.shape:
+                place.flags.writeable = False
+        return make(method, places, self.frames, *self._scalars.values())
 
     def _place(self, slot: Slot) -> Any:
         """Return what indexes the slot in its view: arrays have one of their own, bools count bytes."""
@@ -146,11 +158,12 @@ class Memory:
 
     def bind(self, block: Block, record: Record, position: int, period: float) -> Block:
         """Return the block as its methods see it: its fields are the bytes from ``position`` on."""
-        kind = _bound_class(type(block), record)
-        bound: Block = kind.from_buffer(self.bytes, position * SLOT)  # type: ignore[attr-defined]
+        kind: Any = _bound_class(type(block), record)  # type: ignore[arg-type]  # mypy: a class has no hash
+        bound: Block = kind.from_buffer(self.bytes, position * SLOT)
         for item in record.fields:
             if item.shape:
-                bound.__dict__[f"_{item.name}"] = self.view(Slot(item.scalar, item.shape, position + item.offset))
+                view = self.view(Slot(item.scalar, item.shape, position + item.offset))
+                bound.__dict__[_array_key(item.name)] = view
         bound.period = period
         for name, param in block.interface.params.items():
             value = getattr(block, name)
@@ -159,7 +172,7 @@ class Memory:
             else:
                 setattr(bound, name, value)
         for state in block.interface.states.values():
-            setattr(bound, state.name, state.init)
+            setattr(bound, state.name, SCALARS[state.signal.scalar](state.init))
         return bound
 
 
@@ -169,7 +182,7 @@ def _kind(slot: Slot) -> str:
 
 @functools.cache
 def _caller(arguments: tuple[str, ...], targets: tuple[str, ...]) -> Callable[..., Callable[[], None]]:
-    """Make the maker of calls for one signature; its text is made of the kinds alone, never of a user's input."""
+    """Make the maker of calls for one signature; its text is made of the kinds alone."""
     patterns = {"frame": "frames[p{}]", "array": "p{}", **{scalar: f"{scalar}[p{{}}]" for scalar in VIEWS}}
     sources = [patterns[kind].format(index) for index, kind in enumerate(arguments)]
     sinks = [
@@ -194,19 +207,27 @@ def _caller(arguments: tuple[str, ...], targets: tuple[str, ...]) -> Callable[..
 def _bound_class(block: type[Block], record: Record) -> type[Block]:
     """Make the block's class again as a C structure over its record; array fields become views."""
     fields: list[tuple[str, Any]] = []
-    attributes: dict[str, Any] = {"__init__": object.__init__}
+    attributes: dict[str, Any] = {
+        "__init__": object.__init__,
+        "__module__": block.__module__,
+        "_fields_": fields,
+    }
     for item in record.fields:
         if item.shape:
-            fields.append((f"_{item.name}_slots", ctypes.c_double * math.prod(item.shape)))
-            attributes[item.name] = _array_property(f"_{item.name}")
+            fields.append((f"{item.name}.slots", ctypes.c_double * math.prod(item.shape)))
+            attributes[item.name] = _array_property(_array_key(item.name))
         else:
             fields.append((item.name, C_TYPES[item.scalar]))
             if item.scalar == "bool":
-                fields.append((f"_{item.name}_rest", ctypes.c_uint8 * (SLOT - 1)))
-    attributes["_fields_"] = fields
-    metaclass = type(ctypes.Structure)
-    made: type[Block] = metaclass(block.__name__, (block, ctypes.Structure), attributes, bound=True)
-    return made
+                fields.append((f"{item.name}.rest", ctypes.c_uint8 * (SLOT - 1)))
+    return types.new_class(
+        block.__name__, (block, ctypes.Structure), {"bound": True}, lambda body: body.update(attributes)
+    )
+
+
+def _array_key(name: str) -> str:
+    """Return where a bound block keeps an array's view, a name that no attribute of an author can have."""
+    return f"{name}[]"
 
 
 def _array_property(key: str) -> property:

@@ -1,41 +1,44 @@
 """From a checked graph to something that runs: one memory layout and flat lists of calls.
 
-Layout, in 8-byte slots: time | constants | signals, task by task and block by block | delayed signals | slopes | one record per block. A block's
-outputs lie side by side, so a row of the log is one slice. The native tier is meant to run the same plan.
+Layout, in 8-byte slots: time | signals, task by task (the continuous one first), block by block | constants |
+delayed signals | slopes | one record per block. A block's outputs lie side by side: a row of the log is one
+slice. The native tier is meant to run the same plan.
 """
 
 from __future__ import annotations
 
 import hashlib
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.block import NO_FRAME, Block, Random
+from quadvis.block import NO_FRAME, Block, Random, Shape
 from quadvis.graph import Constant, Graph, Node, Task, Wire, selected
-from quadvis.memory import Memory, Record, Slot
+from quadvis.memory import SLOT, Memory, Record, Slot
 
 Call = Callable[[], None]
+Positions = NDArray[np.intp]  # in ``Memory.floats``
 TIME = Slot("float64", (), 0)
 STREAM_MODULUS = 4294944443  # the smaller of the two moduli of MRG32k3a: every seed below it is valid
 
 
 @dataclass(eq=False)
 class Bound:
-    """A block in its place: ``self`` over memory, its input and output slots, its calls."""
+    """A block in its place: ``self`` over memory, slots of inputs, outputs and derivatives, its calls."""
 
     node: Node
     self: Block
     inputs: dict[str, Slot]
     outputs: dict[str, Slot]
+    slopes: dict[str, Slot]  # of its continuous states
     record: Record
     position: int
     output: Call | None = None
     update: Call | None = None
+    deriv: Call | None = None
 
     def field(self, name: str) -> Slot:
         """Return the slot of a parameter or state."""
@@ -48,7 +51,7 @@ class Bound:
         slots = [slot for slot in self.outputs.values() if slot.scalar != "frame"]
         if not slots:
             return slice(0, 0)
-        return slice(slots[0].position * 8, (slots[-1].position + slots[-1].size) * 8)
+        return slice(slots[0].position * SLOT, (slots[-1].position + slots[-1].size) * SLOT)
 
 
 @dataclass(eq=False)
@@ -58,55 +61,77 @@ class Plan:
     graph: Graph
     memory: Memory
     steps: list[Bound]
+    held: slice  # the bytes of the time and of the continuous task's signals, which minor steps write over
     delays: dict[str, list[Call]] = field(default_factory=dict)  # task -> copies made before its blocks run
-    continuous: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))  # places of the states
-    slopes: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))  # their derivatives, in the same order
+    continuous: Positions = field(default_factory=lambda: _positions(()))  # of the continuous states
+    slopes: Positions = field(
+        default_factory=lambda: _positions(())
+    )  # of their derivatives, in the same order
     derivatives: list[Call] = field(default_factory=list)
     minor: list[Call] = field(default_factory=list)  # the outputs that derivatives depend on
 
+    def __post_init__(self) -> None:
+        self._by_path = {step.node.path: step for step in self.steps}
+
     def __getitem__(self, path: str) -> Bound:
-        return next(step for step in self.steps if step.node.path == path)
+        return self._by_path[path]
+
+    def owner(self, call: Call) -> Bound:
+        """Return the block that a call belongs to."""
+        return next(step for step in self.steps if call in (step.output, step.update, step.deriv))
 
     def due(self, tasks: Sequence[Task]) -> list[Bound]:
         """Return the blocks of some tasks in execution order: what runs at a tick at which these are due."""
         return [step for step in self.steps if step.node.task in tasks]
 
-    def finite(self, steps: Sequence[Bound]) -> NDArray[np.intp]:
+    def finite(self, steps: Sequence[Bound]) -> Positions:
         """Return the positions that must hold finite numbers once these blocks have run."""
-        positions: list[int] = []
-        for step in steps:
-            for name, slot in step.outputs.items():
-                if slot.scalar == "float64" and not step.node.block.interface.outputs[name].nan:
-                    positions.extend(range(slot.position, slot.position + slot.size))
-        return np.array(positions, np.intp)
+        return _positions(
+            slot
+            for step in steps
+            for name, slot in step.outputs.items()
+            if slot.scalar == "float64" and not step.node.block.interface.outputs[name].nan
+        )
+
+
+def _positions(slots: Iterable[Slot]) -> Positions:
+    """Return the position of every element."""
+    ranges = [range(slot.position, slot.position + slot.size) for slot in slots]
+    return np.array([position for run in ranges for position in run], np.intp)
 
 
 def make_plan(graph: Graph, seed: int) -> Plan:
     """Lay out memory, bind every block and prepare its calls; states hold their initial values, seeded."""
     layout = _Layout(graph)
     memory = Memory(layout.size, [NO_FRAME] * layout.frames)
-    plan = Plan(graph, memory, [])
-    for node in graph.nodes:
-        record, position = layout.records[node.path]
-        bound_self = memory.bind(node.block, record, position, float(node.task.period))
-        inputs = {port: layout.source(node, port) for port in node.inputs}
-        bound = Bound(node, bound_self, inputs, layout.outputs[node.path], record, position)
-        for port, source in node.inputs.items():
-            if isinstance(source, Constant):
-                memory.write(inputs[port], source.value)
-        for name, state in node.block.interface.states.items():
-            if isinstance(state, Random):
-                memory.write(bound.field(name), _stream(seed, node.path, name))
-        if "output" in node.block.interface.arguments:
-            bound.output = _call(memory, bound, "output", list(bound.outputs.values()))
-        if "update" in node.block.interface.arguments:
-            bound.update = _call(memory, bound, "update", [])
-        plan.steps.append(bound)
+    steps = [_bind(memory, layout, node, seed) for node in graph.nodes]
+    plan = Plan(graph, memory, steps, slice(0, layout.continuous * SLOT))
     for (path, port), slot in layout.delayed.items():
         task = graph[path].task.name
         plan.delays.setdefault(task, []).append(memory.copy(layout.outputs[path][port], slot))
-    _prepare_continuous(plan, layout.slopes)
+    _prepare_continuous(plan)
     return plan
+
+
+def _bind(memory: Memory, layout: _Layout, node: Node, seed: int) -> Bound:
+    record, position = layout.records[node.path]
+    bound_self = memory.bind(node.block, record, position, float(node.task.period))
+    inputs = {port: layout.source(node, port) for port in node.inputs}
+    slopes = layout.slopes[node.path]
+    bound = Bound(node, bound_self, inputs, layout.outputs[node.path], slopes, record, position)
+    for port, source in node.inputs.items():
+        if isinstance(source, Constant):
+            memory.write(inputs[port], source.value)
+    for name, state in node.block.interface.states.items():
+        if isinstance(state, Random):
+            memory.write(bound.field(name), _stream(seed, node.path, name))
+    if "output" in node.block.interface.arguments:
+        bound.output = _call(memory, bound, "output", list(bound.outputs.values()))
+    if "update" in node.block.interface.arguments:
+        bound.update = _call(memory, bound, "update", [])
+    if "deriv" in node.block.interface.arguments:
+        bound.deriv = _call(memory, bound, "deriv", list(slopes.values()))
+    return bound
 
 
 def _call(memory: Memory, bound: Bound, method: str, targets: list[Slot]) -> Call:
@@ -115,27 +140,46 @@ def _call(memory: Memory, bound: Bound, method: str, targets: list[Slot]) -> Cal
     return memory.call(getattr(bound.self, method), arguments, targets)
 
 
-def _prepare_continuous(plan: Plan, slopes: int) -> None:
-    """Number the continuous states, and find the blocks that minor steps must compute again."""
-    positions: list[int] = []
+def _prepare_continuous(plan: Plan) -> None:
+    """Gather the continuous states, and find the blocks that minor steps must compute again."""
+    states = [(step.field(name), slope) for step in plan.steps for name, slope in step.slopes.items()]
+    plan.continuous = _positions(state for state, _ in states)
+    plan.slopes = _positions(slope for _, slope in states)
+    plan.derivatives = [step.deriv for step in plan.steps if step.deriv is not None]
     needed: set[str] = set()
     for step in plan.steps:
-        node, interface = step.node, step.node.block.interface
-        targets = []
-        for state in interface.continuous:
-            slot = step.field(state.name)
-            targets.append(Slot("float64", slot.shape, slopes + len(positions)))
-            positions.extend(range(slot.position, slot.position + slot.size))
-        if targets:
-            plan.derivatives.append(_call(plan.memory, step, "deriv", targets))
-            needed.update(wire.block for _, wire in node.wires(interface.arguments["deriv"]))
-    plan.continuous = np.array(positions, np.intp)
-    plan.slopes = plan.memory.floats[slopes : slopes + len(positions)]
+        needed.update(_sources(step.node, step.node.block.interface.arguments.get("deriv", ())))
+    moving = _moving(plan.steps)
     for step in reversed(plan.steps):
         node = step.node
-        if node.path in needed and node.task.continuous and step.output is not None:
+        if node.path in needed & moving and step.output is not None:
             plan.minor.insert(0, step.output)
-            needed.update(wire.block for _, wire in node.wires(node.block.interface.feedthrough))
+            needed.update(_sources(node, node.block.interface.feedthrough))
+
+
+def _moving(steps: Sequence[Bound]) -> set[str]:
+    """Return the blocks whose outputs move between two ticks.
+
+    They are in the continuous task, and have continuous states, or follow time or another moving block. A
+    block that has an ``update`` and passes its input on is a sampled one: its output stands still until the
+    next tick. So does that of a block which is not numeric, since it may reach outside.
+    """
+    found: set[str] = set()
+    for step in steps:
+        node, interface = step.node, step.node.block.interface
+        if not node.task.continuous:
+            continue
+        follows = "time" in interface.arguments.get("output", ())
+        if "update" not in interface.arguments:
+            follows |= not found.isdisjoint(_sources(node, interface.feedthrough))
+        if interface.continuous or (node.block.numeric and follows):
+            found.add(node.path)
+    return found
+
+
+def _sources(node: Node, ports: Iterable[str]) -> Iterator[str]:
+    """Yield the blocks whose present outputs some inputs of a block read."""
+    return (wire.block for _, wire in node.wires(ports) if wire.crossing != "delay")
 
 
 def _stream(seed: int, path: str, state: str) -> list[int]:
@@ -153,24 +197,30 @@ class _Layout:
         self.constants: dict[tuple[str, str], Slot] = {}
         self.outputs: dict[str, dict[str, Slot]] = {}
         self.delayed: dict[tuple[str, str], Slot] = {}
+        self.slopes: dict[str, dict[str, Slot]] = {}
         self.records: dict[str, tuple[Record, int]] = {}
+        self.continuous = 1  # where the continuous task's signals end
+        for task in graph.tasks:
+            for node in graph.nodes:
+                if node.task == task:
+                    ports = node.block.interface.outputs
+                    self.outputs[node.path] = {port: self._take(node, port) for port in ports}
+            if task.continuous:
+                self.continuous = self.size
         for node in graph.nodes:
             for port, source in node.inputs.items():
                 if isinstance(source, Constant):
                     self.constants[node.path, port] = self._take(node, port)
-        for task in graph.tasks:
-            for node in graph.nodes:
-                if node.task == task:
-                    self.outputs[node.path] = {port: self._take(node, port) for port in node.block.interface.outputs}
         for node in graph.nodes:
             for _, wire in node.wires():
                 key = (wire.block, wire.port)
                 if wire.crossing == "delay" and key not in self.delayed:
                     self.delayed[key] = self._take(graph[wire.block], wire.port)
-        self.slopes = self.size
-        self.size += sum(
-            math.prod(node.shape(state.name)) for node in graph.nodes for state in node.block.interface.continuous
-        )
+        for node in graph.nodes:
+            self.slopes[node.path] = {
+                state.name: self._room("float64", node.shape(state.name))
+                for state in node.block.interface.continuous
+            }
         for node in graph.nodes:
             record = Record.of(node.block, node.sizes)
             self.records[node.path] = (record, self.size)
@@ -182,8 +232,11 @@ class _Layout:
         if scalar == "frame":
             self.frames += 1
             return Slot("frame", (), self.frames - 1)
-        slot = Slot(scalar, node.shape(port), self.size)
-        self.size += math.prod(slot.shape)
+        return self._room(scalar, node.shape(port))
+
+    def _room(self, scalar: str, shape: Shape) -> Slot:
+        slot = Slot(scalar, shape, self.size)
+        self.size += slot.size
         return slot
 
     def source(self, node: Node, port: str) -> Slot:
@@ -192,7 +245,8 @@ class _Layout:
         if isinstance(source, Constant):
             return self.constants[node.path, port]
         wire: Wire = source
-        slot = self.delayed[wire.block, wire.port] if wire.crossing == "delay" else self.outputs[wire.block][wire.port]
+        delayed = wire.crossing == "delay"
+        slot = self.delayed[wire.block, wire.port] if delayed else self.outputs[wire.block][wire.port]
         if not wire.index:
             return slot
         part = selected(slot.shape, wire.index)

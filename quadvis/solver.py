@@ -1,8 +1,8 @@
 """Fixed-step solvers of ordinary differential equations, named as in Simulink.
 
-Each is its Butcher tableau: the nodes c, the rows of A (explicit, so one weight vector per stage) and the weights b.
-Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, table II.1; ode3 is Bogacki-Shampine's
-third-order formula, ode2 Heun's, ode4 the classical Runge-Kutta formula.
+Each is its Butcher tableau: the nodes c, the rows of A (explicit, so one weight vector per stage), the
+weights b. Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, table II.1; ode3 is the
+third-order formula of Bogacki and Shampine, ode2 Heun's, ode4 the classical one of Runge and Kutta.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
+Rates = Callable[[float, Vector], Vector]  # the derivative of a state at a time; a fresh array each time
 
 
 @dataclass(frozen=True)
@@ -35,19 +36,30 @@ TABLEAUS = {
 }
 
 
-def integrate(
-    name: str, rates: Callable[[float, Vector], Vector], time: float, state: Vector, step: float
-) -> Vector:
-    """Return the state one step later; ``rates(time, state)`` gives its derivative, at major and minor steps."""
-    tableau = TABLEAUS[name]
-    slopes: list[Vector] = []
-    for node, weights in zip(tableau.nodes, tableau.stages, strict=True):
-        guess = state
-        for weight, slope in zip(weights, slopes, strict=True):
-            if weight:
-                guess = guess + (step * weight) * slope
-        slopes.append(rates(time + node * step, guess))
-    result = state
-    for weight, slope in zip(tableau.weights, slopes, strict=True):
-        result = result + (step * weight) * slope
-    return result
+class Solver:
+    """Advances a state by one fixed step."""
+
+    def __init__(self, name: str, step: float) -> None:
+        tableau = TABLEAUS[name]
+        self._stages = [
+            (node * step, _scaled(weights, step))
+            for node, weights in zip(tableau.nodes, tableau.stages, strict=True)
+        ]
+        self._weights = _scaled(tableau.weights, step)
+
+    def advance(self, rates: Rates, time: float, state: Vector, slope: Vector) -> Vector:
+        """Return the state one step later; ``slope`` is ``rates(time, state)``."""
+        slopes = [slope]
+        for node, weights in self._stages[1:]:
+            slopes.append(rates(time + node, _moved(state, weights, slopes)))
+        return _moved(state, self._weights, slopes)
+
+
+def _scaled(weights: tuple[float, ...], step: float) -> list[tuple[int, float]]:
+    return [(index, step * weight) for index, weight in enumerate(weights) if weight]
+
+
+def _moved(state: Vector, weights: list[tuple[int, float]], slopes: list[Vector]) -> Vector:
+    for index, weight in weights:
+        state = state + weight * slopes[index]
+    return state

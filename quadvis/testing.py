@@ -9,7 +9,8 @@ import numpy as np
 
 from quadvis.block import Block
 from quadvis.engine import Engine
-from quadvis.graph import Constant, Graph, Node, Task
+from quadvis.memory import Slot
+from quadvis.rig import alone, parameter_sizes
 from quadvis.units import parse_period
 
 
@@ -44,18 +45,16 @@ def drive(
 ) -> Driven:
     """Feed a block step by step and return its outputs.
 
-    Each input is one constant value or an array (a list for frames) with a leading time axis; ``rate`` is a rate
-    such as "10 Hz" or a period such as "5 ms", a number means Hz; ``steps`` is needed when no input has a time axis.
-    TypeError if an input is unknown, missing or does not fit.
+    Each input is one constant value or an array (a list for frames) with a leading time axis. ``rate`` is a
+    rate such as "10 Hz" or a period such as "5 ms", a number means Hz. ``steps`` is needed when no input has
+    a time axis. TypeError if an input is unknown, missing or does not fit.
     """
     interface = block.interface
     for name in inputs:
         if name not in interface.inputs:
-            raise TypeError(f"{type(block).__name__} has no input '{name}'; it has {', '.join(interface.inputs)}")
-    sizes: dict[str, Any] = {}
-    for param in interface.params.values():
-        if param.signal.scalar != "str":
-            param.signal.unify(np.shape(getattr(block, param.name)), sizes)
+            known = ", ".join(interface.inputs) or "none"
+            raise TypeError(f"{type(block).__name__} has no input '{name}'; it has {known}")
+    sizes = parameter_sizes(block)
     series = {}
     for name, port in interface.inputs.items():
         value = inputs.get(name, port.default)
@@ -65,13 +64,12 @@ def drive(
     counts = {len(values) for values, constant in series.values() if not constant}
     if len(counts) > 1 or (not counts and steps is None):
         raise TypeError("inputs must have one length, or give steps")
+    if counts and not 0 < (steps or 1) <= min(counts):
+        raise TypeError("inputs must have at least one sample, and one for each of the steps")
     count = steps if steps is not None else counts.pop()
-    period = 1 / Fraction(rate) if not isinstance(rate, str) else parse_period(rate)
-    task = Task("drive", period, continuous=bool(interface.continuous))
-    node = Node("block", type(block).__name__, block, task, {}, sizes)
-    node.inputs = {name: Constant(values[0]) for name, (values, _) in series.items()}
-    graph = Graph("drive", [node], solver, period if task.continuous else None)
-    return _drive(Engine(graph, seed), series, count)
+    period = parse_period(rate) if isinstance(rate, str) else 1 / Fraction(str(rate))
+    first = {name: values[0] for name, (values, _) in series.items()}
+    return _drive(alone(block, first, sizes, period, solver, seed), series, count)
 
 
 def _series(name: str, signal: Any, value: Any, sizes: dict[str, Any], steps: int | None) -> tuple[Any, bool]:
@@ -100,12 +98,17 @@ def _drive(engine: Engine, series: dict[str, tuple[Any, bool]], count: int) -> D
         for name, slot in bound.outputs.items():
             rows[name].append(memory.read(slot))
 
-    engine.observe("drive", record)
+    engine.observe(bound.node.task.name, record)
     with engine:
         for k in range(count):
             for name, (values, constant) in series.items():
                 memory.write(bound.inputs[name], values[0 if constant else k])
             engine.run(1)
     time = np.array([float(k * engine.period) for k in range(count)])
-    frames = {name for name, slot in bound.outputs.items() if slot.scalar == "frame"}
-    return Driven(time, {name: row if name in frames else np.array(row) for name, row in rows.items()}, engine)
+    signals = {name: _array(rows[name], slot) for name, slot in bound.outputs.items()}
+    return Driven(time, signals, engine)
+
+
+def _array(rows: list[Any], slot: Slot) -> Any:
+    """Return the values with a leading time axis; frames stay a list."""
+    return rows if slot.scalar == "frame" else np.array(rows, slot.scalar).reshape(-1, *slot.shape)

@@ -1,0 +1,107 @@
+"""Every block of the library passes the conformance suite; a new one is covered without being named here."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from quadvis.block import Frame
+from quadvis.catalogue import Catalogue
+from quadvis.conformance import CHECKS, Subject
+from quadvis.testing import drive
+from quadvis_blocks.vision._calibration import CameraCalibration
+from quadvis_blocks.vision.rendered_camera import RenderedCamera
+
+ROOT = Path(__file__).parents[2]
+CALIB = ROOT / "diagrams" / "calib"
+CAMERA, COLOURS, PLANES = (str(CALIB / f"{name}.yaml") for name in ("camera", "colours", "two_planes"))
+
+
+@pytest.fixture(scope="session")
+def frames() -> list[Frame]:
+    """What a camera sees from six places: the target whole, in part and not at all."""
+    places = [
+        [0.0, 0.0, 1.5],
+        [0.2, -0.1, 1.4],
+        [1.2, 0.3, 1.5],
+        [0.1, 0.0, 1.6],
+        [9.0, 9.0, 1.5],
+        [0.0, 0.1, 1.5],
+    ]
+    camera = RenderedCamera(calibration=CAMERA)
+    seen = drive(camera, position=places, attitude=np.zeros((6, 3)), rate="10 Hz").frame
+    return [Frame.none(), *seen, seen[-1]]
+
+
+@pytest.fixture(scope="session")
+def centres() -> list[Any]:
+    """Where four circles are in the picture: a square, a turned one, one with a circle missing, noise."""
+    camera = CameraCalibration.load(CAMERA)
+    square = np.array([[0.5, -0.5, 3.0], [0.5, 0.5, 3.0], [-0.5, 0.5, 3.0], [-0.5, -0.5, 3.0]])
+    turned = square @ np.array([[0.8, 0.6, 0.0], [-0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+    partly = camera.project(square)
+    partly[2] = np.nan
+    noise = np.random.default_rng(1).uniform(0.0, 300.0, (4, 2))
+    return [camera.project(square), camera.project(turned), partly, noise]
+
+
+@pytest.fixture
+def subject(
+    request: pytest.FixtureRequest, tmp_path: Path, frames: list[Frame], centres: list[Any]
+) -> Subject:
+    """The block of a test, with values by their names in the library for what random numbers do not suit."""
+    name = request.node.callspec.params["name"]
+    block = Catalogue().find(name)
+    values = {
+        "calibration": CAMERA,
+        "colours": COLOURS,
+        "folder": str(_pictures(tmp_path)),
+        "file": str(_video(tmp_path / "video.avi")),
+        "times": [0.0, 0.35, 1.0],
+        "values": [[1.0, 2.0], [3.0, -1.0], [0.0, 0.0]],
+    }
+    given = {key: values[key] for key, param in block.interface.params.items() if param.required}
+    if "latency" in block.interface.params:
+        given["latency"] = 0.15
+    inputs: dict[str, list[Any]] = {}
+    if name.startswith("vision."):
+        places = [[0.0, 0.0, 1.5], [0.1, -0.2, 1.4], [3.0, 0.0, 1.5]]
+        inputs = {"position": places, "attitude": [[0.05, -0.03, 0.3]], "frame": frames, "centres": centres}
+    suited = {key: series for key, series in inputs.items() if key in block.interface.inputs}
+    return Subject(block, given, suited, ROOT.joinpath("tests", "blocks", *_test_path(name)))
+
+
+def _test_path(name: str) -> tuple[str, ...]:
+    *group, block = name.split(".")
+    return (*group, f"test_{block}.py")
+
+
+def _pictures(folder: Path) -> Path:
+    for number in range(5):
+        cv2.imwrite(str(folder / f"{number}.png"), np.full((6, 8, 3), 40 * number, np.uint8))
+    return folder
+
+
+def _video(path: Path) -> Path:
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, (64, 48))
+    for number in range(5):
+        writer.write(np.full((48, 64, 3), 40 * number, np.uint8))
+    writer.release()
+    return path
+
+
+@pytest.mark.parametrize("check", CHECKS)
+@pytest.mark.parametrize("name", Catalogue().names())
+def test_every_block_conforms(name: str, check: str, subject: Subject) -> None:
+    CHECKS[check](subject)
+
+
+@pytest.mark.parametrize("check", ["starts_the_same", "repeats_after_restore", "returns_what_it_declares"])
+@pytest.mark.parametrize("name", ["vision.pose_plane", "vision.pose_n_points"])
+def test_both_poses_conform_with_a_camera_calibrated_on_two_planes(
+    name: str, check: str, subject: Subject
+) -> None:
+    CHECKS[check](replace(subject, given={"calibration": PLANES, "rays": "two_planes"}))

@@ -1,0 +1,208 @@
+import numpy as np
+import pytest
+
+from quadvis.block import Block, Frame, In, Out, Param, State
+from quadvis.memory import SLOT, Memory, Record, Slot
+
+
+class Mixed(Block):
+    """Parameters and states of every kind."""
+
+    u = In("float64[*]")
+    y = Out("float64[*]")
+    gain = Param(2.5)
+    count = Param(7, type="int64")
+    on = Param(True, type="bool")
+    mode = Param("b", choices=("a", "b", "c"))
+    path = Param("file.txt", type="str")
+    matrix = Param(((1.0, 2.0), (3.0, 4.0)), type="float64[2,2]")
+    flags = Param((True, False, True), type="bool[3]")
+    level = State(init=0.5)
+    hits = State("int64")
+    open_ = State("bool")
+    last = State("float64[*]", init=1.5)
+    places = State("int64[2]")
+
+    def output(self, u):
+        return u
+
+
+def bound(sizes: dict, position: int = 3) -> tuple[Memory, Record, Block]:
+    record = Record.of(Mixed(), sizes)
+    memory = Memory(position + record.size + 2)
+    return memory, record, memory.bind(Mixed(), record, position, 0.25)
+
+
+def slot(record: Record, name: str, position: int = 3) -> Slot:
+    field = record[name]
+    return Slot(field.scalar, field.shape, position + field.offset)
+
+
+def test_a_record_has_the_period_the_parameters_and_the_states_one_slot_for_each_element() -> None:
+    record = Record.of(Mixed(), {"*": (3,)})
+    names = "period gain count on mode matrix flags level hits open_ last places"
+    assert [field.name for field in record.fields] == names.split()
+    ends = [field.offset + int(np.prod(field.shape)) for field in record.fields]
+    assert [field.offset for field in record.fields[1:]] == ends[:-1] and record.size == ends[-1]
+
+
+def test_a_bound_block_begins_with_its_parameters_and_initial_states() -> None:
+    _, _, block = bound({"*": (3,)})
+    assert (block.period, block.gain, block.count, block.on, block.mode) == (0.25, 2.5, 7, True, 1)
+    assert block.path == "file.txt"
+    assert block.matrix.tolist() == [[1.0, 2.0], [3.0, 4.0]] and block.flags.tolist() == [True, False, True]
+    assert (block.level, block.hits, block.open_) == (0.5, 0, False)
+    assert block.last.tolist() == [1.5] * 3 and block.places.tolist() == [0, 0]
+
+
+def test_scalars_are_plain_python_when_interpreted() -> None:
+    _, _, block = bound({"*": ()})
+    assert [type(value) for value in (block.gain, block.hits, block.open_, block.last)] == [
+        float,
+        int,
+        bool,
+        float,
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("level", -2.25),
+        ("hits", -(2**40)),
+        ("open_", True),
+        ("last", [1.0, 2.0, 3.0]),
+        ("places", [5, -6]),
+        ("flags", [False, True, True]),
+    ],
+)
+def test_the_block_and_the_memory_see_the_same_bytes(name: str, value: object) -> None:
+    memory, record, block = bound({"*": (3,)})
+    setattr(block, name, value)
+    assert np.array_equal(memory.read(slot(record, name)), value)
+    memory.write(slot(record, name), 0)
+    assert not np.any(getattr(block, name))
+
+
+def test_a_number_given_to_an_array_state_fills_it() -> None:
+    _, _, block = bound({"*": (3,)})
+    block.last = 4.0
+    assert block.last.tolist() == [4.0] * 3
+
+
+def test_the_numpy_record_has_the_same_layout() -> None:
+    memory, record, block = bound({"*": (2,)})
+    block.last, block.places, block.hits, block.open_ = [8.0, 9.0], [1, 2], 3, True
+    view = np.frombuffer(memory.bytes, record.dtype, 1, 3 * SLOT)[0]
+    assert view["last"].tolist() == [8.0, 9.0] and view["places"].tolist() == [1, 2]
+    assert (view["hits"], view["open_"], view["gain"], view["period"]) == (3, True, 2.5, 0.25)
+    assert view["flags"].tolist() == [1, 0, 1]
+
+
+def test_a_truth_value_fills_its_slot_with_zero_or_one() -> None:
+    memory, record, block = bound({"*": ()})
+    block.open_ = True
+    for name in ("open_", "on", "flags"):
+        field = record[name]
+        start = (3 + field.offset) * SLOT
+        whole = np.frombuffer(memory.bytes, np.int64, int(np.prod(field.shape)), start)
+        assert np.array_equal(whole, np.ravel(getattr(block, name)).astype(int))
+
+
+def test_blocks_side_by_side_do_not_touch_each_other() -> None:
+    record = Record.of(Mixed(), {"*": (2,)})
+    memory = Memory(2 * record.size)
+    first, second = (memory.bind(Mixed(), record, k * record.size, 1.0) for k in range(2))
+    before = bytes(memory.raw[record.size * SLOT :])
+    first.last, first.hits, first.level = [7.0, 7.0], 7, 7.0
+    assert bytes(memory.raw[record.size * SLOT :]) == before and second.hits == 0
+
+
+def test_an_attribute_of_the_author_never_hides_a_state() -> None:
+    class Cached(Block, numeric=False):
+        last = State("float64[2]")
+        seen = State("bool")
+
+        def update(self):
+            self._last = "cache"
+            self._last_slots = self._seen_rest = "cache"
+            self.last = [1.0, 2.0]
+
+    record = Record.of(Cached(), {})
+    memory = Memory(record.size)
+    block = memory.bind(Cached(), record, 0, 1.0)
+    block.update()
+    assert block.last.tolist() == [1.0, 2.0] and block._last == "cache"
+
+
+@pytest.mark.parametrize(
+    ("scalar", "shape", "values"),
+    [
+        ("float64", (), [1.5, -2.0]),
+        ("int64", (), [3, -(2**50)]),
+        ("bool", (), [True, False]),
+        ("float64", (4, 2), [np.arange(8.0).reshape(4, 2), np.ones((4, 2))]),
+        ("int64", (3,), [np.array([1, 2, 3]), np.array([0, -1, 5])]),
+        ("bool", (2,), [np.array([True, False]), np.array([False, True])]),
+        ("frame", (), [Frame(np.ones((2, 2, 3), np.uint8), 0.5, 1), Frame.none()]),
+    ],
+)
+def test_a_call_carries_every_kind_from_slot_to_slot(scalar: str, shape: tuple, values: list) -> None:
+    memory = Memory(40, [None, None])
+    frame = scalar == "frame"
+    source, target = Slot(scalar, shape, 0 if frame else 2), Slot(scalar, shape, 1 if frame else 20)
+    call, copy = memory.call(lambda value: value, [source], [target]), memory.copy(source, target)
+    for run, value in zip((call, copy), values, strict=True):
+        memory.write(source, value)
+        run()
+        found = memory.read(target)
+        assert found is value if frame else np.array_equal(found, value)
+        assert frame or type(found) is type(memory.read(source))
+
+
+def test_a_call_takes_several_arguments_and_gives_several_results() -> None:
+    memory = Memory(12)
+    a, flag, pair = Slot("float64", (), 1), Slot("bool", (), 2), Slot("float64", (2,), 3)
+    total, positive, doubled = Slot("float64", (), 6), Slot("bool", (), 7), Slot("float64", (2,), 8)
+    memory.write(a, 0.5)
+    memory.write(flag, True)
+    memory.write(pair, [1.0, 2.0])
+    memory.call(
+        lambda x, up, v: (x + v.sum(), up and x > 0, 2 * v), [a, flag, pair], [total, positive, doubled]
+    )()
+    assert memory.read(total) == 3.5 and memory.read(positive) is True
+    assert memory.read(doubled).tolist() == [2.0, 4.0]
+
+
+def test_an_array_argument_cannot_be_written_to() -> None:
+    memory = Memory(8)
+
+    def scale(u):
+        u *= 2.0
+        return u
+
+    call = memory.call(scale, [Slot("float64", (3,), 1)], [Slot("float64", (3,), 4)])
+    with pytest.raises(ValueError, match="read-only"):
+        call()
+
+
+@pytest.mark.parametrize("result", [np.zeros(4), (1.0, 2.0)])
+def test_a_result_of_another_shape_is_an_error(result: object) -> None:
+    memory = Memory(8)
+    with pytest.raises(ValueError, match="broadcast"):
+        memory.call(lambda: result, [], [Slot("float64", (3,), 1)])()
+
+
+@pytest.mark.parametrize("result", [None, "1", 1j])
+def test_a_result_that_is_no_number_is_an_error(result: object) -> None:
+    memory = Memory(2)
+    with pytest.raises(TypeError):
+        memory.call(lambda: result, [], [Slot("float64", (), 1)])()
+
+
+def test_what_is_read_is_a_copy_and_a_view_is_not() -> None:
+    memory = Memory(4)
+    place = Slot("float64", (2,), 1)
+    read, view = memory.read(place), memory.view(place)
+    memory.write(place, [5.0, 6.0])
+    assert read.tolist() == [0.0, 0.0] and view.tolist() == [5.0, 6.0]
