@@ -3,24 +3,39 @@
 from __future__ import annotations
 
 import argparse
-import json
+import os
+import re
 import signal
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from quadvis.errors import QuadvisError
+from quadvis.errors import QuadvisError, RunError
 
-FAILED, INTERRUPTED = 1, 130
+FAILED, INTERRUPTED, PIPE_BROKEN = 1, 130, 141
+
+JSON_HELP = """\
+--json prints one object: diagram, variant, hash, seed, passed, duration_s, wall_s, cpu_s, real_time_factor, log;
+summary: {label: {signal, unit, and the statistics by name}};
+expect: [{expectation, signal, kind, unit, limit, found, met}].
+Numbers are in the unit beside them, null where there is none.
+Exit code: 0 all expectations met, 1 one is not or the run stopped, 2 bad input, 130 interrupted."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0 ok, 1 a run failed or missed what it should, 2 bad input."""
     options = _parser().parse_args(arguments)
-    signal.signal(signal.SIGTERM, _terminate)
+    with suppress(ValueError):  # signals belong to the main thread
+        signal.signal(signal.SIGTERM, _terminate)
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")  # a name may hold what the terminal cannot show
     try:
-        return int(options.command(options))
+        code = int(options.command(options))
+        sys.stdout.flush()
+        return code
     except QuadvisError as error:
         print(error, file=sys.stderr)
         return error.exit_code
@@ -28,9 +43,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("interrupted", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
-        # The reader of the pipe has gone; there is nobody left to tell.
-        sys.stderr.close()
-        return 0
+        # The reader of the pipe has gone; Python would complain about what is still to be written.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return PIPE_BROKEN
 
 
 def _terminate(number: int, _: object) -> None:
@@ -42,12 +57,15 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="quadvis", description="Block diagrams in YAML that fly a four-rotor craft.")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    def add(name: str, command: Any, words: str) -> argparse.ArgumentParser:
-        added: argparse.ArgumentParser = commands.add_parser(name, help=words, description=words)
+    def add(name: str, command: Any, words: str, epilog: str = "") -> argparse.ArgumentParser:
+        added: argparse.ArgumentParser = commands.add_parser(
+            name, help=words, description=f"{words[:1].upper()}{words[1:]}.", epilog=epilog,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )  # fmt: skip
         added.set_defaults(command=command)
         return added
 
-    run = add("run", _run, "run a diagram and judge it by what it expects")
+    run = add("run", _run, "run a diagram and judge it by what it expects", JSON_HELP)
     _diagram_options(run)
     run.add_argument("--stop-time", metavar="T", help="such as '20 s'; replaces the diagram's")
     run.add_argument("--seed", type=int, metavar="N", help="seed of all noise; replaces the diagram's")
@@ -79,7 +97,7 @@ def _diagram_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="the diagram")
     parser.add_argument("--variant", metavar="V", help="one of the diagram's variants")
     parser.add_argument("--set", action="append", default=[], metavar="BLOCK.PARAM=VALUE",
-                        help="replace a parameter, such as roll.bandwidth='2.5 rad/s'; repeat for more")  # fmt: skip
+                        help="replace a parameter, such as control/roll.bandwidth='2.5 rad/s'; repeat for more")  # fmt: skip
 
 
 def _load(options: argparse.Namespace, **more: Any) -> Any:
@@ -93,14 +111,16 @@ def _run(options: argparse.Namespace) -> int:
     from quadvis.run import run
 
     diagram = _load(options, stop_time=options.stop_time, seed=options.seed)
-    log = options.log
-    if log is None:
-        log = Path("runs") / f"{diagram.name}{f'-{diagram.variant}' if diagram.variant else ''}.mcap"
-        log.parent.mkdir(exist_ok=True)
-    with ProgressLine(diagram.duration) as progress:
-        result = run(diagram, log=log or None, progress=progress)
+    log = _log_path(options.log, diagram)
+    try:
+        with ProgressLine(diagram.duration) as progress:
+            result = run(diagram, log=log, progress=progress)
+    except (RunError, KeyboardInterrupt):
+        if log is not None and log.is_file():
+            print(f"log up to there: {log}", file=sys.stderr)
+        raise
     if options.json:
-        print(json.dumps(result.facts() | {"log": str(log) or None}, allow_nan=False))
+        _print_json(result.facts() | {"log": str(log) if log else None})
     else:
         print("\n".join(summary_lines(result)))
         if log:
@@ -108,11 +128,31 @@ def _run(options: argparse.Namespace) -> int:
     return 0 if result.passed else FAILED
 
 
+def _log_path(given: str | None, diagram: Any) -> Path | None:
+    """Return where the log goes: where it is wanted, or in a folder that is made for it."""
+    if given is not None:
+        path = Path(given)
+        if given and path.is_dir():
+            raise QuadvisError(f"cannot write the log '{given}': it is a folder")
+        if given and not path.parent.is_dir():
+            raise QuadvisError(f"cannot write the log '{given}': there is no folder '{path.parent}'")
+        return path if given else None
+    name = "-".join(filter(None, (diagram.name, diagram.variant)))
+    path = Path("runs") / f"{re.sub(r'[^A-Za-z0-9_.-]+', '-', name).strip('-.') or 'run'}.mcap"
+    try:
+        path.parent.mkdir(exist_ok=True)
+    except OSError as error:
+        problem = f"cannot make the folder '{path.parent}' for the log: {(error.strerror or str(error)).lower()}"
+        raise QuadvisError(f"{problem}; name another place with --log") from error
+    return path
+
+
 def _check(options: argparse.Namespace) -> int:
+    from quadvis.diagram import check
     from quadvis.errors import DiagramError
 
     try:
-        diagram = _load(options)
+        diagram = _load(options) if options.variant else check(options.file, options.set)
     except DiagramError as error:
         if not options.json:
             raise
@@ -121,12 +161,14 @@ def _check(options: argparse.Namespace) -> int:
              "subject": fault.subject, "problem": fault.problem, "remedy": fault.remedy}
             for fault in error.faults
         ]  # fmt: skip
-        print(json.dumps({"ok": False, "faults": faults}))
+        _print_json({"ok": False, "faults": faults})
         return error.exit_code
     tasks = ", ".join(task.name for task in diagram.graph.tasks)
-    facts = {"ok": True, "diagram": diagram.name, "blocks": len(diagram.graph.nodes), "hash": diagram.hash}
-    print(json.dumps(facts) if options.json else
-          f"{options.file}: {len(diagram.graph.nodes)} blocks in {tasks}: no fault")  # fmt: skip
+    count = len(diagram.graph.nodes)
+    if options.json:
+        _print_json({"ok": True, "diagram": diagram.name, "blocks": count, "hash": diagram.hash})
+    else:
+        print(f"{options.file}: {count} blocks in {tasks}: no fault")
     return 0
 
 
@@ -136,7 +178,7 @@ def _list(options: argparse.Namespace) -> int:
 
     catalogue = Catalogue(Path())
     if options.json:
-        print(json.dumps([facts(name, catalogue.find(name)) for name in catalogue.names()]))
+        _print_json([facts(name, catalogue.find(name)) for name in catalogue.names()])
         return 0
     lines, failures = catalogue_lines(catalogue)
     print("\n".join(lines))
@@ -150,7 +192,10 @@ def _describe(options: argparse.Namespace) -> int:
     from quadvis.describe import description, facts
 
     block = Catalogue(Path()).find(options.block)
-    print(json.dumps(facts(options.block, block)) if options.json else description(options.block, block))
+    if options.json:
+        _print_json(facts(options.block, block))
+    else:
+        print(description(options.block, block))
     return 0
 
 
@@ -173,7 +218,7 @@ def _schema(options: argparse.Namespace) -> int:
     from quadvis.catalogue import Catalogue
     from quadvis.schema import diagram_schema
 
-    return _write(json.dumps(diagram_schema(Catalogue(Path())), indent=1) + "\n", options.output or "-")
+    return _write(_json(diagram_schema(Catalogue(Path())), indent=1) + "\n", options.output or "-")
 
 
 def _new(options: argparse.Namespace) -> int:
@@ -184,12 +229,22 @@ def _new(options: argparse.Namespace) -> int:
     return 0
 
 
+def _print_json(data: Any) -> None:
+    print(_json(data))
+
+
+def _json(data: Any, indent: int | None = None) -> str:
+    import json
+
+    return json.dumps(data, indent=indent, allow_nan=False)
+
+
 def _write(text: str, output: str) -> int:
     if output == "-":
         sys.stdout.write(text)
         return 0
     try:
-        Path(output).write_text(text)
+        Path(output).write_text(text, encoding="utf-8")
     except OSError as error:
         raise QuadvisError(f"cannot write '{output}': {error.strerror}") from error
     print(output)

@@ -1,4 +1,4 @@
-"""From YAML to a plain description of what the file says: keys known, texts read, places kept, nothing looked up."""
+"""From YAML to what a file says: keys known, texts read, places kept; nothing is looked up elsewhere."""
 
 from __future__ import annotations
 
@@ -7,37 +7,33 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 
-from quadvis.document import Mapping, Node, Scalar, Sequence, read_yaml
-from quadvis.errors import Faults, Place, suggestion
-from quadvis.graph import CROSSINGS, SOLVERS, Index
+from quadvis.document import Mapping, Node, Scalar, parse_yaml, read_yaml
+from quadvis.errors import Faults, Place
+from quadvis.graph import CROSSINGS, SOLVERS
+from quadvis.reference import Reference, read_reference
 from quadvis.units import Unit
+from quadvis.values import QUANTITY_KEYS, read_constant
 
 VERSION = 1
 CONTINUOUS = "continuous"
-NAME = re.compile(r"[A-Za-z_]\w{0,63}(?:/[A-Za-z_]\w{0,63})*")
-REFERENCE = re.compile(r"(?P<block>[A-Za-z_][\w/]*)\.(?P<port>[A-Za-z_]\w*)(?:\[(?P<index>[^\]]*)\])?")
+INSIDE = "in"  # the name under which a part's blocks see what comes in
+NAME = re.compile(r"[A-Za-z_]\w{0,63}", re.ASCII)
+PATH = re.compile(rf"{NAME.pattern}(?:/{NAME.pattern})*", re.ASCII)  # a resolved diagram has whole paths
 SECOND = Unit.parse("s")
 
-BLOCK_KEYS = ("block", "part", "rate", "slot", "with", "in")
+REQUIRED_KEYS = ("quadvis", "name", "blocks")
 DIAGRAM_KEYS = (
-    "doc", "params", "rates", "solver", "stop_time", "seed", "blocks", "variants", "log", "expect", "summary", "figures",
+    "doc", "params", "rates", "solver", "stop_time", "seed", "files", "variants",
+    "log", "expect", "summary", "figures",
 )  # fmt: skip
-PART_KEYS = ("doc", "params", "ports", "blocks")
-
-
-@dataclass(frozen=True)
-class Reference:
-    """A signal as a file names it: ``vision/pose.position[1]``."""
-
-    place: Place
-    block: str
-    port: str
-    index: Index = ()
-
-    @property
-    def text(self) -> str:
-        """The name without the index."""
-        return f"{self.block}.{self.port}"
+PART_KEYS = ("doc", "params", "ports")
+BLOCK_KEYS = ("block", "part", "rate", "slot", "with", "in")
+WIRE_KEYS = ("from", "across")
+RATE_KEYS = ("rate", "offset")
+SOLVER_KEYS = ("method", "step")
+PORT_KEYS = ("in", "out")
+VARIANT_KEYS = ("doc", "slots")
+SECTIONS = ("log", "expect", "summary", "figures")
 
 
 @dataclass(frozen=True)
@@ -45,7 +41,7 @@ class InputSpec:
     """What an input is given: a signal or a constant, and how the wire crosses between rates."""
 
     place: Place
-    source: Reference | Node | None  # None: told to be wrong already
+    source: Reference | Node | None  # None: what is wrong has been told
     across: str | None = None
     across_place: Place | None = None
 
@@ -59,9 +55,8 @@ class BlockSpec:
     kind: str
     kind_place: Place
     is_part: bool
-    rate: str | None = None
-    rate_place: Place | None = None
-    slot: bool = False
+    rate: tuple[str, Place] | None = None
+    slot: Place | None = None
     parameters: dict[str, Node] = field(default_factory=dict)
     parameter_places: dict[str, Place] = field(default_factory=dict)
     inputs: dict[str, InputSpec] | None = None  # None: no 'in' was written
@@ -78,76 +73,112 @@ class RateSpec:
 
 @dataclass
 class FileSpec:
-    """Everything that one file says. A part has ports; a diagram has rates, a solver and what to do with a run."""
+    """All that one file says. A part has ports; a diagram has rates, a solver and what to make of a run."""
 
     path: Path
+    place: Place
     name: str = ""
-    doc: str = ""
-    params: dict[str, Node] = field(default_factory=dict)
+    params: dict[str, Node | None] = field(default_factory=dict)  # None: what is wrong has been told
     blocks: dict[str, BlockSpec] = field(default_factory=dict)
     broken: set[str] = field(default_factory=set)  # entries under blocks that could not be read
     inputs: dict[str, Place] = field(default_factory=dict)  # of a part
-    outputs: dict[str, Reference] = field(default_factory=dict)  # of a part
-    rates: dict[str, RateSpec] = field(default_factory=dict)
+    outputs: dict[str, Reference | None] = field(default_factory=dict)  # of a part
+    rates: dict[str, RateSpec | None] = field(default_factory=dict)
     solver: str = "ode4"
     step: Fraction | None = None
-    step_place: Place | None = None
+    step_told: bool = False
     stop_time: Fraction | None = None
     seed: int = 0
-    variants: dict[str, Mapping] = field(default_factory=dict)
-    sections: dict[str, Node] = field(default_factory=dict)  # log, expect, summary, figures: about signals
-    place: Place = field(default_factory=lambda: Place(""))
+    files: dict[str, Node] = field(default_factory=dict)
+    variants: dict[str, dict[str, BlockSpec | None]] = field(default_factory=dict)
+    sections: dict[str, Node] = field(default_factory=dict)  # those about signals
 
 
 def read_file(path: Path, faults: Faults, *, part: bool) -> FileSpec | None:
     """Read a diagram or a part; faults are collected, and None means that nothing could be read."""
-    spec = FileSpec(path, place=Place(str(path)))
-    root = faults.collect(read_yaml, path, faults)
-    root = faults.collect(root.mapping) if root is not None else None
-    if root is None:
+    return _read(path, faults.collect(read_yaml, path, faults), faults, part)
+
+
+def read_text(text: str, path: Path, faults: Faults) -> FileSpec | None:
+    """Read the text of a diagram as if it stood in a file."""
+    return _read(path, faults.collect(parse_yaml, text, str(path), faults), faults, part=False)
+
+
+def _read(path: Path, node: Node | None, faults: Faults, part: bool) -> FileSpec | None:
+    root = faults.collect(node.mapping) if node is not None else None
+    if root is None or not _is_ours(root, faults, part):
         return None
-    version = root.get("quadvis")
-    if version is not None and faults.collect(version.integer) not in (VERSION, None):
-        faults.add(version.place, f"this file has version {version.to_python()}", f"this quadvis reads version {VERSION}")
-        return None
-    optional = PART_KEYS if part else DIAGRAM_KEYS
-    faults.collect(root.fields, ("quadvis", "name", "blocks"), optional, faults)
-    spec.name = _text(root, "name", faults) or path.stem
-    spec.doc = _text(root, "doc", faults) or ""
-    spec.params = dict(_pairs(root, "params", faults))
+    spec = FileSpec(path, Place(str(path)), path.stem)
+    faults.collect(root.fields, REQUIRED_KEYS, PART_KEYS if part else DIAGRAM_KEYS, faults)
+    for key in ("name", "doc"):
+        text = faults.collect(root[key].text) if key in root else None
+        spec.name = text if text and key == "name" else spec.name
+    for name, value in _named(root, "params", "parameter", faults):
+        with faults.about(f"parameter '{name}'"):
+            spec.params[name] = read_constant(value, faults)
     _read_blocks(spec, root, faults)
     if part:
         _read_ports(spec, root, faults)
     else:
         _read_time(spec, root, faults)
-        for key in ("log", "expect", "summary", "figures"):
-            if key in root:
-                spec.sections[key] = root[key]
+        _read_variants(spec, root, faults)
+        spec.files = dict(_map(root.get("files"), faults))
+        spec.sections = {key: root[key] for key in SECTIONS if key in root}
     return spec
 
 
-def _text(root: Mapping, key: str, faults: Faults) -> str | None:
-    node = root.get(key)
-    return None if node is None else faults.collect(node.text)
+def _is_ours(root: Mapping, faults: Faults, part: bool) -> bool:
+    """Tell a file of another version or of the other kind in one sentence, not by all that is odd in it."""
+    version = root.get("quadvis")
+    if version is not None and faults.collect(version.integer) not in (VERSION, None):
+        remedy = f"this quadvis reads version {VERSION}"
+        faults.add(version.place, f"the file is of version {version.to_python()}", remedy)
+        return False
+    if not part and "ports" in root:
+        problem = "this is a part of a diagram, since it has 'ports'"
+        faults.add(root.keys["ports"].place, problem, "give a diagram that names it as 'part: file.yaml'")
+        return False
+    if part and "ports" not in root and "rates" in root:
+        problem = "this is a diagram, not a part, since it has 'rates'"
+        faults.add(
+            root.keys["rates"].place, problem, "give its blocks to a file with 'ports' to make it a part"
+        )
+        return False
+    return True
 
 
-def _pairs(root: Mapping, key: str, faults: Faults) -> list[tuple[str, Node]]:
-    node = root.get(key)
+def _map(node: Node | None, faults: Faults) -> list[tuple[str, Node]]:
     mapping = faults.collect(node.mapping) if node is not None else None
     return list(mapping.values.items()) if mapping is not None else []
+
+
+def _named(root: Mapping, key: str, what: str, faults: Faults) -> list[tuple[str, Node]]:
+    """Return the entries of a map from names; keys that are no names are told."""
+    node = root.get(key)
+    mapping = faults.collect(node.mapping) if node is not None else None
+    for name in mapping.keys.values() if mapping is not None else ():
+        if NAME.fullmatch(name.value) is None:
+            _refuse_name(name, what, faults)
+    return list(mapping.values.items()) if mapping is not None else []
+
+
+def _refuse_name(key: Scalar, what: str, faults: Faults) -> None:
+    remedy = "use letters, digits and '_', and begin with a letter"
+    faults.add(key.place, f"'{key.value}' cannot name a {what}", remedy)
 
 
 def _read_blocks(spec: FileSpec, root: Mapping, faults: Faults) -> None:
     node = root.get("blocks")
     mapping = faults.collect(node.mapping) if node is not None else None
-    if mapping is None:
-        return
-    if not mapping.values:
-        faults.add(mapping.place, "there are no blocks", "add one, such as 'source: {block: sources.sine, rate: fast}'")
-    for key, value in mapping.pairs():
+    if mapping is not None and not mapping.values:
+        remedy = "add one, such as 'source: {block: sources.sine, rate: fast}'"
+        faults.add(mapping.place, "there are no blocks", remedy)
+    for key, value in mapping.pairs() if mapping is not None else []:
         with faults.about(f"block '{key.value}'"):
-            if NAME.fullmatch(key.value) is None or key.value == "in":
-                faults.add(key.place, f"'{key.value}' cannot name a block", "use letters, digits and '_', and not 'in'")
+            if key.value == INSIDE:
+                faults.add(key.place, "no block can be called 'in'", "'in' names the inputs of a part")
+            elif PATH.fullmatch(key.value) is None:
+                _refuse_name(key, "block", faults)
             block = read_block(key.value, key.place, value, faults)
         if block is None:
             spec.broken.add(key.value)
@@ -156,122 +187,95 @@ def _read_blocks(spec: FileSpec, root: Mapping, faults: Faults) -> None:
 
 
 def read_block(name: str, place: Place, node: Node, faults: Faults) -> BlockSpec | None:
-    """Read one entry under ``blocks`` or under a variant's ``slots``."""
+    """Read one entry under ``blocks`` or under a variant's ``slots``; None if it does not say what it is."""
     fields = faults.collect(node.fields, (), BLOCK_KEYS, faults)
     if fields is None:
         return None
-    kinds = [key for key in ("block", "part") if key in fields]
+    kinds = [fields[key] for key in ("block", "part") if key in fields]
+    kind = faults.collect(kinds[0].text) if len(kinds) == 1 else None
+    parameters, inputs = fields.get("with"), fields.get("in")
+    given = faults.collect(parameters.mapping) if parameters is not None else None
+    wired = _map(inputs, faults)
+    read = {port: _read_input(value, faults) for port, value in wired}
+    rate = faults.collect(fields["rate"].text) if "rate" in fields else None
+    is_slot = faults.collect(fields["slot"].boolean) if "slot" in fields else False
     if len(kinds) != 1:
         problem = "both 'block' and 'part' are given" if kinds else "neither 'block' nor 'part' is given"
         faults.add(place, problem, "give 'block: group.name' or 'part: file.yaml'")
-        return None
-    kind = faults.collect(fields[kinds[0]].text)
     if kind is None:
         return None
-    rate = faults.collect(fields["rate"].text) if "rate" in fields else None
-    slot = faults.collect(fields["slot"].boolean) if "slot" in fields else False
-    parameters = fields.get("with")
-    given = faults.collect(parameters.mapping) if parameters is not None else None
-    inputs = fields.get("in")
-    wired = faults.collect(inputs.mapping) if inputs is not None else None
-    read = {}
-    for key, value in wired.pairs() if wired is not None else []:
-        read[key.value] = _read_input(value, faults) or InputSpec(value.place, None)
     return BlockSpec(
-        name, place, kind, fields[kinds[0]].place, kinds[0] == "part", rate,
-        fields["rate"].place if "rate" in fields else None, bool(slot),
+        name, place, kind, kinds[0].place, "part" in fields,
+        (rate, fields["rate"].place) if rate is not None else None,
+        fields["slot"].place if is_slot else None,
         dict(given.values) if given is not None else {},
-        {key.value: key.place for key, _ in given.pairs()} if given is not None else {},
+        {key: node.place for key, node in given.keys.items()} if given is not None else {},
         read if inputs is not None else None,
     )  # fmt: skip
 
 
-def _read_input(node: Node, faults: Faults) -> InputSpec | None:
+def _read_input(node: Node, faults: Faults) -> InputSpec:
     """Read ``block.port``, ``{from: block.port, across: hold}``, a constant, or ``{value: ..., unit: ...}``."""
-    if isinstance(node, Mapping) and "value" not in node:
-        fields = faults.collect(node.fields, ("from",), ("across",), faults)
-        source = read_reference(fields["from"], faults) if fields is not None and "from" in fields else None
-        if fields is None or source is None:
-            return None
-        across = fields.get("across")
+    if isinstance(node, Mapping) and not any(key in node for key in QUANTITY_KEYS):
+        faults.collect(node.fields, WIRE_KEYS[:1], WIRE_KEYS[1:], faults)
+        source = read_reference(node["from"], faults) if "from" in node else None
+        across = node.get("across")
         crossing = faults.collect(across.choice, CROSSINGS) if across is not None else None
         return InputSpec(node.place, source, crossing, across.place if across is not None else None)
-    if isinstance(node, Scalar) and not node.value.startswith("$") and node.value[:1].isalpha():
-        if node.value in ("true", "false"):
-            return InputSpec(node.place, node)
-        source = read_reference(node, faults)
-        return None if source is None else InputSpec(node.place, source)
+    if isinstance(node, Scalar) and _is_reference(node.value):
+        return InputSpec(node.place, read_reference(node, faults))
     return InputSpec(node.place, node)
 
 
-def read_reference(node: Node, faults: Faults) -> Reference | None:
-    """Read the name of a signal, with an index if there is one."""
-    text = faults.collect(node.text)
-    if text is None:
-        return None
-    match = REFERENCE.fullmatch(text)
-    index = _index(match["index"]) if match and match["index"] is not None else ()
-    if match is None or index is None:
-        faults.add(node.place, f"'{text}' is not a signal", "write block.port, block.port[0] or part/block.port[0:2]")
-        return None
-    return Reference(node.place, match["block"], match["port"], index)
-
-
-def _index(text: str) -> Index | None:
-    parts: list[int | slice] = []
-    for part in text.split(","):
-        bounds = re.fullmatch(r"\s*(\d{1,6})\s*(:\s*(\d{1,6})\s*)?", part)
-        if bounds is None:
-            return None
-        parts.append(slice(int(bounds[1]), int(bounds[3])) if bounds[2] else int(bounds[1]))
-    return tuple(parts)
-
-
-def index_text(index: Index) -> str:
-    """Return an index as a file writes it."""
-    parts = [f"{part.start}:{part.stop}" if isinstance(part, slice) else str(part) for part in index]
-    return f"[{','.join(parts)}]" if parts else ""
+def _is_reference(text: str) -> bool:
+    """Say whether an input's text is meant as a signal: no number, truth value or ``$name``."""
+    return (text[:1].isalpha() or text[:1] == "_") and text not in ("true", "false")
 
 
 def _read_ports(spec: FileSpec, root: Mapping, faults: Faults) -> None:
     node = root.get("ports")
-    fields = faults.collect(node.fields, (), ("in", "out"), faults) if node is not None else None
+    fields = faults.collect(node.fields, (), PORT_KEYS, faults) if node is not None else None
     if fields is None:
         return
-    names = faults.collect(fields["in"].items) if "in" in fields else None
-    for item in names or []:
+    for item in (faults.collect(fields["in"].items) if "in" in fields else None) or []:
         name = faults.collect(item.name)
-        if name is not None:
+        if name is not None and name in spec.inputs:
+            remedy = "keep one of them"
+            faults.add(item.place, f"input '{name}' is already in line {spec.inputs[name].line}", remedy)
+        elif name is not None:
             spec.inputs[name] = item.place
-    for name, value in _pairs(fields, "out", faults):
-        reference = read_reference(value, faults)
-        if reference is not None:
-            spec.outputs[name] = reference
+    for name, value in _named(fields, "out", "port", faults):
+        spec.outputs[name] = read_reference(value, faults)
 
 
 def _read_time(spec: FileSpec, root: Mapping, faults: Faults) -> None:
-    for name, value in _pairs(root, "rates", faults):
-        rate = _read_rate(value, faults)
-        if name == CONTINUOUS:
-            faults.add(value.place, "'continuous' is the solver's rate", "choose another name, or set 'solver: {step: ...}'")
-        elif rate is not None:
-            spec.rates[name] = rate
+    for name, value in _named(root, "rates", "rate", faults):
+        with faults.about(f"rate '{name}'"):
+            spec.rates[name] = _read_rate(value, faults)
+            if name == CONTINUOUS:
+                remedy = "choose another name, or set 'solver: {step: ...}'"
+                faults.add(value.place, "'continuous' is the rate of the solver", remedy)
     solver = root.get("solver")
-    fields = faults.collect(solver.fields, (), ("method", "step"), faults) if solver is not None else None
-    if fields is not None:
-        if "method" in fields:
-            spec.solver = faults.collect(fields["method"].choice, SOLVERS) or spec.solver
-        if "step" in fields:
-            spec.step = faults.collect(fields["step"].period)
-            spec.step_place = fields["step"].place
+    fields = faults.collect(solver.fields, (), SOLVER_KEYS, faults) if solver is not None else None
+    if fields is not None and "method" in fields:
+        spec.solver = faults.collect(fields["method"].choice, SOLVERS) or spec.solver
+    if fields is not None and "step" in fields:
+        spec.step = faults.collect(fields["step"].period)
+    spec.step_told = solver is not None and (fields is None or ("step" in fields and spec.step is None))
     if "stop_time" in root:
-        spec.stop_time = read_duration(root["stop_time"], faults)
+        spec.stop_time = read_duration(root["stop_time"], faults) or Fraction(0)
     if "seed" in root:
         spec.seed = faults.collect(root["seed"].integer) or 0
-    for name, value in _pairs(root, "variants", faults):
-        variant = faults.collect(value.fields, (), ("doc", "slots"), faults)
-        if variant is not None:
-            spec.variants[name] = variant
+
+
+def _read_rate(node: Node, faults: Faults) -> RateSpec | None:
+    if not isinstance(node, Mapping):
+        period = faults.collect(node.period)
+        return None if period is None else RateSpec(node.place, period)
+    faults.collect(node.fields, RATE_KEYS[:1], RATE_KEYS[1:], faults)
+    period = faults.collect(node["rate"].period) if "rate" in node else None
+    offset = read_duration(node["offset"], faults) if "offset" in node else Fraction(0)
+    return None if period is None or offset is None else RateSpec(node.place, period, offset)
 
 
 def read_duration(node: Node, faults: Faults) -> Fraction | None:
@@ -283,45 +287,13 @@ def read_duration(node: Node, faults: Faults) -> Fraction | None:
     return value
 
 
-def _read_rate(node: Node, faults: Faults) -> RateSpec | None:
-    if not isinstance(node, Mapping):
-        period = faults.collect(node.period)
-        return None if period is None else RateSpec(node.place, period)
-    fields = faults.collect(node.fields, ("rate",), ("offset",), faults)
-    period = faults.collect(fields["rate"].period) if fields is not None and "rate" in fields else None
-    offset = read_duration(fields["offset"], faults) if fields is not None and "offset" in fields else Fraction(0)
-    return None if period is None or offset is None else RateSpec(node.place, period, offset)
-
-
-def substitute(node: Node, params: dict[str, Node], faults: Faults) -> Node | None:
-    """Return the node with every ``$name`` or ``$name[i]`` replaced by the parameter that it names."""
-    if isinstance(node, Scalar) and node.plain and node.value.startswith("$"):
-        return _parameter(node, params, faults)
-    if isinstance(node, Sequence):
-        children = [substitute(child, params, faults) for child in node.values]
-        whole = [child for child in children if child is not None]
-        return Sequence(whole, node.file, node.line, node.column, node.key) if len(whole) == len(children) else None
-    return node
-
-
-def _parameter(node: Scalar, params: dict[str, Node], faults: Faults) -> Node | None:
-    match = re.fullmatch(r"\$(\w+)(?:\[(\d{1,6})\])?", node.value)
-    if match is None or match[1] not in params:
-        name = match[1] if match else node.value[1:]
-        remedy = suggestion(name, params) or "declare it under 'params'"
-        faults.add(node.place, f"there is no parameter '{name}' here", remedy)
-        return None
-    found = params[match[1]]
-    if match[2] is None:
-        return found
-    values = found["value"] if isinstance(found, Mapping) and "value" in found else found
-    if not isinstance(values, Sequence) or int(match[2]) >= len(values):
-        faults.add(node.place, f"parameter '{match[1]}' has no element {match[2]}", "count from 0")
-        return None
-    element = values[int(match[2])]
-    units = found.get("unit") if isinstance(found, Mapping) else None
-    if isinstance(units, Scalar) and isinstance(element, Scalar):
-        each = units.value.split()
-        unit = each[min(int(match[2]), len(each) - 1)] if each else ""
-        return Scalar(f"{element.value} {unit}", False, element.file, element.line, element.column, element.key)
-    return element
+def _read_variants(spec: FileSpec, root: Mapping, faults: Faults) -> None:
+    for variant, value in _named(root, "variants", "variant", faults):
+        spec.variants[variant] = {}
+        with faults.about(f"variant '{variant}'"):
+            fields = faults.collect(value.fields, (), VARIANT_KEYS, faults)
+            slots = fields.get("slots") if fields is not None else None
+            mapping = faults.collect(slots.mapping) if slots is not None else None
+        for key, entry in mapping.pairs() if mapping is not None else []:
+            with faults.about(f"variant '{variant}', block '{key.value}'"):
+                spec.variants[variant][key.value] = read_block(key.value, key.place, entry, faults)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from types import TracebackType
 from typing import Self, TextIO
 
+from quadvis.describe import table
 from quadvis.run import Result
+from quadvis.verdict import Entry, Outcome, Verdict
 
 
 class ProgressLine:
@@ -39,24 +40,26 @@ class ProgressLine:
 
 def summary_lines(result: Result) -> list[str]:
     """Return the summary of a run, for people."""
-    diagram = result.diagram
+    diagram, outcome = result.diagram, result.outcome
     variant = f" ({diagram.variant})" if diagram.variant else ""
     lines = [f"{diagram.name}{variant}: {result.duration:g} s, seed {diagram.seed}"]
-    width = max((len(entry.label) for entry in diagram.summary), default=0)
-    for entry in diagram.summary:
-        values = result.outcome.summary[entry.label]
-        shown = [f"{name} {_number(value, entry.scale, entry.unit)}" for name, value in values.items()]
-        stretch = f"  ({entry.part.after:g} s on)" if entry.part.after else ""
-        lines.append(f"  {entry.label.ljust(width)}  {', '.join(shown)}{stretch}")
-    lines += [f"  {verdict}" for verdict in result.outcome.verdicts]
-    lines.append(f"  {result.wall:.1f} s of wall time, {result.real_time_factor:.0f} x real time")
-    met = sum(verdict.met for verdict in result.outcome.verdicts)
-    if result.outcome.verdicts:
-        lines.append(f"{'PASSED' if result.passed else 'FAILED'}: {met} of {len(result.outcome.verdicts)} expectations met")
+    lines += [f"  {line}" for line in table([_entry_row(entry, outcome) for entry in diagram.summary])]
+    lines += [f"  {line}" for line in table([_verdict_row(verdict) for verdict in outcome.verdicts])]
+    speed = f", {result.real_time_factor:.0f} x real time" if result.duration and result.wall else ""
+    lines.append(f"  {result.wall:.1f} s of wall time{speed}")
+    met = sum(verdict.met for verdict in outcome.verdicts)
+    if outcome.verdicts:
+        count = len(outcome.verdicts)
+        lines.append(f"{'PASSED' if result.passed else 'FAILED'}: {met} of {count} expectations met")
     return lines
 
 
-def _number(value: float, scale: float, unit: str) -> str:
-    if math.isnan(value):
-        return "none"
-    return f"{value / scale:.4g}" + ("" if unit == "1" else f" {unit}")
+def _entry_row(entry: Entry, outcome: Outcome) -> tuple[str, ...]:
+    values = outcome.summary[entry.label]
+    shown = ", ".join(f"{name} {entry.shows(name, value)}" for name, value in values.items())
+    of = f"of {entry.part.shows(entry.part.of)}" if entry.part.of else ""
+    return entry.label, shown, ", ".join(filter(None, (of, entry.part.stretch)))
+
+
+def _verdict_row(verdict: Verdict) -> tuple[str, ...]:
+    return "met" if verdict.met else "NOT MET", str(verdict.expectation), verdict.shown

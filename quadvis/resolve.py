@@ -1,79 +1,130 @@
-"""A checked diagram written out as one flat file: what a log keeps, and what its hash is made of."""
+"""A checked diagram written out as one flat file: what a log keeps, and what its hash is made of.
+
+Nothing in it depends on the machine: paths are relative to the diagram's folder, and each file that a parameter
+names is held by the SHA-256 of its contents.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import os
+from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from quadvis.block import Declared, Param, units_of
+from quadvis.block import Param
 from quadvis.document import dump_yaml
+from quadvis.errors import Faults, QuadvisError
 from quadvis.graph import Graph, Node, Wire
-from quadvis.loader import CONTINUOUS, VERSION, FileSpec, index_text
+from quadvis.loader import CONTINUOUS, VERSION, FileSpec
 from quadvis.observe import Observation
+from quadvis.reference import wire_text
 
 
-def resolved_text(spec: FileSpec, graph: Graph, stop_time: Any, seed: int, observation: Observation) -> str:
-    """Return the diagram with parts expanded, variant and settings applied and every parameter written out."""
+def resolved_text(graph: Graph, stop_time: Fraction, seed: int, observation: Observation, folder: Path) -> str:
+    """Return the diagram with parts expanded, variant and settings applied and every parameter written out.
+
+    It loads in ``folder``, and gives the same run to the bit. QuadvisError if a file cannot be read.
+    """
     rates = {
         task.name: {"rate": f"{task.period} s", "offset": f"{task.offset} s"} if task.offset else f"{task.period} s"
         for task in graph.tasks
         if not task.continuous
     }
-    data: dict[str, Any] = {"quadvis": VERSION, "name": spec.name}
-    data["rates"] = rates
+    data: dict[str, Any] = {"quadvis": VERSION, "name": graph.name}
+    if rates:
+        data["rates"] = rates
     if graph.step is not None:
         data["solver"] = {"method": graph.solver, "step": f"{graph.step} s"}
-    data["stop_time"] = f"{stop_time} s"
-    data["seed"] = seed
-    data["blocks"] = {node.path: _block(node) for node in graph.nodes}
+    data |= {"stop_time": f"{stop_time} s", "seed": seed}
+    files = {path: file_digest(path) for path in _files(graph) if os.path.isfile(path)}
+    if files:
+        data["files"] = {_relative(path, folder): digest for path, digest in sorted(files.items())}
+    data["blocks"] = {node.path: _block(node, folder) for node in graph.nodes}
     data["log"] = {"signals": observation.logged, "every": observation.every}
-    data |= observation.sections
-    if observation.figures:
-        data["figures"] = observation.figures
-    return dump_yaml(data)
+    return dump_yaml(data | observation.sections)
 
 
-def _block(node: Node) -> dict[str, Any]:
+def _files(graph: Graph) -> list[str]:
+    """Return the paths that parameters name."""
+    return [
+        getattr(node.block, param.name)
+        for node in graph.nodes
+        for param in node.block.interface.params.values()
+        if param.is_file
+    ]
+
+
+def file_digest(path: str | Path) -> str:
+    """Return the SHA-256 of a file's contents."""
+    try:
+        with open(path, "rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise QuadvisError(f"cannot read '{path}': {error.strerror}") from error
+
+
+def check_files(spec: FileSpec, faults: Faults) -> None:
+    """Tell the files that are not what they were when the diagram was written out."""
+    for name, node in spec.files.items():
+        wanted = faults.collect(node.text)
+        path = spec.path.parent / name
+        if not os.path.isfile(path):
+            faults.add(node.place, f"there is no file '{name}'", "paths are relative to the diagram")
+        elif wanted is not None and file_digest(path) != wanted:
+            faults.add(node.place, f"file '{name}' is not what it was: its SHA-256 differs", "bring the old one back")
+
+
+def _relative(path: str, folder: Path) -> str:
+    """Return a path as a diagram in a folder writes it, wherever that folder is."""
+    return Path(os.path.relpath(path, folder)).as_posix()
+
+
+def _block(node: Node, folder: Path) -> dict[str, Any]:
     found: dict[str, Any] = {"block": node.kind, "rate": CONTINUOUS if node.task.continuous else node.task.name}
-    interface = node.block.interface
-    values = {name: _parameter(param, getattr(node.block, name)) for name, param in interface.params.items()}
-    if values:
-        found["with"] = values
+    values = {
+        name: _parameter(node, param, folder)
+        for name, param in node.block.interface.params.items()
+        if param.choices or param.is_text or np.isfinite(getattr(node.block, name)).all()  # only defaults may not be
+    }
     inputs: dict[str, Any] = {}
     for port, source in node.inputs.items():
         if isinstance(source, Wire):
             text = wire_text(source)
             inputs[port] = {"from": text, "across": source.crossing} if source.crossing else text
-        elif source.value is not interface.inputs[port].default:
-            inputs[port] = _quantity(interface.inputs[port], source.value)
-    if inputs:
-        found["in"] = inputs
-    return found
+        elif source.value is not node.block.interface.inputs[port].default:
+            inputs[port] = _quantity(node, port, source.value)
+    return found | ({"with": values} if values else {}) | ({"in": inputs} if inputs else {})
 
 
-def wire_text(wire: Wire) -> str:
-    """Return a wire's source as a diagram writes it."""
-    return wire.source + index_text(wire.index)
-
-
-def constant_text(declared: Declared, value: Any) -> str:
-    """Return a constant input as a diagram writes it."""
-    found = _quantity(declared, value)
-    return str(found["value"]) + f" {found['unit']}" if isinstance(found, dict) else str(found)
-
-
-def _parameter(param: Param, value: Any) -> Any:
+def _parameter(node: Node, param: Param, folder: Path) -> Any:
+    value = getattr(node.block, param.name)
     if param.choices:
         return param.choices[value]
-    return value if param.is_text else _quantity(param, value)
+    if param.is_text:
+        return _relative(value, folder) if param.is_file else value
+    return _quantity(node, param.name, value)
 
 
-def _quantity(declared: Declared, value: Any) -> Any:
+def constant_text(node: Node, port: str, value: Any) -> str:
+    """Return a constant input as a diagram writes it."""
+    found = _quantity(node, port, value)
+    return f"{found['value']} {found['unit']}" if isinstance(found, dict) else str(found)
+
+
+def _quantity(node: Node, name: str, value: Any) -> Any:
+    """Return a value in the units that the checker found for it."""
     array = np.asarray(value)
-    units = units_of(declared, max(1, array.size))
-    if array.dtype != float or not any(unit.symbols for unit in units) or any(unit.variables for unit in units):
+    texts = [str(unit) if unit.symbols else "" for unit in node.units[name]]
+    if array.dtype != float or not any(texts):
         return array.tolist()
     if array.ndim == 0:
-        return f"{float(array)!r} {units[0]}"
-    return {"value": array.tolist(), "unit": declared.unit}
+        return f"{float(array)!r} {texts[0]}"
+    if len(set(texts)) == 1:
+        return {"value": array.tolist(), "unit": texts[0]}
+    if array.ndim == 1:
+        return {"value": array.tolist(), "unit": " ".join(text or "1" for text in texts)}
+    quantities = [f"{number!r} {text}".strip() for number, text in zip(array.ravel().tolist(), texts, strict=True)]
+    return np.reshape(np.array(quantities, dtype=object), array.shape).tolist()

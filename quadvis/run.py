@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import platform
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -66,7 +67,22 @@ class Result:
         return self.duration / self.wall if self.wall else float("inf")
 
     def facts(self) -> dict[str, Any]:
-        """Return the outcome as plain data: what `quadvis run --json` prints."""
+        """Return the outcome as plain data: what `quadvis run --json` prints.
+
+        ``diagram``, ``variant`` (or None), ``hash``, ``seed``: what was run. ``passed``: whether all expectations are
+        met. ``duration_s`` simulated, in ``wall_s`` of wall time and ``cpu_s`` of processor time;
+        ``real_time_factor``. ``summary``: by label ``{signal, unit, rms, max, ...}``. ``expect``: a list of
+        ``{expectation, signal, kind, unit, limit, found, met}``. Numbers are in the unit beside them, None where
+        there is none.
+        """
+        summary = {
+            entry.label: {
+                "signal": entry.part.text,
+                "unit": str(entry.part.unit),
+                **{name: _finite(value) for name, value in self.outcome.summary[entry.label].items()},
+            }
+            for entry in self.diagram.summary
+        }
         return {
             "diagram": self.diagram.name,
             "variant": self.diagram.variant,
@@ -76,14 +92,14 @@ class Result:
             "duration_s": self.duration,
             "wall_s": self.wall,
             "cpu_s": self.cpu,
-            "real_time_factor": self.real_time_factor,
-            "summary": {label: dict(values) for label, values in self.outcome.summary.items()},
-            "expect": [
-                {"what": str(verdict.expectation), "limit": verdict.expectation.limit, "found": verdict.found,
-                 "met": verdict.met}
-                for verdict in self.outcome.verdicts
-            ],
-        }  # fmt: skip
+            "real_time_factor": _finite(self.real_time_factor),
+            "summary": summary,
+            "expect": [verdict.facts() for verdict in self.outcome.verdicts],
+        }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def run(diagram: Diagram, *, log: str | Path | None = None, progress: Progress | None = None) -> Result:

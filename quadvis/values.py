@@ -1,26 +1,96 @@
-"""Typed values out of a diagram's nodes: parameters, constant inputs, and the units that they were written in."""
+"""Typed values out of a diagram's nodes: parameters, constants, and the units in which they were written."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from quadvis import document as yaml
 from quadvis.block import Param, SignalType
-from quadvis.document import Mapping, Node, Scalar, measure
-from quadvis.document import Sequence as List
+from quadvis.document import Node, Scalar, measure
+from quadvis.errors import Faults, quoted, suggestion
 from quadvis.units import Unit, UnitError, parse_quantity, split_quantity
 
-ONE = Unit()
+QUANTITY_KEYS = ("value", "unit")
+_PARAMETER = re.compile(r"\$(?P<name>[A-Za-z_]\w*)(?:\[(?P<element>\d{1,6})\])?", re.ASCII)
+
+OpenUnits = tuple[Unit | None, ...]  # of the elements; None is a 0 without unit, which fits any
 
 
-def read_parameter(param: Param, node: Node) -> tuple[Any, tuple[Unit, ...]]:
+def read_constant(node: Node, faults: Faults) -> Node | None:
+    """Return a value with each unit at its number: ``{value: [1, 2], unit: m}`` becomes ``[1 m, 2 m]``.
+
+    None if it is wrong, which is told; ``$name`` has no place in it.
+    """
+    return substitute(node, None, faults)
+
+
+def substitute(node: Node, params: Mapping[str, Node | None] | None, faults: Faults) -> Node | None:
+    """Do the same, with every ``$name`` and ``$name[i]`` replaced by the parameter that it names."""
+    if isinstance(node, Scalar):
+        return _parameter(node, params, faults) if node.value.startswith("$") else node
+    if isinstance(node, yaml.Sequence):
+        found = [substitute(child, params, faults) for child in node]
+        whole = [child for child in found if child is not None]
+        return _list(node, whole) if len(whole) == len(found) else None
+    assert isinstance(node, yaml.Mapping)
+    if not any(key in node for key in QUANTITY_KEYS):
+        return node  # no value at all: whoever reads it will say so
+    faults.collect(node.fields, QUANTITY_KEYS[:1], QUANTITY_KEYS[1:], faults)
+    value = substitute(node["value"], params, faults) if "value" in node else None
+    unit = node.get("unit")
+    return value if value is None or unit is None else faults.collect(_spread, value, unit)
+
+
+def _parameter(node: Scalar, params: Mapping[str, Node | None] | None, faults: Faults) -> Node | None:
+    if params is None:
+        faults.add(node.place, f"{quoted(node.value)} stands where a value must", "write the value itself")
+        return None
+    match = _PARAMETER.fullmatch(node.value)
+    if match is None or match["name"] not in params:
+        name = match["name"] if match else node.value[1:]
+        remedy = suggestion(name, params) or "declare it under 'params'"
+        faults.add(node.place, f"there is no parameter {quoted(name)} here", remedy)
+        return None
+    found = params[match["name"]]
+    if found is None or match["element"] is None:
+        return found
+    element = int(match["element"])
+    if isinstance(found, yaml.Sequence) and element < len(found):
+        return found[element]
+    count = f"has {len(found)} elements" if isinstance(found, yaml.Sequence) else "is one value"
+    faults.add(node.place, f"parameter '{match['name']}' {count}, there is no [{element}]", "count from 0")
+    return None
+
+
+def _spread(value: Node, unit: Node) -> Node:
+    """Put a unit, or one unit for each element of the last axis, behind every number that has none."""
+    units = unit.units()
+    if any(each.variables for each in units):
+        raise unit.fault(f"{quoted(unit.text())} is not a unit")
+    shape = measure(value)
+    if len(units) not in (1, shape[-1] if shape else 1):
+        raise unit.fault(f"there are {len(units)} units for {shape[-1] if shape else 1} values")
+    leaves = [_with_unit(leaf, units[i % len(units)]) for i, leaf in enumerate(_leaves(value))]
+    return _rebuilt(value, iter(leaves))
+
+
+def _with_unit(leaf: Node, unit: Unit) -> Node:
+    number, written = split_quantity(leaf.value) if isinstance(leaf, Scalar) else ("", "")
+    if not number or written or not unit.symbols:
+        return leaf
+    return Scalar(f"{number} {unit}", False, leaf.file, leaf.line, leaf.column, leaf.key)
+
+
+def read_parameter(param: Param, node: Node) -> tuple[Any, OpenUnits]:
     """Return a parameter's value as the block takes it, and its units where the declaration leaves them open.
 
     DiagramError if the value is of another kind, shape or unit.
     """
     if param.is_file:
-        # A path is relative to the file that it stands in, wherever the diagram is run from.
+        # A path is relative to the file in which it stands, wherever the diagram is run from.
         return str(Path(node.file).parent / node.text()), ()
     if param.is_text:
         return node.text(), ()
@@ -29,42 +99,41 @@ def read_parameter(param: Param, node: Node) -> tuple[Any, tuple[Unit, ...]]:
     return read_value(param.signal, param.units, node)
 
 
-def read_value(signal: SignalType, units: Sequence[Unit], node: Node) -> tuple[Any, tuple[Unit, ...]]:
-    """Return a number, truth value or nested list in SI units, and the units of the elements if ``units`` has variables.
+def read_value(signal: SignalType, units: Sequence[Unit], node: Node) -> tuple[Any, OpenUnits]:
+    """Return a number, truth value or nested list in the declared unit, and the units if they are open.
 
-    A value is a quantity ("50 ms"), a list of them, or ``{value: [0, 1.5], unit: m}``. Numbers without a unit are
-    refused where the declaration has one, except 0.
+    Numbers without a unit are refused where the declaration has one, except 0. All faults of the elements are
+    raised together.
     """
-    written: tuple[Unit, ...] = ()
-    if isinstance(node, Mapping):
-        fields = node.fields(("value",), ("unit",))
-        written = fields["unit"].units() if "unit" in fields else ()
-        node = fields["value"]
     if signal.scalar == "frame":
         raise node.wrong("a wire from a camera or a file")
-    if signal.scalar != "float64" and not signal.shape:
-        return (node.boolean() if signal.scalar == "bool" else node.integer()), ()
     shape = measure(node)
     if not signal.unify(shape, {}):
-        wanted = " x ".join(map(str, signal.shape)) + " values" if signal.shape else "one value"
-        found = " x ".join(map(str, shape)) + " values" if shape else "one value"
-        raise node.fault(f"this takes {wanted}, not {found}")
+        label = quoted(node.key) if node.key else "this"
+        raise node.fault(f"{label} takes {shape_text(signal.shape)}, not {shape_text(shape)}")
+    faults = Faults()
     leaves = _leaves(node)
-    values, found_units = [], []
-    for index, leaf in enumerate(leaves):
-        declared = units[index] if len(units) == len(leaves) else units[0]
-        given = written[index if len(written) == len(leaves) else 0] if written else None
-        value, unit = _number(leaf, declared, given)
-        values.append(value)
-        found_units.append(unit)
-    open_units = tuple(found_units) if any(unit.variables for unit in units) else ()
-    return _nested(node, iter(values)), open_units
+    read = [
+        faults.collect(_element, signal.scalar, units[i % len(units)], leaf) for i, leaf in enumerate(leaves)
+    ]
+    faults.check()
+    found = [pair for pair in read if pair is not None]
+    is_open = any(unit.variables for unit in units)
+    return _plain(node, iter(value for value, _ in found)), tuple(
+        unit for _, unit in found
+    ) if is_open else ()
 
 
-def _number(node: Node, declared: Unit, given: Unit | None) -> tuple[float, Unit]:
-    """Return one element in SI units, and its unit."""
-    if given is not None and isinstance(node, Scalar) and not split_quantity(node.value)[1]:
-        node = Scalar(f"{node.value} {given}" if given.symbols else node.value, False, node.file, node.line, node.column)
+def shape_text(shape: Sequence[int | str]) -> str:
+    """Return a shape in words."""
+    return f"{' x '.join(map(str, shape))} values" if shape else "one value"
+
+
+def _element(scalar: str, declared: Unit, node: Node) -> tuple[Any, Unit | None]:
+    if scalar == "bool":
+        return node.boolean(), None
+    if scalar == "int64":
+        return node.integer(), None
     if not declared.variables:
         return node.quantity(declared, bare=False), declared
     text = node.text()
@@ -72,17 +141,33 @@ def _number(node: Node, declared: Unit, given: Unit | None) -> tuple[float, Unit
         value, unit = parse_quantity(text)
     except UnitError as error:
         raise node.fault(error.problem, error.remedy) from None
-    return value, si(unit)
+    if unit.variables:
+        raise node.fault(f"{quoted(text)} has no unit that there is")
+    return value, None if not value and not split_quantity(text)[1] else si(unit)
 
 
 def si(unit: Unit) -> Unit:
-    """Return the SI unit of the same dimension."""
+    """Return the SI unit of the same dimension: m for cm."""
+    if unit.scale == 1.0:
+        return unit
     return Unit.parse("*".join(f"{name}^({power})" for name, power in sorted(unit.dimension)) or "1")
 
 
 def _leaves(node: Node) -> list[Node]:
-    return [leaf for child in node for leaf in _leaves(child)] if isinstance(node, List) else [node]
+    return [leaf for child in node for leaf in _leaves(child)] if isinstance(node, yaml.Sequence) else [node]
 
 
-def _nested(node: Node, values: Any) -> Any:
-    return [_nested(child, values) for child in node] if isinstance(node, List) else next(values)
+def _rebuilt(node: Node, leaves: Iterator[Node]) -> Node:
+    return (
+        _list(node, [_rebuilt(child, leaves) for child in node])
+        if isinstance(node, yaml.Sequence)
+        else next(leaves)
+    )
+
+
+def _plain(node: Node, values: Iterator[Any]) -> Any:
+    return [_plain(child, values) for child in node] if isinstance(node, yaml.Sequence) else next(values)
+
+
+def _list(like: Node, values: list[Node]) -> yaml.Sequence:
+    return yaml.Sequence(values, like.file, like.line, like.column, like.key)

@@ -1,0 +1,62 @@
+"""Variants: other blocks in the slots of a diagram, with the same outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from quadvis.block import Out
+from quadvis.errors import Faults, suggestion
+from quadvis.loader import BlockSpec, FileSpec
+
+Outputs = Mapping[str, Mapping[str, Out]]  # by slot and port
+
+
+def fill_slots(spec: FileSpec, variant: str | None, faults: Faults) -> FileSpec:
+    """Return the diagram with a variant's blocks in their slots; faults of the other variants are told too."""
+    if variant is not None and variant not in spec.variants:
+        remedy = suggestion(variant, spec.variants) or "the diagram has no variants"
+        faults.add(spec.place, f"there is no variant '{variant}'", remedy)
+    blocks = dict(spec.blocks)
+    for name, entries in spec.variants.items():
+        for slot, block in entries.items():
+            if block is None or slot in spec.broken:
+                continue
+            base = spec.blocks.get(slot)
+            if base is None:
+                remedy = suggestion(slot, [known for known, block in spec.blocks.items() if block.slot])
+                faults.add(
+                    block.place, f"variant '{name}' fills '{slot}', which is not in the diagram", remedy
+                )
+            elif base.slot is None:
+                problem = f"variant '{name}' fills '{slot}', which is not a slot"
+                faults.add(block.place, problem, f"write 'slot: true' in block '{slot}'")
+            elif name == variant:
+                blocks[slot] = _in_slot(base, block)
+    return replace(spec, blocks=blocks)
+
+
+def _in_slot(base: BlockSpec, block: BlockSpec) -> BlockSpec:
+    """Return what is put into a slot: it takes the wires and the rate of the slot unless it brings its own."""
+    inputs = base.inputs if block.inputs is None else block.inputs
+    return replace(block, slot=base.slot, inputs=inputs, rate=block.rate or base.rate)
+
+
+def check_slots(spec: FileSpec, filled: FileSpec, promised: Outputs, given: Outputs, faults: Faults) -> None:
+    """Refuse a block that lacks an output of the one whose slot it takes, or gives another kind of signal."""
+    for slot, outputs in given.items():
+        before, now = spec.blocks[slot], filled.blocks[slot]
+        for port, wanted in promised.get(slot, {}).items():
+            offered = outputs.get(port)
+            problem = ""
+            if offered is None:
+                problem = f"'{now.kind}' has no output '{port}', which '{before.kind}' gives in this slot"
+            elif (offered.signal, offered.units) != (wanted.signal, wanted.units):
+                problem = f"output '{port}' of '{now.kind}' is {_words(offered)}, that of '{before.kind}' {_words(wanted)}"
+            if problem:
+                remedy = "choose one with the same outputs"
+                faults.add(now.kind_place, problem, remedy, subject=f"block '{slot}'")
+
+
+def _words(port: Out) -> str:
+    return port.type if port.unit == "1" else f"{port.type} in {port.unit}"

@@ -1,0 +1,198 @@
+"""What every name of a signal means: a wire from a block, through the ports of parts, or a constant."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from quadvis.block import Out
+from quadvis.document import Node, Sequence
+from quadvis.errors import Faults, Place, suggestion
+from quadvis.expand import Expansion, FlatBlock, Scope
+from quadvis.graph import Index, Wire
+from quadvis.loader import INSIDE, InputSpec
+from quadvis.reference import Reference
+from quadvis.slots import Outputs
+from quadvis.values import substitute
+
+MAX_PORTS = 50  # of parts, that a signal passes without meeting a block
+
+
+@dataclass(frozen=True)
+class Source:
+    """What an input is given; None where the fault has been told."""
+
+    place: Place
+    source: Wire | Node | None
+    across: Place | None = None
+
+
+class Wiring:
+    """Finds what is behind a name. ``promised`` are outputs of slots whose absence is told elsewhere."""
+
+    def __init__(self, expansion: Expansion, faults: Faults, promised: Outputs | None = None) -> None:
+        self.expansion, self.faults, self.promised = expansion, faults, promised or {}
+        # What goes in and out of parts is sought once, so that a fault in it is told once.
+        self._found: dict[tuple[str, str], Source] = {}
+        self._sought: set[tuple[str, str]] = set()
+        self._check_ports(expansion.root)
+
+    def _check_ports(self, scope: Scope) -> None:
+        """Look at what goes in and out of every part, used or not."""
+        for child in scope.children.values():
+            for port in child.spec.inputs:
+                self._entry(child, port)
+            for port in child.spec.outputs:
+                self._export(child, port)
+            self._check_ports(child)
+
+    def inputs(self, block: FlatBlock) -> Iterator[tuple[str, Source]]:
+        """Yield what each input of a block is given."""
+        for port, given in (block.spec.inputs or {}).items():
+            yield port, self._source(block.scope, given)
+
+    def outputs(self, name: str) -> Mapping[str, Out]:
+        """Return the outputs of one of the diagram's own blocks or parts, as far as they are right."""
+        blocks, child = self.expansion.blocks, self.expansion.root.children.get(name)
+        if child is None:
+            kind = blocks[name].kind if name in blocks else None
+            return kind.interface.outputs if kind is not None else {}
+        found = {}
+        for port in child.spec.outputs:
+            source = self._export(child, port).source
+            kind = blocks[source.block].kind if isinstance(source, Wire) else None
+            if isinstance(source, Wire) and kind is not None:
+                found[port] = kind.interface.outputs[source.port]
+        return found
+
+    def find(self, scope: Scope, reference: Reference) -> Source:
+        """Return what a name means in a scope."""
+        if reference.block == INSIDE:
+            return self._indexed(self._inside(scope, reference), reference)
+        owner, name = _owner(scope, reference.block)
+        path = owner.prefix + name
+        if name.partition("/")[0] in owner.broken or name in owner.broken:
+            return Source(reference.place, None)
+        if name not in owner.spec.blocks:
+            remedy = suggestion(name, [*owner.spec.blocks, *([INSIDE] if owner.parent else [])])
+            self.faults.add(reference.place, f"there is no block '{reference.block}'", remedy)
+            return Source(reference.place, None)
+        child = owner.children.get(name)
+        if child is None:
+            kind = self.expansion.blocks[path].kind
+            if kind is None or not self._offers(path, reference, kind.interface.outputs):
+                return Source(reference.place, None)
+            return Source(reference.place, Wire(path, reference.port, reference.index))
+        if not self._offers(path, reference, child.spec.outputs):
+            return Source(reference.place, None)
+        return self._indexed(replace(self._export(child, reference.port), place=reference.place), reference)
+
+    def _offers(self, path: str, reference: Reference, outputs: Mapping[str, object]) -> bool:
+        if reference.port in outputs:
+            return True
+        if reference.port not in self.promised.get(path, {}):
+            remedy = suggestion(reference.port, outputs) if outputs else "it has none"
+            problem = f"block '{reference.block}' has no output '{reference.port}'"
+            self.faults.add(reference.place, problem, remedy)
+        return False
+
+    def _source(self, scope: Scope, given: InputSpec) -> Source:
+        if given.source is None:
+            return Source(given.place, None)
+        if isinstance(given.source, Node):
+            return Source(given.place, substitute(given.source, scope.params, self.faults))
+        found = self.find(scope, given.source)
+        if isinstance(found.source, Wire) and given.across is not None:
+            return Source(found.place, replace(found.source, crossing=given.across), given.across_place)
+        return found
+
+    def _inside(self, scope: Scope, reference: Reference) -> Source:
+        if scope.parent is None:
+            problem = "'in' names the inputs of a part, and a diagram has none"
+            self.faults.add(reference.place, problem, "name a block")
+        elif reference.port not in scope.spec.inputs:
+            remedy = suggestion(reference.port, scope.spec.inputs) or "declare it under 'ports: {in: [...]}'"
+            self.faults.add(reference.place, f"this part has no input '{reference.port}'", remedy)
+        else:
+            return self._entry(scope, reference.port)
+        return Source(reference.place, None)
+
+    def _entry(self, scope: Scope, port: str) -> Source:
+        """Return what comes into a part by a port."""
+        assert scope.instance is not None and scope.parent is not None
+        given = (scope.instance.inputs or {}).get(port)
+        if given is None:
+            return Source(scope.instance.place, None)
+        key = (f"{scope.prefix}{INSIDE}", port)
+        if self._begin(key, scope, scope.spec.inputs[port]):
+            with self.faults.about(scope.subject):
+                self._found[key] = self._source(scope.parent, given)
+            self._sought.discard(key)
+        return self._found[key]
+
+    def _export(self, scope: Scope, port: str) -> Source:
+        """Return what goes out of a part by a port."""
+        reference = scope.spec.outputs[port]
+        if reference is None:
+            return Source(scope.spec.place, None)
+        key = (scope.prefix, port)
+        if self._begin(key, scope, reference.place):
+            with self.faults.about(scope.subject):
+                self._found[key] = self.find(scope, reference)
+            self._sought.discard(key)
+        return self._found[key]
+
+    def _begin(self, key: tuple[str, str], scope: Scope, place: Place) -> bool:
+        """Say whether a port is still to be looked at; one that is being looked at leads back to itself."""
+        if key in self._found:
+            return False
+        problem, remedy = "", "wire it to a block"
+        if key in self._sought:
+            problem = f"port '{key[1]}' of the part leads back to itself, through no block"
+        elif len(self._sought) >= MAX_PORTS:
+            problem = f"port '{key[1]}' leads through more than {MAX_PORTS} ports of parts and no block"
+        if problem:
+            self.faults.add(place, problem, remedy, subject=scope.subject)
+            self._found[key] = Source(place, None)
+            return False
+        self._sought.add(key)
+        return True
+
+    def _indexed(self, found: Source, reference: Reference) -> Source:
+        if not reference.index or found.source is None:
+            return found
+        place = reference.place
+        if isinstance(found.source, Node):
+            part = _element(found.source, reference.index)
+            if part is None:
+                self.faults.add(place, "the constant has no such element", "count from 0")
+            return Source(place, part)
+        if found.source.index:
+            problem = "the signal is an element or a run already, it cannot take a second index"
+            self.faults.add(place, problem, "write one index")
+            return Source(place, None)
+        return Source(place, replace(found.source, index=reference.index), found.across)
+
+
+def _owner(scope: Scope, name: str) -> tuple[Scope, str]:
+    """Return the scope in which a block is named, and its name there: names may reach into parts."""
+    head, slash, rest = name.partition("/")
+    if slash and name not in scope.spec.blocks and head in scope.children:
+        return _owner(scope.children[head], rest)
+    return scope, name
+
+
+def _element(node: Node, index: Index) -> Node | None:
+    """Return a part of a constant; None if there is no such part."""
+    for part in index:
+        if not isinstance(node, Sequence):
+            return None
+        if isinstance(part, slice):
+            values = node.values[part]
+            if len(index) > 1 or not values or (part.stop or 0) > len(node):
+                return None
+            return Sequence(values, node.file, node.line, node.column, node.key)
+        if part >= len(node):
+            return None
+        node = node[part]
+    return node
