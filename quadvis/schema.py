@@ -1,0 +1,204 @@
+"""The JSON schema of diagrams and parts, made from the declarations: completion, hover and checks in editors.
+
+An editor checks the form as one types; `quadvis check` knows more: units, shapes, rates, loops.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from quadvis.block import Block, Declared, Param
+from quadvis.catalogue import Catalogue
+from quadvis.describe import default_text, first_line
+from quadvis.graph import CROSSINGS, SOLVERS
+from quadvis.loader import (
+    BLOCK_KEYS,
+    CONTINUOUS,
+    DIAGRAM_KEYS,
+    PART_KEYS,
+    PORT_KEYS,
+    RATE_KEYS,
+    REQUIRED_KEYS,
+    SOLVER_KEYS,
+    VARIANT_KEYS,
+    VERSION,
+    WIRE_KEYS,
+)
+from quadvis.observe import LOG_KEYS, STRETCH_KEYS, SUMMARY_KEYS
+from quadvis.values import QUANTITY_KEYS
+from quadvis.verdict import EXPECTATIONS, STATISTICS
+
+Schema = dict[str, Any]
+
+TEXT: Schema = {"type": "string"}
+QUANTITY: Schema = {"type": ["string", "number"]}
+CONSTANT: Schema = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": r"^[-+.$\d]"}]}
+NAME: Schema = {"pattern": "^[A-Za-z_][A-Za-z0-9_/]*$"}
+LIBRARY_BLOCK: Schema = {
+    "type": "string",
+    "pattern": "^[a-z][a-z0-9_]*:",
+    "description": "a block of another library",
+}
+
+
+def diagram_schema(catalogue: Catalogue) -> Schema:
+    """Return the schema of diagrams and parts; the catalogue's blocks are offered with their ports and parameters."""
+    blocks = {name: catalogue.find(name) for name in catalogue.names()}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "quadvis diagram",
+        "type": "object",
+        "required": list(REQUIRED_KEYS),
+        "if": {"required": ["ports"]},
+        "then": _closed((*REQUIRED_KEYS, *PART_KEYS), _top()),
+        "else": _closed((*REQUIRED_KEYS, *DIAGRAM_KEYS), _top()),
+        "$defs": _definitions(blocks),
+    }
+
+
+def _closed(keys: Iterable[str], properties: Mapping[str, Schema], required: Iterable[str] = ()) -> Schema:
+    """Return an object that has these keys and no others."""
+    found: Schema = {"type": "object", "properties": {key: properties[key] for key in keys}}
+    found["additionalProperties"] = False
+    if required:
+        found["required"] = list(required)
+    return found
+
+
+def _map_of(value: Schema, words: str) -> Schema:
+    return {"type": "object", "propertyNames": NAME, "additionalProperties": value, "description": words}
+
+
+def _list_of(value: Schema, words: str) -> Schema:
+    return {"type": "array", "items": value, "description": words}
+
+
+def _ref(name: str) -> Schema:
+    return {"$ref": f"#/$defs/{name}"}
+
+
+def _top() -> dict[str, Schema]:
+    return {
+        "quadvis": {"const": VERSION, "description": "version of the format"},
+        "name": {**TEXT, "description": "name of the diagram, and of its log"},
+        "doc": {**TEXT, "description": "what it is for"},
+        "params": _map_of(_ref("value"), "named values, used as $name or $name[2]"),
+        "rates": _map_of(_ref("rate"), "named rates, such as 20 Hz or 50 ms"),
+        "solver": _closed(SOLVER_KEYS, {
+            "method": {"enum": list(SOLVERS), "description": "fixed-step solver, named as in Simulink"},
+            "step": {**QUANTITY, "description": "such as 5 ms; it divides every period"},
+        }),
+        "stop_time": {**QUANTITY, "description": "length of a run, such as 20 s"},
+        "seed": {"type": "integer", "description": "seed of all noise"},
+        "files": {"type": "object", "description": "SHA-256 of the files that blocks read; in resolved diagrams"},
+        "blocks": _map_of(_ref("block"), "all blocks by name"),
+        "variants": _map_of(_closed(VARIANT_KEYS, {"doc": TEXT, "slots": _map_of(_ref("block"), "by slot")}),
+                            "other blocks for those marked 'slot: true'"),
+        "ports": _closed(PORT_KEYS, {
+            "in": _list_of(TEXT, "names of what comes in; inside the part 'in.name'"),
+            "out": _map_of(_ref("signal"), "what goes out"),
+        }),
+        "log": _closed(LOG_KEYS, {
+            "signals": _list_of(TEXT, "blocks to log, or patterns such as 'vision/*'"),
+            "every": _map_of({"type": "integer", "minimum": 1}, "by rate: one row in so many"),
+        }),
+        "expect": _list_of(_ref("expectation"), "what a run must show"),
+        "summary": {
+            "type": "object",
+            "additionalProperties": {"anyOf": [_ref("signal"), _ref("entry")]},
+            "description": "lines of the summary by their labels",
+        },
+        "figures": _list_of({"type": "object"}, "what `quadvis plot` draws"),
+    }  # fmt: skip
+
+
+def _definitions(blocks: Mapping[str, type[Block]]) -> dict[str, Schema]:
+    stretch: dict[str, Schema] = {key: QUANTITY for key in STRETCH_KEYS}
+    kinds: dict[str, Schema] = {
+        key: {**QUANTITY, "description": kind.words} for key, kind in EXPECTATIONS.items()
+    }
+    shown = _list_of({"enum": list(STATISTICS)}, "statistics to show")
+    signal = {
+        **TEXT,
+        "pattern": r"^[A-Za-z_][\w/]*\.[A-Za-z_]\w*(\[[0-9:, ]*\])?$",
+        "description": "block.port",
+    }
+    wire = {"from": _ref("signal"), "across": {"oneOf": [
+        {"const": name, "description": words} for name, words in CROSSINGS.items()
+    ]}}  # fmt: skip
+    quantity = {"value": {}, "unit": TEXT}
+    values = [QUANTITY, {"type": "boolean"}, {"type": "array"}, _closed(QUANTITY_KEYS, quantity, ["value"])]
+    return {
+        "signal": signal,
+        "value": {"anyOf": values},
+        "input": {"anyOf": [signal, CONSTANT, *values[1:], _closed(WIRE_KEYS, wire, ["from"])]},
+        "rate": {"anyOf": [QUANTITY, _closed(RATE_KEYS, {"rate": QUANTITY, "offset": QUANTITY}, ["rate"])]},
+        "expectation": _closed(("signal", *STRETCH_KEYS, *EXPECTATIONS), {"signal": signal, **stretch, **kinds},
+                               ["signal"]),
+        "entry": _closed(("signal", *SUMMARY_KEYS), {"signal": signal, **stretch, "show": shown, "unit": TEXT},
+                         ["signal"]),
+        "block": _any_block(blocks),
+        **{f"block:{name}": _one_block(block) for name, block in blocks.items()},
+    }  # fmt: skip
+
+
+def _any_block(blocks: Mapping[str, type[Block]]) -> Schema:
+    """Return the schema of an entry under ``blocks``: common keys, then those of the block that it names."""
+    known: list[Schema] = [
+        {"const": name, "description": first_line(block)} for name, block in blocks.items()
+    ]
+    common: dict[str, Schema] = {
+        "block": {"anyOf": [*known, LIBRARY_BLOCK]},
+        "part": {**TEXT, "description": "file of a subsystem, relative to this one"},
+        "rate": {**TEXT, "description": f"one of the diagram's rates, or '{CONTINUOUS}'"},
+        "slot": {"type": "boolean", "description": "variants may put another block here"},
+        "with": _map_of(_ref("value"), "parameters"),
+        "in": _map_of(_ref("input"), "inputs: block.port, a constant, or {from: block.port, across: hold}"),
+    }
+    cases = [
+        {
+            "if": {"required": ["block"], "properties": {"block": {"const": name}}},
+            "then": _ref(f"block:{name}"),
+        }
+        for name in blocks
+    ]
+    return {
+        **_closed(BLOCK_KEYS, common),
+        "oneOf": [{"required": ["block"]}, {"required": ["part"]}],
+        "allOf": cases,
+    }
+
+
+def _one_block(block: type[Block]) -> Schema:
+    interface = block.interface
+    parameters: Schema = {
+        "additionalProperties": False,
+        "properties": {name: _parameter(param) for name, param in interface.params.items()},
+    }
+    inputs: Schema = {
+        "additionalProperties": False,
+        "properties": {
+            name: {**_ref("input"), "description": _words(port)} for name, port in interface.inputs.items()
+        },
+    }
+    return {"description": inspect.getdoc(block) or "", "properties": {"with": parameters, "in": inputs}}
+
+
+def _parameter(param: Param) -> Schema:
+    found: Schema = {"description": _words(param)}
+    if param.choices:
+        # A parameter of the diagram may stand in for the word.
+        found["anyOf"] = [{"enum": list(param.choices)}, {"type": "string", "pattern": r"^\$"}]
+    elif param.is_text:
+        found |= TEXT
+    else:
+        found |= _ref("value")
+    default = default_text(param)
+    return found if default is None else {**found, "default": default}
+
+
+def _words(item: Declared) -> str:
+    unit = "" if item.unit == "1" else f", {item.unit}"
+    return f"{item.doc} ({item.type}{unit})"
