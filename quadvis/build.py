@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from typing import Any
@@ -10,8 +11,10 @@ from quadvis.block import Block, Param, ParameterError
 from quadvis.errors import DiagramError, Fault, Faults, QuadvisError, suggestion
 from quadvis.expand import Expansion, FlatBlock
 from quadvis.flow import Connection, Draft
-from quadvis.graph import Constant, Task, Wire
-from quadvis.loader import CONTINUOUS, FileSpec
+from quadvis.graph import Constant, Task, Wire, common_divisor
+from quadvis.loader import CONTINUOUS, SECOND, FileSpec
+from quadvis.names import absent, remedy_for
+from quadvis.units import format_quantity
 from quadvis.values import OpenUnits, read_parameter, read_value
 from quadvis.wiring import Wiring
 
@@ -24,7 +27,9 @@ class Builder:
     def __init__(self, spec: FileSpec, expansion: Expansion, wiring: Wiring, faults: Faults) -> None:
         self.spec, self.expansion, self.wiring, self.faults = spec, expansion, wiring, faults
         self.tasks = {
-            name: Task(name, rate.period, rate.offset) for name, rate in spec.rates.items() if rate is not None
+            name: Task(name, rate.period, rate.offset)
+            for name, rate in spec.rates.items()
+            if rate is not None
         }
         self.step = self._choose_step()
 
@@ -34,9 +39,7 @@ class Builder:
         for flat in self.expansion.blocks.values():
             with self.faults.about(f"block '{flat.path}'"):
                 draft = self._draft(flat)
-            if draft is None:
-                self.expansion.unknown.add(flat.path)
-            else:
+            if draft is not None:
                 found.append(draft)
         return found
 
@@ -46,13 +49,13 @@ class Builder:
             list(self.wiring.inputs(flat))
             return None
         task = self._task(flat, flat.kind)
-        built = self._build(flat, flat.kind)
+        block, units = self._build(flat, flat.kind)
         connections = dict(self._connections(flat, flat.kind))
-        if built is None:
-            return None
-        block, units = built
         places = {name: flat.place(name) for name in flat.parameters}
-        return Draft(flat.path, flat.spec.place, flat.spec.kind, block, task, connections, places, units)
+        told = "in" in flat.spec.told
+        return Draft(
+            flat.path, flat.spec.place, flat.spec.kind, block, task, connections, places, units, told
+        )
 
     def _choose_step(self) -> Fraction | None:
         """Take the solver's step if anything is continuous; every period must then be a whole number of steps."""
@@ -65,14 +68,20 @@ class Builder:
                 problem = f"block '{first.path}' is continuous and the solver has no step"
                 self.faults.add(first.spec.place, problem, "add 'solver: {method: ode4, step: 5 ms}'")
             return NO_STEP
-        for name, rate in self.spec.rates.items():
-            for what, time in (("period", rate.period), ("offset", rate.offset)) if rate is not None else ():
-                if rate is not None and (time / step).denominator != 1:
-                    problem = (
-                        f"rates '{name}' and 'continuous' are not commensurate: the {what} of {float(time):g} s is "
-                        f"not a whole number of solver steps of {float(step):g} s"
-                    )
-                    self.faults.add(rate.place, problem, "choose a step that divides it")
+        used = {flat.rate[0] for flat in self.expansion.blocks.values() if flat.rate is not None}
+        times = {
+            f"the {what} of '{task.name}' ({_time_text(time)})": time
+            for task in self.tasks.values()
+            for what, time in (("period", task.period), ("offset", task.offset))
+            if task.name in used and time
+        }
+        unfit = [words for words, time in times.items() if (time / step).denominator != 1]
+        if unfit:
+            fitting = common_divisor([*times.values()])
+            fitting /= math.ceil(fitting / step)
+            problem = f"a step of {_time_text(step)} is not commensurate with {' and '.join(unfit)}"
+            remedy = f"choose one that divides them all, such as '{_time_text(fitting)}'"
+            self.faults.add(self.spec.step_place or self.spec.place, problem, remedy)
         return step
 
     def _task(self, flat: FlatBlock, kind: type[Block]) -> Task | None:
@@ -86,24 +95,27 @@ class Builder:
             return continuous
         names = [*self.spec.rates, CONTINUOUS]
         if flat.rate is None:
-            choice = f"choose from {', '.join(names)}" if len(names) > 1 else "declare one under 'rates'"
-            self.faults.add(flat.rateless, "key 'rate' is missing", choice)
+            entries = list(flat.around)
+            if not any("rate" in entry.told for entry in entries):
+                choice = f"choose from {', '.join(names)}" if len(names) > 1 else "declare one under 'rates'"
+                self.faults.add(entries[-1].place, "key 'rate' is missing", choice)
             return None
         name, place = flat.rate
         if name == CONTINUOUS:
             return continuous
         if name not in self.spec.rates:
-            self.faults.add(place, f"there is no rate '{name}'", suggestion(name, names) or "declare it under 'rates'")
+            remedy = suggestion(name, names) if self.spec.rates else ""
+            self.faults.add(place, f"there is no rate '{name}'", remedy or "declare it under 'rates'")
         return self.tasks.get(name)
 
-    def _build(self, flat: FlatBlock, kind: type[Block]) -> tuple[Block, dict[str, OpenUnits]] | None:
+    def _build(self, flat: FlatBlock, kind: type[Block]) -> tuple[Block | type[Block], dict[str, OpenUnits]]:
         declared = kind.interface.params
         values: dict[str, Any] = {}
         units: dict[str, OpenUnits] = {}
-        whole = flat.path not in self.expansion.unknown
+        whole = flat.path not in self.expansion.broken
         for name, node in flat.parameters.items():
             if name not in declared:
-                remedy = suggestion(name, declared) if declared else "it has none"
+                remedy = remedy_for(name, flat.parameters, declared)
                 self.faults.add(flat.place(name), f"{flat.spec.kind} has no parameter '{name}'", remedy)
                 whole = False
                 continue
@@ -114,13 +126,14 @@ class Builder:
             values[name] = read[0]
             if read[1]:
                 units[name] = read[1]
-        for name, param in declared.items():
-            if param.required and name not in flat.spec.parameters and name not in flat.parameters:
-                wanted = "a path" if param.is_file else param.wanted()
-                self.faults.add(flat.spec.place, f"parameter '{name}' is missing", f"give {wanted} under 'with'")
-                whole = False
+        required = [name for name, param in declared.items() if param.required]
+        whole &= all(name in flat.parameters for name in required)
+        given = flat.spec.parameters | flat.parameters
+        for name in absent(required, given, declared) if "with" not in flat.spec.told else ():
+            wanted = "a path" if declared[name].is_file else declared[name].wanted()
+            self.faults.add(flat.spec.place, f"parameter '{name}' is missing", f"give {wanted} under 'with'")
         block = self._construct(flat, kind, values) if whole else None
-        return (block, units) if block is not None else None
+        return block or kind, units
 
     def _accepts(self, param: Param, value: Any, flat: FlatBlock) -> bool:
         try:
@@ -163,6 +176,12 @@ class Builder:
                 read = self.faults.collect(read_value, declared.signal, declared.units, source.source)
                 value, units = (Constant(read[0]), read[1]) if read is not None else (None, ())
                 yield port, Connection(source.place, value, units)
+
+
+def _time_text(time: Fraction) -> str:
+    """Return a time for people, exactly: a decimal number if it is one."""
+    is_decimal = (10**12 * time).denominator == 1
+    return format_quantity(float(time), SECOND, 12) if is_decimal else f"{time} s"
 
 
 def _is_continuous(flat: FlatBlock) -> bool:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import os
 import pkgutil
 import re
 import sys
@@ -80,7 +81,7 @@ class Catalogue:
 
     def _own_file(self, path: str) -> Path | None:
         file = self.own.joinpath(*path.split(".")).with_suffix(".py") if self.own else None
-        return file if file and file.is_file() else None
+        return file if file and os.path.isfile(file) else None
 
     def _in_library(self, library: str, path: str, name: str) -> type[Block]:
         packages = _libraries()
@@ -102,11 +103,10 @@ def _libraries() -> dict[str, str]:
 
 def _exists(module: str) -> bool:
     """Return whether a module is there, without importing it; one whose package fails to import is."""
-    package, _, _ = module.rpartition(".")
     try:
         return importlib.util.find_spec(module) is not None and not _is_package(module)
     except ModuleNotFoundError as error:
-        return not (error.name and (package == error.name or package.startswith(error.name + ".")))
+        return not f"{module}.".startswith(f"{error.name}.")  # True: it is something else that is missing
     except Exception:
         return True
 

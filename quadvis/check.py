@@ -7,10 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from typing import cast
 
-from quadvis.errors import Faults, Place, suggestion
+from quadvis.block import Block
+from quadvis.errors import Faults, Place
 from quadvis.flow import Draft, Key, Link, ShapeFlow
-from quadvis.graph import Constant, Node, Task, Wire, execution_order
+from quadvis.graph import TOLD, Constant, Node, Task, Wire, execution_order
+from quadvis.names import absent, remedy_for
 from quadvis.unit_flow import UnitFlow
 from quadvis.values import shape_text
 
@@ -29,13 +32,15 @@ class WireCheck:
     def _node(self, draft: Draft) -> Node:
         interface = draft.block.interface
         inputs: dict[str, Wire | Constant] = {
-            name: Constant(port.default) for name, port in interface.inputs.items() if port.default is not None
+            name: Constant(port.default)
+            for name, port in interface.inputs.items()
+            if port.default is not None
         }
         for name, connection in draft.connections.items():
             if connection.source is not None and name in interface.inputs:
                 inputs[name] = connection.source
-        node = Node(draft.path, draft.kind, draft.block, draft.task or NO_TASK, inputs)
-        for name, param in interface.params.items():
+        node = Node(draft.path, draft.kind, cast(Block, draft.block), draft.task or NO_TASK, inputs)
+        for name, param in interface.params.items() if draft.whole else ():
             shape = getattr(getattr(draft.block, name), "shape", ())
             if param.signal.scalar != "str" and not param.signal.unify(shape, node.sizes):
                 wanted = shape_text(param.signal.resolve(node.sizes))
@@ -53,7 +58,7 @@ class WireCheck:
         self.lost = shapes.lost
         units = UnitFlow(self.drafts, self.nodes, self._whole(links), self.lost, self.faults)
         units.run()
-        for path, port in units.lost:
+        for path, port in units.lost | {link.key for link in links if link.wire.crossing == TOLD}:
             # A loop through a wire that is wrong is no news.
             self.nodes[path].inputs.pop(port, None)
         order, loops = execution_order(list(self.nodes.values()))
@@ -74,7 +79,7 @@ class WireCheck:
             for port, connection in draft.connections.items():
                 wire = connection.source
                 if port not in inputs:
-                    remedy = suggestion(port, inputs) if inputs else "it has none"
+                    remedy = remedy_for(port, draft.connections, inputs)
                     self._fault(draft, connection.place, f"{draft.kind} has no input '{port}'", remedy)
                 elif isinstance(wire, Wire) and wire.block in self.drafts:
                     link = Link(draft, port, connection, wire, inputs[port])
@@ -87,13 +92,13 @@ class WireCheck:
 
     def _check_connected(self) -> None:
         for draft in self.drafts.values():
-            for port, declared in draft.block.interface.inputs.items():
-                if port not in draft.connections and declared.default is None:
-                    self.lost.add((draft.path, port))
-                    remedy = f"add '{port}: block.port' under 'in'"
-                    if declared.signal.scalar != "frame":
-                        remedy += ", or a constant"
-                    self._fault(draft, draft.place, f"input '{port}' is not connected", remedy)
+            inputs = draft.block.interface.inputs
+            wanted = [port for port, declared in inputs.items() if declared.default is None]
+            self.lost |= {(draft.path, port) for port in wanted if port not in draft.connections}
+            for port in absent(wanted, draft.connections, inputs) if not draft.told else ():
+                constant = ", or a constant" if inputs[port].signal.scalar != "frame" else ""
+                remedy = f"add '{port}: block.port' under 'in'{constant}"
+                self._fault(draft, draft.place, f"input '{port}' is not connected", remedy)
 
     def _is_right_kind(self, link: Link) -> bool:
         wire, wanted = link.wire, link.declared.signal.scalar
@@ -102,28 +107,32 @@ class WireCheck:
         if given == wanted:
             return True
         fitting = [name for name, port in outputs.items() if port.signal.scalar == wanted]
-        remedy = f"'{wire.block}.{fitting[0]}' is" if len(fitting) == 1 else f"wire a {wanted} signal"
+        remedy = (
+            f"'{wire.block}.{fitting[0]}' is {wanted}" if len(fitting) == 1 else f"wire a {wanted} signal"
+        )
         problem = f"input '{link.port}' takes {wanted}, '{wire.source}' is {given}"
         self._fault(link.draft, link.connection.place, problem, remedy)
         return False
 
     def _check_rates(self, links: Sequence[Link]) -> None:
+        told: set[Place] = set()  # one wire may lead to several blocks of a part
         for draft, port, connection, wire, _ in links:
             source = self.drafts[wire.block].task
             if draft.task is None or source is None or draft.task == source:
                 continue
             problem, remedy = crossing_fault(source, draft.task, wire.crossing)
-            if problem:
+            if problem and connection.place not in told:
+                told.add(connection.place)
                 text = f"'{wire.source}' ({rate_text(source)}) into '{port}' ({rate_text(draft.task)}): {problem}"
                 self._fault(draft, connection.across or connection.place, text, remedy)
 
     def _tell_loop(self, loop: list[Key]) -> None:
         """Say the loop in the direction of the signal."""
         path, port = loop[0]
-        steps = [f"{name}.{entered}" for name, entered in reversed(loop)]
+        steps = [f"{name}.{entered}" for name, entered in (loop[0], *reversed(loop))]
         remedy = "break it with 'across: delay' on one of these wires, or with a block that holds a state"
         place = self.drafts[path].connections[port].place
-        self._fault(self.drafts[path], place, "algebraic loop: " + " -> ".join([*steps, steps[0]]), remedy)
+        self._fault(self.drafts[path], place, "algebraic loop: " + " -> ".join(steps), remedy)
 
 
 def crossing_fault(source: Task, target: Task, crossing: str | None) -> tuple[str, str]:
@@ -134,6 +143,8 @@ def crossing_fault(source: Task, target: Task, crossing: str | None) -> tuple[st
     if crossing is None:
         fitting = fitting if ratio.denominator == 1 else "newest"
         return "the wire does not say how it crosses between rates", f"add 'across: {fitting}'"
+    if crossing == TOLD:
+        return "", ""
     if crossing != "newest" and ratio.denominator != 1:
         return (
             f"the periods are in the ratio {ratio}, not commensurate for 'across: {crossing}'",

@@ -54,7 +54,9 @@ def _terminate(number: int, _: object) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="quadvis", description="Block diagrams in YAML that fly a four-rotor craft.")
+    parser = argparse.ArgumentParser(
+        prog="quadvis", description="Block diagrams in YAML that fly a four-rotor craft."
+    )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     def add(name: str, command: Any, words: str, epilog: str = "") -> argparse.ArgumentParser:
@@ -69,7 +71,9 @@ def _parser() -> argparse.ArgumentParser:
     _diagram_options(run)
     run.add_argument("--stop-time", metavar="T", help="such as '20 s'; replaces the diagram's")
     run.add_argument("--seed", type=int, metavar="N", help="seed of all noise; replaces the diagram's")
-    run.add_argument("--log", metavar="PATH", help="where to write the log; default runs/NAME.mcap, '' for none")
+    run.add_argument(
+        "--log", metavar="PATH", help="where to write the log; default runs/NAME.mcap, '' for none"
+    )
     run.add_argument("--json", action="store_true", help="print one JSON object instead of the summary")
     check = add("check", _check, "check a diagram and tell all its faults")
     _diagram_options(check)
@@ -142,7 +146,9 @@ def _log_path(given: str | None, diagram: Any) -> Path | None:
     try:
         path.parent.mkdir(exist_ok=True)
     except OSError as error:
-        problem = f"cannot make the folder '{path.parent}' for the log: {(error.strerror or str(error)).lower()}"
+        problem = (
+            f"cannot make the folder '{path.parent}' for the log: {(error.strerror or str(error)).lower()}"
+        )
         raise QuadvisError(f"{problem}; name another place with --log") from error
     return path
 
@@ -180,7 +186,7 @@ def _list(options: argparse.Namespace) -> int:
     if options.json:
         _print_json([facts(name, catalogue.find(name)) for name in catalogue.names()])
         return 0
-    lines, failures = catalogue_lines(catalogue)
+    lines, failures = catalogue_lines(catalogue, _width())
     print("\n".join(lines))
     if failures:
         raise QuadvisError("\n".join(failures))
@@ -195,7 +201,7 @@ def _describe(options: argparse.Namespace) -> int:
     if options.json:
         _print_json(facts(options.block, block))
     else:
-        print(description(options.block, block))
+        print(description(options.block, block, _width()))
     return 0
 
 
@@ -237,6 +243,13 @@ def _json(data: Any, indent: int | None = None) -> str:
     import json
 
     return json.dumps(data, indent=indent, allow_nan=False)
+
+
+def _width() -> int | None:
+    """Return the width of the terminal; None where text goes elsewhere."""
+    from shutil import get_terminal_size
+
+    return get_terminal_size().columns if sys.stdout.isatty() else None
 
 
 def _write(text: str, output: str) -> int:

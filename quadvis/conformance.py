@@ -47,6 +47,8 @@ def check_block(
             check(subject)
         except AssertionError as error:
             problems.append(f"{block.__name__}: {name}: {error}")
+        except Exception as error:
+            problems.append(f"{block.__name__}: {name}: {type(error).__name__}: {error}")
     if problems:
         raise AssertionError("\n".join(problems))
 
@@ -85,7 +87,7 @@ def all_declarations_used(subject: Subject) -> None:
     asked = {name for names in interface.arguments.values() for name in names}
     idle = [name for name in interface.inputs if name not in asked]
     assert not idle, f"no method asks for {', '.join(idle)}; take it away"
-    classes = [kind for kind in subject.block.__mro__ if issubclass(kind, Block) and kind is not Block]
+    classes = [kind for kind in subject.block.__mro__ if kind not in Block.__mro__]
     functions = [value for kind in classes for value in vars(kind).values() if inspect.isfunction(value)]
     names = {name for function in functions for name in _names(function.__code__)}
     idle = [name for name in (*interface.params, *interface.states) if name not in names]

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import inspect
+import math
+import textwrap
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, Declared, Param
+from quadvis.block import Block, Declared, In, Out, Param, State
 from quadvis.catalogue import Catalogue, CatalogueError
+
+LEAST = 30  # columns left for the words about a port, however narrow the terminal
 
 
 def first_line(block: type[Block]) -> str:
@@ -17,7 +21,7 @@ def first_line(block: type[Block]) -> str:
     return (inspect.getdoc(block) or "").partition("\n")[0]
 
 
-def catalogue_lines(catalogue: Catalogue) -> tuple[list[str], list[str]]:
+def catalogue_lines(catalogue: Catalogue, width: int | None = None) -> tuple[list[str], list[str]]:
     """Return one line per block, and one per block that cannot be loaded: those are told, never skipped."""
     rows, failures = [], []
     for name in catalogue.names():
@@ -25,24 +29,77 @@ def catalogue_lines(catalogue: Catalogue) -> tuple[list[str], list[str]]:
             rows.append((name, first_line(catalogue.find(name))))
         except CatalogueError as error:
             failures.append(str(error))
-    return table(rows), failures
+    return table(rows, width), failures
 
 
-def description(name: str, block: type[Block]) -> str:
-    """Return a block's docstring, ports, parameters and states as text."""
+def description(name: str, block: type[Block], width: int | None = None) -> str:
+    """Return a block's docstring, ports, parameters and states as text, and how a diagram uses it."""
     interface = block.interface
-    parts = [f"{name}\n", inspect.getdoc(block) or "", ""]
+    lines = [name, "", *(inspect.getdoc(block) or "").splitlines(), ""]
     feedthrough = interface.feedthrough
-    for title, items, extra in (
-        ("inputs", interface.inputs, lambda port: "direct feedthrough" if port.name in feedthrough else ""),
-        ("outputs", interface.outputs, lambda port: "NaN means missing" if port.nan else ""),
-        ("parameters", interface.params, _param_words),
-        ("states", interface.states, lambda state: "continuous" if state.continuous else ""),
+    for title, rows in (
+        ("inputs", [_input_row(port, port.name in feedthrough) for port in interface.inputs.values()]),
+        ("outputs", [_output_row(port) for port in interface.outputs.values()]),
+        ("parameters", [_param_row(param) for param in interface.params.values()]),
+        ("states", [_state_row(state) for state in interface.states.values()]),
     ):
-        if items:
-            rows = [(f"  {item.name}", item.type, _unit(item), extra(item), item.doc) for item in items.values()]
-            parts += [f"{title}:", *table(rows), ""]
-    return "\n".join(parts)
+        if rows:
+            lines += [title, *(f"  {line}" for line in table(rows, width and width - 2)), ""]
+    lines += ["in a diagram", *(f"  {line}" for line in example(name, block))]
+    return "\n".join(lines)
+
+
+def _input_row(port: In, direct: bool) -> tuple[str, ...]:
+    words = [] if direct else ["no direct feedthrough"]
+    if port.default is not None:
+        words.append("optional" if _is_nan(port.default) else f"optional, {value_text(port, port.default)}")
+    return port.name, _kind(port), "; ".join(words), port.doc
+
+
+def _output_row(port: Out) -> tuple[str, ...]:
+    return port.name, _kind(port), "NaN means missing" if port.nan else "", port.doc
+
+
+def _param_row(param: Param) -> tuple[str, ...]:
+    default = default_text(param)
+    words = [" | ".join(param.choices), bounds(param), "tunable" if param.tune else ""]
+    kind = "" if param.choices else _kind(param)
+    return (
+        param.name,
+        kind,
+        "required" if default is None else f"= {default}",
+        "; ".join(filter(None, words)),
+        param.doc,
+    )
+
+
+def _state_row(state: State) -> tuple[str, ...]:
+    return state.name, _kind(state), "continuous" if state.continuous else "", state.doc
+
+
+def _kind(item: Declared) -> str:
+    """Return what a port holds, as short as it is clear: "m", "[3] m", "bool"."""
+    kind = item.type.removeprefix("float64")
+    return " ".join(filter(None, (kind, "" if item.unit == "1" else item.unit))) or "number"
+
+
+def example(name: str, block: type[Block]) -> list[str]:
+    """Return an entry of a diagram with all that must be given."""
+    interface = block.interface
+    lines = [f"{name.rpartition('.')[2].rpartition(':')[2]}:", f"  block: {name}"]
+    lines += [] if interface.continuous else ["  rate: ..."]
+    required = {param.name: _sample(param) for param in interface.params.values() if param.required}
+    wired = {port.name: "block.port" for port in interface.inputs.values() if port.default is None}
+    for key, values in (("with", required), ("in", wired)):
+        if values:
+            lines.append(f"  {key}: {{{', '.join(f'{item}: {text}' for item, text in values.items())}}}")
+    return lines
+
+
+def _sample(param: Param) -> str:
+    if param.is_file:
+        return "path"
+    return param.choices[0] if param.choices else "..."
 
 
 def facts(name: str, block: type[Block]) -> dict[str, Any]:
@@ -54,13 +111,16 @@ def facts(name: str, block: type[Block]) -> dict[str, Any]:
     interface = block.interface
     params = plain(interface.params.values())
     for param in interface.params.values():
-        params[param.name] |= {"default": default_text(param), "bounds": _bounds(param), "tune": param.tune}
+        params[param.name] |= {"default": default_text(param), "bounds": bounds(param), "tune": param.tune}
         if param.choices:
-            params[param.name]["choices"] = list(param.choices)
+            params[param.name] |= {"type": "choice", "choices": list(param.choices)}
+    inputs = plain(interface.inputs.values())
+    for port in interface.inputs.values():
+        inputs[port.name]["optional"] = port.default is not None
     return {
         "block": name,
         "doc": inspect.getdoc(block) or "",
-        "inputs": plain(interface.inputs.values()),
+        "inputs": inputs,
         "outputs": plain(interface.outputs.values()),
         "params": params,
         "states": plain(interface.states.values()),
@@ -69,38 +129,54 @@ def facts(name: str, block: type[Block]) -> dict[str, Any]:
     }
 
 
-def _unit(item: Declared) -> str:
-    return "" if item.unit == "1" else item.unit
-
-
 def default_text(param: Param) -> str | None:
     """Return a parameter's default as a diagram would write it; None if it must be given."""
     if param.required:
         return None
     if param.is_text or param.choices:
         return str(param.default)
-    value = np.asarray(param.default).tolist()
-    text = str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else str(value)
-    return text if param.unit == "1" else f"{text} {param.unit}"
+    return value_text(param, param.default)
 
 
-def _param_words(param: Param) -> str:
-    words = [f"= {default_text(param)}" if not param.required else "required"]
-    words += [" | ".join(param.choices)] if param.choices else []
-    words += [_bounds(param)] if _bounds(param) else []
-    words += ["tunable"] if param.tune else []
-    return ", ".join(words)
+def value_text(declared: Declared, value: Any) -> str:
+    """Return a value as a diagram would write it; units that are left open are left out."""
+    text = _plain_text(np.asarray(value).tolist())
+    unit = declared.unit
+    if unit == "1" or any(each.variables for each in declared.units) or not np.any(value):
+        return text
+    return f"{{value: {text}, unit: {unit}}}" if text.startswith("[") else f"{text} {unit}"
 
 
-def _bounds(param: Param) -> str:
+def _plain_text(value: Any) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(map(_plain_text, value))}]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _is_nan(value: Any) -> bool:
+    return isinstance(value, float) and math.isnan(value)
+
+
+def bounds(param: Param) -> str:
+    """Return what a parameter's value must keep to."""
     marks = ((param.min, ">="), (param.above, ">"), (param.max, "<="), (param.below, "<"))
     return ", ".join(f"{mark} {bound:g}" for bound, mark in marks if bound is not None)
 
 
-def table(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return rows with aligned columns; empty columns take no room."""
+def table(rows: Sequence[Sequence[str]], width: int | None = None) -> list[str]:
+    """Return rows with aligned columns; empty columns take no room, and the last wraps at a width."""
     if not rows:
         return []
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    kept = [column for column, width in enumerate(widths) if width]
-    return ["  ".join(row[column].ljust(widths[column]) for column in kept).rstrip() for row in rows]
+    kept = [column for column, found in enumerate(widths) if found]
+    lines = []
+    for row in rows:
+        head = "".join(row[column].ljust(widths[column]) + "  " for column in kept[:-1])
+        last = row[kept[-1]] if kept else ""
+        parts = textwrap.wrap(last, max(LEAST, width - len(head))) if width and last else [last]
+        lines += [
+            ((" " * len(head) if number else head) + part).rstrip() for number, part in enumerate(parts)
+        ]
+    return lines

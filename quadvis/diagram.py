@@ -103,7 +103,9 @@ class Diagram:
         for node in nodes:
             interface = node.block.interface
             shown = [port for port in interface.inputs if self._is_drawn(node, port)]
-            blocks.append(DrawnBlock(node.path, node.kind, tuple(shown), tuple(interface.outputs), node.task.name))
+            blocks.append(
+                DrawnBlock(node.path, node.kind, tuple(shown), tuple(interface.outputs), node.task.name)
+            )
             for port in shown:
                 source = node.inputs[port]
                 if isinstance(source, Wire):
@@ -193,11 +195,12 @@ class _Assembly:
         """Return the diagram; it may run if there are no faults."""
         spec, faults = self.spec, self.faults
         filled = fill_slots(spec, variant, faults)
-        promised = self._promised(filled)
         expansion = Expansion(filled, self.catalogue, settings, self.parts, faults)
-        wiring = Wiring(expansion, faults, promised)
+        wiring = Wiring(expansion, faults)
+        promised = self._promised(filled)
         given = {slot: wiring.outputs(slot) for slot in promised if slot not in expansion.unknown}
-        check_slots(spec, filled, promised, given, faults)
+        wiring.refused = check_slots(spec, filled, promised, given, faults)
+        wiring.check_ports(expansion.root)
         builder = Builder(spec, expansion, wiring, faults)
         drafts = builder.drafts()
         graph = Graph(spec.name, WireCheck(drafts, faults).run(), spec.solver, builder.step)
@@ -221,7 +224,9 @@ class _Assembly:
         return {slot: base.outputs(slot) for slot in changed}
 
 
-def _settings(settings: Mapping[str, Any] | Sequence[str], faults: Faults) -> dict[str, dict[str, Node | None]]:
+def _settings(
+    settings: Mapping[str, Any] | Sequence[str], faults: Faults
+) -> dict[str, dict[str, Node | None]]:
     """Return the replaced parameters by block path ("" for the diagram's own) and name; None if it is told."""
     if isinstance(settings, Mapping):
         settings = [f"{name}={_text(value)}" for name, value in settings.items()]
@@ -232,7 +237,9 @@ def _settings(settings: Mapping[str, Any] | Sequence[str], faults: Faults) -> di
         with faults.about(f"'{name}'"):
             if not text or not parameter:
                 remedy = "write block.parameter=value, such as control/roll.bandwidth='2 rad/s'"
-                faults.add(Place(COMMAND_LINE), "there is no value" if parameter else "there is no parameter", remedy)
+                faults.add(
+                    Place(COMMAND_LINE), "there is no value" if parameter else "there is no parameter", remedy
+                )
                 continue
             node = faults.collect(_setting, text, parameter)
             found.setdefault(path, {})[parameter] = read_constant(node, faults) if node is not None else None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from quadvis.catalogue import Catalogue, CatalogueError
 from quadvis.document import Node
 from quadvis.errors import DiagramError, Faults, Place, closest, suggestion
 from quadvis.loader import BlockSpec, FileSpec, read_file
+from quadvis.names import absent, remedy_for
 from quadvis.values import substitute
 
 MAX_BLOCKS = 5_000  # parts in parts multiply
@@ -51,18 +52,16 @@ class FlatBlock:
     @property
     def rate(self) -> tuple[str, Place] | None:
         """The block's rate, or that of the nearest part around it that has one."""
-        rate, scope = self.spec.rate, self.scope
-        while rate is None and scope.instance is not None and scope.parent is not None:
-            rate, scope = scope.instance.rate, scope.parent
-        return rate
+        return next((spec.rate for spec in self.around if spec.rate is not None), None)
 
     @property
-    def rateless(self) -> Place:
-        """Where a missing rate is to be written: at the block, or at the outermost part around it."""
-        place, scope = self.spec.place, self.scope
+    def around(self) -> Iterator[BlockSpec]:
+        """The block's entry, then those of the parts around it."""
+        yield self.spec
+        scope = self.scope
         while scope.instance is not None and scope.parent is not None:
-            place, scope = scope.instance.place, scope.parent
-        return place
+            yield scope.instance
+            scope = scope.parent
 
     def place(self, parameter: str) -> Place:
         """Where a parameter is given its value."""
@@ -93,7 +92,8 @@ class Expansion:
     ) -> None:
         self.catalogue, self.settings, self.parts, self.faults = catalogue, settings, parts, faults
         self.blocks: dict[str, FlatBlock] = {}
-        self.unknown: set[str] = set()  # blocks and parts that are there but have faults of their own
+        self.unknown: set[str] = set()  # blocks and parts that are there, but nothing else is known of them
+        self.broken: set[str] = set()  # blocks of which a parameter is wrong
         self._count = 0
         self._used: set[tuple[str, str]] = set()
         params = {name: self._setting("", name) or node for name, node in spec.params.items()}
@@ -132,7 +132,9 @@ class Expansion:
                     self.faults.add(block.place, problem, "use fewer parts in parts")
                     raise DiagramError(self.faults)
                 if block.slot is not None and scope.parent is not None:
-                    self.faults.add(block.slot, "a part has no slots", "make the whole part a slot of the diagram")
+                    self.faults.add(
+                        block.slot, "a part has no slots", "make the whole part a slot of the diagram"
+                    )
                 values = self._values(scope, block, path)
                 if block.is_part:
                     self._expand_part(scope, block, values, files)
@@ -142,14 +144,14 @@ class Expansion:
                     self.blocks[path] = FlatBlock(path, block, scope, self._find_kind(block, path), values)
 
     def _values(self, scope: Scope, block: BlockSpec, path: str) -> dict[str, Node]:
-        """Return the parameters of a block or part; one with a fault makes a block unknown."""
+        """Return the parameters of a block or part."""
         values: dict[str, Node] = {}
         for name, node in block.parameters.items():
             value = substitute(node, scope.params, self.faults)
             if value is not None:
                 values[name] = value
             elif not block.is_part:
-                self.unknown.add(path)
+                self.broken.add(path)
         for name in self.settings.get(path, {}):
             value = self._setting(path, name)
             if value is not None:
@@ -176,21 +178,19 @@ class Expansion:
         for name, node in values.items():
             if name not in spec.params:
                 place = block.parameter_places.get(name, node.place)
-                self._tell_stranger(place, f"part '{block.kind}' has no parameter '{name}'", name, spec.params)
+                problem = f"part '{block.kind}' has no parameter '{name}'"
+                self.faults.add(place, problem, remedy_for(name, values, spec.params))
         inputs = block.inputs or {}
         for name, given in inputs.items():
             if name not in spec.inputs:
-                self._tell_stranger(given.place, f"part '{block.kind}' has no input '{name}'", name, spec.inputs)
-        for name in spec.inputs:
-            if name not in inputs:
-                remedy = f"add '{name}: block.port' under 'in', or a constant"
-                self.faults.add(block.place, f"input '{name}' is not connected", remedy)
+                problem = f"part '{block.kind}' has no input '{name}'"
+                self.faults.add(given.place, problem, remedy_for(name, inputs, spec.inputs))
+        for name in absent(spec.inputs, inputs, spec.inputs) if "in" not in block.told else ():
+            remedy = f"add '{name}: block.port' under 'in', or a constant"
+            self.faults.add(block.place, f"input '{name}' is not connected", remedy)
         child = Scope(f"{scope.prefix}{block.name}/", spec, spec.params | values, scope, block)
         scope.children[block.name] = child
         self._expand(child, (*files, os.path.realpath(file)))
-
-    def _tell_stranger(self, place: Place, problem: str, name: str, known: Mapping[str, object]) -> None:
-        self.faults.add(place, problem, suggestion(name, known) if known else "it has none")
 
     def _part(self, block: BlockSpec, file: Path, files: tuple[str, ...]) -> FileSpec | None:
         problem, remedy = "", ""
@@ -199,9 +199,14 @@ class Expansion:
         elif len(files) > MAX_DEPTH:
             problem, remedy = f"parts are nested deeper than {MAX_DEPTH} files", "write them flatter"
         elif not os.path.isfile(file):
-            near = closest(file.name, _yaml_files(file.parent))
+            others = [
+                name for name in _yaml_files(file.parent) if os.path.realpath(file.parent / name) not in files
+            ]
+            near = closest(file.name, others)
             problem = f"there is no file '{block.kind}'"
-            remedy = f"did you mean '{near}'?" if near else "a path is relative to the file in which it stands"
+            remedy = (
+                f"did you mean '{near}'?" if near else "a path is relative to the file in which it stands"
+            )
         if problem:
             self.faults.add(block.kind_place, problem, remedy)
             return None

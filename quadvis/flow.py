@@ -11,6 +11,7 @@ import numpy as np
 from quadvis.block import Block, In
 from quadvis.errors import Faults, Place
 from quadvis.graph import Constant, Node, Task, Wire, selected
+from quadvis.reference import index_text
 from quadvis.units import Unit
 from quadvis.values import OpenUnits, shape_text
 
@@ -30,16 +31,26 @@ class Connection:
 
 @dataclass
 class Draft:
-    """A block whose name and parameters are right; its wires are not checked yet. ``task`` is None if unknown."""
+    """A block whose wires are not checked yet.
+
+    ``block`` is the class alone if the parameters are wrong: what depends on them is not looked at. ``task`` is
+    None if the rate is.
+    """
 
     path: str
     place: Place
     kind: str
-    block: Block
+    block: Block | type[Block]
     task: Task | None
     connections: dict[str, Connection]
     places: Mapping[str, Place] = field(default_factory=dict)  # of the parameters that are given
-    units: Mapping[str, OpenUnits] = field(default_factory=dict)  # of those whose declaration leaves them open
+    units: Mapping[str, OpenUnits] = field(default_factory=dict)  # of the parameters where they are open
+    told: bool = False  # that its inputs cannot be read
+
+    @property
+    def whole(self) -> bool:
+        """True if its parameters are known."""
+        return isinstance(self.block, Block)
 
 
 class Link(NamedTuple):
@@ -70,6 +81,7 @@ class Flow:
         self.lost = set(lost)
         self._waiting = {link.key: link for link in links}
         self._settled: set[str] = set()
+        self._told: set[Place] = set()
         self._rank = {path: rank for rank, path in enumerate(drafts)}
         self._into: dict[str, list[Link]] = {path: [] for path in drafts}
         self._from: dict[str, list[Link]] = {path: [] for path in drafts}
@@ -115,8 +127,10 @@ class Flow:
                     changed.append(link.draft.path)
 
     def fault(self, path: str, place: Place, problem: str, remedy: str = "") -> None:
-        """Tell a fault of a block."""
-        self.faults.add(place, problem, remedy, subject=f"block '{path}'")
+        """Tell a fault of a block, once for a wire that leads to several blocks of a part."""
+        if place not in self._told:
+            self._told.add(place)
+            self.faults.add(place, problem, remedy, subject=f"block '{path}'")
 
     def knows(self, link: Link) -> bool:
         """Say whether what comes along a wire is known."""
@@ -133,6 +147,11 @@ class Flow:
     def knowledge(self, path: str) -> int:
         """Return how well a block can go ahead in a ring; higher is better."""
         return 0
+
+
+def misfit(wire: Wire, shape: Sequence[int]) -> str:
+    """Say that an index goes beyond a signal."""
+    return f"index {index_text(wire.index)} does not fit '{wire.source}', which has {shape_text(shape)}"
 
 
 class ShapeFlow(Flow):
@@ -152,8 +171,8 @@ class ShapeFlow(Flow):
         try:
             part = selected(shape, wire.index)
         except IndexError:
-            remedy = "count from 0" if shape else "leave the index out"
-            self.fault(link.draft.path, link.connection.place, f"the index goes beyond the signal, {source}", remedy)
+            remedy = "count from 0" if shape else "leave it out"
+            self.fault(link.draft.path, link.connection.place, misfit(wire, shape), remedy)
             return False
         if part is None:
             problem = f"the elements do not lie side by side, {source}"
@@ -186,6 +205,8 @@ class ShapeFlow(Flow):
                 shape = np.shape(connection.source.value)
                 if not self._fit(draft, port, shape, f"the constant has {shape_text(shape)}"):
                     self.lost.add((path, port))
+        if not draft.whole:
+            return
         interface = node.block.interface
         doubtful = {
             size for port, declared in interface.inputs.items() if (path, port) in self.lost

@@ -20,6 +20,7 @@ CROSSINGS = {
     "delay": "the producer's value of one of its periods ago, which breaks loops",
     "newest": "whatever the producer gave last, for rates that do not fit into each other",
 }
+TOLD = "told"  # in place of a crossing that cannot be read
 SOLVERS = ("ode1", "ode2", "ode3", "ode4")
 
 Index = tuple[Any, ...]  # integers, then slices, as numpy takes them

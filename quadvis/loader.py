@@ -8,10 +8,10 @@ from fractions import Fraction
 from pathlib import Path
 
 from quadvis.document import Mapping, Node, Scalar, parse_yaml, read_yaml
-from quadvis.errors import Faults, Place
-from quadvis.graph import CROSSINGS, SOLVERS
+from quadvis.errors import DiagramError, Faults, Place, closest
+from quadvis.graph import CROSSINGS, SOLVERS, TOLD
 from quadvis.reference import Reference, read_reference
-from quadvis.units import Unit
+from quadvis.units import Unit, split_quantity
 from quadvis.values import QUANTITY_KEYS, read_constant
 
 VERSION = 1
@@ -20,6 +20,7 @@ INSIDE = "in"  # the name under which a part's blocks see what comes in
 NAME = re.compile(r"[A-Za-z_]\w{0,63}", re.ASCII)
 PATH = re.compile(rf"{NAME.pattern}(?:/{NAME.pattern})*", re.ASCII)  # a resolved diagram has whole paths
 SECOND = Unit.parse("s")
+SHORTEST, LONGEST = Fraction(1, 10**9), Fraction(10**9)  # s: the log counts nanoseconds
 
 REQUIRED_KEYS = ("quadvis", "name", "blocks")
 DIAGRAM_KEYS = (
@@ -60,6 +61,7 @@ class BlockSpec:
     parameters: dict[str, Node] = field(default_factory=dict)
     parameter_places: dict[str, Place] = field(default_factory=dict)
     inputs: dict[str, InputSpec] | None = None  # None: no 'in' was written
+    told: frozenset[str] = frozenset()  # keys that are wrong or misspelt: what they lack is no news
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,7 @@ class FileSpec:
     rates: dict[str, RateSpec | None] = field(default_factory=dict)
     solver: str = "ode4"
     step: Fraction | None = None
+    step_place: Place | None = None
     step_told: bool = False
     stop_time: Fraction | None = None
     seed: int = 0
@@ -191,36 +194,49 @@ def read_block(name: str, place: Place, node: Node, faults: Faults) -> BlockSpec
     fields = faults.collect(node.fields, (), BLOCK_KEYS, faults)
     if fields is None:
         return None
+    told = {closest(key, BLOCK_KEYS) or "" for key in fields if key not in BLOCK_KEYS}
     kinds = [fields[key] for key in ("block", "part") if key in fields]
     kind = faults.collect(kinds[0].text) if len(kinds) == 1 else None
-    parameters, inputs = fields.get("with"), fields.get("in")
-    given = faults.collect(parameters.mapping) if parameters is not None else None
-    wired = _map(inputs, faults)
-    read = {port: _read_input(value, faults) for port, value in wired}
+    given = faults.collect(fields["with"].mapping) if "with" in fields else None
+    wired = faults.collect(fields["in"].mapping) if "in" in fields else None
+    inputs = {port: _read_input(value, faults) for port, value in (wired.values if wired else {}).items()}
     rate = faults.collect(fields["rate"].text) if "rate" in fields else None
     is_slot = faults.collect(fields["slot"].boolean) if "slot" in fields else False
-    if len(kinds) != 1:
+    if len(kinds) != 1 and not told & {"block", "part"}:
         problem = "both 'block' and 'part' are given" if kinds else "neither 'block' nor 'part' is given"
         faults.add(place, problem, "give 'block: group.name' or 'part: file.yaml'")
     if kind is None:
         return None
+    read = {"rate": rate, "with": given, "in": wired, "slot": is_slot}
+    told |= {key for key, value in read.items() if key in fields and value is None}
     return BlockSpec(
-        name, place, kind, kinds[0].place, "part" in fields,
-        (rate, fields["rate"].place) if rate is not None else None,
-        fields["slot"].place if is_slot else None,
-        dict(given.values) if given is not None else {},
-        {key: node.place for key, node in given.keys.items()} if given is not None else {},
-        read if inputs is not None else None,
-    )  # fmt: skip
+        name,
+        place,
+        kind,
+        kinds[0].place,
+        is_part="part" in fields,
+        rate=(rate, fields["rate"].place) if rate is not None else None,
+        slot=fields["slot"].place if is_slot else None,
+        parameters=given.values if given is not None else {},
+        parameter_places={key: node.place for key, node in given.keys.items()} if given is not None else {},
+        inputs=inputs if "in" in fields else None,
+        told=frozenset(told),
+    )
 
 
 def _read_input(node: Node, faults: Faults) -> InputSpec:
     """Read ``block.port``, ``{from: block.port, across: hold}``, a constant, or ``{value: ..., unit: ...}``."""
-    if isinstance(node, Mapping) and not any(key in node for key in QUANTITY_KEYS):
+    is_value = isinstance(node, Mapping) and any(key in node for key in QUANTITY_KEYS)
+    if isinstance(node, Mapping) and is_value and "from" in node:
+        faults.add(node.place, "a signal and a value are given at once", "keep 'from' or 'value'")
+        return InputSpec(node.place, None)
+    if isinstance(node, Mapping) and not is_value:
         faults.collect(node.fields, WIRE_KEYS[:1], WIRE_KEYS[1:], faults)
         source = read_reference(node["from"], faults) if "from" in node else None
         across = node.get("across")
         crossing = faults.collect(across.choice, CROSSINGS) if across is not None else None
+        if crossing is None and len(node) > 1:
+            crossing = TOLD
         return InputSpec(node.place, source, crossing, across.place if across is not None else None)
     if isinstance(node, Scalar) and _is_reference(node.value):
         return InputSpec(node.place, read_reference(node, faults))
@@ -250,17 +266,17 @@ def _read_ports(spec: FileSpec, root: Mapping, faults: Faults) -> None:
 
 def _read_time(spec: FileSpec, root: Mapping, faults: Faults) -> None:
     for name, value in _named(root, "rates", "rate", faults):
-        with faults.about(f"rate '{name}'"):
-            spec.rates[name] = _read_rate(value, faults)
-            if name == CONTINUOUS:
-                remedy = "choose another name, or set 'solver: {step: ...}'"
-                faults.add(value.place, "'continuous' is the rate of the solver", remedy)
+        spec.rates[name] = _read_rate(value, faults)
+        if name == CONTINUOUS:
+            remedy = "choose another name, or set 'solver: {step: ...}'"
+            faults.add(value.place, "'continuous' is the rate of the solver", remedy)
     solver = root.get("solver")
     fields = faults.collect(solver.fields, (), SOLVER_KEYS, faults) if solver is not None else None
     if fields is not None and "method" in fields:
         spec.solver = faults.collect(fields["method"].choice, SOLVERS) or spec.solver
     if fields is not None and "step" in fields:
-        spec.step = faults.collect(fields["step"].period)
+        spec.step_place = fields["step"].place
+        spec.step = _read_step(fields["step"], faults)
     spec.step_told = solver is not None and (fields is None or ("step" in fields and spec.step is None))
     if "stop_time" in root:
         spec.stop_time = read_duration(root["stop_time"], faults) or Fraction(0)
@@ -270,21 +286,49 @@ def _read_time(spec: FileSpec, root: Mapping, faults: Faults) -> None:
 
 def _read_rate(node: Node, faults: Faults) -> RateSpec | None:
     if not isinstance(node, Mapping):
-        period = faults.collect(node.period)
+        period = _in_range(node, faults.collect(node.period), faults)
         return None if period is None else RateSpec(node.place, period)
     faults.collect(node.fields, RATE_KEYS[:1], RATE_KEYS[1:], faults)
-    period = faults.collect(node["rate"].period) if "rate" in node else None
+    rate = node.get("rate")
+    period = _in_range(rate, faults.collect(rate.period), faults) if rate is not None else None
     offset = read_duration(node["offset"], faults) if "offset" in node else Fraction(0)
     return None if period is None or offset is None else RateSpec(node.place, period, offset)
 
 
+def _read_step(node: Node, faults: Faults) -> Fraction | None:
+    has_unit = isinstance(node, Scalar) and split_quantity(node.value)[1]
+    return _in_range(node, faults.collect(node.period) if has_unit else read_duration(node, faults), faults)
+
+
 def read_duration(node: Node, faults: Faults) -> Fraction | None:
     """Read a time that is not negative."""
+    number, unit = split_quantity(node.value) if isinstance(node, Scalar) else ("", "")
+    if not number and not unit:
+        faults.collect(_raise, node.wrong("a time such as '20 s'"))
+        return None
+    if number and not unit and number.strip("0.+-"):
+        label = f"'{node.key}': " if node.key else ""
+        faults.add(node.place, f"{label}'{number}' has no unit", f"did you mean '{number} s'?")
+        return None
     value = faults.collect(node.exact, SECOND)
-    if value is not None and value < 0:
-        faults.add(node.place, "a time cannot be negative", "write one such as '20 s'")
+    if value is not None and not 0 <= value <= LONGEST:
+        label = f"'{node.key}'" if node.key else "a time"
+        faults.add(node.place, f"{label} must be between 0 s and 1e9 s", "write one such as '20 s'")
         return None
     return value
+
+
+def _raise(error: DiagramError) -> None:
+    raise error
+
+
+def _in_range(node: Node, period: Fraction | None, faults: Faults) -> Fraction | None:
+    if period is None or SHORTEST <= period <= LONGEST:
+        return period
+    faults.add(
+        node.place, f"'{node.key}': the period must be between 1e-9 s and 1e9 s", "write such as '20 Hz'"
+    )
+    return None
 
 
 def _read_variants(spec: FileSpec, root: Mapping, faults: Faults) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 from quadvis import document as yaml
 from quadvis.document import Node, Scalar
 from quadvis.errors import Faults, Place, suggestion
+from quadvis.flow import misfit
 from quadvis.graph import Graph, Wire, selected
 from quadvis.loader import read_duration
 from quadvis.plot import read_figures
@@ -36,7 +37,9 @@ class Observation:
     every: dict[str, int] = field(default_factory=dict)  # of a task's rows one in so many is logged
     expectations: list[Expectation] = field(default_factory=list)
     summary: list[Entry] = field(default_factory=list)
-    sections: dict[str, Any] = field(default_factory=dict)  # expect, summary, figures as data, with full names
+    sections: dict[str, Any] = field(
+        default_factory=dict
+    )  # expect, summary, figures as data, with full names
 
     def judge(self, signals: Signals) -> Outcome:
         """Return the summary and the verdicts of a run."""
@@ -44,7 +47,9 @@ class Observation:
         return Outcome(summary, tuple(expectation.judge(signals) for expectation in self.expectations))
 
 
-def read_observation(sections: Mapping[str, Node], wiring: Wiring, graph: Graph, faults: Faults) -> Observation:
+def read_observation(
+    sections: Mapping[str, Node], wiring: Wiring, graph: Graph, faults: Faults
+) -> Observation:
     """Read the sections against the blocks that there are; faults are collected."""
     reader = _Reader(wiring, graph, faults)
     with faults.about("log"):
@@ -75,20 +80,30 @@ class _Reader:
     def log(self, node: Node | None) -> None:
         """Read which blocks are logged, and how often: ``{signals: [craft, "eyes/*"], every: {imu: 10}}``."""
         fields = self.faults.collect(node.fields, (), LOG_KEYS, self.faults) if node is not None else None
-        patterns = self.faults.collect(fields["signals"].items) if fields is not None and "signals" in fields else None
+        patterns = (
+            self.faults.collect(fields["signals"].items)
+            if fields is not None and "signals" in fields
+            else None
+        )
         if patterns is None:
             self.result.logged = list(self.nodes)
         else:
             wanted = {path for pattern in patterns for path in self._matching(pattern)}
             self.result.logged = [path for path in self.nodes if path in wanted]
         tasks = {node.task.name for node in self.nodes.values()}
-        every = self.faults.collect(fields["every"].mapping) if fields is not None and "every" in fields else None
+        every = (
+            self.faults.collect(fields["every"].mapping) if fields is not None and "every" in fields else None
+        )
         for key, value in every.pairs() if every is not None else []:
             count = self.faults.collect(value.integer)
             if key.value not in tasks and not self.wiring.expansion.unknown:
-                self.faults.add(key.place, f"no block runs at a rate '{key.value}'", suggestion(key.value, tasks))
+                self.faults.add(
+                    key.place, f"no block runs at a rate '{key.value}'", suggestion(key.value, tasks)
+                )
             elif count is not None and count < 1:
-                self.faults.add(value.place, "a row cannot be kept more often than it comes", "write 1 or more")
+                self.faults.add(
+                    value.place, "a row cannot be kept more often than it comes", "write 1 or more"
+                )
             elif count is not None:
                 self.result.every[key.value] = count
 
@@ -110,7 +125,9 @@ class _Reader:
     def _signal(self, node: Node) -> tuple[Part, str] | None:
         """Return a signal over the whole run, with its scalar kind; None if it is told to be wrong."""
         reference = read_reference(node, self.faults)
-        source = self.wiring.find(self.wiring.expansion.root, reference).source if reference is not None else None
+        source = (
+            self.wiring.find(self.wiring.expansion.root, reference).source if reference is not None else None
+        )
         if isinstance(source, Node):
             self.faults.add(node.place, "this is a constant, not a signal", "name an output of a block")
         if not isinstance(source, Wire) or source.block not in self.nodes:
@@ -119,17 +136,20 @@ class _Reader:
         scalar = found.block.interface.outputs[source.port].signal.scalar
         if scalar == "frame":
             self.faults.add(node.place, f"'{name}' is a picture, not a number", "name another signal")
-        if scalar == "frame" or source.port not in found.units:
+        sizes = found.block.interface.outputs[source.port].signal.shape
+        is_open = any(isinstance(size, str) and size not in found.sizes for size in sizes)
+        if scalar == "frame" or source.port not in found.units or is_open:
             return None
         shape = found.shape(source.port)
         try:
             part = selected(shape, source.index)
         except IndexError:
-            size = f"has {' x '.join(map(str, shape))} elements" if shape else "is one value"
-            self.faults.add(node.place, f"the index goes beyond the signal, '{name}' {size}", "count from 0")
+            self.faults.add(node.place, misfit(source, shape), "count from 0" if shape else "leave it out")
             return None
         if part is None:
-            self.faults.add(node.place, "the elements do not lie side by side", "take one element, or a run of them")
+            self.faults.add(
+                node.place, "the elements do not lie side by side", "take one element, or a run of them"
+            )
             return None
         if source.block not in self.result.logged:
             problem = f"block '{source.block}' is not logged"
@@ -146,14 +166,14 @@ class _Reader:
     def _part(self, fields: yaml.Mapping) -> tuple[Part, str] | None:
         """Return the part that an expectation or a line of the summary is about."""
         found = self._signal(fields["signal"]) if "signal" in fields else None
-        limits = {
-            name: read_duration(fields[name], self.faults) for name in STRETCH_KEYS[:2] if name in fields
-        }
+        after, before = (
+            read_duration(fields[name], self.faults) if name in fields else None for name in STRETCH_KEYS[:2]
+        )
         if found is None:
             return None
-        stretch = {name: float(value) for name, value in limits.items() if value is not None}
         of = self.faults.collect(fields["of"].quantity, found[0].unit, bare=False) if "of" in fields else None
-        return replace(found[0], of=of or 0.0, **stretch), found[1]
+        end = math.inf if before is None else float(before)
+        return replace(found[0], of=of or 0.0, after=float(after or 0), before=end), found[1]
 
     def expectation(self, node: Node) -> None:
         """Read ``{signal: plant.position[0], after: 20 s, within: 0.15 m}``."""
@@ -162,8 +182,10 @@ class _Reader:
             return
         found = self._part(fields)
         kinds = [kind for kind in EXPECTATIONS if kind in fields]
-        if not kinds:
-            self.faults.add(node.place, "nothing is expected of the signal", f"add one of {', '.join(EXPECTATIONS)}")
+        if not kinds and all(key in ("signal", *STRETCH_KEYS) for key in fields):
+            self.faults.add(
+                node.place, "nothing is expected of the signal", f"add one of {', '.join(EXPECTATIONS)}"
+            )
         for kind in kinds if found is not None else []:
             assert found is not None
             unit = ONE if kind == "count" else found[0].unit
@@ -188,7 +210,7 @@ class _Reader:
             return
         part, scalar = found
         if unit is not None and not unit.dimension_equals(part.unit):
-            problem = f"'{part.text}' is in {words(part.unit)}, not in {words(unit)}"
+            problem = f"'{part.text}' has {words(part.unit)}, which is not shown in {words(unit)}"
             self.faults.add(fields["unit"].place, problem, "write a unit of the same kind")
         default = ("rms", "max") if scalar == "float64" else ("count",)
         shown = tuple(name for name in show if name is not None) or default
@@ -199,11 +221,15 @@ class _Reader:
         read_figures(node, self.faults)
         told = {fault.place for fault in self.faults}
         for panel in _panels(node):
-            unit = self.faults.collect(panel["unit"].unit) if "unit" in panel and panel["unit"].place not in told else None
+            unit = (
+                self.faults.collect(panel["unit"].unit)
+                if "unit" in panel and panel["unit"].place not in told
+                else None
+            )
             for name in _signals(panel):
                 found = self._signal(name) if name.place not in told else None
                 if found is not None and unit is not None and not unit.dimension_equals(found[0].unit):
-                    problem = f"'{found[0].text}' is in {words(found[0].unit)}, the panel in {words(unit)}"
+                    problem = f"'{found[0].text}' has {words(found[0].unit)}, the panel is in {words(unit)}"
                     self.faults.add(name.place, problem, "give it a panel of its own")
 
 

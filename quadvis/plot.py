@@ -73,6 +73,11 @@ LEGEND_ROWS = 4
 MOST_CURVES = 12  # that a legend can name
 FEW_SAMPLES = 40  # that deserve a mark each
 
+STRETCH_KEYS = ("from", "to")
+PANEL_KEYS = ("signals", "title", "unit", "reference")
+TRACE_KEYS = ("signal", "label")
+FIGURE_KEYS = ("title", *STRETCH_KEYS, "panels", "signals", "unit", "reference")
+
 _SELECTOR = r"(?:\d{1,9}|\d{0,9}:\d{0,9})"
 _SIGNAL = re.compile(rf"([^\[\]\s.]+\.[^\[\]\s.]+)(?:\[({_SELECTOR}(?:,{_SELECTOR})*)\])?")
 
@@ -200,8 +205,8 @@ def read_figures(node: nodes.Node, faults: Faults) -> list[Figure]:
 
 def _read_figure(node: nodes.Node, faults: Faults) -> Figure:
     single = "panels" not in node.mapping()
-    keys = ("signals", "unit", "reference") if single else ("panels",)
-    entry = node.fields(("title", keys[0]), ("from", "to", *keys[1:]), faults)
+    keys = [key for key in PANEL_KEYS if key != "title"] if single else ["panels"]
+    entry = node.fields(("title", keys[0]), (*STRETCH_KEYS, *keys[1:]), faults)
     title = entry.get("title")
     name = faults.collect(title.text) if title else None
     panels = [entry] if single else faults.collect(_some, entry["panels"]) or []
@@ -227,7 +232,7 @@ def _some(node: nodes.Node) -> list[nodes.Node]:
 
 def _read_panel(node: nodes.Node, faults: Faults, single: bool) -> Panel:
     """Read a panel; in a figure of one panel the keys and the title are the figure's."""
-    entry = node.mapping() if single else node.fields(("signals",), ("title", "unit", "reference"), faults)
+    entry = node.mapping() if single else node.fields(PANEL_KEYS[:1], PANEL_KEYS[1:], faults)
     title, signals, unit, reference = map(entry.get, ("title", "signals", "unit", "reference"))
     entries = _some(signals) if isinstance(signals, nodes.Sequence) else [signals] if signals else []
     traces = [faults.collect(_read_trace, trace) for trace in entries]
@@ -247,7 +252,7 @@ def _read_unit(node: nodes.Node) -> Unit:
 def _read_trace(node: nodes.Node) -> Trace:
     label = None
     if isinstance(node, nodes.Mapping):
-        entry = node.fields(("signal",), ("label",))
+        entry = node.fields(TRACE_KEYS[:1], TRACE_KEYS[1:])
         node, label = entry["signal"], entry.get("label")
     try:
         split_signal(node.text())

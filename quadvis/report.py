@@ -27,7 +27,9 @@ class ProgressLine:
         if self.shown:
             filled = int(24 * min(1.0, time / self.duration)) if self.duration else 24
             bar = "#" * filled + "." * (24 - filled)
-            self.stream.write(f"\r[{bar}] {time:6.1f} / {self.duration:g} s  {time / max(wall, 1e-9):.0f} x real time ")
+            self.stream.write(
+                f"\r[{bar}] {time:6.1f} / {self.duration:g} s  {time / max(wall, 1e-9):.0f} x real time "
+            )
             self.stream.flush()
 
     def __exit__(

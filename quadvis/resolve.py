@@ -23,13 +23,17 @@ from quadvis.observe import Observation
 from quadvis.reference import wire_text
 
 
-def resolved_text(graph: Graph, stop_time: Fraction, seed: int, observation: Observation, folder: Path) -> str:
+def resolved_text(
+    graph: Graph, stop_time: Fraction, seed: int, observation: Observation, folder: Path
+) -> str:
     """Return the diagram with parts expanded, variant and settings applied and every parameter written out.
 
     It loads in ``folder``, and gives the same run to the bit. QuadvisError if a file cannot be read.
     """
     rates = {
-        task.name: {"rate": f"{task.period} s", "offset": f"{task.offset} s"} if task.offset else f"{task.period} s"
+        task.name: {"rate": f"{task.period} s", "offset": f"{task.offset} s"}
+        if task.offset
+        else f"{task.period} s"
         for task in graph.tasks
         if not task.continuous
     }
@@ -74,7 +78,11 @@ def check_files(spec: FileSpec, faults: Faults) -> None:
         if not os.path.isfile(path):
             faults.add(node.place, f"there is no file '{name}'", "paths are relative to the diagram")
         elif wanted is not None and file_digest(path) != wanted:
-            faults.add(node.place, f"file '{name}' is not what it was: its SHA-256 differs", "bring the old one back")
+            faults.add(
+                node.place,
+                f"file '{name}' is not what it was: its SHA-256 differs",
+                "bring that one back, or leave the entry out",
+            )
 
 
 def _relative(path: str, folder: Path) -> str:
@@ -83,11 +91,16 @@ def _relative(path: str, folder: Path) -> str:
 
 
 def _block(node: Node, folder: Path) -> dict[str, Any]:
-    found: dict[str, Any] = {"block": node.kind, "rate": CONTINUOUS if node.task.continuous else node.task.name}
+    found: dict[str, Any] = {
+        "block": node.kind,
+        "rate": CONTINUOUS if node.task.continuous else node.task.name,
+    }
     values = {
         name: _parameter(node, param, folder)
         for name, param in node.block.interface.params.items()
-        if param.choices or param.is_text or np.isfinite(getattr(node.block, name)).all()  # only defaults may not be
+        if param.choices
+        or param.is_text
+        or np.isfinite(getattr(node.block, name)).all()  # only defaults may not be
     }
     inputs: dict[str, Any] = {}
     for port, source in node.inputs.items():
@@ -126,5 +139,7 @@ def _quantity(node: Node, name: str, value: Any) -> Any:
         return {"value": array.tolist(), "unit": texts[0]}
     if array.ndim == 1:
         return {"value": array.tolist(), "unit": " ".join(text or "1" for text in texts)}
-    quantities = [f"{number!r} {text}".strip() for number, text in zip(array.ravel().tolist(), texts, strict=True)]
+    quantities = [
+        f"{number!r} {text}".strip() for number, text in zip(array.ravel().tolist(), texts, strict=True)
+    ]
     return np.reshape(np.array(quantities, dtype=object), array.shape).tolist()

@@ -110,7 +110,9 @@ def run(diagram: Diagram, *, log: str | Path | None = None, progress: Progress |
     signals = Recording(channels)
     wall, cpu = time.perf_counter(), time.process_time()
     with ExitStack() as stack:
-        writer = stack.enter_context(LogWriter(log, channels, _metadata(diagram))) if log is not None else None
+        writer = (
+            stack.enter_context(LogWriter(log, channels, _metadata(diagram))) if log is not None else None
+        )
         for index, bound in enumerate(logged):
             _record(engine, index, bound, diagram.decimation(bound.node.path), signals, writer)
         stack.enter_context(engine)

@@ -27,12 +27,13 @@ from quadvis.loader import (
     WIRE_KEYS,
 )
 from quadvis.observe import LOG_KEYS, STRETCH_KEYS, SUMMARY_KEYS
+from quadvis.plot import FIGURE_KEYS, PANEL_KEYS, TRACE_KEYS
 from quadvis.values import QUANTITY_KEYS
 from quadvis.verdict import EXPECTATIONS, STATISTICS
 
 Schema = dict[str, Any]
 
-TEXT: Schema = {"type": "string"}
+TEXT: Schema = {"type": ["string", "number", "boolean"]}  # any scalar is a text where one is wanted
 QUANTITY: Schema = {"type": ["string", "number"]}
 CONSTANT: Schema = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": r"^[-+.$\d]"}]}
 NAME: Schema = {"pattern": "^[A-Za-z_][A-Za-z0-9_/]*$"}
@@ -110,7 +111,7 @@ def _top() -> dict[str, Schema]:
             "additionalProperties": {"anyOf": [_ref("signal"), _ref("entry")]},
             "description": "lines of the summary by their labels",
         },
-        "figures": _list_of({"type": "object"}, "what `quadvis plot` draws"),
+        "figures": _list_of(_ref("figure"), "what `quadvis plot` draws"),
     }  # fmt: skip
 
 
@@ -139,9 +140,33 @@ def _definitions(blocks: Mapping[str, type[Block]]) -> dict[str, Schema]:
                                ["signal"]),
         "entry": _closed(("signal", *SUMMARY_KEYS), {"signal": signal, **stretch, "show": shown, "unit": TEXT},
                          ["signal"]),
+        **_figures(signal),
         "block": _any_block(blocks),
         **{f"block:{name}": _one_block(block) for name, block in blocks.items()},
     }  # fmt: skip
+
+
+def _figures(signal: Schema) -> dict[str, Schema]:
+    trace = _closed(
+        TRACE_KEYS, {"signal": signal, "label": {**TEXT, "description": "in the legend"}}, ["signal"]
+    )
+    signals = {"anyOf": [signal, _list_of({"anyOf": [signal, trace]}, "curves of the panel")]}
+    panel: dict[str, Schema] = {
+        "signals": signals,
+        "title": TEXT,
+        "unit": {**TEXT, "description": "of the axis; that of the first signal if absent"},
+        "reference": {**QUANTITY, "description": "dashed line from which the RMS in the legend counts"},
+    }
+    figure = panel | {
+        "from": {**QUANTITY, "description": "stretch of the run, such as 40 s"},
+        "to": QUANTITY,
+        "panels": _list_of(_ref("panel"), "side by side, three in a row"),
+    }
+    either = {"oneOf": [{"required": ["panels"]}, {"required": ["signals"]}]}
+    return {
+        "panel": _closed(PANEL_KEYS, panel, ["signals"]),
+        "figure": {**_closed(FIGURE_KEYS, figure, ["title"]), **either},
+    }
 
 
 def _any_block(blocks: Mapping[str, type[Block]]) -> Schema:
@@ -173,17 +198,25 @@ def _any_block(blocks: Mapping[str, type[Block]]) -> Schema:
 
 def _one_block(block: type[Block]) -> Schema:
     interface = block.interface
+    required = [name for name, param in interface.params.items() if param.required]
     parameters: Schema = {
         "additionalProperties": False,
         "properties": {name: _parameter(param) for name, param in interface.params.items()},
+        "required": required,
     }
     inputs: Schema = {
         "additionalProperties": False,
         "properties": {
             name: {**_ref("input"), "description": _words(port)} for name, port in interface.inputs.items()
         },
+        "required": [name for name, port in interface.inputs.items() if port.default is None],
     }
-    return {"description": inspect.getdoc(block) or "", "properties": {"with": parameters, "in": inputs}}
+    return {
+        "description": inspect.getdoc(block) or "",
+        "properties": {"with": parameters, "in": inputs},
+        # What stands in a slot may take its wires from there, but brings its own parameters.
+        "required": ["with"] if required else [],
+    }
 
 
 def _parameter(param: Param) -> Schema:
@@ -201,4 +234,5 @@ def _parameter(param: Param) -> Schema:
 
 def _words(item: Declared) -> str:
     unit = "" if item.unit == "1" else f", {item.unit}"
-    return f"{item.doc} ({item.type}{unit})"
+    kind = "choice" if isinstance(item, Param) and item.choices else item.type
+    return f"{item.doc} ({kind}{unit})"

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import keyword
 import re
 from pathlib import Path
 
 from quadvis.catalogue import STANDARD, Catalogue
 from quadvis.errors import QuadvisError
+
+TAKEN = ("Any", "Block", "In", "Out", "Param", "State")  # what the skeleton imports
 
 BLOCK = '''"""{title}."""
 
@@ -114,16 +117,20 @@ def new_block(name: str) -> list[Path]:
         raise QuadvisError(
             f"'{name}' cannot name a block; write group.name in lower case, such as signal.my_filter"
         )
+    *groups, last = name.split(".")
+    kind = "".join(part.capitalize() for part in last.split("_"))
+    if any(map(keyword.iskeyword, (*groups, last))) or kind in TAKEN:
+        raise QuadvisError(
+            f"'{name}' cannot name a block, since Python uses a word of it; choose another name"
+        )
     if name in Catalogue().names():
         raise QuadvisError(f"'{name}' is in the standard library; choose another name")
-    *groups, last = name.split(".")
     library = Path("blocks", STANDARD)
     ours = library.is_dir()
     block = Path(library if ours else "blocks", *groups, f"{last}.py")
     test = Path("tests", "blocks", *groups, f"test_{last}.py")
     _refuse_existing(block, test)
-    words = {"name": "".join(part.capitalize() for part in last.split("_")), "path": name}
-    words["title"] = last.replace("_", " ").capitalize()
+    words = {"name": kind, "path": name, "title": last.replace("_", " ").capitalize()}
     head = STANDARD_HEAD.format(module=f"{STANDARD}.{name}", **words) if ours else OWN_HEAD.format(
         up=len(test.parts) - 1, **words
     )  # fmt: skip
@@ -137,6 +144,8 @@ def new_diagram(file: str) -> list[Path]:
     path = Path(file)
     if path.suffix not in (".yaml", ".yml"):
         raise QuadvisError(f"'{file}' is not a YAML file; write a name such as loop.yaml")
+    if re.fullmatch(r"[A-Za-z_][\w-]*", path.stem, re.ASCII) is None:
+        raise QuadvisError(f"'{path.stem}' cannot name a diagram; use letters, digits, '_' and '-'")
     _refuse_existing(path)
     _write(path, DIAGRAM.format(name=path.stem))
     return [path]
@@ -151,6 +160,6 @@ def _refuse_existing(*paths: Path) -> None:
 def _write(path: Path, text: str) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
+        path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise QuadvisError(f"cannot write '{path}': {error.strerror}") from error

@@ -10,6 +10,7 @@ from quadvis.errors import Faults, suggestion
 from quadvis.loader import BlockSpec, FileSpec
 
 Outputs = Mapping[str, Mapping[str, Out]]  # by slot and port
+Refused = set[tuple[str, str]]  # slots and ports that another block should have, which is told
 
 
 def fill_slots(spec: FileSpec, variant: str | None, faults: Faults) -> FileSpec:
@@ -28,6 +29,8 @@ def fill_slots(spec: FileSpec, variant: str | None, faults: Faults) -> FileSpec:
                 faults.add(
                     block.place, f"variant '{name}' fills '{slot}', which is not in the diagram", remedy
                 )
+            elif base.slot is None and "slot" in base.told:
+                continue
             elif base.slot is None:
                 problem = f"variant '{name}' fills '{slot}', which is not a slot"
                 faults.add(block.place, problem, f"write 'slot: true' in block '{slot}'")
@@ -42,20 +45,38 @@ def _in_slot(base: BlockSpec, block: BlockSpec) -> BlockSpec:
     return replace(block, slot=base.slot, inputs=inputs, rate=block.rate or base.rate)
 
 
-def check_slots(spec: FileSpec, filled: FileSpec, promised: Outputs, given: Outputs, faults: Faults) -> None:
-    """Refuse a block that lacks an output of the one whose slot it takes, or gives another kind of signal."""
+def check_slots(
+    spec: FileSpec, filled: FileSpec, promised: Outputs, given: Outputs, faults: Faults
+) -> Refused:
+    """Tell the outputs that a block in a slot lacks, or has of another kind, and return them."""
+    refused = set()
     for slot, outputs in given.items():
         before, now = spec.blocks[slot], filled.blocks[slot]
-        for port, wanted in promised.get(slot, {}).items():
+        for port, wanted in promised[slot].items():
             offered = outputs.get(port)
             problem = ""
             if offered is None:
                 problem = f"'{now.kind}' has no output '{port}', which '{before.kind}' gives in this slot"
-            elif (offered.signal, offered.units) != (wanted.signal, wanted.units):
-                problem = f"output '{port}' of '{now.kind}' is {_words(offered)}, that of '{before.kind}' {_words(wanted)}"
+            elif _differ(offered, wanted):
+                this, that = _words(offered), _words(wanted)
+                problem = f"output '{port}' of '{now.kind}' is {this}, that of '{before.kind}' is {that}"
             if problem:
+                refused.add((slot, port))
                 remedy = "choose one with the same outputs"
                 faults.add(now.kind_place, problem, remedy, subject=f"block '{slot}'")
+    return refused
+
+
+def _differ(offered: Out, wanted: Out) -> bool:
+    """Say whether no signal fits both; what their declarations leave open the wires will show."""
+    shapes = offered.signal.shape, wanted.signal.shape
+    fixed = all(isinstance(size, int) for shape in shapes for size in shape)
+    units = not any(unit.variables for unit in (*offered.units, *wanted.units))
+    return (
+        offered.signal.scalar != wanted.signal.scalar
+        or (fixed and offered.signal.shape != wanted.signal.shape)
+        or (units and offered.units != wanted.units)
+    )
 
 
 def _words(port: Out) -> str:

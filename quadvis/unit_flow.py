@@ -28,7 +28,11 @@ class Bindings:
             # The unit of a scalar holds for every element of the block's vectors.
             places = self.elements if len(units) == 1 else self.elements[index : index + 1]
             wanted = pattern[index % len(pattern)]
-            if unit is not None and unit != wanted and not all([_unify(wanted, unit, bound) for bound in places]):
+            if (
+                unit is not None
+                and unit != wanted
+                and not all([_unify(wanted, unit, bound) for bound in places])
+            ):
                 return index
         return None
 
@@ -58,7 +62,11 @@ def _variable(unit: Unit) -> str:
 
 def _unify(wanted: Unit, unit: Unit, bound: dict[str, Unit]) -> bool:
     name = _variable(wanted)
-    return bound.setdefault(name, unit) == unit if name else bool(wanted.variables) and unify(wanted, unit, bound)
+    return (
+        bound.setdefault(name, unit) == unit
+        if name
+        else bool(wanted.variables) and unify(wanted, unit, bound)
+    )
 
 
 class UnitFlow(Flow):
@@ -67,11 +75,11 @@ class UnitFlow(Flow):
     def run(self) -> None:
         """Follow every wire, then note the units of all ports and parameters."""
         self.bindings = {path: Bindings() for path in self.drafts}
-        self.told: set[tuple[str, str]] = set()
         super().run()
         for path, node in self.nodes.items():
             interface = node.block.interface
-            for declared in (*interface.outputs.values(), *interface.params.values(), *interface.inputs.values()):
+            params = interface.params.values() if self.drafts[path].whole else ()
+            for declared in (*interface.outputs.values(), *params, *interface.inputs.values()):
                 units = self._units(path, declared)
                 if not any(unit.variables for unit in units):
                     node.units[declared.name] = units
@@ -126,7 +134,7 @@ class UnitFlow(Flow):
         bindings, interface = self.bindings[path], self.drafts[path].block.interface
         self._match_given(path)
         doubtful = [port for name, port in interface.inputs.items() if (path, name) in self.lost]
-        if bindings.open(doubtful):
+        if bindings.open(doubtful) or not self.drafts[path].whole:
             return
         for variable in bindings.open(interface.inputs.values()):
             bindings.bind(variable, ONE)
@@ -140,15 +148,14 @@ class UnitFlow(Flow):
     def _match_given(self, path: str) -> None:
         for name, declared, units in self._given(path):
             wrong = self.bindings[path].match(declared.units, units)
-            if wrong is not None and (path, name) not in self.told:
-                self.told.add((path, name))
+            if wrong is not None:
                 self._tell_given(path, name, declared, wrong, units[wrong] or ONE)
 
     def _tell_given(self, path: str, name: str, declared: Declared, index: int, unit: Unit) -> None:
         draft = self.drafts[path]
         wanted = self.bindings[path].unit(declared.units, index)
         place = draft.connections[name].place if name in draft.connections else draft.places[name]
-        problem = f"'{name}' has {words(unit)}, the wires of the block make it {words(wanted)}"
+        problem = f"'{name}' has {words(unit)}, its unit here is {wanted if wanted.symbols else 'none'}"
         self.fault(path, place, problem, f"write it in {wanted}" if wanted.symbols else "leave the unit out")
 
     def knowledge(self, path: str) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -34,14 +35,15 @@ def substitute(node: Node, params: Mapping[str, Node | None] | None, faults: Fau
     if isinstance(node, yaml.Sequence):
         found = [substitute(child, params, faults) for child in node]
         whole = [child for child in found if child is not None]
-        return _list(node, whole) if len(whole) == len(found) else None
+        if len(whole) < len(found):
+            return None
+        return yaml.Sequence(whole, node.file, node.line, node.column, node.key)
     assert isinstance(node, yaml.Mapping)
     if not any(key in node for key in QUANTITY_KEYS):
         return node  # no value at all: whoever reads it will say so
     faults.collect(node.fields, QUANTITY_KEYS[:1], QUANTITY_KEYS[1:], faults)
     value = substitute(node["value"], params, faults) if "value" in node else None
-    unit = node.get("unit")
-    return value if value is None or unit is None else faults.collect(_spread, value, unit)
+    return None if value is None else faults.collect(_spread, value, node.get("unit"), node.key)
 
 
 def _parameter(node: Scalar, params: Mapping[str, Node | None] | None, faults: Faults) -> Node | None:
@@ -65,23 +67,28 @@ def _parameter(node: Scalar, params: Mapping[str, Node | None] | None, faults: F
     return None
 
 
-def _spread(value: Node, unit: Node) -> Node:
-    """Put a unit, or one unit for each element of the last axis, behind every number that has none."""
-    units = unit.units()
-    if any(each.variables for each in units):
-        raise unit.fault(f"{quoted(unit.text())} is not a unit")
-    shape = measure(value)
-    if len(units) not in (1, shape[-1] if shape else 1):
-        raise unit.fault(f"there are {len(units)} units for {shape[-1] if shape else 1} values")
-    leaves = [_with_unit(leaf, units[i % len(units)]) for i, leaf in enumerate(_leaves(value))]
-    return _rebuilt(value, iter(leaves))
+def _spread(value: Node, unit: Node | None, key: str) -> Node:
+    """Put a unit, or one for each element of the last axis, behind numbers that have none; call it ``key``."""
+    units = unit.units() if unit is not None else (Unit(),)
+    if unit is not None:
+        if any(each.variables for each in units):
+            raise unit.fault(f"{quoted(unit.text())} is not a unit")
+        shape = measure(value)
+        if len(units) not in (1, shape[-1] if shape else 1):
+            raise unit.fault(f"there are {len(units)} units for {shape[-1] if shape else 1} values")
+    return _with_units(value, itertools.cycle(units), key)
 
 
-def _with_unit(leaf: Node, unit: Unit) -> Node:
-    number, written = split_quantity(leaf.value) if isinstance(leaf, Scalar) else ("", "")
-    if not number or written or not unit.symbols:
-        return leaf
-    return Scalar(f"{number} {unit}", False, leaf.file, leaf.line, leaf.column, leaf.key)
+def _with_units(node: Node, units: Iterator[Unit], key: str) -> Node:
+    if isinstance(node, yaml.Sequence):
+        values = [_with_units(child, units, f"{key}[{index}]") for index, child in enumerate(node)]
+        return yaml.Sequence(values, node.file, node.line, node.column, key)
+    unit = next(units)
+    if not isinstance(node, Scalar):
+        return node
+    number, written = split_quantity(node.value)
+    text = f"{number} {unit}" if number and not written and unit.symbols else node.value
+    return Scalar(text, node.plain, node.file, node.line, node.column, key)
 
 
 def read_parameter(param: Param, node: Node) -> tuple[Any, OpenUnits]:
@@ -136,14 +143,19 @@ def _element(scalar: str, declared: Unit, node: Node) -> tuple[Any, Unit | None]
         return node.integer(), None
     if not declared.variables:
         return node.quantity(declared, bare=False), declared
-    text = node.text()
+    if not isinstance(node, Scalar) or not node.value:
+        raise node.wrong("a number or a quantity")
+    label = f"{quoted(node.key)}: " if node.key else ""
     try:
-        value, unit = parse_quantity(text)
+        value, unit = parse_quantity(node.value)
     except UnitError as error:
-        raise node.fault(error.problem, error.remedy) from None
+        raise node.fault(label + error.problem, error.remedy) from None
     if unit.variables:
-        raise node.fault(f"{quoted(text)} has no unit that there is")
-    return value, None if not value and not split_quantity(text)[1] else si(unit)
+        raise node.fault(f"{label}{quoted(unit)} is not a unit")
+    if split_quantity(node.value)[1]:
+        return value, si(unit)
+    # Without a unit it is 0, which fits any, or the variables stand for plain numbers: 3 in "a/s" is 3 1/s.
+    return value, declared.substitute(dict.fromkeys(declared.variables, Unit())) if value else None
 
 
 def si(unit: Unit) -> Unit:
@@ -157,17 +169,5 @@ def _leaves(node: Node) -> list[Node]:
     return [leaf for child in node for leaf in _leaves(child)] if isinstance(node, yaml.Sequence) else [node]
 
 
-def _rebuilt(node: Node, leaves: Iterator[Node]) -> Node:
-    return (
-        _list(node, [_rebuilt(child, leaves) for child in node])
-        if isinstance(node, yaml.Sequence)
-        else next(leaves)
-    )
-
-
 def _plain(node: Node, values: Iterator[Any]) -> Any:
     return [_plain(child, values) for child in node] if isinstance(node, yaml.Sequence) else next(values)
-
-
-def _list(like: Node, values: list[Node]) -> yaml.Sequence:
-    return yaml.Sequence(values, like.file, like.line, like.column, like.key)

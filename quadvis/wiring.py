@@ -12,7 +12,7 @@ from quadvis.expand import Expansion, FlatBlock, Scope
 from quadvis.graph import Index, Wire
 from quadvis.loader import INSIDE, InputSpec
 from quadvis.reference import Reference
-from quadvis.slots import Outputs
+from quadvis.slots import Refused
 from quadvis.values import substitute
 
 MAX_PORTS = 50  # of parts, that a signal passes without meeting a block
@@ -28,23 +28,23 @@ class Source:
 
 
 class Wiring:
-    """Finds what is behind a name. ``promised`` are outputs of slots whose absence is told elsewhere."""
+    """Finds what is behind a name. ``refused`` are outputs of slots whose fault has been told."""
 
-    def __init__(self, expansion: Expansion, faults: Faults, promised: Outputs | None = None) -> None:
-        self.expansion, self.faults, self.promised = expansion, faults, promised or {}
+    def __init__(self, expansion: Expansion, faults: Faults) -> None:
+        self.expansion, self.faults = expansion, faults
+        self.refused: Refused = set()
         # What goes in and out of parts is sought once, so that a fault in it is told once.
         self._found: dict[tuple[str, str], Source] = {}
         self._sought: set[tuple[str, str]] = set()
-        self._check_ports(expansion.root)
 
-    def _check_ports(self, scope: Scope) -> None:
+    def check_ports(self, scope: Scope) -> None:
         """Look at what goes in and out of every part, used or not."""
         for child in scope.children.values():
             for port in child.spec.inputs:
                 self._entry(child, port)
             for port in child.spec.outputs:
                 self._export(child, port)
-            self._check_ports(child)
+            self.check_ports(child)
 
     def inputs(self, block: FlatBlock) -> Iterator[tuple[str, Source]]:
         """Yield what each input of a block is given."""
@@ -74,7 +74,9 @@ class Wiring:
         if name.partition("/")[0] in owner.broken or name in owner.broken:
             return Source(reference.place, None)
         if name not in owner.spec.blocks:
-            remedy = suggestion(name, [*owner.spec.blocks, *([INSIDE] if owner.parent else [])])
+            way = reference.block.removesuffix(name)
+            known = [way + other for other in owner.spec.blocks] + [INSIDE] * bool(owner.spec.inputs)
+            remedy = suggestion(reference.block, known)
             self.faults.add(reference.place, f"there is no block '{reference.block}'", remedy)
             return Source(reference.place, None)
         child = owner.children.get(name)
@@ -88,13 +90,13 @@ class Wiring:
         return self._indexed(replace(self._export(child, reference.port), place=reference.place), reference)
 
     def _offers(self, path: str, reference: Reference, outputs: Mapping[str, object]) -> bool:
-        if reference.port in outputs:
-            return True
-        if reference.port not in self.promised.get(path, {}):
+        if (path, reference.port) in self.refused:
+            return False
+        if reference.port not in outputs:
             remedy = suggestion(reference.port, outputs) if outputs else "it has none"
             problem = f"block '{reference.block}' has no output '{reference.port}'"
             self.faults.add(reference.place, problem, remedy)
-        return False
+        return reference.port in outputs
 
     def _source(self, scope: Scope, given: InputSpec) -> Source:
         if given.source is None:

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from quadvis_blocks.vision._level import level_pose
 from quadvis_blocks.vision._pose import pose_from_n_points, pose_from_plane
 from quadvis_blocks.vision._projection import attitude_of
 
@@ -75,6 +76,18 @@ def test_exact_points_give_the_published_poses_back(method, published, order):
         assert pose.position == pytest.approx(row[:3], abs=1e-7)
         found = attitude_of(pose.rotation.T @ np.diag([1.0, -1.0, -1.0]))
         assert found == pytest.approx(angles, abs=1e-7)
+
+
+@pytest.mark.parametrize("published", [FIRST, SECOND])
+def test_two_circles_and_the_tilt_give_the_published_poses_back_too(published):
+    for row in published:
+        yaw, pitch, roll = np.radians(row[3:])
+        rays = to_rays(to_pixels(camera_points(row[:3], (roll, pitch, yaw))))
+        points = rays[:, :2] / rays[:, 2:]
+        for rows in itertools.combinations(range(4), 2):
+            seen = np.full((4, 2), np.nan)
+            seen[list(rows)] = points[list(rows)]
+            assert level_pose(seen, roll, pitch, SIDE) == pytest.approx((*row[:3], yaw), abs=1e-7)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -1,4 +1,4 @@
-"""What a run does: crossings, delays, integration, determinism, snapshots, and how it ends when something fails."""
+"""What a run does: crossings, delays, integration, determinism, snapshots, and how it ends on a failure."""
 
 import math
 from collections.abc import Callable
@@ -271,7 +271,7 @@ def test_parts_of_a_signal_are_wired_without_a_block() -> None:
     assert [value for _, value in rows] == pytest.approx([400 + 90 + 7, 1000 + 400 + 92 + 7.1])
 
 
-@given(st.lists(st.tuples(st.integers(1, 40), st.integers(0, 5)), min_size=1, max_size=4))
+@given(st.lists(st.tuples(st.integers(1, 40), st.integers(0, 50)), min_size=1, max_size=4))
 def test_every_task_runs_at_its_own_times_and_at_no_other(rates: list[tuple[int, int]]) -> None:
     tasks = [
         Task(str(k), Fraction(1, rate), Fraction(late, 20 * rate)) for k, (rate, late) in enumerate(rates)
@@ -330,11 +330,11 @@ def test_a_loop_of_blocks_converges_with_the_order_of_the_solver(solver: str, or
 
     errors = []
     for steps in (100, 200):
-        task = Task("continuous", Fraction(2, steps), continuous=True)
+        task = Task("continuous", Fraction(5, 2 * steps), continuous=True)
         nodes = [node("mass", Mass(), task, u="damper.y"), node("damper", Damper(), task, v="mass.v")]
         made = Engine(Graph("test", execution_order(nodes)[0], solver, task.period))
         run(made, steps + 1)
-        errors.append(abs(made.read("mass", "x") - 3.0 * math.exp(-2.0)))
+        errors.append(abs(made.read("mass", "x") - 3.5 * math.exp(-2.5)))
     assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)
 
 
@@ -478,7 +478,7 @@ def _paper_command(s: np.ndarray) -> np.ndarray:
     b = 5e-3 * nested(-x, -vx, pitch, q) / 0.24 / 2
     c = 9e-3 * (-2 * r - yaw) / 0.016 / 4
     thrusts = np.array([u / 4 + b + c, u / 4 - a - c, u / 4 - b + c, u / 4 + a - c])
-    assert 0.0 <= thrusts.min() and thrusts.max() <= 2.0, "the comparison is without rotor limits"
+    assert thrusts.min() >= 0.0 and thrusts.max() <= 2.0, "the comparison is without rotor limits"
     return thrusts
 
 
@@ -510,7 +510,8 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others() -> None:
     first, again, other = (mixed(seed) for seed in (1, 1, 2))
     for made in (first, again, other):
         run(made, 200)
-    assert first.snapshot().memory == again.snapshot().memory != other.snapshot().memory
+    memories = [made.snapshot().memory for made in (first, again, other)]
+    assert memories[0] == memories[1] and memories[0] != memories[2]
 
 
 def test_a_random_stream_does_not_depend_on_other_blocks() -> None:
@@ -565,6 +566,15 @@ def test_observers_see_every_nth_tick_of_their_task_from_its_first_on() -> None:
     made.observe("10 Hz + 1/20", seen.append, every=3)
     run(made, 20)
     assert seen == [1, 7, 13, 19]
+
+
+def test_observers_see_states_as_the_outputs_did() -> None:
+    made = engine(node("clock", Clock(), hz(10)), node("late", Delay(), hz(10), u="clock.y"))
+    seen: list[tuple[float, float]] = []
+    late = made.plan["late"].self
+    made.observe("10 Hz + 0", lambda _: seen.append((made.read("late", "y"), late.last)))
+    run(made, 3)
+    assert seen == [(-1.0, -1.0), (0.0, 0.0), (0.1, 0.1)]
 
 
 def test_running_in_pieces_is_running_at_once() -> None:
@@ -702,7 +712,7 @@ def test_an_error_in_quadvis_own_words_is_told_without_the_name_of_its_class() -
 
 
 def ports(count: int, log: list[str], **actions: Callable[[], object]) -> Engine:
-    """Return an engine of blocks that log when they are opened, started and closed; an action is "open1", "close0"."""
+    """Return an engine of blocks that log their opening, start and end; actions are for "open1", "close0"."""
 
     class Port(Block, numeric=False):
         y = Out()

@@ -1,76 +1,103 @@
-"""quadvis.skeleton"""
+"""What `quadvis new` writes runs at once, and nothing is ever written over."""
 
-import os
+from __future__ import annotations
+
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-import quadvis
+from quadvis.diagram import load
 from quadvis.errors import QuadvisError
 from quadvis.skeleton import new_block, new_diagram
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
-def test_a_new_block_passes_its_own_test_and_runs_in_a_diagram_beside_it(folder):
-    block, test = new_block("filters.my_lag")
-    found = subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", test], cwd=folder,
-                           env=os.environ, capture_output=True, text=True, check=False)  # fmt: skip
-    assert found.returncode == 0, found.stdout
-    assert "2 passed" in found.stdout
-    (diagram,) = new_diagram("loop.yaml")
-    text = diagram.read_text().replace("signal.low_pass", "filters.my_lag").replace("time_constant: 0.5 s", "share: 0.1")
-    diagram.write_text(text)
-    result = quadvis.load(diagram).run()
-    # 300 ticks of 10 ms after the step at 1 s, the tick of the step included: 1 - 0.9^301.
-    assert result["lag.y"][400] == pytest.approx(1 - 0.9**301, rel=1e-12)
+def test_a_new_block_is_found_by_a_diagram_beside_it_and_passes_its_test(
+    project: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    paths = new_block("signal.my_filter")
+    assert paths == [Path("blocks/signal/my_filter.py"), Path("tests/blocks/signal/test_my_filter.py")]
+    (project / "loop.yaml").write_text(
+        "quadvis: 1\nname: loop\nrates: {fast: 10 Hz}\nstop_time: 0.4 s\nblocks:\n"
+        "  one: {block: sources.constant, rate: fast, with: {value: 1 m}}\n"
+        "  lag: {block: signal.my_filter, rate: fast, with: {share: 0.5}, in: {u: one.y}}\n"
+    )
+    result = load("loop.yaml").run()
+    assert result["lag.y"] == pytest.approx([0.5, 0.75, 0.875, 0.9375, 0.96875])
+    assert result.units["lag.y"] == "m"
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    done = subprocess.run([sys.executable, "-m", "pytest", "-q"], capture_output=True, text=True)
+    assert (done.returncode, "2 passed" in done.stdout) == (0, True), done.stdout
 
 
-def test_a_new_block_in_the_library_lies_where_the_library_is(folder):
-    (folder / "blocks" / "quadvis_blocks").mkdir(parents=True)
-    block, test = new_block("signal.my_lag")
-    assert block.as_posix() == "blocks/quadvis_blocks/signal/my_lag.py"
-    assert test.as_posix() == "tests/blocks/signal/test_my_lag.py"
-    assert "from quadvis_blocks.signal.my_lag import MyLag" in test.read_text()
+def test_a_new_block_of_the_standard_library_goes_there(project: Path) -> None:
+    (project / "blocks" / "quadvis_blocks").mkdir(parents=True)
+    block, test = new_block("signal.my_filter")
+    assert block == Path("blocks/quadvis_blocks/signal/my_filter.py")
+    assert "from quadvis_blocks.signal.my_filter import MyFilter" in test.read_text()
 
 
-def test_a_new_diagram_meets_its_expectation():
-    (diagram,) = new_diagram("loop.yaml")
-    assert quadvis.load(diagram).run().passed
+def test_a_new_diagram_runs_and_meets_what_it_expects() -> None:
+    (path,) = new_diagram("loop.yaml")
+    assert path == Path("loop.yaml")
+    assert load(path).run().passed
+
+
+def test_a_new_diagram_may_go_into_a_new_folder() -> None:
+    (path,) = new_diagram("mine/loop.yaml")
+    assert load(path).name == "loop"
 
 
 @pytest.mark.parametrize(
-    ("name", "words"),
+    ("name", "reason"),
     [
-        ("My.Block", "cannot name a block; write group.name in lower case"),
-        ("../evil", "cannot name a block"),
+        ("Signal.Filter", "cannot name a block"),
+        ("signal.2nd", "cannot name a block"),
+        ("signal filter", "cannot name a block"),
+        ("../filter", "cannot name a block"),
+        ("signal._hidden", "cannot name a block"),
+        ("", "cannot name a block"),
+        ("signal.", "cannot name a block"),
+        ("signal.lambda", "since Python uses a word of it"),
+        ("class.filter", "since Python uses a word of it"),
+        ("signal.block", "since Python uses a word of it"),
         ("signal.derivative", "is in the standard library"),
     ],
 )
-def test_a_name_that_no_block_can_have_is_refused(folder, name, words):
-    with pytest.raises(QuadvisError, match=words):
+def test_a_name_that_no_block_can_have_is_refused(name: str, reason: str, project: Path) -> None:
+    with pytest.raises(QuadvisError, match=reason):
         new_block(name)
-    assert list(folder.iterdir()) == []
+    assert list(project.iterdir()) == []
 
 
-def test_nothing_is_overwritten(folder):
-    new_block("mine")
-    (folder / "tests" / "blocks" / "test_mine.py").write_text("precious")
-    (folder / "blocks" / "mine.py").unlink()
-    with pytest.raises(QuadvisError, match="is there already"):
-        new_block("mine")
-    assert (folder / "tests" / "blocks" / "test_mine.py").read_text() == "precious"
-    assert not (folder / "blocks" / "mine.py").exists()
-    new_diagram("loop.yaml")
+@pytest.mark.parametrize("name", ["loop", "loop.txt", ".yaml", "a: b.yaml", "loop#1.yaml", ""])
+def test_a_name_that_no_diagram_can_have_is_refused(name: str, project: Path) -> None:
+    with pytest.raises(QuadvisError, match="is not a YAML file|cannot name a diagram"):
+        new_diagram(name)
+    assert list(project.iterdir()) == []
+
+
+def test_nothing_is_written_over(project: Path) -> None:
+    Path("loop.yaml").write_text("mine")
     with pytest.raises(QuadvisError, match="'loop.yaml' is there already"):
         new_diagram("loop.yaml")
+    assert Path("loop.yaml").read_text() == "mine"
+    test = Path("tests/blocks/signal/test_my_filter.py")
+    test.parent.mkdir(parents=True)
+    test.write_text("mine")
+    with pytest.raises(QuadvisError, match="is there already"):
+        new_block("signal.my_filter")
+    assert not Path("blocks").exists()
 
 
-def test_a_diagram_must_be_a_yaml_file():
-    with pytest.raises(QuadvisError, match=r"'loop.txt' is not a YAML file; write a name such as loop.yaml"):
-        new_diagram("loop.txt")
+def test_a_place_that_cannot_be_written_is_a_sentence(project: Path) -> None:
+    Path("blocks").write_text("a file in the way")
+    with pytest.raises(QuadvisError, match="cannot write 'blocks/signal/my_filter.py'"):
+        new_block("signal.my_filter")

@@ -1,4 +1,5 @@
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -50,7 +51,7 @@ def test_the_error_falls_with_the_order_that_the_name_says(name: str) -> None:
     errors = [
         abs(solve(name, pendulum, [1.0, 0.0], 4.0, steps)[0] - exact(4.0)) for steps in (100, 200, 400, 800)
     ]
-    orders = [math.log2(coarse / fine) for coarse, fine in zip(errors, errors[1:], strict=False)]
+    orders = [math.log2(coarse / fine) for coarse, fine in pairwise(errors)]
     assert orders[-1] == pytest.approx(ORDERS[name], abs=0.1)
 
 

@@ -1,0 +1,76 @@
+"""Every diagram of the repository is checked and flown for two seconds, each variant too."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import quadvis
+from quadvis.diagram import Diagram
+from quadvis.engine import Engine
+
+DIAGRAMS = Path(__file__).parents[2] / "diagrams"
+CASES = [
+    (path.name, variant)
+    for path in sorted(DIAGRAMS.glob("*.yaml"))
+    for variant in (None, *yaml.safe_load(path.read_text()).get("variants", {}))
+]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the diagrams, so that what a diagram writes beside itself stays out of the repository."""
+    return Path(shutil.copytree(DIAGRAMS, tmp_path_factory.mktemp("repository") / "diagrams"))
+
+
+def load(folder: Path, name: str, variant: str | None) -> Diagram:
+    """Return a diagram that stops after two seconds, or when it wants to if that is earlier."""
+    loaded = quadvis.load(folder / name, variant=variant)
+    return quadvis.load(folder / name, variant=variant, stop_time=min(2.0, loaded.duration))
+
+
+@pytest.mark.parametrize(("name", "variant"), CASES)
+def test_every_diagram_runs_and_gives_finite_times_for_all_its_signals(
+    folder: Path, name: str, variant: str | None
+) -> None:
+    diagram = load(folder, name, variant)
+    result = diagram.run()
+    assert result.duration == diagram.duration
+    for signal in result:
+        times = result.times(signal)
+        assert len(times) == len(result[signal]) > 0 and 0.0 <= times[0] <= times[-1] <= diagram.duration
+
+
+@pytest.mark.parametrize(("name", "variant"), CASES)
+def test_every_diagram_repeats_to_the_bit_with_the_same_seed(
+    folder: Path, name: str, variant: str | None
+) -> None:
+    first, again = (load(folder, name, variant).run() for _ in range(2))
+    assert all(first[signal].tobytes() == again[signal].tobytes() for signal in first)
+
+
+def test_the_hover_is_among_them_with_a_variant_for_the_second_method() -> None:
+    assert {("hover.yaml", None), ("hover.yaml", "plane")} <= set(CASES)
+
+
+@pytest.mark.parametrize(("name", "variant"), CASES)
+def test_every_diagram_repeats_from_a_snapshot_in_the_same_engine_and_in_a_fresh_one(
+    folder: Path, name: str, variant: str | None
+) -> None:
+    diagram = load(folder, name, variant)
+    engine, fresh = Engine(diagram.graph, diagram.seed), Engine(diagram.graph, diagram.seed)
+    half = diagram.ticks // 2
+    with engine, fresh:
+        engine.run(half)
+        snapshot = engine.snapshot()
+        engine.run(diagram.ticks - half)
+        first = engine.snapshot()
+        for again in (engine, fresh):
+            again.restore(snapshot)
+            again.run(diagram.ticks - half)
+            assert again.snapshot().memory == first.memory
+            for one, other in zip(again.snapshot().frames, first.frames, strict=True):
+                assert np.array_equal(one.pixels, other.pixels)
+                assert (repr(one.stamp), one.sequence) == (repr(other.stamp), other.sequence)

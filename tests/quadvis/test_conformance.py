@@ -1,0 +1,176 @@
+"""The suite lets good blocks pass, and each check catches the fault that it is there for."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from quadvis.block import Block
+from quadvis.catalogue import Catalogue
+from quadvis.conformance import CHECKS, Subject, check_block
+
+GOOD = '''"""A fan."""
+
+from quadvis.block import Block, Frame, In, Out, Param, ParameterError, Random, State
+from quadvis_blocks._random import uniform
+
+class Fan(Block):
+    """A fan that spins up towards its command."""
+
+    command = In("float64[*]", unit="rad/s", doc="speed wanted")
+    enable = In("bool", default=True, doc="whether it may turn")
+    speed = Out("float64[*]", unit="rad/s", doc="speed")
+    turns = Out("int64", doc="how many")
+    lag = Param(0.5, unit="s", above=0.0, max=10.0, doc="time constant")
+    blades = Param(3, type="int64", min=1, doc="number of blades")
+    offset = Param((0.0, 1.0), type="float64[2]", min=-5.0, doc="offsets")
+    model = Param("slow", choices=("slow", "fast"), doc="how it follows")
+    now = State("float64[*]")
+    count = State("int64")
+    stream = Random()
+
+    def start(self):
+        self.now = uniform(self.stream)
+
+    def output(self, enable):
+        if not enable:
+            return 0.0 * self.now, self.count
+        return self.now + self.offset[0], self.count
+
+    def update(self, command):
+        share = self.period / self.lag if self.model == 0 else 1.0
+        self.now = self.now + share * (command - self.now)
+        self.count += self.blades
+'''
+
+
+def block(folder: Path, text: str = GOOD) -> type[Block]:
+    """Return the block of a file fan.py: on disk, since compiled code is made from the source."""
+    file = folder / "blocks" / "wind" / "fan.py"
+    file.parent.mkdir(parents=True)
+    file.write_text(text)
+    return Catalogue(folder).find("wind.fan")
+
+
+def test_a_good_block_passes(tmp_path: Path) -> None:
+    pytest.importorskip("numba")
+    check_block(block(tmp_path), test=tmp_path / "blocks" / "wind" / "fan.py")
+
+
+def test_a_missing_test_is_told(tmp_path: Path) -> None:
+    with pytest.raises(AssertionError, match=r"there is no test at .*test_fan\.py; write one"):
+        CHECKS["tested"](Subject(block(tmp_path), test=tmp_path / "test_fan.py"))
+
+
+def test_a_file_is_called_as_its_class(tmp_path: Path) -> None:
+    with pytest.raises(AssertionError, match=r"the class in fan\.py must be called Fan"):
+        CHECKS["one_block_in_its_module"](Subject(block(tmp_path, GOOD.replace("class Fan", "class Blower"))))
+
+
+def test_a_module_has_one_public_block(tmp_path: Path) -> None:
+    found = block(tmp_path)
+    other = type("Other", (Block,), {"__module__": found.__module__})
+    sys.modules[found.__module__].__dict__["Other"] = other
+    with pytest.raises(AssertionError, match="the module defines Fan, Other; move the others"):
+        CHECKS["one_block_in_its_module"](Subject(found))
+
+
+COUNT = "        self.count += self.blades"
+BLIND = """    def __init__(self, **given):
+        self.__dict__.update(lag=0.5, blades=3, offset=(0.0, 1.0), model=0)
+
+    def start"""
+WRONG_WORDS = """    def __init__(self, **given):
+        try:
+            super().__init__(**given)
+        except ParameterError as error:
+            raise ParameterError(error.parameter, "wrong" if error.parameter == "blades" else str(error))
+
+    def start"""
+REMEMBERS = """        self.runs = getattr(self, "runs", 0) + 1
+        self.now = float(self.runs) + uniform(self.stream)"""
+CALLS = """        self.calls = getattr(self, "calls", 0) + 1
+        if not enable or self.calls % 2:"""
+HIDES = """        self.hidden = getattr(self, "hidden", 0) + 1
+        self.count += self.hidden * self.blades"""
+OPENS = """        if not hasattr(self, "first"):
+            self.first = self.count
+        self.count += self.blades + self.first"""
+FAULTS = [
+    (
+        "documented",
+        "towards its command.",
+        "towards its command",
+        "must be a sentence that ends in a full stop",
+    ),
+    ("documented", ', doc="speed wanted"', "", "these need a doc: command"),
+    ("all_declarations_used", COUNT, f"{COUNT}\n\n    idle = State()", "no method uses idle"),
+    ("all_declarations_used", COUNT, f"{COUNT}\n\n    idle = In(default=0.0)", "no method asks for idle"),
+    ("refuses_bad_parameters", "    def start", BLIND, "lag = 'no such choice' must be refused"),
+    ("refuses_bad_parameters", "    def start", WRONG_WORDS, "say 'blades must be ...', not 'wrong'"),
+    ("starts_the_same", "        self.now = uniform(self.stream)", REMEMBERS, "keep nothing in attributes"),
+    (
+        "output_changes_nothing",
+        "        if not enable:",
+        "        self.count += 1\n        if not enable:",
+        "only update may",
+    ),
+    ("output_changes_nothing", "        if not enable:", CALLS, "output gave two answers at step 0"),
+    ("repeats_after_restore", COUNT, HIDES, "restored in the same engine it gives something else"),
+    ("repeats_after_restore", COUNT, OPENS, "restored in a fresh engine it gives something else"),
+    (
+        "returns_what_it_declares",
+        "[0], self.count",
+        "[0], 0.5 * self.count",
+        "must return int64 for turns, not 0.0",
+    ),
+    (
+        "returns_what_it_declares",
+        "return self.now + self.offset[0], self.count",
+        "return self.count",
+        "must return 2 values",
+    ),
+]
+
+
+@pytest.mark.parametrize(("name", "before", "after", "sentence"), FAULTS)
+def test_each_check_catches_its_fault(
+    name: str, before: str, after: str, sentence: str, tmp_path: Path
+) -> None:
+    assert GOOD.count(before) == 1
+    with pytest.raises(AssertionError) as caught:
+        CHECKS[name](Subject(block(tmp_path, GOOD.replace(before, after))))
+    assert sentence in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("after", "sentence"),
+    [
+        ("        self.count = (self.count + 3) * 2**62 % 1000003", "update at step 0: count is"),
+        ("        self.count += len(vars(self))", "Untyped global name 'vars'"),
+    ],
+)
+def test_a_method_that_does_not_compile_to_the_same_is_told(
+    after: str, sentence: str, tmp_path: Path
+) -> None:
+    numba = pytest.importorskip("numba")
+    with pytest.raises((AssertionError, numba.core.errors.NumbaError)) as caught:
+        CHECKS["compiles"](Subject(block(tmp_path, GOOD.replace(COUNT, after))))
+    assert sentence in str(caught.value)
+
+
+def test_blocks_that_are_not_numeric_need_not_compile(tmp_path: Path) -> None:
+    text = GOOD.replace("Fan(Block)", "Fan(Block, numeric=False)").replace(
+        COUNT, "        self.count += len(vars(self))"
+    )
+    CHECKS["compiles"](Subject(block(tmp_path, text)))
+
+
+def test_everything_that_is_wrong_is_told_at_once(tmp_path: Path) -> None:
+    text = GOOD.replace("towards its command.", "").replace("Fan(Block)", "Fan(Block, numeric=False)")
+    text = text.replace(COUNT, "        self.count += self.blades / 0")
+    with pytest.raises(AssertionError) as caught:
+        check_block(block(tmp_path, text))
+    lines = str(caught.value).splitlines()
+    assert lines[0].startswith("Fan: documented: the docstring's first line must be a sentence")
+    assert any("ZeroDivisionError: division by zero" in line for line in lines[1:])

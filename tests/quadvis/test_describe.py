@@ -1,0 +1,160 @@
+"""Words about blocks say what the declarations say, and fit a terminal."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from quadvis.block import Block, In, Out, Param, State
+from quadvis.catalogue import Catalogue
+from quadvis.describe import catalogue_lines, default_text, description, example, facts, first_line, table
+from quadvis.diagram import load_text
+from quadvis.document import parse_yaml
+
+
+class Sample(Block):
+    """One sentence about it.
+
+    And a paragraph.
+    """
+
+    u = In("float64[3]", unit="m", doc="what comes in")
+    v = In("bool", default=True, doc="whether it is good")
+    w = In(unit="s", default=math.nan, doc="when")
+    y = Out("float64[3]", unit="m/s", nan=True, doc="what goes out")
+    gain = Param(2.0, unit="1/s", above=0.0, max=10.0, tune=True, doc="how much")
+    mode = Param("fast", choices=("fast", "slow"), doc="how")
+    file = Param(type="file", doc="where from")
+    shape = Param((0.0, 1.5), type="float64[2]", unit="rad", doc="in which form")
+    on = Param(True, type="bool")
+    count = Param(3, type="int64", min=1)
+    free = Param(1.0, unit="a")
+    last = State("float64[3]")
+
+    def output(self, u: Any) -> Any:
+        """Return nothing much."""
+        return u
+
+    def update(self, u: Any, v: bool, w: float) -> None:
+        """Keep it."""
+
+
+def test_a_description_lists_ports_parameters_and_states_in_columns() -> None:
+    assert description("group.sample", Sample).splitlines() == [
+        "group.sample",
+        "",
+        "One sentence about it.",
+        "",
+        "And a paragraph.",
+        "",
+        "inputs",
+        "  u  [3] m                                        what comes in",
+        "  v  bool   no direct feedthrough; optional, true  whether it is good",
+        "  w  s      no direct feedthrough; optional        when",
+        "",
+        "outputs",
+        "  y  [3] m/s  NaN means missing  what goes out",
+        "",
+        "parameters",
+        "  gain   1/s      = 2 1/s                          > 0, <= 10; tunable  how much",
+        "  mode            = fast                           fast | slow          how",
+        "  file   file     required                                              where from",
+        "  shape  [2] rad  = {value: [0, 1.5], unit: rad}                        in which form",
+        "  on     bool     = true",
+        "  count  int64    = 3                              >= 1",
+        "  free   a        = 1",
+        "",
+        "states",
+        "  last  [3]",
+        "",
+        "in a diagram",
+        "  sample:",
+        "    block: group.sample",
+        "    rate: ...",
+        "    with: {file: path}",
+        "    in: {u: block.port}",
+    ] or pytest.fail(description("group.sample", Sample))
+
+
+def test_the_facts_are_plain_json() -> None:
+    found = json.loads(json.dumps(facts("group.sample", Sample), allow_nan=False))
+    assert found["block"] == "group.sample"
+    assert found["inputs"]["u"] == {"type": "float64[3]", "unit": "m", "doc": "what comes in", "optional": False}
+    assert found["inputs"]["w"]["optional"] is True
+    assert found["params"]["gain"] == {
+        "type": "float64", "unit": "1/s", "doc": "how much", "default": "2 1/s", "bounds": "> 0, <= 10", "tune": True,
+    }  # fmt: skip
+    assert found["params"]["mode"]["choices"] == ["fast", "slow"]
+    assert found["params"]["file"]["default"] is None
+    assert found["feedthrough"] == ["u"]
+
+
+@pytest.mark.parametrize("name", Catalogue().names())
+def test_every_default_reads_back_as_it_is(name: str) -> None:
+    from quadvis.values import read_constant, read_parameter
+
+    block = Catalogue().find(name)
+    for param in block.interface.params.values():
+        text = default_text(param)
+        if text is None or param.is_text or "inf" in text:
+            continue
+        from quadvis.errors import Faults
+
+        faults = Faults()
+        node = read_constant(parse_yaml(text), faults)
+        assert node is not None, text
+        value = param.accept(read_parameter(param, node)[0])
+        assert value == pytest.approx(param.accept(param.default), rel=1e-5)
+
+
+@pytest.mark.parametrize("name", Catalogue().names())
+def test_every_example_of_a_diagram_is_one(name: str, tmp_path: Path) -> None:
+    block = Catalogue().find(name)
+    lines = "\n".join(f"  {line}" for line in example(name, block)).replace("rate: ...", "rate: fast")
+    text = f"quadvis: 1\nname: x\nrates: {{fast: 1 Hz}}\nstop_time: 1 s\nsolver: {{step: 1 s}}\nblocks:\n{lines}\n"
+    problems = []
+    try:
+        load_text(text, tmp_path)
+    except Exception as error:
+        problems = [fault.problem for fault in error.faults]  # type: ignore[attr-defined]
+    left = [problem for problem in problems if "no block 'block'" not in problem and "path" not in problem]
+    assert not [problem for problem in left if "is missing" in problem or "not connected" in problem or "unknown" in problem]
+
+
+def test_every_block_is_listed_with_what_it_does() -> None:
+    catalogue = Catalogue()
+    lines, failures = catalogue_lines(catalogue)
+    assert failures == []
+    assert [line.split()[0] for line in lines] == catalogue.names()
+    for line in lines:
+        name = line.split()[0]
+        assert line.endswith(first_line(catalogue.find(name)))
+        assert first_line(catalogue.find(name)).endswith(".")
+
+
+def test_a_block_that_cannot_be_loaded_is_told_not_skipped(tmp_path: Path) -> None:
+    (tmp_path / "blocks" / "own").mkdir(parents=True)
+    (tmp_path / "blocks" / "own" / "broken.py").write_text("import nothing_like_it\n")
+    _, failures = catalogue_lines(Catalogue(tmp_path))
+    assert len(failures) == 1
+    assert "own.broken" in failures[0]
+
+
+def test_long_words_wrap_in_their_own_column() -> None:
+    rows = [("a", "one two three four five six seven eight nine ten"), ("bcd", "eleven")]
+    assert table(rows, 36) == [
+        "a    one two three four five six",
+        "     seven eight nine ten",
+        "bcd  eleven",
+    ]
+    assert max(len(line) for name in Catalogue().names()
+               for line in description(name, Catalogue().find(name), 100).splitlines()) <= 110  # fmt: skip
+
+
+def test_an_empty_table_has_no_lines() -> None:
+    assert table([]) == []
+    assert table([("", "")]) == [""]

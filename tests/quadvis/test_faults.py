@@ -1,0 +1,48 @@
+"""Every defect is told once, at its place, with what would be right: see `corpus.py` for how cases are written."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import pytest
+
+from quadvis.diagram import check, load
+from quadvis.errors import DiagramError, Fault
+
+from .corpus import Case, all_cases
+
+
+def faults(case: Case, folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[Fault]:
+    """Return what is told about a case: with all variants, or as the command line asks for."""
+    case.write(folder)
+    monkeypatch.chdir(folder)
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--set", action="append", default=[])
+    parser.add_argument("--variant")
+    parser.add_argument("--stop-time")
+    parser.add_argument("--seed", type=int)
+    options = parser.parse_args(case.arguments)
+    settings = options.set
+    try:
+        if options.variant or options.stop_time or options.seed:
+            load("case.yaml", variant=options.variant, settings=settings, stop_time=options.stop_time, seed=options.seed)
+        else:
+            check("case.yaml", settings)
+    except DiagramError as error:
+        return error.faults
+    return []
+
+
+@pytest.mark.parametrize("case", all_cases(), ids=lambda case: case.title)
+def test_the_right_faults_are_told_at_the_right_places(
+    case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = faults(case, tmp_path, monkeypatch)
+    assert sorted(map(str, told)) == case.expected()
+
+
+def test_the_corpus_has_a_title_for_every_case() -> None:
+    titles = [case.title for case in all_cases()]
+    assert len(titles) > 100
+    assert len(set(titles)) == len(titles)
