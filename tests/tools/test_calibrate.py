@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import datetime
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -101,7 +103,10 @@ def test_photographs_give_a_camera_beside_that_of_opencv(photographs, tmp_path):
     camera = CameraCalibration.load(output)
     assert camera.size == (452, 322)
     assert camera.matrix == pytest.approx(ours)
-    assert camera.views == 4
+    assert camera.evidence.errors == pytest.approx([view["rms"] for view in found["views"]])
+    assert camera.evidence.rms == pytest.approx(found["cameras"]["equations (7)-(10)"]["rms"])
+    assert datetime.date.fromisoformat(camera.evidence.date) <= datetime.date.today()
+    assert len(camera.evidence.points) == 40
     assert cv2.imread(str(drawing)).shape == (644, 904, 3)
 
 
@@ -150,7 +155,16 @@ def test_two_pictures_of_the_board_are_too_few(photographs):
         (("view0.png", *BOARD, "--window", "0"), "1 to 100"),
         (("view0.png", *BOARD, "--points", "points.csv"), "not both"),
         (("view0.png", *BOARD, "--size", "452x322"), "belong to --points"),
+        (("view0.png", *BOARD, "--picture", "small.png"), "belong to --points"),
+        (("view0.png", *BOARD, "--two-planes", "planes.yaml"), "--heights 0cm,10cm"),
+        (("view0.png", "view1.png", *BOARD, "--heights", "0cm"), "1 heights for 2 photographs"),
+        (("view0.png", "view1.png", *BOARD, "--heights", "0,1"), "no unit"),
+        (("view0.png", "wall.png", *BOARD, "--heights", "0cm,1cm"), "found in 1 of 2 pictures; it takes 2"),
+        (("view0.png", "view1.png", *BOARD, "--heights", "0cm,1cm", "--skew"), "without --heights"),
         (("--points", "points.csv", *BOARD), "belong to photographs"),
+        (("--points", "points.csv", "--size", "452x322", "--picture", "small.png"), "not both"),
+        (("--points", "points.csv", "--picture", "note.png"), "not a picture"),
+        (("--points", "points.csv", "--size", "320x240", "--output", "camera.yaml"), "outside a picture"),
         (("--points", "absent.csv"), "absent.csv"),
         (("--points", "note.png"), "no column"),
         (("--points", "points.csv", "--output", "camera.yaml"), "--size"),
@@ -176,7 +190,10 @@ def test_points_in_space_give_the_camera_that_saw_them(tmp_path):
     cameras = json.loads(done.stdout)["cameras"]
     assert np.array(cameras["equations (7)-(10)"]["K"]) == pytest.approx(K, abs=1e-4)
     assert np.array(cameras["OpenCV, no skew"]["K"]) == pytest.approx(K, abs=0.5)
-    assert CameraCalibration.load(output).matrix == pytest.approx(K, abs=1e-4)
+    camera = CameraCalibration.load(output)
+    assert camera.matrix == pytest.approx(K, abs=1e-4)
+    # The points that the file keeps are in the camera's own axes, in front of it.
+    assert camera.evidence.points[:, 2].min() == pytest.approx(22, abs=1e-3)
 
 
 def test_points_on_one_plane_are_refused(tmp_path):
@@ -191,6 +208,67 @@ def test_points_at_two_heights_give_a_two_planes_calibration(tmp_path):
     assert not planes.projective
     assert pytest.approx([0, 0, 27], abs=1e-6) == planes.F
     assert planes.pinhole[0] == pytest.approx(K, abs=1e-4)
+    assert planes.evidence.rms == pytest.approx(0, abs=1e-6) and planes.evidence.errors.shape == (2,)
+    assert datetime.date.fromisoformat(planes.evidence.date) <= datetime.date.today()
+    assert planes.unit is None
+
+
+def test_the_residuals_of_both_calibrations_are_drawn_over_the_picture(tmp_path):
+    points = points_file(tmp_path / "points.csv", heights=(1, 6))
+    grey = np.full((322, 452), 60, np.uint8)
+    grey[:, 200:] = 200
+    cv2.imwrite(str(tmp_path / "photo.png"), grey)
+    names = ("--points", points, "--picture", "photo.png", "--residuals", "residuals.png")
+    assert calibrate(*names, "--two-planes", "planes.yaml", folder=tmp_path).returncode == 0
+    drawn = cv2.imread(str(tmp_path / "residuals.png"))
+    assert drawn.shape == (644, 1808, 3)
+    for left in (0, 904):
+        assert drawn[20, left + 100].mean() < drawn[20, left + 800].mean() - 20
+
+
+def board(height, tilt=0.0, turn=0.0):
+    """Return a noisy picture by K of a 7x5 board with 25 mm squares, `height` m nearer than 0.42 m."""
+    checks = np.pad(np.indices((6, 8)).sum(axis=0) % 2, 1, constant_values=1)
+    texture = (40 + 180 * np.kron(checks, np.ones((40, 40)))).astype(np.uint8)
+    onto_board = np.array([[1, 0, 0.5 - 200], [0, 1, 0.5 - 160], [0, 0, 1600]])
+    onto_samples = np.array([[4, 0, 1.5], [0, 4, 1.5], [0, 0, 1]])
+    r = cv2.Rodrigues(np.array([tilt, 0, 0.0]))[0] @ cv2.Rodrigues(np.array([0, 0, turn]))[0]
+    shift = np.array([0, 0, 0.42]) - r[:, 2] * height
+    h = onto_samples @ K @ np.column_stack([r[:, :2], shift]) @ onto_board
+    fine = cv2.warpPerspective(texture, h, (4 * 452, 4 * 322), borderValue=220)
+    picture = cv2.resize(fine, (452, 322), interpolation=cv2.INTER_AREA)
+    noise = np.random.default_rng(1).normal(0, 2, picture.shape)
+    return np.clip(picture + noise, 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("turn", [0.1, 1.5, 3.0])
+@pytest.mark.parametrize("tilt", [0.0, 0.04])
+def test_photographs_of_a_board_at_two_heights_give_both_calibrations(tmp_path, turn, tilt):
+    for name, height in (("low.png", 0.0), ("high.png", 0.1)):
+        cv2.imwrite(str(tmp_path / name), board(height, tilt, turn))
+    arguments = ["low.png", "high.png", *BOARD, "--window", "auto", "--heights", "0 mm, 10 cm"]
+    arguments += ["--two-planes", "planes.yaml", "--output", "camera.yaml", "--residuals", "residuals.png"]
+    done = calibrate(*arguments, *(["--projective"] if tilt else []), folder=tmp_path)
+    assert done.returncode == 0 and not done.stderr, done.stderr
+    assert "low.png" in done.stdout and "two planes" in done.stdout
+    camera = CameraCalibration.load(tmp_path / "camera.yaml")
+    planes = TwoPlanesCalibration.load(tmp_path / "planes.yaml")
+    assert camera.size == (452, 322)
+    assert camera.matrix == pytest.approx(K, abs=4) and planes.pinhole[0] == pytest.approx(K, abs=4)
+    assert (planes.z1, planes.z2, planes.unit) == (0, 0.1, "m")
+    assert planes.F[2] == pytest.approx(0.42, abs=0.005)
+    assert max(camera.evidence.rms, planes.evidence.rms) < 0.2
+    assert cv2.imread(str(tmp_path / "residuals.png")).shape == (644, 1808, 3)
+
+
+def test_the_tilt_of_a_photographed_board_is_told_in_degrees(tmp_path):
+    for name, height in (("low.png", 0.0), ("high.png", 0.1)):
+        cv2.imwrite(str(tmp_path / name), board(height, np.radians(3)))
+    heights = ("low.png", "high.png", *BOARD, "--window", "auto", "--heights", "0cm,10cm")
+    done = calibrate(*heights, "--two-planes", "planes.yaml", folder=tmp_path)
+    assert done.returncode == 0
+    told = re.search(r"tilted against the image by ([0-9.]+) deg.*--projective", done.stderr)
+    assert float(told[1]) == pytest.approx(3, abs=0.5)
 
 
 def test_a_tilted_board_is_told_and_projective_maps_take_it(tmp_path):

@@ -156,7 +156,7 @@ def _linearise(bundle: Bundle, board: Floats, views: Floats) -> tuple[Floats, Fl
         depth = placed[..., 2]
         normalised = placed[..., :2] / depth[..., None]
         lens = bundle.distortion
-        bent = _lens.distort(normalised, lens)
+        bent, slopes = _lens.linearise(normalised, lens)
         focal = bundle.matrix[:2, :2]
         residuals = bent @ focal.T + bundle.matrix[:2, 2] - views
         jacobian = np.zeros((*views.shape, 16))
@@ -164,7 +164,7 @@ def _linearise(bundle: Bundle, board: Floats, views: Floats) -> tuple[Floats, Fl
         jacobian[..., 1, 1] = bent[..., 1]
         jacobian[..., 0, 2] = jacobian[..., 1, 3] = 1
         jacobian[..., 5:10] = focal @ _lens.by_lens(normalised)
-        by_point = focal @ _lens.by_point(normalised, lens) @ _by_depth(normalised, depth)
+        by_point = focal @ slopes @ _by_depth(normalised, depth)
         turned = placed - bundle.translations[:, None]
         # d(w x p)/dw = -[p]x, written out as a cross product of each row with p.
         jacobian[..., 10:13] = np.cross(turned[..., None, :], by_point)

@@ -13,21 +13,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from quadvis.document import Node, dump_yaml, read_yaml
-from quadvis.errors import DiagramError, Fault, QuadvisError, sentence
+from quadvis.errors import DiagramError, Fault
+from quadvis_blocks.vision import _lens
+from quadvis_blocks.vision._evidence import KEYS, CalibrationError, Evidence
 
 Array = NDArray[np.float64]
 
 _ITERATIONS = 50
 _TOLERANCE = 1e-13  # of a normalised coordinate: far below a millionth of a pixel
 
-
-class CalibrationError(QuadvisError):
-    """A calibration that no camera can have: `field` says which part, the text what would be right."""
-
-    def __init__(self, field: str, problem: str, remedy: str = "") -> None:
-        """Keep the parts; the message joins them."""
-        self.field, self.problem, self.remedy = field, problem, remedy
-        super().__init__(sentence(problem, remedy))
+NOTHING_KNOWN = Evidence()
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,16 +30,14 @@ class CameraCalibration:
     """What is known of a camera; impossible values raise `CalibrationError`.
 
     `size` is (width, height) in px. `matrix` is K = [[fx, s, cx], [0, fy, cy], [0, 0, 1]] in px, pixel
-    centres at whole numbers. `distortion` is (k1, k2, p1, p2, k3). `rms` (px), `views` and `date` say how it
-    was found, if known.
+    centres at whole numbers. `distortion` is (k1, k2, p1, p2, k3). `evidence` says how it was found, if
+    known; its points are in camera axes.
     """
 
     size: tuple[int, int]
     matrix: Array
     distortion: Array
-    rms: float | None = None
-    views: int | None = None
-    date: str | None = None
+    evidence: Evidence = NOTHING_KNOWN
 
     def __post_init__(self) -> None:
         """Make the arrays read-only float64 and check everything."""
@@ -63,17 +56,16 @@ class CameraCalibration:
         """Read a calibration file; `DiagramError` with file, line and column if anything in it is wrong.
 
         The file is YAML: `size: [width, height]`, `matrix: 3x3`, `distortion: [k1, k2, p1, p2, k3]` and,
-        optionally, `rms`, `views` and `date`.
+        optionally, `rms` (px), `errors: [px of each view]`, `date` and `points: [[x, y, z, u, v], ...]` in
+        camera axes, which the camera must meet as well as `rms` says.
         """
-        fields = read_yaml(path).fields(("size", "matrix", "distortion"), ("rms", "views", "date"))
+        fields = read_yaml(path).fields(("size", "matrix", "distortion"), KEYS)
         try:
             return cls(
                 size=_size(fields["size"]),
                 matrix=np.array(fields["matrix"].array((3, 3))),
                 distortion=np.array(fields["distortion"].array((5,))),
-                rms=fields["rms"].number() if "rms" in fields else None,
-                views=fields["views"].integer() if "views" in fields else None,
-                date=fields["date"].text() if "date" in fields else None,
+                evidence=Evidence.read(fields),
             )
         except CalibrationError as error:
             place = fields[error.field].place
@@ -81,15 +73,13 @@ class CameraCalibration:
 
     def save(self, path: str | Path, comment: str = "") -> None:
         """Write the calibration as YAML for `load`, number for number; `comment` goes on top of the file."""
-        known = {"rms": self.rms, "views": self.views, "date": self.date}
         data = {
             "size": list(self.size),
             "matrix": self.matrix.tolist(),
             "distortion": self.distortion.tolist(),
         }
-        data |= {key: value for key, value in known.items() if value is not None}
         head = "".join(f"# {line}\n" for line in comment.splitlines())
-        Path(path).write_text(head + dump_yaml(data), encoding="utf-8")
+        Path(path).write_text(head + dump_yaml(data | self.evidence.facts()), encoding="utf-8")
 
     def normalise(self, pixels: ArrayLike) -> Array:
         """Return the undistorted rays (x, y) at depth 1 of pixels (n, 2): K and the lens are taken out.
@@ -113,41 +103,22 @@ class CameraCalibration:
         """Return the pixels (n, 2) of normalised points (n, 2): the inverse of `normalise`."""
         xy = np.asarray(rays, dtype=np.float64).reshape(-1, 2)
         if self.distortion.any():
-            xy = self._distort(xy)[0]
+            xy = _lens.distort(xy, self.distortion)
         return np.asarray(xy @ self.matrix[:2, :2].T + self.matrix[:2, 2])
-
-    def _distort(self, xy: Array) -> tuple[Array, Array]:
-        """Return the distorted points (n, 2) and the Jacobian (n, 2, 2) of the distortion there."""
-        k1, k2, p1, p2, k3 = self.distortion
-        x, y = xy[:, 0], xy[:, 1]
-        r2 = x * x + y * y
-        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3))  # d radial / d x = slope * x
-        bent = np.column_stack(
-            (
-                x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
-                y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
-            )
-        )
-        jacobian = np.empty((len(xy), 2, 2))
-        jacobian[:, 0, 0] = radial + slope * x * x + 2 * p1 * y + 6 * p2 * x
-        jacobian[:, 0, 1] = jacobian[:, 1, 0] = slope * x * y + 2 * p1 * x + 2 * p2 * y
-        jacobian[:, 1, 1] = radial + slope * y * y + 6 * p1 * y + 2 * p2 * x
-        return bent, jacobian
 
     def _undistort(self, distorted: Array) -> Array:
         """Invert the distortion by Newton's method; NaN where no point, or only one behind a fold, fits."""
         xy = distorted.copy()
         with np.errstate(all="ignore"):
+            bent, jacobian = _lens.linearise(xy, self.distortion)
             for _ in range(_ITERATIONS):
-                bent, jacobian = self._distort(xy)
                 step = _solve(jacobian, distorted - bent)
                 xy += step
+                bent, jacobian = _lens.linearise(xy, self.distortion)
                 if not (np.abs(step) > _TOLERANCE).any():
                     break
-            bent, jacobian = self._distort(xy)
             at_rest = np.abs(bent - distorted).max(axis=1) < 1e-9
-            unfolded = np.linalg.det(jacobian) > 0
+            unfolded = _determinant(jacobian) > 0
             xy[~(at_rest & unfolded)] = np.nan
         return xy
 
@@ -156,7 +127,11 @@ def _solve(matrices: Array, right: Array) -> Array:
     """Solve (n, 2, 2) linear systems by Cramer's rule; a singular one gives infinities, no exception."""
     a, b, c, d = matrices[:, 0, 0], matrices[:, 0, 1], matrices[:, 1, 0], matrices[:, 1, 1]
     e, f = right[:, 0], right[:, 1]
-    return np.column_stack((e * d - b * f, a * f - e * c)) / (a * d - b * c)[:, None]
+    return np.column_stack((e * d - b * f, a * f - e * c)) / _determinant(matrices)[:, None]
+
+
+def _determinant(matrices: Array) -> Array:
+    return np.asarray(matrices[:, 0, 0] * matrices[:, 1, 1] - matrices[:, 0, 1] * matrices[:, 1, 0])
 
 
 def _size(node: Node) -> tuple[int, int]:
@@ -191,3 +166,10 @@ def _check(camera: CameraCalibration) -> None:
     if not error < 1e-6:
         problem = "distortion folds the picture: pixels inside the image have no ray"
         raise CalibrationError("distortion", problem, "calibrate again with points out to the corners")
+    camera.evidence.check(camera.project)
+    points = camera.evidence.points
+    if points is not None and not ((points[:, 3:] > -1) & (points[:, 3:] < camera.size)).all():
+        problem = f"a stored point lies outside a picture of {width} x {height} px"
+        raise CalibrationError(
+            "size", problem, "give the size of the pictures that the camera was found with"
+        )

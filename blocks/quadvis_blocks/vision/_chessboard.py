@@ -19,7 +19,8 @@ import numpy as np
 
 from quadvis.errors import QuadvisError
 from quadvis_blocks.vision._bundle import LENS, Bundle, adjust
-from quadvis_blocks.vision._calibration import CalibrationError, CameraCalibration
+from quadvis_blocks.vision._calibration import CameraCalibration
+from quadvis_blocks.vision._evidence import CalibrationError, Evidence
 from quadvis_blocks.vision._homogeneous import HomogeneousCalibration, calibrate
 from quadvis_blocks.vision._residuals import rms
 
@@ -158,10 +159,12 @@ def find_corners(picture: Picture, board: Board, window: int | None = USUAL_WIND
     return Corners(np.reshape(fine, (-1, 2)).astype(float), half > _CROWDED * distance)
 
 
-def read_views(paths: Sequence[str], board: Board, window: int | None = USUAL_WINDOW) -> Views:
+def read_views(
+    paths: Sequence[str], board: Board, window: int | None = USUAL_WINDOW, least: int = 3
+) -> Views:
     """Return the corners of the board in photographs; those that do not show it are left out.
 
-    `QuadvisError` if fewer than 3 show it, if one is no picture, or if they differ in size.
+    `QuadvisError` if fewer than `least` show it, if one is no picture, or if they differ in size.
     """
     pictures = [read_picture(path) for path in paths]
     for path, picture in zip(paths, pictures, strict=True):
@@ -174,9 +177,11 @@ def read_views(paths: Sequence[str], board: Board, window: int | None = USUAL_WI
         (path, find_corners(picture, board, window)) for path, picture in zip(paths, pictures, strict=True)
     ]
     seen = [(Path(path).name, corners) for path, corners in found if corners is not None]
-    if len(seen) < 3:
+    if len(seen) < least:
         wanted = f"a board of {board.columns}x{board.rows} inner corners"
-        raise QuadvisError(f"{wanted} was found in {len(seen)} of {len(paths)} pictures; it takes 3 or more")
+        raise QuadvisError(
+            f"{wanted} was found in {len(seen)} of {len(paths)} pictures; it takes {least} or more"
+        )
     height, width = pictures[0].shape
     return Views(
         names=[name for name, _ in seen],
@@ -204,12 +209,51 @@ def calibrate_views(
     straight = CameraCalibration(size, bundle.matrix, np.zeros(5))
     homogeneous = calibrate(placed, straight.to_pixels(bent.normalise(pixels)))
     camera = replace(bent, matrix=homogeneous.matrix)
-    predicted = camera.project((placed - homogeneous.centre) @ homogeneous.rotation.T)
-    camera = replace(camera, rms=float(rms(predicted - pixels)), views=len(measured))
+    seen = (placed - homogeneous.centre) @ homogeneous.rotation.T
+    predicted = camera.project(seen).reshape(measured.shape)
+    points = seen.reshape(*measured.shape[:2], 3)
+    camera = replace(camera, evidence=Evidence.of([*points], [*measured], [*predicted]))
     bundle_rms = float(rms(bent.project(placed) - pixels))
-    return ChessboardCalibration(
-        homogeneous, bundle, bundle_rms, camera, measured, predicted.reshape(measured.shape), omitted
+    return ChessboardCalibration(homogeneous, bundle, bundle_rms, camera, measured, predicted, omitted)
+
+
+def at_heights(
+    board: Board, views: Sequence[Floats], heights: Sequence[float]
+) -> tuple[list[Floats], list[Floats]]:
+    """Return points (n, 3) and pixels (n, 2) of each view of a board that was moved along its normal alone.
+
+    heights are those of the views (n, 2) in the unit of the board; z goes toward the camera. x follows that
+    edge of the board which goes most to the right in the first picture, y is up from it.
+    """
+    points, pixels, right = [], [], np.array([1.0, 0.0])
+    for view, height in zip(views, heights, strict=True):
+        grid = _turned(np.reshape(view, (board.rows, board.columns, 2)), right)
+        right = _along(grid)
+        row, column = np.indices(grid.shape[:2], dtype=float).reshape(2, -1)
+        flat = np.column_stack((column, -row)) * board.square
+        points.append(np.column_stack((flat, np.full(len(flat), height))))
+        pixels.append(grid.reshape(-1, 2))
+    return points, pixels
+
+
+def _turned(grid: Floats, right: Floats) -> Floats:
+    """Return the corners (rows, columns, 2) in the order that has its columns most along a direction.
+
+    Which corner of a board comes first is OpenCV's choice, and may change from one picture to the next.
+    """
+    down = (grid[-1] - grid[0]).mean(axis=0)
+    across = _along(grid)
+    if across[0] * down[1] - across[1] * down[0] < 0:
+        grid = grid[:, ::-1]
+    quarters = range(4) if grid.shape[0] == grid.shape[1] else (0, 2)
+    return max(
+        (np.rot90(grid, turns) for turns in quarters), key=lambda turned: float(_along(turned) @ right)
     )
+
+
+def _along(grid: Floats) -> Floats:
+    """Return the direction from the first column to the last, (2,)."""
+    return np.asarray((grid[:, -1] - grid[:, 0]).mean(axis=0))
 
 
 def _adjusted(

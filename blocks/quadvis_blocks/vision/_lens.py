@@ -14,26 +14,31 @@ if TYPE_CHECKING:
 
 def distort(normalised: Floats, lens: Floats) -> Floats:
     """Return normalised coordinates (..., 2) after the lens (5,)."""
-    _, _, p1, p2, _ = lens
-    x, y = normalised[..., 0], normalised[..., 1]
-    r2 = x * x + y * y
-    radial = _radial(r2, lens)
-    bent_x = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
-    bent_y = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
-    return np.stack([bent_x, bent_y], axis=-1)
+    return linearise(normalised, lens)[0]
 
 
 def by_point(normalised: Floats, lens: Floats) -> Floats:
     """Return the derivatives (..., 2, 2) of the distorted coordinates by the undistorted ones (..., 2)."""
-    k1, k2, p1, p2, k3 = lens
+    return linearise(normalised, lens)[1]
+
+
+def linearise(normalised: Floats, lens: Floats) -> tuple[Floats, Floats]:
+    """Return normalised coordinates (..., 2) after the lens (5,), and their derivatives (..., 2, 2)."""
+    k1, k2, p1, p2, k3 = lens.tolist()
     x, y = normalised[..., 0], normalised[..., 1]
-    r2 = x * x + y * y
-    radial = _radial(r2, lens)
-    slope = 2 * (k1 + r2 * (2 * k2 + 3 * k3 * r2))
-    along_x = radial + slope * x * x + 2 * p1 * y + 6 * p2 * x
-    along_y = radial + slope * y * y + 6 * p1 * y + 2 * p2 * x
-    mixed = slope * x * y + 2 * (p1 * x + p2 * y)
-    return _matrix([along_x, mixed], [mixed, along_y])
+    xx, xy, yy = x * x, x * y, y * y
+    r2 = xx + yy
+    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    slope = 2 * (k1 + r2 * (2 * k2 + 3 * k3 * r2))  # d radial / dx = slope x
+    along, across = 2 * (p1 * y + p2 * x), 2 * (p1 * x + p2 * y)
+    bent = np.empty_like(normalised)
+    bent[..., 0] = x * radial + 2 * p1 * xy + p2 * (r2 + 2 * xx)
+    bent[..., 1] = y * radial + p1 * (r2 + 2 * yy) + 2 * p2 * xy
+    jacobian = np.empty((*normalised.shape, 2))
+    jacobian[..., 0, 0] = radial + slope * xx + along + 4 * p2 * x
+    jacobian[..., 1, 1] = radial + slope * yy + along + 4 * p1 * y
+    jacobian[..., 0, 1] = jacobian[..., 1, 0] = slope * xy + across
+    return bent, jacobian
 
 
 def by_lens(normalised: Floats) -> Floats:
@@ -41,16 +46,6 @@ def by_lens(normalised: Floats) -> Floats:
     x, y = normalised[..., 0], normalised[..., 1]
     r2 = x * x + y * y
     tangential = 2 * x * y
-    return _matrix(
-        [x * r2, x * r2**2, tangential, r2 + 2 * x * x, x * r2**3],
-        [y * r2, y * r2**2, r2 + 2 * y * y, tangential, y * r2**3],
-    )
-
-
-def _radial(r2: Floats, lens: Floats) -> Floats:
-    k1, k2, _, _, k3 = lens
-    return np.asarray(1 + r2 * (k1 + r2 * (k2 + r2 * k3)))
-
-
-def _matrix(first: list[Floats], second: list[Floats]) -> Floats:
+    first = [x * r2, x * r2**2, tangential, r2 + 2 * x * x, x * r2**3]
+    second = [y * r2, y * r2**2, r2 + 2 * y * y, tangential, y * r2**3]
     return np.stack([np.stack(first, axis=-1), np.stack(second, axis=-1)], axis=-2)

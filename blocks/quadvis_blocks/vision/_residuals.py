@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from quadvis_blocks.vision._drawing import SHIFT, Picture, sixteenths, write_on_plate
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
-    Picture = NDArray[np.uint8]
-
-_SHIFT = 4  # OpenCV draws at fractions of a pixel when coordinates are given in sixteenths
 
 
 def rms(residuals: Floats) -> Floats:
@@ -21,12 +22,16 @@ def rms(residuals: Floats) -> Floats:
 
 
 def draw_residuals(
-    picture: Picture, measured: Floats, predicted: Floats, magnification: float = 30.0
+    picture: Picture,
+    measured: Sequence[Floats] | Floats,
+    predicted: Sequence[Floats] | Floats,
+    title: str = "residuals",
+    magnification: float = 30.0,
 ) -> Picture:
-    """Return the picture, faded and enlarged if small, with arrows from measured to predicted pixels.
+    """Return the grey picture, faded and enlarged if small, with arrows from measured to predicted pixels.
 
-    measured and predicted are (m, n, 2); each view has a colour of its own. Arrows are `magnification` times
-    too long.
+    measured and predicted are m views of pixels (n, 2); each view has a colour of its own. Arrows are
+    `magnification` times too long; the title and the rms are written below.
     """
     import cv2
 
@@ -39,19 +44,13 @@ def draw_residuals(
     for colour, starts, ends in zip(colours, measured, predicted, strict=True):
         tips = starts + magnification * (ends - starts)
         lengths = zoom * np.linalg.norm(tips - starts, axis=1)
-        heads = np.minimum(0.3, 8 / np.maximum(np.nan_to_num(lengths), 1))
-        for start, tip, head in zip(_fixed(starts, zoom), _fixed(tips, zoom), heads, strict=True):
-            cv2.arrowedLine(canvas, start, tip, colour, 1, cv2.LINE_AA, _SHIFT, float(head))
-    overall = float(rms((predicted - measured).reshape(-1, 2)))
-    label = f"measured -> predicted, x {magnification:g}; rms {overall:.3f} px; {len(measured)} views"
-    cv2.putText(
-        canvas, label, (12, canvas.shape[0] - 14), cv2.FONT_HERSHEY_SIMPLEX, 0.6, (0, 0, 0), 1, cv2.LINE_AA
+        heads = np.minimum(0.3, 8 / np.maximum(np.nan_to_num(lengths), 1)).tolist()
+        places = zip(sixteenths(starts, zoom).tolist(), sixteenths(tips, zoom).tolist(), heads, strict=True)
+        for start, tip, head in places:
+            cv2.arrowedLine(canvas, start, tip, colour, 1, cv2.LINE_AA, SHIFT, head)
+    overall = float(rms(np.concatenate(list(predicted)) - np.concatenate(list(measured))))
+    label = (
+        f"{title}: measured -> predicted, x {magnification:g}; rms {overall:.3g} px; {len(measured)} views"
     )
+    write_on_plate(canvas, label, (12, canvas.shape[0] - 14), (235, 235, 235), 0.5)
     return np.asarray(canvas, dtype=np.uint8)
-
-
-def _fixed(pixels: Floats, zoom: int) -> list[tuple[int, int]]:
-    bounded = np.nan_to_num(pixels, nan=-1e4).clip(-1e4, 1e4)
-    # The centre of pixel 0 lies half a pixel inside the picture, at any size.
-    enlarged = (bounded + 0.5) * zoom - 0.5
-    return [(int(x), int(y)) for x, y in np.rint(enlarged * 2**_SHIFT)]

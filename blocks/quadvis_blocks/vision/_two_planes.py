@@ -17,17 +17,29 @@ fitted on. Rays use neither.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from quadvis.document import read_yaml
+from quadvis.document import dump_yaml, read_yaml
 from quadvis.errors import DiagramError, Fault, QuadvisError
-from quadvis_blocks.vision._calibration import CalibrationError
-from quadvis_blocks.vision._homogeneous import homography, rq
+from quadvis.units import Unit, UnitError
+from quadvis_blocks.vision._evidence import KEYS, LEAST_ERROR, MOST_ERROR, CalibrationError, Evidence
+from quadvis_blocks.vision._homogeneous import rq
+from quadvis_blocks.vision._plane_maps import (
+    PARALLEL,
+    affine_map,
+    apply,
+    columns,
+    focal_point,
+    homogeneous,
+    image_plane,
+    projective_map,
+    unit,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -36,7 +48,8 @@ if TYPE_CHECKING:
 
 _SHAPES = {"H1": (3, 3), "H2": (3, 3), "F": (3,), "V_R": (3,), "V_C": (3,)}
 _NUMBERS = ("z1", "z2", "rho_p", "gamma_p")
-_PARALLEL = 1e-9  # relative size below which lines meet nowhere, or a map is singular
+_SIGNIFICANT = 10.0  # F ratio; noise alone gives as much in 7 of 100 000 calibrations with 20 points
+_NOTHING_KNOWN = Evidence()
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +60,8 @@ class TwoPlanesCalibration:
     (3, 3) are affine, (rho, gamma, 1) H = (x, y, z), or `projective`, (x w, y w, w) with w > 0. The focal
     point `F` (3,) is nearest to all lines. `V_R`, `V_C` (3,) and the piercing point `rho_p` (to the right),
     `gamma_p` (downwards) belong to (5) and are in pixels; the printed piercing point of (37) is in the other
-    order.
+    order. `evidence` says how it was found, if known, with errors of the first and the second plane by
+    `pinhole` and points in the calibration frame; `unit` is the unit of all lengths, if known.
     """
 
     z1: float
@@ -60,6 +74,8 @@ class TwoPlanesCalibration:
     rho_p: float
     gamma_p: float
     projective: bool = False
+    evidence: Evidence = _NOTHING_KNOWN
+    unit: str | None = None
 
     def __post_init__(self) -> None:
         """Make the arrays read-only and check everything."""
@@ -87,27 +103,32 @@ class TwoPlanesCalibration:
         g, q = np.asarray(points, dtype=float), np.asarray(pixels, dtype=float)
         first, second = _split(g)
         make = projective_map if projective else affine_map
-        maps = [(make(q[plane], g[plane]), float(g[plane, 2].mean())) for plane in (first, second)]
+        maps = [(make(q[plane], g[plane]), float(np.median(g[plane, 2]))) for plane in (first, second)]
         focus = focal_point(*(apply(h, z, q, projective=projective) for h, z in maps))
         v_r, v_c, piercing = image_plane(unit(g - focus), q)
         (h1, z1), (h2, z2) = maps
-        return cls(z1, z2, h1, h2, focus, v_r, v_c, float(piercing[0]), float(piercing[1]), projective)
+        found = cls(z1, z2, h1, h2, focus, v_r, v_c, float(piercing[0]), float(piercing[1]), projective)
+        planes = [(g[plane], q[plane]) for plane in (first, second)]
+        predicted = [found.project(points, exact=True) for points, _ in planes]
+        evidence = Evidence.of([points for points, _ in planes], [seen for _, seen in planes], predicted)
+        return replace(found, evidence=evidence)
 
     @classmethod
     def load(cls, path: str | Path) -> TwoPlanesCalibration:
         """Read a calibration file; `DiagramError` with file, line and column if anything in it is wrong.
 
         The file is YAML with the keys convention (row), z1, z2, H1, H2, projective, F, V_R, V_C, rho_p,
-        gamma_p.
+        gamma_p and, optionally, unit (of length), rms (px), errors (px, of both planes), date and points
+        (rows x, y, z, rho, gamma), which the camera must meet as well as rms says.
         """
-        fields = read_yaml(str(path)).fields(
-            required={"convention", "projective", *_NUMBERS, *_SHAPES}, optional=set()
-        )
+        required = ("convention", "projective", *_NUMBERS, *_SHAPES)
+        fields = read_yaml(str(path)).fields(required, (*KEYS, "unit"))
         fields["convention"].choice(("row",))
         values: dict[str, Any] = {name: fields[name].number() for name in _NUMBERS}
         values |= {name: fields[name].array(shape) for name, shape in _SHAPES.items()}
+        values["unit"] = fields["unit"].text() if "unit" in fields else None
         try:
-            return cls(**values, projective=fields["projective"].boolean())
+            return cls(**values, projective=fields["projective"].boolean(), evidence=Evidence.read(fields))
         except CalibrationError as error:
             fault = Fault(fields[error.field].place, "two planes", error.problem, error.remedy)
             raise DiagramError([fault]) from None
@@ -121,7 +142,9 @@ class TwoPlanesCalibration:
             lines += [f"{name}:", *(f"  - {_flow(row)}" for row in getattr(self, name))]
         lines += [f"{name}: {_flow(getattr(self, name))}" for name in ("F", "V_R", "V_C")]
         lines += [f"{name}: {float(getattr(self, name))!r}" for name in ("rho_p", "gamma_p")]
-        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        known = self.evidence.facts() | ({} if self.unit is None else {"unit": self.unit})
+        text = "\n".join(lines) + "\n" + (dump_yaml(known) if known else "")
+        Path(path).write_text(text, encoding="utf-8")
 
     def back_project(self, pixels: ArrayLike) -> tuple[Floats, Floats]:
         """Return the images (n, 3) of pixels (n, 2) on the first and the second plane, eq. (1)."""
@@ -136,7 +159,7 @@ class TwoPlanesCalibration:
 
         Camera axes are x along the rows of the image, y down, z forward. Rows with NaN stay NaN.
         """
-        q = _homogeneous(pixels)
+        q = homogeneous(pixels)
         return unit(q @ np.linalg.inv(self.pinhole[0]).T)
 
     @cached_property
@@ -174,92 +197,27 @@ class TwoPlanesCalibration:
 
     def _directions(self, h: Floats, z: float) -> Floats:
         """Return A (3, 3) with g - F ~ A (rho, gamma, 1)' for the image g on one plane."""
-        x, y, w = _columns(h, self.projective).T
+        x, y, w = columns(h, self.projective).T
         scale = np.linalg.norm(w) * abs(self.F[2] - z)
         rows = [x - self.F[0] * w, y - self.F[1] * w, (z - self.F[2]) * w]
         return np.asarray(np.stack(rows) / scale)
 
 
-def affine_map(pixels: ArrayLike, points: ArrayLike) -> Floats:
-    """Return H (3, 3) with points (n, 3) ~ (rho, gamma, 1) H, least squares over pixels (n, 2), eq. (3).
+def board_tilt(points: ArrayLike, pixels: ArrayLike) -> float:
+    """Return the angle in rad of the planes against the image, which affine maps cannot know; 0 if not seen.
 
-    All points have the same z. `QuadvisError` if the pixels are fewer than 3 or lie on a line.
+    points (n, 3) lie at two heights, pixels (n, 2) belong to them. An angle counts if projective maps fit so
+    much better than affine ones that noise cannot be the reason (F test, four parameters more).
+
+    `QuadvisError` as for `TwoPlanesCalibration.fit`.
     """
-    q, g = _homogeneous(pixels), np.asarray(points, dtype=float)
-    if len(q) != len(g) or len(q) < 3:
-        raise QuadvisError(f"{len(g)} points and {len(q)} pixels; a plane needs at least 3, one for each")
-    if not np.isfinite(q).all():
-        raise QuadvisError(
-            "a pixel of a calibration plane is not finite; leave out points that were not seen"
-        )
-    centred = q[:, :2] - q[:, :2].mean(axis=0)
-    extents = np.linalg.svd(centred, compute_uv=False)
-    if not extents[1] > _PARALLEL * extents[0]:
-        raise QuadvisError("the pixels of a calibration plane lie on a line; spread them over the picture")
-    h, *_ = np.linalg.lstsq(q, g, rcond=None)
-    h[:, 2] = (0, 0, g[:, 2].mean())
-    return np.asarray(h)
-
-
-def projective_map(pixels: ArrayLike, points: ArrayLike) -> Floats:
-    """Return H (3, 3) with (x w, y w, w) = (rho, gamma, 1) H for points (n, 3) and pixels (n, 2), n >= 4.
-
-    Its largest element is 1 or -1. `QuadvisError` as for `homography`.
-    """
-    h = homography(pixels, np.asarray(points, dtype=float)[:, :2]).T
-    return np.asarray(h / np.abs(h).max())
-
-
-def apply(h: Floats, z: float, pixels: ArrayLike, *, projective: bool = False) -> Floats:
-    """Return the images (n, 3) of pixels (n, 2) on the plane at height z, eq. (1)."""
-    g = _homogeneous(pixels) @ _columns(h, projective)
-    return np.column_stack([g[:, :2] / g[:, 2:], np.full(len(g), float(z))])
-
-
-def focal_point(g1: ArrayLike, g2: ArrayLike) -> Floats:
-    """Return F (3,), the point nearest to the lines through rows of g1 and g2 (n, 3), least squares.
-
-    F = (sum (I - u u'))^-1 sum (I - u u') g1 over the unit directions u of the lines.
-
-    `QuadvisError` if the lines are parallel.
-    """
-    start, u = np.asarray(g1, dtype=float), unit(np.asarray(g2, dtype=float) - np.asarray(g1, dtype=float))
-    across = np.eye(3) - u[:, :, None] * u[:, None, :]
-    normal = across.sum(axis=0)
-    if not np.linalg.eigvalsh(normal)[0] > _PARALLEL * len(u):
-        raise QuadvisError(
-            "the lines between the planes are parallel; the planes must differ in scale or shape"
-        )
-    return np.asarray(np.linalg.solve(normal, np.einsum("nij,nj->i", across, start)))
-
-
-def image_plane(directions: ArrayLike, pixels: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    """Return V_R (3,), V_C (3,) and the piercing point (rho_p, gamma_p), eq. (5)-(6): X = W+ B.
-
-    directions (n, 3) are the unit vectors of (4), n >= 4. Seen under a small field the fourth column of W is
-    all but a combination of the third, which only the bend of the unit sphere tells apart: conditions of 70
-    to 500 are usual.
-    """
-    v = np.asarray(directions, dtype=float)
-    x, *_ = np.linalg.lstsq(
-        np.column_stack([v, np.ones(len(v))]), np.asarray(pixels, dtype=float), rcond=None
-    )
-    return x[:3, 0], x[:3, 1], x[3]
-
-
-def unit(vectors: Floats) -> Floats:
-    """Return rows (n, 3) at length one."""
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
-
-
-def _homogeneous(pixels: ArrayLike) -> Floats:
-    q = np.asarray(pixels, dtype=float).reshape(-1, 2)
-    return np.column_stack([q, np.ones(len(q))])
-
-
-def _columns(h: Floats, projective: bool) -> Floats:
-    """Return the map to (x w, y w, w); w is 1 everywhere for an affine one."""
-    return np.column_stack([h[:, :2], h[:, 2] if projective else (0.0, 0.0, 1.0)])
+    affine, projective = (TwoPlanesCalibration.fit(points, pixels, projective=kind) for kind in (False, True))
+    loose, tight = (float(np.sum(kind.residuals(points, pixels) ** 2)) for kind in (affine, projective))
+    free = 2 * len(np.asarray(points)) - 16
+    exact = (PARALLEL * float(np.ptp(points))) ** 2
+    if free < 1 or loose <= exact or loose - tight <= _SIGNIFICANT * 4 * tight / free:
+        return 0.0
+    return float(np.arccos(np.clip(abs(projective.pinhole[1][2, 2]), 0.0, 1.0)))
 
 
 def _split(points: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -295,8 +253,36 @@ def _check(planes: TwoPlanesCalibration) -> None:
                 name, f"the last column of {name} is not (0, 0, {z:g})", "affine maps end so"
             )
         sizes = np.linalg.svd(planes._directions(h, z), compute_uv=False)
-        if not sizes[2] > _PARALLEL * sizes[0]:
+        if not sizes[2] > PARALLEL * sizes[0]:
             raise CalibrationError(name, f"{name} is singular", "its points must not lie on a line")
         if np.linalg.det(planes._directions(h, z)) < 0:
             remedy = "x right, y up, z toward the camera is right-handed"
             raise CalibrationError(name, f"{name} mirrors the picture", remedy)
+    planes.evidence.check(lambda points: planes.project(points, exact=True))
+    if planes.evidence.points is not None:
+        _check_points(planes, planes.evidence.points)
+    if planes.unit is not None:
+        _check_unit(planes.unit)
+
+
+def _check_points(planes: TwoPlanesCalibration, stored: Floats) -> None:
+    """Refuse numbers of (5) that fit the stored points much worse than their best ones."""
+    points, pixels = stored[:, :3], stored[:, 3:]
+    v_r, v_c, piercing = image_plane(unit(points - planes.F), pixels)
+    best = unit(points - planes.F) @ np.column_stack([v_r, v_c]) + piercing
+    found, least = (
+        float(np.sqrt(np.mean(np.sum((kind - pixels) ** 2, axis=1))))
+        for kind in (planes.project(points), best)
+    )
+    if found > MOST_ERROR * least + 50 * LEAST_ERROR:
+        problem = f"equation (5) misses the stored points by {found:.3g} px rms; {least:.3g} px is possible"
+        raise CalibrationError("V_R", problem, "check V_R, V_C, rho_p and gamma_p, or calibrate again")
+
+
+def _check_unit(text: str) -> None:
+    try:
+        known = Unit.parse(text)
+    except UnitError as error:
+        raise CalibrationError("unit", error.problem, error.remedy) from None
+    if not known.dimension_equals(Unit.parse("m")):
+        raise CalibrationError("unit", f"'{text}' is not a unit of length", "write m, cm or mm")

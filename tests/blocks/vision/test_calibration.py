@@ -1,5 +1,7 @@
 """The camera calibration against OpenCV, closed forms and its own file."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -9,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadvis.errors import DiagramError
-from quadvis_blocks.vision._calibration import CalibrationError, CameraCalibration
+from quadvis_blocks.vision._calibration import CameraCalibration
+from quadvis_blocks.vision._evidence import CalibrationError, Evidence
 
 PAPER = Path(__file__).parents[3] / "diagrams" / "calib" / "camera.yaml"
 PAPER_K = np.array([[430.0, 2.0, 226.0], [0.0, 438.0, 161.0], [0.0, 0.0, 1.0]])
@@ -109,16 +112,97 @@ def test_a_pixel_beyond_the_lens_fold_has_no_ray() -> None:
     assert np.isnan(rays[1]).all()
 
 
+def found_with(camera: CameraCalibration, noise: float, views: int = 3, count: int = 30) -> CameraCalibration:
+    """Return the camera with the evidence of noisy pixels of points in its view."""
+    random = np.random.default_rng(2)
+    clouds = [points(count, seed) for seed in range(views)]
+    seen = [camera.project(cloud) + random.normal(0, noise, (count, 2)) for cloud in clouds]
+    evidence = Evidence.of(clouds, seen, [camera.project(cloud) for cloud in clouds])
+    return replace(camera, evidence=replace(evidence, date="2026-11-22"))
+
+
 def test_what_is_saved_is_what_is_loaded(tmp_path: Path) -> None:
     matrix = np.array([[1 / 3 * 1600, 1e-7, 342.371], [0, 536.016, 235.537], [0, 0, 1]])
-    camera = CameraCalibration((640, 480), matrix, OPENCV_LENS, rms=0.408, views=13, date="2026-11-22")
+    camera = found_with(CameraCalibration((640, 480), matrix, OPENCV_LENS), noise=0.4)
     path = tmp_path / "camera.yaml"
     camera.save(path, comment="left camera\nof the bench")
     again = CameraCalibration.load(path)
     assert np.array_equal(again.matrix, camera.matrix)
     assert np.array_equal(again.distortion, camera.distortion)
-    assert (again.size, again.rms, again.views, again.date) == (camera.size, 0.408, 13, "2026-11-22")
+    assert again.size == camera.size
+    for name in ("rms", "errors", "date", "points"):
+        assert np.array_equal(getattr(again.evidence, name), getattr(camera.evidence, name)), name
     assert path.read_text().startswith("# left camera\n# of the bench\n")
+
+
+def test_a_calibration_of_which_nothing_is_known_is_saved_too(tmp_path: Path) -> None:
+    CameraCalibration((452, 322), PAPER_K, np.zeros(5)).save(tmp_path / "camera.yaml")
+    assert CameraCalibration.load(tmp_path / "camera.yaml").evidence.rms is None
+
+
+@given(noise=st.floats(0.01, 1.0), views=st.integers(1, 5), count=st.integers(8, 60))
+def test_the_evidence_of_noise_is_its_size_and_some_typical_points(
+    noise: float, views: int, count: int
+) -> None:
+    camera = CameraCalibration((640, 480), OPENCV_K, OPENCV_LENS)
+    evidence = found_with(camera, noise, views, count).evidence
+    assert evidence.rms is not None and evidence.errors is not None and evidence.points is not None
+    assert evidence.rms == pytest.approx(noise * np.sqrt(2), rel=0.6)
+    assert evidence.rms == pytest.approx(np.sqrt(np.mean(evidence.errors**2)))
+    assert len(evidence.errors) == views
+    assert len(evidence.points) == min(40, views * count)
+    kept = camera.project(evidence.points[:, :3]) - evidence.points[:, 3:]
+    assert np.sqrt(np.mean(np.sum(kept**2, axis=1))) == pytest.approx(evidence.rms, rel=0.1)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.4])
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("536.073", "563.073"),  # fx
+        ("536.016", "506.016"),  # fy
+        ("342.371", "324.371"),  # cx
+        ("235.537", "335.537"),  # cy
+        ("-0.26509", "0.26509"),  # k1
+    ],
+)
+def test_a_number_that_was_changed_after_the_calibration_is_noticed(
+    tmp_path: Path, noise: float, old: str, new: str
+) -> None:
+    path = tmp_path / "camera.yaml"
+    found_with(CameraCalibration((640, 480), OPENCV_K, OPENCV_LENS), noise).save(path)
+    text = path.read_text()
+    assert text.count(old) == 1
+    path.write_text(text.replace(old, new))
+    with pytest.raises(DiagramError, match="misses the stored points") as caught:
+        CameraCalibration.load(path)
+    line = next(number for number, line in enumerate(text.splitlines(), 1) if line.startswith("points:"))
+    assert str(caught.value).startswith(f"{path}:{line + 1}:")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (r"rms: .*", "rms: -0.4", "not negative"),
+        (r"rms: .*", "rms: 3.0", "rms must be there, and lie between them"),
+        (r"rms: .*\n", "", "rms must be there"),
+        (r"errors: .*", "errors: [0.5, -0.1, 0.2]", "not negative"),
+        (r"errors: .*", "errors: 0.5", "list"),
+        (r"date: .*", "date: yesterday", "2026-11-22"),
+        (r"size: .*", "size: [320, 240]", "outside a picture of 320 x 240 px"),
+        (r"points:\n- \[", "points:\n- [1.0, ", "5"),
+        (r"points:\n- \[[^,]*,", "points:\n- [1 mm,", "unit"),
+    ],
+)
+def test_evidence_that_cannot_be_is_refused(tmp_path: Path, old: str, new: str, words: str) -> None:
+    path = tmp_path / "camera.yaml"
+    found_with(CameraCalibration((640, 480), OPENCV_K, OPENCV_LENS), 0.4).save(path)
+    text, count = re.subn(old, new, path.read_text(), count=1)
+    assert count == 1
+    path.write_text(text)
+    with pytest.raises(DiagramError, match=re.escape(words)) as caught:
+        CameraCalibration.load(path)
+    assert str(caught.value).startswith(f"{path}:")
 
 
 GOOD = "size: [452, 322]\nmatrix: [[430, 2, 226], [0, 438, 161], [0, 0, 1]]\ndistortion: [0, 0, 0, 0, 0]\n"

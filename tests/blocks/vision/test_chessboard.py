@@ -106,7 +106,7 @@ def test_the_bundle_adjustment_reaches_what_calibrate_camera_reaches():
     assert ours.bundle.matrix == pytest.approx(theirs.matrix, abs=1e-2)
     assert ours.bundle.distortion == pytest.approx(theirs.distortion, abs=1e-3)
     assert ours.bundle_rms == pytest.approx(theirs.rms, abs=1e-6)
-    assert ours.camera.rms == pytest.approx(theirs.rms, rel=0.01)
+    assert ours.camera.evidence.rms == pytest.approx(theirs.rms, rel=0.01)
     assert ours.errors == pytest.approx(theirs.errors, rel=0.1)
 
 
@@ -130,7 +130,7 @@ def test_rendered_boards_give_the_camera_that_rendered_them():
         assert error < 0.15
     camera = chessboard.calibrate_views(BOARD, [corners.pixels for corners in found], SIZE).camera
     assert camera.matrix == pytest.approx(K, abs=1.5)
-    assert camera.rms < 0.1
+    assert camera.evidence.rms < 0.1
 
 
 def test_a_picture_without_a_board_has_no_corners():
@@ -243,7 +243,7 @@ def test_photographs_give_the_reference_camera_within_half_a_pixel(side):
     assert found.bundle.matrix == pytest.approx(np.array(reference["K"]), abs=0.05)
     assert found.bundle.distortion == pytest.approx(reference["dist"], abs=2e-3)
     assert found.bundle_rms == pytest.approx(reference["rms"], abs=2e-3)
-    assert found.camera.rms < 1.01 * reference["rms"]
+    assert found.camera.evidence.rms < 1.01 * reference["rms"]
 
 
 @needs_photographs
@@ -251,7 +251,7 @@ def test_photographs_give_the_reference_camera_within_half_a_pixel(side):
 def test_a_window_clear_of_the_neighbours_halves_the_residuals_of_the_photographs(side):
     wide = chessboard.calibrate_views(BOARD, photographed(side, chessboard.USUAL_WINDOW), SIZE)
     clear = chessboard.calibrate_views(BOARD, photographed(side, None), SIZE)
-    assert clear.camera.rms < 0.5 * wide.camera.rms
+    assert clear.camera.evidence.rms < 0.5 * wide.camera.evidence.rms
 
 
 @needs_photographs
@@ -267,3 +267,32 @@ def test_boards_placed_by_the_other_camera_of_the_pair_give_the_same_k(side, oth
     assert found.matrix == pytest.approx(own.bundle.matrix, abs=2.0)
     # The cameras stood 83 mm apart, as OpenCV's own stereo calibration of the set says.
     assert np.linalg.norm(found.centre) == pytest.approx(0.0833, abs=0.001)
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(9, 6), (7, 7)])
+@pytest.mark.parametrize("order", ["as it is", "turned by 180 deg", "turned by 90 deg", "mirrored"])
+def test_corners_at_two_heights_are_those_of_one_board_in_whatever_order_they_come(columns, rows, order):
+    board = chessboard.Board(columns, rows, 0.025)
+    flat = np.column_stack([board.points, np.zeros(columns * rows)])
+    turn = np.array([0.02, -0.03, 0.2])
+    heights = [0.0, 0.1]
+    normal = cv2.Rodrigues(turn)[0][:, 2]
+    seen = [
+        cv2.projectPoints(flat, turn, np.array([-0.1, -0.06, 0.5]) - height * normal, K, np.zeros(5))[0]
+        for height in heights
+    ]
+    views = [pixels.reshape(rows, columns, 2) for pixels in seen]
+    changes = {
+        "as it is": lambda grid: grid,
+        "turned by 180 deg": lambda grid: grid[::-1, ::-1],
+        "turned by 90 deg": lambda grid: np.rot90(grid) if columns == rows else grid,
+        "mirrored": lambda grid: grid[:, ::-1],
+    }
+    views[1] = changes[order](views[1])
+    points, pixels = chessboard.at_heights(board, [view.reshape(-1, 2) for view in views], heights)
+    assert [set(view[:, 2]) for view in points] == [{0.0}, {0.1}]
+    found = calibrate(np.vstack(points), np.vstack(pixels))
+    assert found.rms < 1e-6
+    assert found.matrix == pytest.approx(K, abs=1e-3)
+    # x goes to the right in the picture, y up, and z toward the camera.
+    assert np.diag(found.rotation) @ [1, -1, -1] > 2.9

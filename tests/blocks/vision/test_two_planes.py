@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -155,11 +158,84 @@ def example(projective=False):
 
 @pytest.mark.parametrize("projective", [False, True])
 def test_a_file_gives_back_the_same_numbers(tmp_path, projective):
-    saved = example(projective)
+    found = example(projective)
+    saved = replace(found, unit="cm", evidence=replace(found.evidence, date="2026-11-22"))
     saved.save(tmp_path / "planes.yaml", comment="two\nlines")
     loaded = TwoPlanesCalibration.load(tmp_path / "planes.yaml")
     for name in ("z1", "z2", "H1", "H2", "F", "V_R", "V_C", "rho_p", "gamma_p", "projective"):
         assert np.array_equal(getattr(loaded, name), getattr(saved, name)), name
+    for name in ("rms", "errors", "date", "points"):
+        assert np.array_equal(getattr(loaded.evidence, name), getattr(saved.evidence, name)), name
+    assert loaded.unit == "cm"
+
+
+def test_the_evidence_is_the_error_of_each_plane_in_pixels():
+    points, pixels = good()
+    random = np.random.default_rng(1)
+    pixels[:30] += random.normal(0, 0.05, (30, 2))
+    pixels[30:] += random.normal(0, 0.5, (30, 2))
+    evidence = TwoPlanesCalibration.fit(points, pixels, projective=True).evidence
+    assert evidence.errors[1] > 5 * evidence.errors[0] > 0
+    assert evidence.rms == pytest.approx(np.sqrt(np.mean(evidence.errors**2)))
+    assert len(evidence.points) == 40
+
+
+NUMBERS = [("H1", 0), ("H1", 4), ("H1", 6), ("H2", 0), ("H2", 4), ("H2", 7), ("F", 0), ("F", 2)]
+NUMBERS += [("V_R", 0), ("V_C", 1), ("rho_p", 0), ("gamma_p", 0)]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.3])
+@pytest.mark.parametrize(("key", "index"), NUMBERS)
+def test_a_number_that_was_changed_after_the_calibration_is_noticed(tmp_path, key, index, noise):
+    points, pixels = good()
+    pixels += np.random.default_rng(1).normal(0, noise, pixels.shape)
+    file = tmp_path / "planes.yaml"
+    TwoPlanesCalibration.fit(points, pixels).save(file)
+    before, after = file.read_text().split(f"{key}:", 1)
+    numbers = list(re.finditer(r"-?[0-9.]+(?:e-?[0-9]+)?", after))
+    place = numbers[index]
+    changed = f"{1.1 * float(place[0]) + 0.2 * (key == 'F')!r}"
+    file.write_text(f"{before}{key}:{after[: place.start()]}{changed}{after[place.end() :]}")
+    with pytest.raises(QuadvisError, match="misses the stored points") as caught:
+        TwoPlanesCalibration.load(file)
+    assert f"{file}:" in str(caught.value)
+
+
+@pytest.mark.parametrize(("old", "new"), [("z1: 1.0", "z1: 1.5"), ("z2: 6.0", "z2: 5.0")])
+def test_a_height_that_was_changed_after_the_calibration_is_noticed(tmp_path, old, new):
+    file = tmp_path / "planes.yaml"
+    example(projective=True).save(file)
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))
+    with pytest.raises(QuadvisError, match="misses the stored points"):
+        TwoPlanesCalibration.load(file)
+
+
+def test_a_piercing_point_in_the_printed_order_is_noticed(tmp_path):
+    file = tmp_path / "planes.yaml"
+    example().save(file)
+    text = file.read_text()
+    file.write_text(text.replace("rho_p", "x").replace("gamma_p", "rho_p").replace("x:", "gamma_p:"))
+    with pytest.raises(QuadvisError, match=r"equation \(5\) misses the stored points"):
+        TwoPlanesCalibration.load(file)
+
+
+@pytest.mark.parametrize("degrees", [0.5, 1.0, 3.0])
+def test_the_tilt_of_the_board_is_seen_through_the_noise(degrees):
+    k = np.array([[457.0, 0, 176], [0, 457, 144], [0, 0, 1]])
+    r = turn(0, degrees) @ AXES
+    points, pixels = pictures(k, r, np.array([0, 0, 3.5]) - 25 * r[2])
+    pixels += np.random.default_rng(2).normal(0, 0.05, pixels.shape)
+    assert np.degrees(two_planes.board_tilt(points, pixels)) == pytest.approx(degrees, rel=0.3)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05, 1.0])
+def test_noise_is_not_taken_for_a_tilt(noise):
+    points, pixels = good()
+    for seed in range(20):
+        seen = pixels + np.random.default_rng(seed).normal(0, noise, pixels.shape)
+        assert two_planes.board_tilt(points, seen) == 0
 
 
 @pytest.mark.parametrize(
@@ -171,6 +247,9 @@ def test_a_file_gives_back_the_same_numbers(tmp_path, projective):
         ("F: [", "F: [1, ", "F"),
         ("z1: 1.0", "z1: 2.0", "H1"),
         ("rho_p: ", "rho: ", "rho_p"),
+        ("points:", "unit: kg\npoints:", "not a unit of length"),
+        ("points:", "unit: cmm\npoints:", "cmm"),
+        ("- [-5.0, -4.0, 1.0,", "- [-5.0, -4.0, 1.5,", "misses the stored points"),
     ],
 )
 def test_a_file_that_is_wrong_is_refused_with_its_place(tmp_path, old, new, said):

@@ -1,0 +1,73 @@
+"""What a calibration found, as a table for people and as JSON for programs."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+_WIDTH = 22  # of the first column
+_INTRINSICS = ("fx", "fy", "skew", "cx", "cy")
+_LENS = ("k1", "k2", "p1", "p2", "k3")
+
+
+@dataclass
+class Report:
+    """Cameras (name, K, rms px), lenses by name, and views (name, rms px, OpenCV's rms px if it has one)."""
+
+    cameras: list[tuple[str, Floats, float]] = field(default_factory=list)
+    lenses: dict[str, Floats] = field(default_factory=dict)
+    views: list[tuple[str, float, float | None]] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    def header(self) -> str:
+        """Return the comment of a camera file."""
+        found = [f"{name}: {' '.join(f'{number:.3f}' for number in _five(k))}" for name, k, _ in self.cameras]
+        return "\n".join([f"By tools/calibrate; {' '.join(_INTRINSICS)} (px):", *found])
+
+    def text(self) -> str:
+        """Return the tables."""
+        lines = [_heads("", (*_INTRINSICS, "rms px"))]
+        for name, k, rms in self.cameras:
+            numbers = "".join(f"{number:10.3f}" for number in _five(k))
+            lines.append(f"{name:<{_WIDTH}}{numbers}{rms:10.4f}")
+        if self.lenses:
+            lines += ["", _heads("", _LENS)]
+            for name, lens in self.lenses.items():
+                lines.append(f"{name:<{_WIDTH}}{''.join(f'{number:10.5f}' for number in lens)}")
+        if self.views:
+            width = max(_WIDTH, 1 + max(len(name) for name, _, _ in self.views))
+            compared = any(theirs is not None for _, _, theirs in self.views)
+            lines += ["", _heads("view", ("rms px", "OpenCV") if compared else ("rms px",), width)]
+            for name, ours, theirs in self.views:
+                lines.append(f"{name:<{width}}{ours:10.4f}{'' if theirs is None else f'{theirs:10.4f}'}")
+        return "\n".join(lines)
+
+    def json(self) -> str:
+        """Return everything; lengths in pixels."""
+        views = [
+            {"name": name, "rms": ours} | ({} if theirs is None else {"OpenCV": theirs})
+            for name, ours, theirs in self.views
+        ]
+        everything: dict[str, Any] = {
+            "cameras": {name: {"K": k.tolist(), "rms": rms} for name, k, rms in self.cameras},
+            "distortion": {name: lens.tolist() for name, lens in self.lenses.items()},
+            "views": views,
+            "warnings": self.warnings,
+        }
+        return json.dumps(everything, indent=2)
+
+
+def _heads(first: str, names: tuple[str, ...], width: int = _WIDTH) -> str:
+    return f"{first:<{width}}" + "".join(f"{name:>10}" for name in names)
+
+
+def _five(k: Floats) -> tuple[float, ...]:
+    """Return fx, fy, skew, cx, cy."""
+    return tuple(map(float, (k[0, 0], k[1, 1], k[0, 1], k[0, 2], k[1, 2])))

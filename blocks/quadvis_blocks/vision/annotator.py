@@ -1,0 +1,77 @@
+"""Draws into a picture what was found in it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from quadvis.block import Block, Frame, In, Out, Param, ParameterError
+from quadvis.errors import QuadvisError
+from quadvis_blocks.vision._calibration import CameraCalibration
+from quadvis_blocks.vision._overlay import Finding, Overlay
+from quadvis_blocks.vision._projection import RADIUS, SIDE
+
+UNKNOWN = (math.nan, math.nan, math.nan)
+
+
+class Annotator(Block, numeric=False):
+    """The picture with what was found in it, for people to watch: write it to a video or to a folder.
+
+    The circles are marked by their numbers, a partly hidden one with its quality. If there is a pose, the
+    square, its axes (x red, y green, z blue) and the outlines of the circles stand where it puts them; those
+    that were not seen are in orange. A caption below the picture tells the time, the detector's status in
+    words, and the pose in cm and degrees.
+
+    The picture and what was found in it must come at the same tick, as they do from a detector of the same
+    rate. All inputs but the picture and the circles may stay open. What is not a picture becomes grey, so
+    that a video shows when the camera failed; before the first picture there is none here either.
+
+    Source: for watching the experiments of section 6; pinhole camera of equations (10) and (38).
+    """
+
+    frame = In("frame", doc="the picture")
+    centres = In("float64[4,2]", unit="px", doc="u, v of circles 1 to 4; a row with NaN is missing")
+    quality = In("float64[4]", default=(1.0,) * 4, doc="radius of each circle over the expected one")
+    status = In("int64", default=-1, doc="of the detector; -1 if not known")
+    position = In("float64[3]", unit="m", default=UNKNOWN, doc="of the camera in target axes, z below it")
+    rotation = In("float64[3,3]", default=(UNKNOWN,) * 3, doc="from target axes to camera axes")
+    yaw = In(unit="rad", default=math.nan, doc="heading against the target")
+    valid = In("bool", default=True, doc="whether there is a pose")
+    annotated = Out("frame", doc="the picture with its marks; stamp and number are those of the picture")
+
+    calibration = Param(type="file", doc="camera calibration file (YAML)")
+    side = Param(SIDE, unit="m", above=0.0, doc="distance between the centres of neighbouring circles")
+    radius = Param(RADIUS, unit="m", above=0.0, doc="radius of the circles")
+    zoom = Param(2, type="int64", min=1, max=8, doc="how many times larger than the picture")
+
+    def check(self) -> None:
+        """Read the calibration."""
+        self._load()
+
+    def _load(self) -> CameraCalibration:
+        try:
+            return CameraCalibration.load(self.calibration)
+        except QuadvisError as error:
+            raise ParameterError("calibration", f"calibration is not usable: {error}") from None
+
+    def open(self) -> None:
+        """Read the calibration."""
+        self._overlay = Overlay(self._load(), self.side, self.radius, self.zoom)
+
+    def output(
+        self,
+        frame: Frame,
+        centres: Any,
+        quality: Any,
+        status: int,
+        position: Any,
+        rotation: Any,
+        yaw: float,
+        valid: bool,
+    ) -> Frame:
+        """Return the picture with what was found in it."""
+        if frame.sequence == 0:
+            return frame
+        found = Finding(centres, quality, int(status), position, rotation, float(yaw), bool(valid))
+        title = f"t {frame.stamp:.2f} s   picture {frame.sequence}"
+        return Frame(self._overlay.draw(frame.pixels, found, title), frame.stamp, frame.sequence)

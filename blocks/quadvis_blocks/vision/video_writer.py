@@ -1,0 +1,120 @@
+"""Frames into a video file, to be watched or played again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, Frame, In, Param, ParameterError, State
+from quadvis.errors import RunError
+from quadvis_blocks.vision._drawing import Picture, is_picture
+
+CODECS = {".mp4": "mp4v", ".avi": "MJPG", ".mkv": "FFV1"}
+FINEST = 65535  # MPEG-4 counts time in fractions no finer than this
+
+
+class VideoWriter(Block, numeric=False):
+    """Writes frames into a video file, which is replaced if it is there.
+
+    The suffix of the file says how: ``.mp4`` is MPEG-4, small and readable everywhere; ``.avi`` is Motion
+    JPEG, of which every picture stands alone; ``.mkv`` is FFV1 and keeps every bit.
+
+    With `keep_time` one picture is written at each tick, black before the first frame and the last one again
+    while no new one comes, so that a second of the video is a second of the run. Without it every new frame
+    is written once, so that `vision.video_file` plays exactly those.
+
+    All pictures of a video have one size, that of the first frame, made even by repeating the last row or
+    column. A frame of another size is fitted into it; one that is not a picture is black. RunError if the
+    file cannot be written.
+    """
+
+    frame = In("frame", doc="the frames to write")
+
+    file = Param(type="file", doc="video file: .mp4, .avi or .mkv; its folder is made if it is not there")
+    keep_time = Param(True, type="bool", doc="write a picture at each tick, also without a new frame")
+
+    last = State("int64", 0)  # sequence number of the last frame
+    due = State("int64", 0)  # pictures up to now; black ones if no frame has told their size
+
+    def check(self) -> None:
+        """Refuse a file that is a folder, and formats that are not known."""
+        if Path(self.file).suffix.lower() not in CODECS:
+            names = ", ".join(CODECS)
+            raise ParameterError("file", f"file must end in one of {names}, got '{Path(self.file).name}'")
+        if Path(self.file).is_dir():
+            raise ParameterError("file", f"file must be a file, '{self.file}' is a folder")
+
+    def open(self) -> None:
+        """Make the folder; the file is begun with the first frame, which has its size."""
+        self._video: Any = None
+        self._picture: Picture | None = None
+        try:
+            Path(self.file).parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise RunError(f"cannot make the folder of '{self.file}': {error.strerror}") from error
+
+    def close(self) -> None:
+        """Finish the file."""
+        video = self.__dict__.get("_video")
+        if video is not None:
+            video.release()
+        self._video = None
+
+    def update(self, frame: Frame) -> None:
+        """Write the frame of this tick."""
+        new = frame.sequence not in (0, self.last)
+        if new:
+            self.last = frame.sequence
+            if self._video is None and is_picture(frame.pixels):
+                self._begin(frame.pixels)
+            if self._video is not None:
+                self._picture = fitted(frame.pixels, self._size)
+        if new or self.keep_time:
+            if self._video is not None:
+                self._video.write(self._picture)
+            self.due += 1
+
+    def _begin(self, pixels: Picture) -> None:
+        import cv2
+
+        height, width = pixels.shape[:2]
+        self._size = (width + width % 2, height + height % 2)
+        codec = cv2.VideoWriter.fourcc(*CODECS[Path(self.file).suffix.lower()])
+        video = cv2.VideoWriter(self.file, cv2.CAP_FFMPEG, codec, frame_rate(self.period), self._size)
+        if not video.isOpened():
+            size = f"{self._size[0]} x {self._size[1]} px"
+            raise RunError(f"cannot write the video '{self.file}' of {size} at {1 / self.period:g} frames/s")
+        self._video = video
+        black = fitted(None, self._size)
+        for _ in range(self.due):
+            video.write(black)
+
+
+def frame_rate(period: float) -> float:
+    """Return frames/s for a period in s, rounded until an MPEG-4 file can say it."""
+    rates = (round(1 / period, digits) for digits in (3, 2, 1))
+    fits = (rate for digits, rate in zip((3, 2, 1), rates, strict=True) if rate * 10**digits <= FINEST)
+    return next(fits, float(round(1 / period)))
+
+
+def fitted(pixels: object, size: tuple[int, int]) -> Picture:
+    """Return a picture of this even width and height that shows `pixels`, shrunk or enlarged if need be."""
+    import cv2
+
+    wide, high = size
+    picture = np.zeros((high, wide, 3), np.uint8)
+    if not is_picture(pixels):
+        return picture
+    source = np.ascontiguousarray(pixels)
+    height, width = source.shape[:2]
+    if (width + width % 2, height + height % 2) == size:
+        border = (0, high - height, 0, wide - width)
+        return np.asarray(cv2.copyMakeBorder(source, *border, cv2.BORDER_REPLICATE), dtype=np.uint8)
+    scale = min(wide / width, high / height)
+    width, height = max(1, round(width * scale)), max(1, round(height * scale))
+    left, top = (wide - width) // 2, (high - height) // 2
+    shown = cv2.resize(source, (width, height), interpolation=cv2.INTER_AREA)
+    picture[top : top + height, left : left + width] = shown
+    return picture

@@ -1,0 +1,175 @@
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PICTURES = ROOT / "diagrams" / "recordings" / "hand_held"
+VIDEO = ROOT / "diagrams" / "recordings" / "hand_held.mp4"
+ANGLES = slice(3, 6)
+
+
+def run(tool, *arguments, folder, options=()):
+    paths = [*filter(None, [os.environ.get("PYTHONPATH")]), str(ROOT), str(ROOT / "blocks")]
+    return subprocess.run(
+        [sys.executable, *options, str(ROOT / "tools" / tool), *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+        timeout=120,
+    )
+
+
+def compare(*arguments, **options):
+    return run("compare_poses", *arguments, **options)
+
+
+def found(*arguments, folder):
+    done = compare(*arguments, "--json", folder=folder)
+    assert done.returncode == 0, done.stderr
+    said = json.loads(done.stdout)
+    return said, {name: np.array(values, dtype=float) for name, values in said["poses"].items()}
+
+
+def refused(*arguments, folder):
+    """Return the one sentence with which the program ends."""
+    done = compare(*arguments, folder=folder)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr and not done.stdout
+    return done.stderr.strip().splitlines()[-1]
+
+
+def test_help_loads_nothing_heavy(tmp_path):
+    done = compare("--help", folder=tmp_path, options=["-X", "importtime"])
+    assert done.returncode == 0 and "examples:" in done.stdout
+    loaded = {line.rsplit("|", 1)[-1].strip().split(".")[0] for line in done.stderr.splitlines()}
+    assert "argparse" in loaded
+    assert not loaded & {"cv2", "numpy", "matplotlib", "yaml", "quadvis", "quadvis_blocks"}
+
+
+def test_without_arguments_it_plays_the_recording_prints_the_table_and_draws_the_figure(tmp_path):
+    done = compare(folder=tmp_path)
+    assert done.returncode == 0 and not done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[0] == "30 pictures; poses: 30 by n_points, 30 by plane"
+    rows = [line.split() for line in lines if line.strip()[:1].isdigit()][1:]
+    assert [row[0] for row in rows] == ["1", "11", "20", "30"]
+    assert {len(row) for row in rows} == {13}
+    assert "n_points - plane, rms of 30 pictures: x " in done.stdout and "z ratio 1." in done.stdout
+    assert cv2.imread(str(tmp_path / "runs" / "comparison.png")) is not None
+
+
+def test_rendered_pictures_are_compared_with_the_true_poses(tmp_path):
+    said, methods = found("--rendered", folder=tmp_path)
+    assert next(iter(methods)) == "truth" and len(methods) >= 3
+    truth = methods.pop("truth")
+    # The first tick of record.yaml: 3 m below the target, level. Later it turns by up to 20 deg.
+    assert truth[0] == pytest.approx([0, 0, 3, 0, 0, 0])
+    for values in methods.values():
+        assert np.abs(values - truth)[:, :3].max() < 0.01
+        assert np.abs(values - truth)[:, ANGLES].max() < np.radians(0.2)
+    pairs = {(pair["first"], pair["second"]) for pair in said["differences"]}
+    assert {("truth", "n_points"), ("truth", "plane"), ("n_points", "plane")} <= pairs
+
+
+def test_both_methods_of_the_paper_find_the_same_attitude(tmp_path):
+    said, _ = found(folder=tmp_path)
+    (pair,) = [p for p in said["differences"] if (p["first"], p["second"]) == ("n_points", "plane")]
+    assert pair["pictures"] == 30
+    assert max(pair["rms"][ANGLES]) < 1e-12
+    assert np.array(pair["z_ratios"]) == pytest.approx(1, abs=1e-3)
+
+
+def test_a_folder_of_any_length_is_played_to_its_end(tmp_path):
+    folder = tmp_path / "pictures: 7 #1"
+    folder.mkdir()
+    for number, path in enumerate(sorted(PICTURES.iterdir())[:7] * 6, 1):
+        shutil.copy(path, folder / f"{number}.jpg")
+    said, methods = found("--folder", folder.name, "--pictures", "42", folder=tmp_path)
+    assert len(said["times"]) == 42
+    # The same seven pictures again and again.
+    for values in methods.values():
+        assert values[7:14] == pytest.approx(values[35:], abs=1e-3)
+
+
+def test_a_video_is_played_to_its_end(tmp_path):
+    said, methods = found("--video", VIDEO, folder=tmp_path)
+    _, pictures = found(folder=tmp_path)
+    assert len(said["times"]) == 30
+    assert methods["plane"] == pytest.approx(pictures["plane"], abs=0.02)
+
+
+def test_a_camera_with_twice_the_focal_length_sees_everything_twice_as_far(tmp_path):
+    text = (ROOT / "diagrams" / "calib" / "camera.yaml").read_text()
+    (tmp_path / "tele.yaml").write_text(text.replace("430, 2", "860, 4").replace("438", "876"))
+    _, plain = found("--pictures", "1", folder=tmp_path)
+    _, tele = found("--pictures", "1", "--calibration", "tele.yaml", folder=tmp_path)
+    # The first picture is level, where nothing else changes.
+    for name, values in plain.items():
+        assert tele[name][0, 2] / values[0, 2] == pytest.approx(2, abs=1e-3)
+
+
+def test_a_parameter_of_one_method_can_be_replaced(tmp_path):
+    text = (ROOT / "diagrams" / "calib" / "camera.yaml").read_text()
+    (tmp_path / "tele.yaml").write_text(text.replace("430, 2", "473, 2.2").replace("438", "481.8"))
+    said, _ = found("--set", "n_points.calibration=tele.yaml", folder=tmp_path)
+    (pair,) = [p for p in said["differences"] if (p["first"], p["second"]) == ("n_points", "plane")]
+    # Ten per cent more focal length, ten per cent farther, as in the paper's figure 3.
+    assert np.mean(pair["z_ratios"]) == pytest.approx(1.1, abs=0.01)
+
+
+def test_the_comparison_of_the_paper_with_a_calibration_of_its_own_for_each_method(tmp_path):
+    # Points on two planes before the camera of (38), looked at from above, and pixels that are 0.05 px off.
+    matrix = np.array([[430.0, 2, 226], [0, 438, 161], [0, 0, 1]])
+    x, y = np.meshgrid(np.linspace(-1.2, 1.2, 9), np.linspace(-0.8, 0.8, 7))
+    points = np.vstack([np.column_stack((x.ravel(), y.ravel(), np.full(x.size, z))) for z in (0.0, 0.5)])
+    e = (points - [0, 0, 3]) @ (matrix @ np.diag([1.0, -1, -1])).T
+    pixels = e[:, :2] / e[:, 2:] + np.random.default_rng(1).normal(0, 0.05, (len(e), 2))
+    rows = "\n".join(",".join(map(repr, row)) for row in np.column_stack((points, pixels)).tolist())
+    (tmp_path / "points.csv").write_text(f"x,y,z,rho,gamma\n{rows}\n")
+    arguments = ("--points", "points.csv", "--size", "452x322")
+    written = ("--two-planes", "planes.yaml", "--output", "camera.yaml")
+    assert run("calibrate", *arguments, *written, folder=tmp_path).returncode == 0
+    own = ("--set", "n_points.rays=two_planes", "--set", "n_points.calibration=planes.yaml")
+    said, methods = found("--rendered", *own, "--set", "plane.calibration=camera.yaml", folder=tmp_path)
+    for name in ("n_points", "plane"):
+        assert np.abs(methods[name] - methods["truth"])[:, :3].max() < 0.03
+    (pair,) = [p for p in said["differences"] if (p["first"], p["second"]) == ("n_points", "plane")]
+    # They agree as their calibrations do, and no better: the attitude is no longer the same.
+    assert max(pair["rms"][:3]) < 0.03
+    assert max(pair["rms"][ANGLES]) > 1e-6
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--folder", "absent"), "folder 'absent' does not exist"),
+        (("--video", "absent.mp4"), "file 'absent.mp4' does not exist"),
+        (("--folder", "a", "--video", "b"), "not allowed with"),
+        (("--calibration", "absent.yaml"), "absent.yaml"),
+        (("--pictures", "31"), "there is no picture 31; there are 30"),
+        (("--pictures", "0"), "not a list of pictures"),
+        (("--pictures", "1,,2"), "not a list of pictures"),
+        (("--side", "1"), "did you mean '1 m'?"),
+        (("--set", "plane.sides=1 m"), "sides"),
+        (("--diagram", ROOT / "diagrams" / "record.yaml", "--set", "folder=made"), "needs two or more"),
+        (("--figure", "file/figure.png"), "cannot write the figure"),
+    ],
+)
+def test_bad_input_ends_with_one_sentence(tmp_path, arguments, said):
+    (tmp_path / "file").touch()
+    assert said in refused(*arguments, folder=tmp_path)
+
+
+def test_the_program_can_be_started_by_its_name():
+    assert os.access(ROOT / "tools" / "compare_poses", os.X_OK)
+    assert (ROOT / "tools" / "compare_poses").read_text().startswith("#!/usr/bin/env python3\n")
