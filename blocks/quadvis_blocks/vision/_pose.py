@@ -17,8 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from quadvis_blocks.vision._projection import target_corners
-from quadvis_blocks.vision._square import square_homography
+from quadvis_blocks.vision._square import Homography, square_homography
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -74,9 +73,17 @@ def pose_from_plane(rays: ArrayLike, side: float) -> Pose | None:
     h = None if None in points else square_homography(points)  # type: ignore[arg-type]
     if h is None:
         return None
-    # From the unit square (p right, q down) to target coordinates: p = x / side + 1/2, q = 1/2 - y / side.
-    a1: Vector = (h[0] / side, h[3] / side, h[6] / side)
-    a2: Vector = (-h[1] / side, -h[4] / side, -h[7] / side)
+    return pose_from_homography(h, side, side)
+
+
+def pose_from_homography(h: Homography, width: float, height: float) -> Pose | None:
+    """Return the pose by equations (34)-(35) from the homography of a rectangle (m); None if there is none.
+
+    `h` takes the unit square (p right, q down) to normalised points, as `square_homography` gives it.
+    """
+    # To target coordinates: p = x / width + 1/2, q = 1/2 - y / height.
+    a1: Vector = (h[0] / width, h[3] / width, h[6] / width)
+    a2: Vector = (-h[1] / height, -h[4] / height, -h[7] / height)
     a3: Vector = ((h[0] + h[1]) / 2 + h[2], (h[3] + h[4]) / 2 + h[5], (h[6] + h[7]) / 2 + h[8])
     columns = _nearest_rotation(a1, a2)
     if columns is None:
@@ -85,9 +92,20 @@ def pose_from_plane(rays: ArrayLike, side: float) -> Pose | None:
     return _pose(columns, _scaled(a3, mu))
 
 
-def corner_points(pose: Pose, side: float) -> Array:
-    """Return corners 1..4 (4, 3) of the square in camera axes (m)."""
-    return (target_corners(side) - pose.position) @ pose.rotation.T
+def camera_points(pose: Pose, points: Array) -> Array:
+    """Return points (n, 3) of the target in camera axes (m)."""
+    return (points - pose.position) @ pose.rotation.T
+
+
+def seen_centres(pose: Pose, points: Array, radius: float) -> Array:
+    """Return the normalised centres (n, 2) of the ellipses that circles on the target become.
+
+    `points` (n, 3) are the circles' centres in camera axes (m); with a `radius` (m) of 0 these are seen. The
+    centre of an ellipse is the pole of the image of the plane's horizon; see also `_projection`.
+    """
+    r = pose.rotation
+    middle = points[:, 2:] * points - radius * radius * (r[:, :2] @ r[2, :2])
+    return np.asarray(middle[:, :2] / middle[:, 2:])
 
 
 def _nearest_rotation(a: Vector, b: Vector) -> tuple[Vector, Vector, Vector] | None:

@@ -1,4 +1,4 @@
-"""What the two pose blocks share: ports, parameters and the way from pixels to rays and back."""
+"""What the pose blocks share: ports, parameters and the way from pixels to rays and back."""
 
 from __future__ import annotations
 
@@ -11,13 +11,17 @@ from numpy.typing import NDArray
 from quadvis.block import Block, In, Out, Param, ParameterError
 from quadvis.errors import QuadvisError
 from quadvis_blocks.vision._calibration import CameraCalibration
-from quadvis_blocks.vision._pose import Pose, corner_points
-from quadvis_blocks.vision._projection import CAMERA_FROM_BODY, SIDE, attitude_of
+from quadvis_blocks.vision._lens import by_point
+from quadvis_blocks.vision._pose import Pose, camera_points, seen_centres
+from quadvis_blocks.vision._projection import CAMERA_FROM_BODY, SIDE, attitude_of, target_corners
+from quadvis_blocks.vision._refine import View, pose_of, refine, unknowns_of
 from quadvis_blocks.vision._two_planes import TwoPlanesCalibration
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool]
 
 PINHOLE, TWO_PLANES = range(2)
+NONE, GAUSS_NEWTON = range(2)
 NOTHING = (np.full(3, math.nan), math.nan, np.full((3, 3), math.nan), math.nan, math.nan, math.nan, False)
 
 
@@ -32,9 +36,14 @@ class PinholeRays:
         xy = self.camera.normalise(pixels)
         return np.column_stack((xy, np.ones(len(xy))))
 
-    def project(self, points: Array) -> Array:
-        """Return the pixels (n, 2) of points (n, 3) in camera axes."""
-        return self.camera.project(points)
+    def pixels(self, points: Array) -> Array:
+        """Return the pixels (n, 2) of normalised points (n, 2)."""
+        return self.camera.to_pixels(points)
+
+    def slopes(self, points: Array) -> Array:
+        """Return the derivatives (n, 2, 2) of pixels by normalised points (n, 2), the lens included."""
+        matrix, lens = self.camera.matrix[:2, :2], self.camera.distortion
+        return matrix @ by_point(points, lens) if lens.any() else _alike(matrix, points)
 
 
 class TwoPlanesRays:
@@ -42,19 +51,28 @@ class TwoPlanesRays:
 
     def __init__(self, path: str) -> None:
         self.planes = TwoPlanesCalibration.load(path)
+        self.matrix = self.planes.pinhole[0]
 
     def rays(self, pixels: Array) -> Array:
         """Return unit vectors (n, 3) in camera axes toward what pixels (n, 2) see, eq. (4)."""
         return self.planes.rays(pixels)
 
-    def project(self, points: Array) -> Array:
-        """Return the pixels (n, 2) of points (n, 3) in camera axes."""
-        pixels = points @ self.planes.pinhole[0].T
-        return np.asarray(pixels[:, :2] / pixels[:, 2:])
+    def pixels(self, points: Array) -> Array:
+        """Return the pixels (n, 2) of normalised points (n, 2)."""
+        return np.asarray(points @ self.matrix[:2, :2].T + self.matrix[:2, 2])
+
+    def slopes(self, points: Array) -> Array:
+        """Return the derivatives (n, 2, 2) of pixels by normalised points (n, 2)."""
+        return _alike(self.matrix[:2, :2], points)
 
 
-class PoseFromCircles(Block, numeric=False):
-    """Position and attitude of the craft from the four circles; a method says how. All four must be there."""
+def _alike(matrix: Array, points: Array) -> Array:
+    """Return the matrix (2, 2) once for each point."""
+    return np.broadcast_to(matrix, (len(points), 2, 2))
+
+
+class PoseFromCircles:
+    """Ports and parameters of a block that finds the craft from the circles of the target."""
 
     centres = In("float64[4,2]", unit="px", doc="u, v of circles 1 to 4; a row with NaN is missing")
     position = Out(
@@ -70,6 +88,9 @@ class PoseFromCircles(Block, numeric=False):
     calibration = Param(type="file", doc="camera calibration file (YAML)")
     rays = Param("pinhole", choices=("pinhole", "two_planes"), doc="what kind of calibration the file holds")
     side = Param(SIDE, unit="m", above=0.0, doc="distance between the centres of neighbouring circles")
+    radius = Param(
+        0.0, unit="m", min=0.0, doc="of the circles, to correct for perspective; 0 takes them as points"
+    )
 
     def check(self) -> None:
         """Read the calibration."""
@@ -86,6 +107,27 @@ class PoseFromCircles(Block, numeric=False):
     def open(self) -> None:
         """Read the calibration."""
         self._camera = self._load()
+        self._corners = target_corners(self.side)
+
+    def _seen(self, pose: Pose, radius: float) -> Array:
+        """Return the normalised points (4, 2) where a pose puts circles of a radius (m)."""
+        return seen_centres(pose, camera_points(pose, self._corners), radius)
+
+    def _described(self, pose: Pose, seen: Array, centres: Array) -> tuple[Any, ...]:
+        """Return the outputs for a pose that puts circles at normalised points `seen` (n, 2)."""
+        roll, pitch, yaw = attitude_of(pose.rotation.T @ CAMERA_FROM_BODY).tolist()
+        errors = self._camera.pixels(seen) - centres
+        residual = math.sqrt(np.vdot(errors, errors) / len(errors))
+        yaw = math.pi if yaw <= -math.pi else yaw
+        return pose.position, yaw, pose.rotation, roll, pitch, residual, True
+
+
+class PoseFromFour(PoseFromCircles, Block, numeric=False):
+    """A method of the paper, which takes all four circles and nothing else; `solve` is that method."""
+
+    refine = Param(
+        "none", choices=("none", "gauss_newton"), doc="how the distance in the picture is made least, if so"
+    )
 
     def solve(self, rays: Array) -> Pose | None:
         """Return the pose from rays (4, 3) to the circles; None if they meet no square in front."""
@@ -93,12 +135,23 @@ class PoseFromCircles(Block, numeric=False):
 
     def output(self, centres: Any) -> tuple[Any, ...]:
         """Return the pose; NaN and false if a circle is missing or the four are no square seen from below."""
-        rays = self._camera.rays(centres)
-        pose = self.solve(rays) if np.isfinite(rays).all() else None
-        if pose is None:
-            return NOTHING
-        roll, pitch, yaw = attitude_of(pose.rotation.T @ CAMERA_FROM_BODY).tolist()
-        error = self._camera.project(corner_points(pose, self.side)) - centres
-        residual = math.sqrt(np.vdot(error, error) / 4)
-        yaw = math.pi if yaw <= -math.pi else yaw
-        return pose.position, yaw, pose.rotation, roll, pitch, residual, True
+        with np.errstate(all="ignore"):  # whatever the pixels are
+            rays = self._camera.rays(centres)
+            pose = self.solve(rays) if np.isfinite(rays).all() else None
+            if pose is not None and (self.radius or self.refine == GAUSS_NEWTON):
+                pose = self._improved(pose, rays[:, :2] / rays[:, 2:])
+            return NOTHING if pose is None else self._described(pose, self._seen(pose, self.radius), centres)
+
+    def _improved(self, start: Pose, points: Array) -> Pose | None:
+        """Return the pose from normalised points (4, 2), corrected for the radius and refined as chosen."""
+        pose: Pose | None = start
+        for _ in range(2 if self.radius else 0):
+            if pose is None:
+                return None
+            shift = self._seen(pose, self.radius) - self._seen(pose, 0.0)
+            pose = self.solve(np.column_stack((points - shift, np.ones(4))))
+        if pose is None or self.refine == NONE:
+            return pose
+        view = View(self._corners, points, self._camera.slopes(points), self.radius)
+        estimate = refine(view, unknowns_of(pose))
+        return None if estimate is None else pose_of(estimate.unknowns)

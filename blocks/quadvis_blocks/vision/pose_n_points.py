@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from quadvis_blocks.vision._pose import Array, Pose, pose_from_n_points
-from quadvis_blocks.vision._pose_block import PoseFromCircles
+from quadvis_blocks.vision._pose_block import PoseFromFour
 
 
-class PoseNPoints(PoseFromCircles, numeric=False):
+class PoseNPoints(PoseFromFour, numeric=False):
     """Position and attitude of the craft from the four circles by the perspective of n points.
 
     The distances of the circles along their rays follow from the fact that opposite sides of a square are

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from quadvis_blocks.vision._pose import Array, Pose, pose_from_plane
-from quadvis_blocks.vision._pose_block import PoseFromCircles
+from quadvis_blocks.vision._pose_block import PoseFromFour
 
 
-class PosePlane(PoseFromCircles, numeric=False):
+class PosePlane(PoseFromFour, numeric=False):
     """Position and attitude of the craft from the four circles by the homography of the target's plane.
 
     The homography from the plane to normalised image points is the first two columns of the rotation and

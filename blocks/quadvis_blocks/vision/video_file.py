@@ -48,8 +48,9 @@ class VideoFile(Block, numeric=False):
             )
 
     def close(self) -> None:
-        """Close the file."""
-        self._video.close()
+        """Close the file, if it could be opened."""
+        if "_video" in self.__dict__:
+            self._video.close()
 
     def output(self, time: float) -> tuple[Frame, bool]:
         """Return the frame of this tick and whether the file is at its end."""

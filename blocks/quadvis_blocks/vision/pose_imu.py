@@ -1,0 +1,96 @@
+"""The pose with the help of the inertial unit, which knows roll and pitch better than four circles do."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, In, Out, Param
+from quadvis_blocks.vision._detect import INCONSISTENT, NOT_FOUND
+from quadvis_blocks.vision._level import level_covariance, level_pose
+from quadvis_blocks.vision._pose_block import NOTHING, Array, Bools, PoseFromCircles
+from quadvis_blocks.vision._projection import RADIUS
+from quadvis_blocks.vision._refine import Estimate, Tilt, View, pose_of, refine
+
+LEVEL, MAP = range(2)
+NO_TILT = 8  # a status; those below are the detector's
+MISFIT_MAX = 0.1  # of the side, rms, of the levelled pose; a tilt wrong by 10 deg gives 0.05 at 1.6 sides
+UNCERTAIN = np.full((4, 4), math.nan)
+
+
+class PoseImu(PoseFromCircles, Block, numeric=False):
+    """Position and heading of the craft from two circles or more, with roll and pitch from the inertial unit.
+
+    `level` takes roll and pitch as they are: what is left is linear, has one solution, and follows from two
+    circles. `map` weighs them against the picture: the pose is the most probable one if circles and angles
+    scatter by `pixel_sigma` and `tilt_sigma`, so it serves near the target, where the picture knows the tilt
+    better, and far from it. With two circles the modes are one. The target frame has x forward, y right and z
+    down from the ceiling; the camera looks up with picture right = forward. Roll and pitch must be those at
+    the instant of the frame: a degree of error moves the craft by 1.7 % of the distance.
+
+    `covariance` is that of one pose by the same sigmas. An error of the angles outlasts a frame, so poses one
+    after the other share it. If there is no pose, everything is NaN, `valid` false, and `status` says why.
+
+    Source: section 6.2 has roll and pitch from the inertial unit, but no use for them in the pose. Two or
+    more points and the vertical: Kukelova, Bujnak and Pajdla, Closed-form solutions to minimal absolute pose
+    problems with known vertical direction (2010); here yaw and distance are linear, as the points are level.
+    """
+
+    imu_roll = In(unit="rad", doc="measured roll at the instant of the frame, right side down is positive")
+    imu_pitch = In(unit="rad", doc="measured pitch at the instant of the frame, nose up is positive")
+    covariance = Out(
+        "float64[4,4]",
+        unit="m^2 m^2 m^2 m*rad " * 3 + "m*rad m*rad m*rad rad^2",
+        nan=True,
+        doc="of x, y, z and yaw",
+    )
+    status = Out(
+        "int64", doc="0, 1, 2: from four, three, two circles; 3: fewer; 4: no square of circles; 8: no tilt"
+    )
+
+    radius = Param(
+        RADIUS, unit="m", min=0.0, doc="of the circles, to correct for perspective; 0 takes them as points"
+    )
+    mode = Param("map", choices=("level", "map"), doc="angles taken as they are, or weighed")
+    pixel_sigma = Param(0.2, unit="px", above=0.0, tune=True, doc="standard deviation of a coordinate")
+    tilt_sigma = Param(
+        math.radians(0.5), unit="rad", above=0.0, tune=True, doc="standard deviation of roll and of pitch"
+    )
+
+    def output(self, centres: Any, imu_roll: float, imu_pitch: float) -> tuple[Any, ...]:
+        """Return the pose, its covariance and the status."""
+        with np.errstate(all="ignore"):  # whatever the pixels are
+            rays = self._camera.rays(centres)
+            seen = np.isfinite(rays).all(axis=1) & (rays[:, 2] > 0)
+            count = int(seen.sum())
+            if count < 2:
+                return *NOTHING, UNCERTAIN, NOT_FOUND
+            if not (math.isfinite(imu_roll) and math.isfinite(imu_pitch)):
+                return *NOTHING, UNCERTAIN, NO_TILT
+            points = np.full((4, 2), math.nan)
+            points[seen] = rays[seen, :2] / rays[seen, 2:]
+            estimate = self._estimate(points, seen, Tilt(imu_roll, imu_pitch, self.tilt_sigma))
+            if estimate is None or not np.isfinite(estimate.covariance).all():
+                return *NOTHING, UNCERTAIN, INCONSISTENT
+            pose = pose_of(estimate.unknowns)
+            described = self._described(pose, self._seen(pose, self.radius)[seen], centres[seen])
+            return *described, estimate.covariance[:4, :4], 4 - count
+
+    def _estimate(self, points: Array, seen: Bools, tilt: Tilt) -> Estimate | None:
+        """Return the unknowns and their covariance from normalised points (4, 2), NaN where not seen."""
+        level = level_pose(points, tilt.roll, tilt.pitch, self.side, self.radius)
+        if level is None:
+            return None
+        start = np.array([*level, tilt.roll, tilt.pitch])
+        misfit = (self._seen(pose_of(start), self.radius) - points)[seen]
+        allowed = MISFIT_MAX * self.side / level[2]  # as the side looks from straight below
+        if not np.vdot(misfit, misfit) < len(misfit) * allowed * allowed:
+            return None
+        weights = self._camera.slopes(points[seen]) / self.pixel_sigma
+        view = View(self._corners[seen], points[seen], weights, self.radius)
+        if self.mode == MAP:
+            return refine(view, start, tilt)
+        covariance = level_covariance(view, start, tilt.sigma)
+        return None if covariance is None else Estimate(start, covariance)
