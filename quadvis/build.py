@@ -12,20 +12,23 @@ from quadvis.errors import DiagramError, Fault, Faults, QuadvisError, suggestion
 from quadvis.expand import Expansion, FlatBlock
 from quadvis.flow import Connection, Draft
 from quadvis.graph import Constant, Task, Wire, common_divisor
-from quadvis.loader import CONTINUOUS, SECOND, FileSpec
+from quadvis.loader import CONTINUOUS, FileSpec
 from quadvis.names import absent, remedy_for
-from quadvis.units import format_quantity
+from quadvis.times import time_text
 from quadvis.values import OpenUnits, read_parameter, read_value
 from quadvis.wiring import Wiring
 
+Made = dict[tuple[str, type[Block], str], Block]  # by path, class and parameters: variants share most
 NO_STEP = Fraction(1, 100)  # stands in for a solver step whose absence has been told
 
 
 class Builder:
-    """Makes the blocks; what has a fault is told and left out. ``step`` is that of the solver, if one is needed."""
+    """Makes the blocks and tells what is wrong with them. ``step`` is the solver's, if one is needed."""
 
-    def __init__(self, spec: FileSpec, expansion: Expansion, wiring: Wiring, faults: Faults) -> None:
-        self.spec, self.expansion, self.wiring, self.faults = spec, expansion, wiring, faults
+    def __init__(
+        self, spec: FileSpec, expansion: Expansion, wiring: Wiring, made: Made, faults: Faults
+    ) -> None:
+        self.spec, self.expansion, self.wiring, self.made, self.faults = spec, expansion, wiring, made, faults
         self.tasks = {
             name: Task(name, rate.period, rate.offset)
             for name, rate in spec.rates.items()
@@ -58,7 +61,7 @@ class Builder:
         )
 
     def _choose_step(self) -> Fraction | None:
-        """Take the solver's step if anything is continuous; every period must then be a whole number of steps."""
+        """Take the solver's step if anything is continuous; every period must be a whole number of steps."""
         first = next(filter(_is_continuous, self.expansion.blocks.values()), None)
         if first is None:
             return None
@@ -70,7 +73,7 @@ class Builder:
             return NO_STEP
         used = {flat.rate[0] for flat in self.expansion.blocks.values() if flat.rate is not None}
         times = {
-            f"the {what} of '{task.name}' ({_time_text(time)})": time
+            f"the {what} of '{task.name}' ({time_text(time)})": time
             for task in self.tasks.values()
             for what, time in (("period", task.period), ("offset", task.offset))
             if task.name in used and time
@@ -79,8 +82,8 @@ class Builder:
         if unfit:
             fitting = common_divisor([*times.values()])
             fitting /= math.ceil(fitting / step)
-            problem = f"a step of {_time_text(step)} is not commensurate with {' and '.join(unfit)}"
-            remedy = f"choose one that divides them all, such as '{_time_text(fitting)}'"
+            problem = f"a step of {time_text(step)} is not commensurate with {' and '.join(unfit)}"
+            remedy = f"choose one that divides them all, such as '{time_text(fitting)}'"
             self.faults.add(self.spec.step_place or self.spec.place, problem, remedy)
         return step
 
@@ -145,8 +148,11 @@ class Builder:
 
     def _construct(self, flat: FlatBlock, kind: type[Block], values: Mapping[str, Any]) -> Block | None:
         """Make the block, which checks its parameters against each other and reads its files."""
+        key = (flat.path, kind, repr(sorted(values.items())))
         try:
-            return kind(**values)
+            if key not in self.made:
+                self.made[key] = kind(**values)
+            return self.made[key]
         except ParameterError as error:
             node = flat.parameters.get(error.parameter)
             self.faults.add(node.place if node is not None else flat.spec.place, str(error))
@@ -158,7 +164,7 @@ class Builder:
         return None
 
     def _from_file(self, fault: Fault, flat: FlatBlock, values: Mapping[str, Any]) -> Fault:
-        """Return a fault of a file that a parameter names; one of the file as a whole is put where it is named."""
+        """Return a fault of a file that a parameter names; one of the whole file is put where it is named."""
         named = [flat.parameters[name] for name, value in values.items() if value == fault.place.file]
         if named and not fault.place.line:
             problem = f"'{named[0].text()}': {fault.problem}"
@@ -176,12 +182,6 @@ class Builder:
                 read = self.faults.collect(read_value, declared.signal, declared.units, source.source)
                 value, units = (Constant(read[0]), read[1]) if read is not None else (None, ())
                 yield port, Connection(source.place, value, units)
-
-
-def _time_text(time: Fraction) -> str:
-    """Return a time for people, exactly: a decimal number if it is one."""
-    is_decimal = (10**12 * time).denominator == 1
-    return format_quantity(float(time), SECOND, 12) if is_decimal else f"{time} s"
 
 
 def _is_continuous(flat: FlatBlock) -> bool:

@@ -123,8 +123,8 @@ class WireCheck:
             problem, remedy = crossing_fault(source, draft.task, wire.crossing)
             if problem and connection.place not in told:
                 told.add(connection.place)
-                text = f"'{wire.source}' ({rate_text(source)}) into '{port}' ({rate_text(draft.task)}): {problem}"
-                self._fault(draft, connection.across or connection.place, text, remedy)
+                ends = f"'{wire.source}' ({rate_text(source)}) into '{port}' ({rate_text(draft.task)})"
+                self._fault(draft, connection.across or connection.place, f"{ends}: {problem}", remedy)
 
     def _tell_loop(self, loop: list[Key]) -> None:
         """Say the loop in the direction of the signal."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import os
 import re
 import signal
@@ -17,7 +18,8 @@ from quadvis.errors import QuadvisError, RunError
 FAILED, INTERRUPTED, PIPE_BROKEN = 1, 130, 141
 
 JSON_HELP = """\
---json prints one object: diagram, variant, hash, seed, passed, duration_s, wall_s, cpu_s, real_time_factor, log;
+--json prints one object: diagram, variant, hash, seed, passed, duration_s, wall_s, cpu_s,
+real_time_factor, log;
 summary: {label: {signal, unit, and the statistics by name}};
 expect: [{expectation, signal, kind, unit, limit, found, met}].
 Numbers are in the unit beside them, null where there is none.
@@ -25,7 +27,7 @@ Exit code: 0 all expectations met, 1 one is not or the run stopped, 2 bad input,
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code: 0 ok, 1 a run failed or missed what it should, 2 bad input."""
+    """Run a command and return its exit code: 0 ok, 1 a run failed or missed what it should, 2 bad input."""
     options = _parser().parse_args(arguments)
     with suppress(ValueError):  # signals belong to the main thread
         signal.signal(signal.SIGTERM, _terminate)
@@ -37,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return code
     except QuadvisError as error:
-        print(error, file=sys.stderr)
+        print(error, *getattr(error, "__notes__", ()), sep="\n", file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
@@ -100,8 +102,8 @@ def _parser() -> argparse.ArgumentParser:
 def _diagram_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="the diagram")
     parser.add_argument("--variant", metavar="V", help="one of the diagram's variants")
-    parser.add_argument("--set", action="append", default=[], metavar="BLOCK.PARAM=VALUE",
-                        help="replace a parameter, such as control/roll.bandwidth='2.5 rad/s'; repeat for more")  # fmt: skip
+    words = "replace a parameter, such as control/roll.bandwidth='2 rad/s'; repeat it for more"
+    parser.add_argument("--set", action="append", default=[], metavar="BLOCK.PARAM=VALUE", help=words)
 
 
 def _load(options: argparse.Namespace, **more: Any) -> Any:
@@ -116,6 +118,7 @@ def _run(options: argparse.Namespace) -> int:
 
     diagram = _load(options, stop_time=options.stop_time, seed=options.seed)
     log = _log_path(options.log, diagram)
+    gc.enable()
     try:
         with ProgressLine(diagram.duration) as progress:
             result = run(diagram, log=log, progress=progress)

@@ -14,6 +14,8 @@ from quadvis.block import Block, Declared, In, Out, Param, State
 from quadvis.catalogue import Catalogue, CatalogueError
 
 LEAST = 30  # columns left for the words about a port, however narrow the terminal
+WIDEST = 34  # columns for a parameter's default
+LINE = 90  # columns of an example
 
 
 def first_line(block: type[Block]) -> str:
@@ -62,15 +64,10 @@ def _output_row(port: Out) -> tuple[str, ...]:
 
 def _param_row(param: Param) -> tuple[str, ...]:
     default = default_text(param)
+    given = "required" if default is None else f"= {default}"
+    given = given if len(given) <= WIDEST else f"{given[: WIDEST - 3]}..."
     words = [" | ".join(param.choices), bounds(param), "tunable" if param.tune else ""]
-    kind = "" if param.choices else _kind(param)
-    return (
-        param.name,
-        kind,
-        "required" if default is None else f"= {default}",
-        "; ".join(filter(None, words)),
-        param.doc,
-    )
+    return param.name, "" if param.choices else _kind(param), given, "; ".join(filter(None, words)), param.doc
 
 
 def _state_row(state: State) -> tuple[str, ...]:
@@ -80,7 +77,8 @@ def _state_row(state: State) -> tuple[str, ...]:
 def _kind(item: Declared) -> str:
     """Return what a port holds, as short as it is clear: "m", "[3] m", "bool"."""
     kind = item.type.removeprefix("float64")
-    return " ".join(filter(None, (kind, "" if item.unit == "1" else item.unit))) or "number"
+    unit = textwrap.shorten(item.unit, WIDEST, placeholder=" ...") if item.unit != "1" else ""
+    return " ".join(filter(None, (kind, unit))) or "number"
 
 
 def example(name: str, block: type[Block]) -> list[str]:
@@ -91,8 +89,10 @@ def example(name: str, block: type[Block]) -> list[str]:
     required = {param.name: _sample(param) for param in interface.params.values() if param.required}
     wired = {port.name: "block.port" for port in interface.inputs.values() if port.default is None}
     for key, values in (("with", required), ("in", wired)):
-        if values:
-            lines.append(f"  {key}: {{{', '.join(f'{item}: {text}' for item, text in values.items())}}}")
+        entries = [f"{item}: {text}" for item, text in values.items()]
+        line = f"  {key}: {{{', '.join(entries)}}}"
+        if entries:
+            lines += [line] if len(line) <= LINE else [f"  {key}:", *(f"    {entry}" for entry in entries)]
     return lines
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from quadvis.build import Builder
+from quadvis.build import Builder, Made
 from quadvis.catalogue import Catalogue
 from quadvis.check import WireCheck, rate_text
 from quadvis.document import Node, Scalar, parse_yaml
@@ -19,9 +19,10 @@ from quadvis.document import Sequence as List
 from quadvis.errors import DiagramError, Fault, Faults, Place, quoted
 from quadvis.expand import Expansion, Parts, Settings
 from quadvis.graph import Graph, Wire
-from quadvis.loader import FileSpec, read_duration, read_file, read_text
+from quadvis.loader import FileSpec, read_file, read_text
 from quadvis.observe import Observation, read_observation
 from quadvis.slots import Outputs, check_slots, fill_slots
+from quadvis.times import read_duration
 from quadvis.values import read_constant
 from quadvis.wiring import Wiring
 
@@ -34,7 +35,7 @@ COMMAND_LINE = "--set"
 
 @dataclass(frozen=True)
 class Diagram:
-    """A diagram without a fault. ``graph`` is what the engine runs, ``observation`` what is made of the run."""
+    """A diagram without a fault: ``graph`` is what the engine runs, ``observation`` what is made of it."""
 
     name: str
     path: Path
@@ -47,7 +48,7 @@ class Diagram:
 
     @cached_property
     def resolved(self) -> str:
-        """The diagram written out flat: parts expanded, variant and settings applied, every parameter given."""
+        """The diagram written out: parts expanded, variant and settings applied, every parameter given."""
         from quadvis.resolve import resolved_text
 
         return resolved_text(self.graph, self.stop_time, self.seed, self.observation, self.path.parent)
@@ -131,8 +132,8 @@ def load(
     """Load and check a diagram; DiagramError tells all its faults at once.
 
     ``settings`` replace parameters: ``{"control/roll.bandwidth": "2.5 rad/s"}``, or texts
-    ``control/roll.bandwidth=2.5 rad/s``; a name without a dot is a parameter of the diagram. ``stop_time`` (s, or
-    a text such as "20 s") and ``seed`` replace the diagram's.
+    ``control/roll.bandwidth=2.5 rad/s``; a name without a dot is a parameter of the diagram. ``stop_time``
+    (s, or a text such as "20 s") and ``seed`` replace the diagram's.
     """
     faults = Faults()
     with _told_once(faults):
@@ -163,7 +164,7 @@ def check(path: str | Path, settings: Mapping[str, Any] | Sequence[str] = ()) ->
 
 @contextmanager
 def _told_once(faults: Faults) -> Iterator[None]:
-    """Raise what was found: one cause may be met from several blocks, but its place and problem are the same."""
+    """Raise what was found. One cause may be met from several blocks: its place and problem are the same."""
     try:
         yield
         faults.check()
@@ -184,6 +185,8 @@ class _Assembly:
         self.spec, self.faults = spec, faults
         self.catalogue = Catalogue(spec.path.parent)
         self.parts = Parts(faults)
+        self.made: Made = {}
+        self._base: Wiring | None = None  # of the diagram without a variant
 
     def diagram(
         self,
@@ -201,7 +204,7 @@ class _Assembly:
         given = {slot: wiring.outputs(slot) for slot in promised if slot not in expansion.unknown}
         wiring.refused = check_slots(spec, filled, promised, given, faults)
         wiring.check_ports(expansion.root)
-        builder = Builder(spec, expansion, wiring, faults)
+        builder = Builder(spec, expansion, wiring, self.made, faults)
         drafts = builder.drafts()
         graph = Graph(spec.name, WireCheck(drafts, faults).run(), spec.solver, builder.step)
         stop = _stop_time(spec, stop_time, faults)
@@ -218,16 +221,15 @@ class _Assembly:
         """Return the outputs of what stands in the slots that a variant fills."""
         spec = self.spec
         changed = [name for name, block in spec.blocks.items() if filled.blocks[name] is not block]
-        if not changed:
-            return {}
-        base = Wiring(Expansion(spec, self.catalogue, {}, self.parts, Faults()), Faults())
-        return {slot: base.outputs(slot) for slot in changed}
+        if changed and self._base is None:
+            self._base = Wiring(Expansion(spec, self.catalogue, {}, self.parts, Faults()), Faults())
+        return {slot: self._base.outputs(slot) for slot in changed if self._base is not None}
 
 
 def _settings(
     settings: Mapping[str, Any] | Sequence[str], faults: Faults
 ) -> dict[str, dict[str, Node | None]]:
-    """Return the replaced parameters by block path ("" for the diagram's own) and name; None if it is told."""
+    """Return the replaced parameters by block ("" for the diagram's own) and name; None if it is told."""
     if isinstance(settings, Mapping):
         settings = [f"{name}={_text(value)}" for name, value in settings.items()]
     found: dict[str, dict[str, Node | None]] = {}
@@ -273,7 +275,7 @@ def _text(value: Any) -> str:
 def _stop_time(spec: FileSpec, given: str | float | None, faults: Faults) -> Fraction:
     if given is not None:
         text = given if isinstance(given, str) else f"{float(given)!r} s"
-        return read_duration(Scalar(text, False, "--stop-time", 0, 0), faults) or Fraction(0)
+        return faults.collect(read_duration, Scalar(text, False, "--stop-time", 0, 0)) or Fraction(0)
     if spec.stop_time is None:
         faults.add(spec.place, "key 'stop_time' is missing", "add 'stop_time: 10 s', or give --stop-time")
         return Fraction(0)

@@ -36,6 +36,9 @@ _FORBIDDEN = re.compile(
 # Directives, of which libyaml compares each with all before it.
 _DIRECTIVE = re.compile("(?:^|[\r\n])%")
 
+# An element of a signal, which ends a text inside {...} and [...].
+_INDEXED = re.compile(r"(?P<name>[^\s{}\[\],:'\"]+)\[[^\[\]{}'\"]*\]")
+
 # PyYAML's words (of libyaml and of its Python parser) and ours; {opened} is the line where the part began.
 _PLAIN_WORDS = (
     ("mapping values are not allowed", "a ':' stands where none can",
@@ -270,6 +273,11 @@ def _in_plain_words(error: yaml.MarkedYAMLError, text: str, name: str) -> Fault:
     indent = source[at.line][: at.column + 1] if at.line < len(source) else ""
     if "\t" in indent and not indent.strip():
         return Fault(place, "", "a tab cannot indent a line", "use spaces")
+    line = source[at.line] if at.line < len(source) and "',' or" in problem else ""
+    for indexed in _INDEXED.finditer(line):
+        if indexed.end("name") == at.column:
+            place = Place(name, at.line + 1, indexed.start() + 1)
+            return Fault(place, "", "a text with '[' needs quotes here", f'write "{indexed.group()}"')
     for words, wrong, right in _PLAIN_WORDS:
         if words in problem:
             return Fault(place, "", wrong.format(opened=opened.line + 1), right)

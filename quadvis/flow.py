@@ -1,4 +1,4 @@
-"""What flows along wires before anything runs: shapes, then units. Both begin at what is declared and given."""
+"""What flows along wires before anything runs: shapes, then units, from what is declared and given."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class Connection:
 class Draft:
     """A block whose wires are not checked yet.
 
-    ``block`` is the class alone if the parameters are wrong: what depends on them is not looked at. ``task`` is
-    None if the rate is.
+    ``block`` is the class alone if the parameters are wrong: what depends on them is not looked at. ``task``
+    is None if the rate is.
     """
 
     path: str
@@ -71,8 +71,8 @@ class Link(NamedTuple):
 class Flow:
     """Lets what is known flow along the wires until all is known, each block after the blocks that feed it.
 
-    ``lost`` are inputs of which nothing is known, since their fault has been told: what depends on them is not
-    looked at. In a ring of blocks nothing comes first; there one block goes ahead with what it has.
+    ``lost`` are inputs of which nothing is known, since their fault has been told: what depends on them is
+    not looked at. In a ring of blocks nothing comes first; there one block goes ahead with what it has.
     """
 
     def __init__(self, drafts: Mapping[str, Draft], nodes: Mapping[str, Node], links: Sequence[Link],
@@ -101,7 +101,7 @@ class Flow:
         return [link for link in self._into[path] if link.key in self._waiting]
 
     def _first_in_ring(self) -> str:
-        """Walk against the signals until a block comes again; of that ring return the block that knows most."""
+        """Walk against the signals until a block comes again; return the one of that ring that knows most."""
         path = next(iter(self._waiting.values())).wire.block
         trail: dict[str, None] = {}
         while path not in trail:

@@ -8,10 +8,10 @@ from fractions import Fraction
 from pathlib import Path
 
 from quadvis.document import Mapping, Node, Scalar, parse_yaml, read_yaml
-from quadvis.errors import DiagramError, Faults, Place, closest
+from quadvis.errors import Faults, Place, closest
 from quadvis.graph import CROSSINGS, SOLVERS, TOLD
 from quadvis.reference import Reference, read_reference
-from quadvis.units import Unit, split_quantity
+from quadvis.times import Rate, read_duration, read_rate, read_step
 from quadvis.values import QUANTITY_KEYS, read_constant
 
 VERSION = 1
@@ -19,8 +19,6 @@ CONTINUOUS = "continuous"
 INSIDE = "in"  # the name under which a part's blocks see what comes in
 NAME = re.compile(r"[A-Za-z_]\w{0,63}", re.ASCII)
 PATH = re.compile(rf"{NAME.pattern}(?:/{NAME.pattern})*", re.ASCII)  # a resolved diagram has whole paths
-SECOND = Unit.parse("s")
-SHORTEST, LONGEST = Fraction(1, 10**9), Fraction(10**9)  # s: the log counts nanoseconds
 
 REQUIRED_KEYS = ("quadvis", "name", "blocks")
 DIAGRAM_KEYS = (
@@ -30,7 +28,6 @@ DIAGRAM_KEYS = (
 PART_KEYS = ("doc", "params", "ports")
 BLOCK_KEYS = ("block", "part", "rate", "slot", "with", "in")
 WIRE_KEYS = ("from", "across")
-RATE_KEYS = ("rate", "offset")
 SOLVER_KEYS = ("method", "step")
 PORT_KEYS = ("in", "out")
 VARIANT_KEYS = ("doc", "slots")
@@ -64,15 +61,6 @@ class BlockSpec:
     told: frozenset[str] = frozenset()  # keys that are wrong or misspelt: what they lack is no news
 
 
-@dataclass(frozen=True)
-class RateSpec:
-    """A named rate: period and offset in seconds, exact."""
-
-    place: Place
-    period: Fraction
-    offset: Fraction = Fraction(0)
-
-
 @dataclass
 class FileSpec:
     """All that one file says. A part has ports; a diagram has rates, a solver and what to make of a run."""
@@ -85,7 +73,7 @@ class FileSpec:
     broken: set[str] = field(default_factory=set)  # entries under blocks that could not be read
     inputs: dict[str, Place] = field(default_factory=dict)  # of a part
     outputs: dict[str, Reference | None] = field(default_factory=dict)  # of a part
-    rates: dict[str, RateSpec | None] = field(default_factory=dict)
+    rates: dict[str, Rate | None] = field(default_factory=dict)
     solver: str = "ode4"
     step: Fraction | None = None
     step_place: Place | None = None
@@ -225,7 +213,7 @@ def read_block(name: str, place: Place, node: Node, faults: Faults) -> BlockSpec
 
 
 def _read_input(node: Node, faults: Faults) -> InputSpec:
-    """Read ``block.port``, ``{from: block.port, across: hold}``, a constant, or ``{value: ..., unit: ...}``."""
+    """Read ``block.port``, ``{from: block.port, across: hold}``, ``1 m`` or ``{value: ..., unit: ...}``."""
     is_value = isinstance(node, Mapping) and any(key in node for key in QUANTITY_KEYS)
     if isinstance(node, Mapping) and is_value and "from" in node:
         faults.add(node.place, "a signal and a value are given at once", "keep 'from' or 'value'")
@@ -266,7 +254,7 @@ def _read_ports(spec: FileSpec, root: Mapping, faults: Faults) -> None:
 
 def _read_time(spec: FileSpec, root: Mapping, faults: Faults) -> None:
     for name, value in _named(root, "rates", "rate", faults):
-        spec.rates[name] = _read_rate(value, faults)
+        spec.rates[name] = faults.collect(read_rate, value)
         if name == CONTINUOUS:
             remedy = "choose another name, or set 'solver: {step: ...}'"
             faults.add(value.place, "'continuous' is the rate of the solver", remedy)
@@ -276,59 +264,12 @@ def _read_time(spec: FileSpec, root: Mapping, faults: Faults) -> None:
         spec.solver = faults.collect(fields["method"].choice, SOLVERS) or spec.solver
     if fields is not None and "step" in fields:
         spec.step_place = fields["step"].place
-        spec.step = _read_step(fields["step"], faults)
+        spec.step = faults.collect(read_step, fields["step"])
     spec.step_told = solver is not None and (fields is None or ("step" in fields and spec.step is None))
     if "stop_time" in root:
-        spec.stop_time = read_duration(root["stop_time"], faults) or Fraction(0)
+        spec.stop_time = faults.collect(read_duration, root["stop_time"]) or Fraction(0)
     if "seed" in root:
         spec.seed = faults.collect(root["seed"].integer) or 0
-
-
-def _read_rate(node: Node, faults: Faults) -> RateSpec | None:
-    if not isinstance(node, Mapping):
-        period = _in_range(node, faults.collect(node.period), faults)
-        return None if period is None else RateSpec(node.place, period)
-    faults.collect(node.fields, RATE_KEYS[:1], RATE_KEYS[1:], faults)
-    rate = node.get("rate")
-    period = _in_range(rate, faults.collect(rate.period), faults) if rate is not None else None
-    offset = read_duration(node["offset"], faults) if "offset" in node else Fraction(0)
-    return None if period is None or offset is None else RateSpec(node.place, period, offset)
-
-
-def _read_step(node: Node, faults: Faults) -> Fraction | None:
-    has_unit = isinstance(node, Scalar) and split_quantity(node.value)[1]
-    return _in_range(node, faults.collect(node.period) if has_unit else read_duration(node, faults), faults)
-
-
-def read_duration(node: Node, faults: Faults) -> Fraction | None:
-    """Read a time that is not negative."""
-    number, unit = split_quantity(node.value) if isinstance(node, Scalar) else ("", "")
-    if not number and not unit:
-        faults.collect(_raise, node.wrong("a time such as '20 s'"))
-        return None
-    if number and not unit and number.strip("0.+-"):
-        label = f"'{node.key}': " if node.key else ""
-        faults.add(node.place, f"{label}'{number}' has no unit", f"did you mean '{number} s'?")
-        return None
-    value = faults.collect(node.exact, SECOND)
-    if value is not None and not 0 <= value <= LONGEST:
-        label = f"'{node.key}'" if node.key else "a time"
-        faults.add(node.place, f"{label} must be between 0 s and 1e9 s", "write one such as '20 s'")
-        return None
-    return value
-
-
-def _raise(error: DiagramError) -> None:
-    raise error
-
-
-def _in_range(node: Node, period: Fraction | None, faults: Faults) -> Fraction | None:
-    if period is None or SHORTEST <= period <= LONGEST:
-        return period
-    faults.add(
-        node.place, f"'{node.key}': the period must be between 1e-9 s and 1e9 s", "write such as '20 Hz'"
-    )
-    return None
 
 
 def _read_variants(spec: FileSpec, root: Mapping, faults: Faults) -> None:

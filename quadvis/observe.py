@@ -13,9 +13,9 @@ from quadvis.document import Node, Scalar
 from quadvis.errors import Faults, Place, suggestion
 from quadvis.flow import misfit
 from quadvis.graph import Graph, Wire, selected
-from quadvis.loader import read_duration
 from quadvis.plot import read_figures
 from quadvis.reference import read_reference, wire_text
+from quadvis.times import read_duration
 from quadvis.unit_flow import words
 from quadvis.units import Unit, split_quantity
 from quadvis.verdict import EXPECTATIONS, STATISTICS, Entry, Expectation, Outcome, Part, Signals
@@ -167,7 +167,8 @@ class _Reader:
         """Return the part that an expectation or a line of the summary is about."""
         found = self._signal(fields["signal"]) if "signal" in fields else None
         after, before = (
-            read_duration(fields[name], self.faults) if name in fields else None for name in STRETCH_KEYS[:2]
+            self.faults.collect(read_duration, fields[name]) if name in fields else None
+            for name in STRETCH_KEYS[:2]
         )
         if found is None:
             return None

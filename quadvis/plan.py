@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.block import NO_FRAME, Block, Random, Shape
-from quadvis.graph import Constant, Graph, Node, Task, Wire, selected
+from quadvis.graph import Constant, Graph, Node, Wire, selected
 from quadvis.memory import SLOT, Memory, Record, Slot
 
 Call = Callable[[], None]
@@ -79,10 +79,6 @@ class Plan:
     def owner(self, call: Call) -> Bound:
         """Return the block that a call belongs to."""
         return next(step for step in self.steps if call in (step.output, step.update, step.deriv))
-
-    def due(self, tasks: Sequence[Task]) -> list[Bound]:
-        """Return the blocks of some tasks in execution order: what runs at a tick at which these are due."""
-        return [step for step in self.steps if step.node.task in tasks]
 
     def finite(self, steps: Sequence[Bound]) -> Positions:
         """Return the positions that must hold finite numbers once these blocks have run."""

@@ -1,4 +1,4 @@
-"""Names of signals as a diagram writes them: ``pose.position``, ``eyes/detector.centres[2,1]``, ``u[0:2]``."""
+"""Names of signals as a diagram writes them: ``pose.position``, ``eyes/camera.centres[2,1]``, ``a.y[:2]``."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """A checked diagram written out as one flat file: what a log keeps, and what its hash is made of.
 
-Nothing in it depends on the machine: paths are relative to the diagram's folder, and each file that a parameter
-names is held by the SHA-256 of its contents.
+Nothing in it depends on the machine: paths are relative to the diagram's folder, and each file that a
+parameter names is held by the SHA-256 of its contents.
 """
 
 from __future__ import annotations

@@ -144,8 +144,8 @@ def _parameters(subject: Subject, shape: Shape) -> Iterator[dict[str, Any]]:
     }
     yield arrays
     others = [{name: value} for name, param in params.items() for value in _choices(param)]
-    if subject.block.numeric:
-        real = {name: param for name, param in params.items() if param.signal.scalar == "float64"}
+    real = {name: param for name, param in params.items() if param.signal.scalar == "float64"}
+    if subject.block.numeric and real:
         others.append({name: _shaken(param, shape) for name, param in real.items()})
     for other in others:
         try:

@@ -29,7 +29,7 @@ SLICE = 0.2  # s of wall time between two calls of the progress, and the longest
 
 @dataclass(frozen=True)
 class Result:
-    """What a run gave: ``result["plant.position"]`` is an array with a leading time axis, ``times`` has its times.
+    """What a run gave: ``result["plant.position"]`` is an array with a leading time axis.
 
     ``duration`` is the simulated time (s), ``wall`` the time that took, ``cpu`` the processor time.
     """
@@ -69,11 +69,11 @@ class Result:
     def facts(self) -> dict[str, Any]:
         """Return the outcome as plain data: what `quadvis run --json` prints.
 
-        ``diagram``, ``variant`` (or None), ``hash``, ``seed``: what was run. ``passed``: whether all expectations are
-        met. ``duration_s`` simulated, in ``wall_s`` of wall time and ``cpu_s`` of processor time;
-        ``real_time_factor``. ``summary``: by label ``{signal, unit, rms, max, ...}``. ``expect``: a list of
-        ``{expectation, signal, kind, unit, limit, found, met}``. Numbers are in the unit beside them, None where
-        there is none.
+        ``diagram``, ``variant`` (or None), ``hash``, ``seed``: what was run. ``passed``: whether all
+        expectations are met. ``duration_s`` simulated, in ``wall_s`` of wall time and ``cpu_s`` of processor
+        time; ``real_time_factor``. ``summary``: by label ``{signal, unit, rms, max, ...}``. ``expect``: list
+        of ``{expectation, signal, kind, unit, limit, found, met}``. Numbers are in the unit beside them, None
+        where there is none.
         """
         summary = {
             entry.label: {
@@ -103,7 +103,7 @@ def _finite(value: float) -> float | None:
 
 
 def run(diagram: Diagram, *, log: str | Path | None = None, progress: Progress | None = None) -> Result:
-    """Run a checked diagram to its stop time; RunError if a block fails, with the log readable up to there."""
+    """Run a diagram to its stop time; RunError if a block fails, with the log readable up to there."""
     engine = Engine(diagram.graph, diagram.seed)
     logged = [bound for bound in engine.plan.steps if diagram.logs(bound.node.path) and _fields(bound)]
     channels = [Channel(f"/{bound.node.path}", _fields(bound), bound.node.task.name) for bound in logged]
@@ -142,22 +142,15 @@ def _record(
 ) -> None:
     raw, row = engine.plan.memory.raw, bound.row
     numerator, denominator = (engine.period * 1_000_000_000).as_integer_ratio()
-    skipped = 0
 
     def observe(tick: int) -> None:
-        nonlocal skipped
-        skipped += 1
-        if skipped < every:
-            return
-        skipped = 0
         data = bytes(raw[row])
         nanoseconds = tick * numerator // denominator
         signals.append(index, nanoseconds, data)
         if writer:
             writer.write(index, nanoseconds, data)
 
-    skipped = every - 1  # the first row is kept
-    engine.observe(bound.node.task.name, observe)
+    engine.observe(bound.node.task.name, observe, every)
 
 
 def _fields(bound: Bound) -> tuple[Field, ...]:

@@ -19,7 +19,6 @@ from quadvis.loader import (
     DIAGRAM_KEYS,
     PART_KEYS,
     PORT_KEYS,
-    RATE_KEYS,
     REQUIRED_KEYS,
     SOLVER_KEYS,
     VARIANT_KEYS,
@@ -28,6 +27,7 @@ from quadvis.loader import (
 )
 from quadvis.observe import LOG_KEYS, STRETCH_KEYS, SUMMARY_KEYS
 from quadvis.plot import FIGURE_KEYS, PANEL_KEYS, TRACE_KEYS
+from quadvis.times import RATE_KEYS
 from quadvis.values import QUANTITY_KEYS
 from quadvis.verdict import EXPECTATIONS, STATISTICS
 
@@ -45,7 +45,7 @@ LIBRARY_BLOCK: Schema = {
 
 
 def diagram_schema(catalogue: Catalogue) -> Schema:
-    """Return the schema of diagrams and parts; the catalogue's blocks are offered with their ports and parameters."""
+    """Return the schema of diagrams and parts, with the ports and parameters of the catalogue's blocks."""
     blocks = {name: catalogue.find(name) for name in catalogue.names()}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -93,7 +93,7 @@ def _top() -> dict[str, Schema]:
         }),
         "stop_time": {**QUANTITY, "description": "length of a run, such as 20 s"},
         "seed": {"type": "integer", "description": "seed of all noise"},
-        "files": {"type": "object", "description": "SHA-256 of the files that blocks read; in resolved diagrams"},
+        "files": {"type": "object", "description": "SHA-256 of the files that blocks read"},
         "blocks": _map_of(_ref("block"), "all blocks by name"),
         "variants": _map_of(_closed(VARIANT_KEYS, {"doc": TEXT, "slots": _map_of(_ref("block"), "by slot")}),
                             "other blocks for those marked 'slot: true'"),
@@ -136,10 +136,12 @@ def _definitions(blocks: Mapping[str, type[Block]]) -> dict[str, Schema]:
         "value": {"anyOf": values},
         "input": {"anyOf": [signal, CONSTANT, *values[1:], _closed(WIRE_KEYS, wire, ["from"])]},
         "rate": {"anyOf": [QUANTITY, _closed(RATE_KEYS, {"rate": QUANTITY, "offset": QUANTITY}, ["rate"])]},
-        "expectation": _closed(("signal", *STRETCH_KEYS, *EXPECTATIONS), {"signal": signal, **stretch, **kinds},
-                               ["signal"]),
-        "entry": _closed(("signal", *SUMMARY_KEYS), {"signal": signal, **stretch, "show": shown, "unit": TEXT},
-                         ["signal"]),
+        "expectation": _closed(
+            ("signal", *STRETCH_KEYS, *EXPECTATIONS), {"signal": signal, **stretch, **kinds}, ["signal"]
+        ),
+        "entry": _closed(
+            ("signal", *SUMMARY_KEYS), {"signal": signal, **stretch, "show": shown, "unit": TEXT}, ["signal"]
+        ),
         **_figures(signal),
         "block": _any_block(blocks),
         **{f"block:{name}": _one_block(block) for name, block in blocks.items()},

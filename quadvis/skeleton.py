@@ -23,7 +23,7 @@ from quadvis.block import Block, In, Out, Param, State
 class {name}(Block):
     """First-order lag of a signal: what the block does, in one sentence.
 
-    ``y[k] = y[k-1] + share * (u[k] - y[k-1])``, from zero. Say here where it comes from and how far it is right.
+    ``y[k] = y[k-1] + share * (u[k] - y[k-1])``, from zero. Say here where it comes from and how far it holds.
     """
 
     share = Param(0.5, above=0.0, max=1.0, tune=True, doc="how much of the way to go at each tick")
@@ -75,7 +75,8 @@ from {module} import {name}
 
 """
 
-DIAGRAM = """# A signal through a lag: change it into your own. `quadvis list` shows all blocks, `quadvis describe BLOCK` one.
+DIAGRAM = """# A signal through a lag: change it into your own.
+# `quadvis list` shows all blocks, `quadvis describe BLOCK` one of them.
 quadvis: 1
 name: {name}
 doc: What this diagram is for.
@@ -110,8 +111,8 @@ figures:
 def new_block(name: str) -> list[Path]:
     """Write a block and its test below the working directory, and return both paths.
 
-    In a folder that holds the standard library they go there, else into ``blocks/`` and ``tests/``. QuadvisError if the
-    name is no block's, is taken, or a file is there already.
+    In a folder that holds the standard library they go there, else into ``blocks/`` and ``tests/``.
+    QuadvisError if the name is no block's, is taken, or a file is there already.
     """
     if re.fullmatch(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*", name) is None:
         raise QuadvisError(

@@ -14,7 +14,7 @@ Refused = set[tuple[str, str]]  # slots and ports that another block should have
 
 
 def fill_slots(spec: FileSpec, variant: str | None, faults: Faults) -> FileSpec:
-    """Return the diagram with a variant's blocks in their slots; faults of the other variants are told too."""
+    """Return the diagram with a variant's blocks in their slots; faults of all variants are told."""
     if variant is not None and variant not in spec.variants:
         remedy = suggestion(variant, spec.variants) or "the diagram has no variants"
         faults.add(spec.place, f"there is no variant '{variant}'", remedy)
@@ -40,7 +40,7 @@ def fill_slots(spec: FileSpec, variant: str | None, faults: Faults) -> FileSpec:
 
 
 def _in_slot(base: BlockSpec, block: BlockSpec) -> BlockSpec:
-    """Return what is put into a slot: it takes the wires and the rate of the slot unless it brings its own."""
+    """Return what is put into a slot: it takes the slot's wires and rate unless it brings its own."""
     inputs = base.inputs if block.inputs is None else block.inputs
     return replace(block, slot=base.slot, inputs=inputs, rate=block.rate or base.rate)
 

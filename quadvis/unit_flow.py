@@ -55,7 +55,7 @@ class Bindings:
 
 
 def _variable(unit: Unit) -> str:
-    """Return the variable that the unit is, empty if it is more: most are, and arithmetic with units is slow."""
+    """Return the variable that the unit is, empty if it is more: a way round slow arithmetic with units."""
     names = [name for name, exponent in unit.exponents if exponent == 1 and name in unit.variables]
     return names[0] if len(unit.exponents) == 1 and names else ""
 
@@ -115,7 +115,8 @@ class UnitFlow(Flow):
             return True
         wanted = bindings.unit(link.declared.units, wrong)
         element = f"[{wrong}]" if len(units) > 1 else ""
-        problem = f"input '{link.port}{element}' takes {words(wanted)}, '{link.wire.source}' has {words(units[wrong])}"
+        found = f"'{link.wire.source}' has {words(units[wrong])}"
+        problem = f"input '{link.port}{element}' takes {words(wanted)}, {found}"
         self.fault(draft.path, link.connection.place, problem, "wire a signal of that unit")
         return False
 

@@ -113,7 +113,13 @@ def read_quantity(text: str, unit: Unit, *, bare: bool = True) -> float:
     if unit.variables:
         return _to_si(number, written, text)
     _require_dimension(text, written, unit)
-    return _to_si(number, written / unit, text)
+    return _to_si(number, _quotient(written, unit), text)
+
+
+@lru_cache(maxsize=1024)
+def _quotient(written: Unit, unit: Unit) -> Unit:
+    """Return the quotient of two units; a diagram has few pairs of them and many quantities."""
+    return written / unit
 
 
 def require_unit(text: str, unit: Unit) -> None:

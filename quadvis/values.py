@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -68,13 +69,13 @@ def _parameter(node: Scalar, params: Mapping[str, Node | None] | None, faults: F
 
 
 def _spread(value: Node, unit: Node | None, key: str) -> Node:
-    """Put a unit, or one for each element of the last axis, behind numbers that have none; call it ``key``."""
+    """Put a unit, or one for each element of the last axis, behind numbers without one; call it ``key``."""
     units = unit.units() if unit is not None else (Unit(),)
     if unit is not None:
         if any(each.variables for each in units):
             raise unit.fault(f"{quoted(unit.text())} is not a unit")
         shape = measure(value)
-        if len(units) not in (1, shape[-1] if shape else 1):
+        if len(units) not in (1, *shape[-1:], math.prod(shape)):
             raise unit.fault(f"there are {len(units)} units for {shape[-1] if shape else 1} values")
     return _with_units(value, itertools.cycle(units), key)
 
@@ -133,6 +134,8 @@ def read_value(signal: SignalType, units: Sequence[Unit], node: Node) -> tuple[A
 
 def shape_text(shape: Sequence[int | str]) -> str:
     """Return a shape in words."""
+    if tuple(shape) == (1,):
+        return "a list of one value"
     return f"{' x '.join(map(str, shape))} values" if shape else "one value"
 
 

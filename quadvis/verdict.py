@@ -79,7 +79,7 @@ STATISTICS: Mapping[str, Callable[[Samples], float]] = {
     "final": lambda values: float(values[-1, 0]),
     "count": _count,
 }
-"""Of distances from ``of``; ``max`` is the largest of their magnitudes, ``count`` that of samples not zero."""
+"""Of distances from ``of``: ``max`` is the largest of their magnitudes, ``count`` that of samples not 0."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ EXPECTATIONS: Mapping[str, Kind] = {
 
 @dataclass(frozen=True)
 class Expectation:
-    """One requirement on a run: ``kind`` is a key of EXPECTATIONS, ``limit`` is in the unit of the elements."""
+    """One requirement on a run: ``kind`` is a key of EXPECTATIONS, ``limit`` in the unit of the elements."""
 
     part: Part
     kind: str

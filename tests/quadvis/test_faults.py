@@ -1,4 +1,4 @@
-"""Every defect is told once, at its place, with what would be right: see `corpus.py` for how cases are written."""
+"""Every defect is told once, at its place, with what would be right. How cases are written: `corpus.py`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,13 @@ def faults(case: Case, folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[Fa
     settings = options.set
     try:
         if options.variant or options.stop_time or options.seed:
-            load("case.yaml", variant=options.variant, settings=settings, stop_time=options.stop_time, seed=options.seed)
+            load(
+                "case.yaml",
+                variant=options.variant,
+                settings=settings,
+                stop_time=options.stop_time,
+                seed=options.seed,
+            )
         else:
             check("case.yaml", settings)
     except DiagramError as error:

@@ -1,4 +1,4 @@
-"""The diagram written out: it loads again, gives the same run, and its hash is that of the experiment alone."""
+"""The diagram written out: it loads again and gives the same run; its hash is the experiment's alone."""
 
 from __future__ import annotations
 
@@ -30,7 +30,9 @@ def same(diagram: Diagram, again: Diagram) -> None:
 
 @pytest.mark.parametrize("variant", [None, "plane", "geometric"])
 def test_the_hover_written_out_gives_the_same_run_to_the_bit(variant: str | None) -> None:
-    diagram = load(DIAGRAMS / "hover.yaml", variant=variant, settings=["bandwidth=1 rad/s"], stop_time="1 s", seed=3)
+    diagram = load(
+        DIAGRAMS / "hover.yaml", variant=variant, settings=["bandwidth=1 rad/s"], stop_time="1 s", seed=3
+    )
     again = load_text(diagram.resolved, DIAGRAMS)
     same(diagram, again)
     first, second = diagram.run(), again.run()
@@ -55,11 +57,17 @@ def test_the_log_of_a_run_loads_as_its_diagram(tmp_path: Path) -> None:
     assert log.metadata["hash"] == diagram.hash
 
 
-def test_the_hash_does_not_depend_on_where_the_diagram_lies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_hash_does_not_depend_on_where_the_diagram_lies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     near, far = copied(tmp_path / "near"), copied(tmp_path / "far" / "away")
     hashes = {load(near).hash, load(far).hash}
     monkeypatch.chdir(tmp_path / "far")
-    hashes |= {load("away/hover.yaml").hash, load("../near/hover.yaml").hash, load("away/../away/hover.yaml").hash}
+    hashes |= {
+        load("away/hover.yaml").hash,
+        load("../near/hover.yaml").hash,
+        load("away/../away/hover.yaml").hash,
+    }
     monkeypatch.chdir(far.parent)
     hashes |= {load("hover.yaml").hash}
     assert len(hashes) == 1

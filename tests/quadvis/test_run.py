@@ -121,7 +121,8 @@ def test_the_facts_are_plain_json_with_null_for_what_is_not_there() -> None:
     assert facts["summary"]["never"] == {"signal": "ramp.y", "unit": "m", "rms": None, "max": None}
     assert facts["summary"]["way"]["final"] == pytest.approx(1.0)
     assert facts["expect"][1] == {
-        "expectation": "ramp.y always above 0.6 m after 1 s", "signal": "ramp.y", "kind": "above", "unit": "m",
+        "expectation": "ramp.y always above 0.6 m after 1 s", "signal": "ramp.y", "kind": "above",
+        "unit": "m",
         "limit": 0.6, "found": pytest.approx(0.5), "met": False,
     }  # fmt: skip
     for key in facts:
@@ -141,10 +142,11 @@ def test_the_summary_lines_up_and_shows_the_units_that_people_read() -> None:
         f"  angle  rms {angle:.4g} deg, max {largest:.4g} deg",
         f"  never  {'rms none, max none':<{len(way)}}  after 3 s",
     ]
+    width = len("noise.y rms at most 1000 deg before 0 s")
     assert lines[4:7] == [
-        f"  met      {'ramp.y within 100 cm':<40}  100 cm",
-        f"  NOT MET  {'ramp.y always above 0.6 m after 1 s':<40}  0.5 m",
-        f"  met      {'noise.y rms at most 1000 deg before 0 s':<40}  {first:.4g} deg",
+        f"  met      {'ramp.y within 100 cm':<{width}}  100 cm",
+        f"  NOT MET  {'ramp.y always above 0.6 m after 1 s':<{width}}  0.5 m",
+        f"  met      noise.y rms at most 1000 deg before 0 s  {first:.4g} deg",
     ]
     assert "s of wall time, " in lines[7]
     assert lines[8] == "FAILED: 2 of 3 expectations met"
@@ -233,10 +235,15 @@ class Root(Block):
     ("action", "message"),
     [
         ("math.nan if u > 0.2 else u", r"^block 'root', port 'y', t = 1.5 s: the output became nan$"),
-        ("1.0 / 0.0 if u > 0.2 else u", r"^block 'root', t = 1.5 s: ZeroDivisionError: float division by zero$"),
+        (
+            "1.0 / 0.0 if u > 0.2 else u",
+            r"^block 'root', t = 1.5 s: ZeroDivisionError: float division by zero$",
+        ),
     ],
 )
-def test_a_block_that_fails_stops_the_run_and_leaves_a_readable_log(action: str, message: str, tmp_path: Path) -> None:
+def test_a_block_that_fails_stops_the_run_and_leaves_a_readable_log(
+    action: str, message: str, tmp_path: Path
+) -> None:
     (tmp_path / "blocks" / "own").mkdir(parents=True)
     (tmp_path / "blocks" / "own" / "root.py").write_text(ROOT.replace("ACTION", action))
     diagram = load_text(FAILING, tmp_path)

@@ -79,14 +79,14 @@ def test_a_name_that_no_block_can_have_is_refused(name: str, reason: str, projec
 
 @pytest.mark.parametrize("name", ["loop", "loop.txt", ".yaml", "a: b.yaml", "loop#1.yaml", ""])
 def test_a_name_that_no_diagram_can_have_is_refused(name: str, project: Path) -> None:
-    with pytest.raises(QuadvisError, match="is not a YAML file|cannot name a diagram"):
+    with pytest.raises(QuadvisError, match=r"is not a YAML file|cannot name a diagram"):
         new_diagram(name)
     assert list(project.iterdir()) == []
 
 
 def test_nothing_is_written_over(project: Path) -> None:
     Path("loop.yaml").write_text("mine")
-    with pytest.raises(QuadvisError, match="'loop.yaml' is there already"):
+    with pytest.raises(QuadvisError, match=r"'loop\.yaml' is there already"):
         new_diagram("loop.yaml")
     assert Path("loop.yaml").read_text() == "mine"
     test = Path("tests/blocks/signal/test_my_filter.py")
@@ -99,5 +99,5 @@ def test_nothing_is_written_over(project: Path) -> None:
 
 def test_a_place_that_cannot_be_written_is_a_sentence(project: Path) -> None:
     Path("blocks").write_text("a file in the way")
-    with pytest.raises(QuadvisError, match="cannot write 'blocks/signal/my_filter.py'"):
+    with pytest.raises(QuadvisError, match=r"cannot write 'blocks/signal/my_filter\.py'"):
         new_block("signal.my_filter")

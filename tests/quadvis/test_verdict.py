@@ -33,7 +33,9 @@ class Signals:
 
 
 def part(**changes: Any) -> Part:
-    return Part(**{"name": "craft.position", "text": "craft.position", "unit": METRE, "shown": METRE} | changes)
+    return Part(
+        **{"name": "craft.position", "text": "craft.position", "unit": METRE, "shown": METRE} | changes
+    )
 
 
 def found(kind: str, rows: Any, limit: float = 0.0, **changes: Any) -> float:
@@ -109,14 +111,20 @@ def test_truths_are_counted() -> None:
     ("kind", "changes", "words"),
     [
         ("within", {}, "met: craft.position within 0.5 m: 0.25 m"),
-        ("rms", {"shown": CENTIMETRE, "after": 0.1}, "met: craft.position rms at most 50 cm after 0.1 s: 25 cm"),
+        (
+            "rms",
+            {"shown": CENTIMETRE, "after": 0.1},
+            "met: craft.position rms at most 50 cm after 0.1 s: 25 cm",
+        ),
         ("below", {"of": 1.0}, "met: craft.position always below 0.5 m of 1 m: -0.75 m"),
         ("above", {"before": 2.0}, "NOT MET: craft.position always above 0.5 m before 2 s: 0.25 m"),
         ("count", {"unit": Unit(), "shown": Unit()}, "NOT MET: craft.position true at most 0.5 times: 3"),
         ("within", {"unit": RADIAN, "shown": DEGREE}, "met: craft.position within 28.65 deg: 14.32 deg"),
     ],
 )
-def test_verdicts_are_said_in_the_unit_that_people_read(kind: str, changes: dict[str, Any], words: str) -> None:
+def test_verdicts_are_said_in_the_unit_that_people_read(
+    kind: str, changes: dict[str, Any], words: str
+) -> None:
     assert str(Expectation(part(**changes), kind, 0.5).judge(Signals([0.25, 0.25, 0.25]))) == words
 
 

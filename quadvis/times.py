@@ -1,0 +1,72 @@
+"""Times of a diagram: rates, steps and durations, all of them exact fractions of a second."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from quadvis.document import Mapping, Node, Scalar
+from quadvis.errors import Faults
+from quadvis.units import Unit, format_quantity, split_quantity
+
+SECOND = Unit.parse("s")
+SHORTEST, LONGEST = Fraction(1, 10**9), Fraction(10**9)  # s: the log counts nanoseconds
+RATE_KEYS = ("rate", "offset")
+
+
+@dataclass(frozen=True)
+class Rate:
+    """When blocks run: period and offset (s)."""
+
+    period: Fraction
+    offset: Fraction = Fraction(0)
+
+
+def read_rate(node: Node) -> Rate:
+    """Read ``20 Hz``, ``50 ms`` or ``{rate: 10 Hz, offset: 70 ms}``."""
+    if not isinstance(node, Mapping):
+        return Rate(read_period(node))
+    faults = Faults()
+    faults.collect(node.fields, RATE_KEYS[:1], RATE_KEYS[1:], faults)
+    period = faults.collect(read_period, node["rate"]) if "rate" in node else None
+    offset = faults.collect(read_duration, node["offset"]) if "offset" in node else None
+    faults.check()
+    assert period is not None
+    return Rate(period, offset or Fraction(0))
+
+
+def read_period(node: Node) -> Fraction:
+    """Read a rate or a period; a number without unit is asked for one."""
+    period = node.period()
+    if not SHORTEST <= period <= LONGEST:
+        problem = f"'{node.key}': the period must be between 1e-9 s and 1e9 s"
+        raise node.fault(problem, "write such as '20 Hz'")
+    return period
+
+
+def read_duration(node: Node) -> Fraction:
+    """Read a time that is not negative."""
+    number, unit = split_quantity(node.value) if isinstance(node, Scalar) else ("", "")
+    if not number and not unit:
+        raise node.wrong("a time such as '20 s'")
+    if not unit and number.strip("0.+-"):
+        label = f"'{node.key}': " if node.key else ""
+        raise node.fault(f"{label}'{number}' has no unit", f"did you mean '{number} s'?")
+    value = node.exact(SECOND)
+    if not 0 <= value <= LONGEST:
+        label = f"'{node.key}'" if node.key else "a time"
+        raise node.fault(f"{label} must be between 0 s and 1e9 s", "write one such as '20 s'")
+    return value
+
+
+def read_step(node: Node) -> Fraction:
+    """Read the step of a solver, mostly written as a time."""
+    if isinstance(node, Scalar) and not split_quantity(node.value)[1]:
+        read_duration(node)
+    return read_period(node)
+
+
+def time_text(time: Fraction) -> str:
+    """Return a time for people, exactly: a decimal number if it is one."""
+    is_decimal = (10**12 * time).denominator == 1
+    return format_quantity(float(time), SECOND, 12) if is_decimal else f"{time} s"

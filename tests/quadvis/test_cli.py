@@ -1,0 +1,407 @@
+"""The command line: what it prints, what it leaves behind, and with which code it ends."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from quadvis.cli import main
+from quadvis.log import read_log
+
+DIAGRAMS = Path(__file__).parents[2] / "diagrams"
+
+LOOP = """\
+quadvis: 1
+name: a loop
+rates: {fast: 100 Hz}
+stop_time: 1 s
+params: {size: 1 m}
+blocks:
+  wave: {block: sources.sine, rate: fast, with: {amplitude: $size}}
+  law: {slot: true, block: signal.gain, rate: fast, in: {u: wave.y}}
+variants:
+  half: {slots: {law: {block: signal.gain, with: {factor: 0.5}}}}
+expect:
+  - {signal: law.y, within: 60 cm}
+summary: {law: {signal: law.y, unit: cm}, later: {signal: law.y, after: 5 s}}
+figures:
+  - {title: Law, signals: [wave.y, law.y], unit: cm}
+"""
+FAULTY = LOOP.replace("sources.sine", "sources.sin").replace("law.y, within: 60 cm", "law.y, within: 60")
+
+Captured = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(autouse=True)
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    before = signal.getsignal(signal.SIGTERM)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "loop.yaml").write_text(LOOP)
+    (tmp_path / "faulty.yaml").write_text(FAULTY)
+    yield tmp_path
+    signal.signal(signal.SIGTERM, before)
+
+
+def done(*arguments: str) -> int:
+    """Return the exit code of a command, argparse's own included."""
+    try:
+        return main(arguments)
+    except SystemExit as error:
+        return int(error.code or 0)
+
+
+# run
+
+
+def test_a_run_that_meets_its_expectations_ends_with_0(capsys: Captured) -> None:
+    assert done("run", "loop.yaml", "--variant", "half") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "a loop (half): 1 s, seed 0"
+    assert lines[-2:] == ["PASSED: 1 of 1 expectations met", "log: runs/a-loop-half.mcap"]
+    assert read_log("runs/a-loop-half.mcap").complete
+
+
+def test_a_run_that_does_not_ends_with_1(capsys: Captured) -> None:
+    assert done("run", "loop.yaml", "--log", "") == 1
+    out = capsys.readouterr().out
+    assert "NOT MET  law.y within 60 cm  100 cm" in out
+    assert out.splitlines()[-1] == "FAILED: 0 of 1 expectations met"
+    assert not Path("runs").exists()
+
+
+def test_settings_stop_time_and_seed_are_taken(capsys: Captured) -> None:
+    assert (
+        done(
+            "run",
+            "loop.yaml",
+            "--set",
+            "size=50 cm",
+            "--stop-time",
+            "0.5 s",
+            "--seed",
+            "9",
+            "--log",
+            "x.mcap",
+        )
+        == 0
+    )
+    assert capsys.readouterr().out.startswith("a loop: 0.5 s, seed 9\n")
+    assert read_log("x.mcap").metadata["seed"] == "9"
+
+
+def test_json_is_one_object_with_the_documented_keys(capsys: Captured) -> None:
+    assert done("run", "loop.yaml", "--json", "--log", "") == 1
+    out = capsys.readouterr().out
+    facts = json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    assert out.count("\n") == 1
+    assert facts["log"] is None
+    assert facts["passed"] is False
+    assert facts["summary"]["later"] == {"signal": "law.y", "unit": "m", "rms": None, "max": None}
+    done("run", "--help")
+    words = capsys.readouterr().out
+    assert all(key in words for key in facts)
+    assert all(key in words for key in facts["expect"][0])
+
+
+def test_json_tells_where_the_log_is(capsys: Captured) -> None:
+    done("run", "loop.yaml", "--json")
+    assert json.loads(capsys.readouterr().out)["log"] == "runs/a-loop.mcap"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("run",),
+        ("run", "none.yaml"),
+        ("run", "."),
+        ("run", "faulty.yaml"),
+        ("run", "loop.yaml", "--variant", "none"),
+        ("run", "loop.yaml", "--set", "size"),
+        ("run", "loop.yaml", "--set", "sise=3 m"),
+        ("run", "loop.yaml", "--set", "law.factor=3 m/x"),
+        ("run", "loop.yaml", "--stop-time", "5"),
+        ("run", "loop.yaml", "--stop-time", "-5 s"),
+        ("run", "loop.yaml", "--seed", "one"),
+        ("run", "loop.yaml", "--seed", "1" * 30),
+        ("run", "loop.yaml", "--log", "none/run.mcap"),
+        ("run", "loop.yaml", "--log", "."),
+        ("run", "loop.yaml", "--unknown"),
+        ("check", "faulty.yaml"),
+        ("check", "faulty.yaml", "--json"),
+        ("describe", "signal.derivativ"),
+        ("describe", "-"),
+        ("draw", "faulty.yaml"),
+        ("draw", "loop.yaml", "-o", "none/x.svg"),
+        ("plot", "none.mcap"),
+        ("plot", "loop.yaml"),
+        ("plot", "."),
+        ("schema", "-o", "none/schema.json"),
+        ("new", "block", "Filter"),
+        ("new", "diagram", "loop.yaml"),
+        ("new", "thing", "x"),
+        ("fly", "loop.yaml"),
+        (),
+    ],
+    ids=" ".join,
+)
+def test_bad_input_ends_with_2_and_a_sentence(
+    arguments: tuple[str, ...], capsys: Captured, project: Path
+) -> None:
+    before = sorted(project.rglob("*"))
+    assert done(*arguments) == 2
+    captured = capsys.readouterr()
+    assert "Traceback" not in captured.err
+    assert captured.err.strip() or json.loads(captured.out)["ok"] is False
+    assert sorted(project.rglob("*")) == before
+
+
+def test_a_folder_that_cannot_be_made_for_the_log_is_a_sentence(capsys: Captured) -> None:
+    Path("runs").write_text("a file in the way")
+    assert done("run", "loop.yaml") == 2
+    assert capsys.readouterr().err == (
+        "cannot make the folder 'runs' for the log: file exists; name another place with --log\n"
+    )
+
+
+def test_the_name_of_a_diagram_cannot_lead_the_log_astray(project: Path) -> None:
+    (project / "sly.yaml").write_text(LOOP.replace("name: a loop", "name: ../../sly"))
+    done("run", "sly.yaml")
+    assert [path.name for path in Path("runs").iterdir()] == ["sly.mcap"]
+    assert not (project.parent / "sly.mcap").exists()
+
+
+OWN = '''\
+"""A block of the test."""
+
+import os
+import signal
+
+from quadvis.block import Block, In, Out
+
+
+class Own(Block, numeric=False):
+    """Does what the test wants."""
+
+    u = In(unit="a")
+    y = Out(unit="a")
+
+    def output(self, u, time):
+        """Pass it on, until the time has come."""
+        if time > 0.5:
+            ACTION
+        return u
+
+    def close(self):
+        """Leave a trace."""
+        open("closed", "w").close()
+'''
+
+
+def own(project: Path, action: str) -> None:
+    (project / "blocks" / "own").mkdir(parents=True)
+    (project / "blocks" / "own" / "own.py").write_text(OWN.replace("ACTION", action))
+    text = LOOP.replace("signal.gain, rate: fast, in", "own.own, rate: fast, in").replace(
+        "stop_time: 1 s", "stop_time: 1000000 s"
+    )
+    (project / "own.yaml").write_text(text)
+
+
+def test_a_block_that_fails_ends_the_run_with_1_and_tells_where_the_log_is(
+    project: Path, capsys: Captured
+) -> None:
+    own(project, "raise ValueError('no good')")
+    assert done("run", "own.yaml") == 1
+    assert capsys.readouterr().err.splitlines() == [
+        "log up to there: runs/a-loop.mcap",
+        "block 'law', t = 0.51 s: ValueError: no good",
+    ]
+    assert len(read_log("runs/a-loop.mcap")["wave.y"]) == 51
+    assert Path("closed").exists()
+
+
+def command(*arguments: str, **options: Any) -> subprocess.Popen[str]:
+    """Start the command line as a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "quadvis", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **options,
+    )
+
+
+@pytest.mark.parametrize(
+    ("number", "code", "words"), [(signal.SIGINT, 130, "interrupted\n"), (signal.SIGTERM, 143, "")]
+)
+def test_an_interrupted_run_leaves_its_log_and_closes_its_blocks(
+    number: signal.Signals, code: int, words: str, project: Path
+) -> None:
+    own(project, f"os.kill(os.getpid(), {int(number)})")
+    process = command("run", "own.yaml")
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == code
+    assert out == ""
+    assert "Traceback" not in err
+    assert err.endswith(words)
+    log = read_log("runs/a-loop.mcap")
+    assert log.complete
+    assert len(log["wave.y"]) >= 51
+    assert Path("closed").exists()
+
+
+def test_a_reader_that_goes_away_is_no_fault() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "quadvis", "list"], stdout=writing, stderr=subprocess.PIPE, text=True
+    )
+    os.close(writing)
+    _, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (141, "")
+
+
+def test_a_terminal_that_cannot_show_a_letter_gets_another(project: Path) -> None:
+    (project / "loop.yaml").write_text(LOOP.replace("name: a loop", "name: Höhe"), encoding="utf-8")
+    process = command("run", "loop.yaml", "--log", "", env={**os.environ, "PYTHONIOENCODING": "ascii"})
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (1, "")
+    assert out.startswith("H\\xf6he: 1 s")
+
+
+# check
+
+
+def test_a_right_diagram_is_told_in_one_line(capsys: Captured) -> None:
+    assert done("check", "loop.yaml") == 0
+    assert capsys.readouterr().out == "loop.yaml: 2 blocks in fast: no fault\n"
+    assert done("check", "loop.yaml", "--variant", "half", "--set", "size=3 m", "--json") == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert (facts["ok"], facts["diagram"], facts["blocks"], len(facts["hash"])) == (True, "a loop", 2, 64)
+
+
+def test_all_faults_are_told_at_once(capsys: Captured) -> None:
+    assert done("check", "faulty.yaml") == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.splitlines() == [
+        "faulty.yaml:7:17: block 'wave': there is no block 'sources.sin'; did you mean 'sources.sine'?",
+    ]
+
+
+def test_faults_are_told_as_json(capsys: Captured) -> None:
+    assert done("check", "faulty.yaml", "--json") == 2
+    assert json.loads(capsys.readouterr().out) == {
+        "ok": False,
+        "faults": [{
+            "file": "faulty.yaml", "line": 7, "column": 17, "subject": "block 'wave'",
+            "problem": "there is no block 'sources.sin'", "remedy": "did you mean 'sources.sine'?",
+        }],
+    }  # fmt: skip
+
+
+def test_faults_of_variants_are_told_without_naming_them(project: Path, capsys: Captured) -> None:
+    (project / "loop.yaml").write_text(LOOP.replace("factor: 0.5", "fact: 0.5"))
+    assert done("check", "loop.yaml") == 2
+    assert "signal.gain has no parameter 'fact'; did you mean 'factor'?" in capsys.readouterr().err
+
+
+# list, describe, draw, plot, schema, new
+
+
+def test_all_blocks_are_listed(capsys: Captured) -> None:
+    assert done("list") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.startswith("signal.derivative  ") for line in lines)
+    assert done("list", "--json") == 0
+    assert [entry["block"] for entry in json.loads(capsys.readouterr().out)] == [
+        line.split()[0] for line in lines
+    ]
+
+
+def test_own_blocks_are_listed_and_broken_ones_told(project: Path, capsys: Captured) -> None:
+    own(project, "pass")
+    (project / "blocks" / "own" / "broken.py").write_text("import nothing_like_it\n")
+    assert done("list") == 2
+    captured = capsys.readouterr()
+    assert "own.own " in captured.out
+    assert "own.broken" in captured.err
+
+
+def test_a_block_is_described(capsys: Captured) -> None:
+    assert done("describe", "signal.gain") == 0
+    assert "factor  b/a  = 1  tunable  the factor" in capsys.readouterr().out
+    assert done("describe", "signal.gain", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["params"]["factor"]["unit"] == "b/a"
+
+
+def test_a_diagram_is_drawn(capsys: Captured) -> None:
+    assert done("draw", "loop.yaml") == 0
+    assert capsys.readouterr().out == "loop.svg\n"
+    assert "wave" in "".join(ElementTree.parse("loop.svg").getroot().itertext())
+    assert done("draw", "loop.yaml", "-o", "-") == 0
+    assert capsys.readouterr().out == Path("loop.svg").read_text()
+
+
+def test_a_log_is_plotted(capsys: Captured) -> None:
+    done("run", "loop.yaml", "--log", "x.mcap")
+    capsys.readouterr()
+    assert done("plot", "x.mcap", "-o", "pictures") == 0
+    assert capsys.readouterr().out == "pictures/1-law.png\n"
+    assert Path("pictures/1-law.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_the_schema_is_json(capsys: Captured) -> None:
+    assert done("schema") == 0
+    schema = json.loads(capsys.readouterr().out)
+    assert schema["$schema"].startswith("https://json-schema.org/draft/2020-12")
+    assert done("schema", "-o", "schema.json") == 0
+    assert json.loads(Path("schema.json").read_text()) == schema
+
+
+def test_new_writes_and_tells_what_it_wrote(capsys: Captured) -> None:
+    assert done("new", "block", "wind.fan") == 0
+    assert capsys.readouterr().out.splitlines() == ["blocks/wind/fan.py", "tests/blocks/wind/test_fan.py"]
+    assert done("new", "diagram", "more.yaml") == 0
+    assert done("run", "more.yaml", "--log", "") == 0
+
+
+def test_help_tells_every_command(capsys: Captured) -> None:
+    assert done("--help") == 0
+    words = capsys.readouterr().out
+    assert all(
+        name in words for name in ("run", "check", "list", "describe", "draw", "plot", "schema", "new")
+    )
+
+
+def cpu(*arguments: str) -> float:
+    """Return the processor time of a command, the least of three."""
+    found = []
+    for _ in range(3):
+        before = os.times()
+        subprocess.run(
+            [sys.executable, *arguments],
+            check=True,
+            capture_output=True,
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        )
+        after = os.times()
+        found.append(
+            after.children_user + after.children_system - before.children_user - before.children_system
+        )
+    return min(found)
+
+
+def test_check_starts_about_as_quickly_as_numpy_does() -> None:
+    os.chdir(DIAGRAMS)
+    main(["check", "hover.yaml"])
+    assert cpu("-m", "quadvis", "check", "hover.yaml") < 4 * cpu("-c", "import numpy, yaml, argparse")
+    assert time.process_time() > 0
