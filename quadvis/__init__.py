@@ -5,13 +5,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from quadvis.diagram import Diagram, load
-    from quadvis.log import Log, read_log
+    from quadvis.diagram.diagram import Diagram, load
+    from quadvis.output.log import Log, read_log
 
 __version__ = "0.1.0"
 __all__ = ["Diagram", "Log", "load", "read_log"]
 
-_HOMES = {"Diagram": "diagram", "load": "diagram", "Log": "log", "read_log": "log"}
+_HOMES = {
+    "Diagram": "diagram.diagram",
+    "load": "diagram.diagram",
+    "Log": "output.log",
+    "read_log": "output.log",
+}
 
 
 def __getattr__(name: str) -> Any:

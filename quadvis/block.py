@@ -1,7 +1,8 @@
 """The contract of a block: ports, parameters and state declared once, behaviour in plain methods.
 
 A block's direct feedthrough is what its ``output`` asks for by name. Its parameters and states live in memory
-that the engine owns (see ``quadvis.memory``): snapshot, replay, tuning and scopes ask nothing of the author.
+that the engine owns (see ``quadvis.engine.memory``): snapshot, replay, tuning and scopes ask nothing of
+the author.
 """
 
 from __future__ import annotations

@@ -107,7 +107,7 @@ def _diagram_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _load(options: argparse.Namespace, **more: Any) -> Any:
-    from quadvis.diagram import load
+    from quadvis.diagram.diagram import load
 
     return load(options.file, variant=options.variant, settings=options.set, **more)
 
@@ -157,7 +157,7 @@ def _log_path(given: str | None, diagram: Any) -> Path | None:
 
 
 def _check(options: argparse.Namespace) -> int:
-    from quadvis.diagram import check
+    from quadvis.diagram.diagram import check
     from quadvis.errors import DiagramError
 
     try:
@@ -215,8 +215,8 @@ def _draw(options: argparse.Namespace) -> int:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from quadvis.log import read_log
-    from quadvis.plot import plot_log
+    from quadvis.output.log import read_log
+    from quadvis.output.plot import plot_log
 
     for path in plot_log(read_log(options.log), Path(options.output) if options.output else None):
         print(path)
@@ -225,7 +225,7 @@ def _plot(options: argparse.Namespace) -> int:
 
 def _schema(options: argparse.Namespace) -> int:
     from quadvis.catalogue import Catalogue
-    from quadvis.schema import diagram_schema
+    from quadvis.diagram.schema import diagram_schema
 
     return _write(_json(diagram_schema(Catalogue(Path())), indent=1) + "\n", options.output or "-")
 

@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import METHODS, Block, Frame, Param, ParameterError
-from quadvis.compiled import Compiled, Compiler
-from quadvis.engine import Snapshot
-from quadvis.memory import Slot
-from quadvis.plan import TIME, Bound
+from quadvis.engine.compiled import Compiled, Compiler
+from quadvis.engine.engine import Snapshot
+from quadvis.engine.memory import Slot
+from quadvis.engine.plan import TIME, Bound
 from quadvis.rig import PERIOD, STEPS, Rig, Subject, rigs
 
 __all__ = ["CHECKS", "Subject", "check_block"]

@@ -7,8 +7,8 @@ from types import TracebackType
 from typing import Self, TextIO
 
 from quadvis.describe import table
+from quadvis.output.verdict import Entry, Outcome, Verdict
 from quadvis.run import Result
-from quadvis.verdict import Entry, Outcome, Verdict
 
 
 class ProgressLine:

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, Frame, In, Param, ParameterError, Shape, Sizes
-from quadvis.engine import Engine
-from quadvis.graph import Constant, Graph, Node, Task
-from quadvis.memory import SLOT
-from quadvis.plan import Bound
+from quadvis.engine.engine import Engine
+from quadvis.engine.graph import Constant, Graph, Node, Task
+from quadvis.engine.memory import SLOT
+from quadvis.engine.plan import Bound
 
 STEPS = 16
 PERIOD = Fraction(1, 10)

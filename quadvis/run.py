@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.engine import Engine
-from quadvis.log import Channel, Field, LogWriter, Recording
-from quadvis.plan import Bound
-from quadvis.verdict import Outcome
+from quadvis.engine.engine import Engine
+from quadvis.engine.plan import Bound
+from quadvis.output.log import Channel, Field, LogWriter, Recording
+from quadvis.output.verdict import Outcome
 
 if TYPE_CHECKING:
-    from quadvis.diagram import Diagram
+    from quadvis.diagram.diagram import Diagram
 
 Progress = Callable[[float, float], None]  # simulated time reached, wall time spent (s)
 SLICE = 0.2  # s of wall time between two calls of the progress, and the longest wait for Ctrl-C

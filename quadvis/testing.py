@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block
-from quadvis.engine import Engine
-from quadvis.memory import Slot
+from quadvis.engine.engine import Engine
+from quadvis.engine.memory import Slot
 from quadvis.rig import alone, parameter_sizes
 from quadvis.units import parse_period
 

@@ -8,8 +8,8 @@ import pytest
 import yaml
 
 import quadvis
-from quadvis.diagram import Diagram
-from quadvis.engine import Engine
+from quadvis.diagram.diagram import Diagram
+from quadvis.engine.engine import Engine
 
 DIAGRAMS = Path(__file__).parents[2] / "diagrams"
 CASES = [

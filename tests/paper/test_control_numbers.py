@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from quadvis.block import Block
-from quadvis.engine import Engine
-from quadvis.graph import Constant, Graph, Node, Task, Wire
+from quadvis.engine.engine import Engine
+from quadvis.engine.graph import Constant, Graph, Node, Task, Wire
 from quadvis.testing import drive
 from quadvis_blocks.control.altitude import Altitude
 from quadvis_blocks.control.mixer import Mixer

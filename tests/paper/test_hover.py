@@ -1,6 +1,6 @@
-"""The reference experiment: hover statistics, with the camera reduced to 0.3 px of noise, and the rendered one.
+"""The reference experiment: hover statistics with 0.3 px of noise for a camera, and with the rendered one.
 
-The expected numbers are of an independent simulation of the same loop (30 seeds, RMS over both horizontal axes).
+The expected numbers are of an independent simulation of the same loop: 30 seeds, RMS over both axes.
 """
 
 from pathlib import Path
@@ -14,7 +14,9 @@ pytestmark = pytest.mark.slow
 
 HOVER = Path(__file__).parents[2] / "diagrams" / "hover.yaml"
 # The statistics were taken without the edges of the picture: the same camera with a larger sensor.
-WIDE = "size: [4520, 3220]\nmatrix: [[430, 2, 2260], [0, 438, 1610], [0, 0, 1]]\ndistortion: [0, 0, 0, 0, 0]\n"
+WIDE = (
+    "size: [4520, 3220]\nmatrix: [[430, 2, 2260], [0, 438, 1610], [0, 0, 1]]\ndistortion: [0, 0, 0, 0, 0]\n"
+)
 QUIET = {"gust.rms": "{value: [0, 0, 0], unit: m/s}", "imu.drift": "0 rad", "imu.angle_noise": "0 rad",
          "imu.rate_noise": "0 rad/s"}  # fmt: skip
 SEEDS = range(1, 11)

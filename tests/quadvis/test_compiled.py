@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from quadvis.block import Block, In, Out, Param, Random, State
-from quadvis.memory import Memory, Record, Slot
+from quadvis.engine.memory import Memory, Record, Slot
 from quadvis.rig import alone, parameter_sizes
 
 numba = pytest.importorskip("numba")
 
-from quadvis.compiled import Compiler  # noqa: E402 - it needs numba only when it compiles
+from quadvis.engine.compiled import Compiler  # noqa: E402 - it needs numba only when it compiles
 
 CALLS: list[str] = []
 LIMIT = 3.0

@@ -13,7 +13,7 @@ import pytest
 from quadvis.block import Block, In, Out, Param, State
 from quadvis.catalogue import Catalogue
 from quadvis.describe import catalogue_lines, default_text, description, example, facts, first_line, table
-from quadvis.diagram import load_text
+from quadvis.diagram.diagram import load_text
 from quadvis.document import parse_yaml
 
 
@@ -104,7 +104,7 @@ def test_the_facts_are_plain_json() -> None:
 
 @pytest.mark.parametrize("name", Catalogue().names())
 def test_every_default_reads_back_as_it_is(name: str) -> None:
-    from quadvis.values import read_constant, read_parameter
+    from quadvis.diagram.values import read_constant, read_parameter
 
     block = Catalogue().find(name)
     for param in block.interface.params.values():

@@ -15,9 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import quadvis
-from quadvis.diagram import check, load, load_text
+from quadvis.diagram.diagram import check, load, load_text
+from quadvis.engine.graph import Constant, Wire
 from quadvis.errors import DiagramError, Faults
-from quadvis.graph import Constant, Wire
 
 DIAGRAMS = Path(__file__).parents[2] / "diagrams"
 HOVER = (DIAGRAMS / "hover.yaml").read_text(encoding="utf-8")

@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
 
-import quadvis.elkjs
-from quadvis.draw import DrawnBlock, DrawnWire, draw
+import quadvis.output.elkjs
 from quadvis.errors import QuadvisError
+from quadvis.output.draw import DrawnBlock, DrawnWire, draw
 
 SVG = "{http://www.w3.org/2000/svg}"
 TASKS = {
@@ -308,7 +308,7 @@ def test_equal_diagrams_give_equal_bytes_in_every_process(hover_svg: str) -> Non
     blocks, wires, constants = hover()
     assert draw("hover", blocks, wires, constants, TASKS) == hover_svg
     program = (
-        "import sys; from quadvis.draw import *; b = [DrawnBlock('a', 'k', ('u',), ('y',), 't')]; "
+        "import sys; from quadvis.output.draw import *; b = [DrawnBlock('a', 'k', ('u',), ('y',), 't')]; "
         "sys.stdout.write(draw('self', b, [DrawnWire('a.y', 'a', 'u')], {}, {'t': 't'}))"
     )
     once, again = (
@@ -460,19 +460,19 @@ def test_a_missing_engine_is_one_sentence_with_the_remedy(monkeypatch: pytest.Mo
 
 
 def test_a_layout_that_takes_too_long_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("quadvis.elkjs.TIME_LIMIT", 0.01)
+    monkeypatch.setattr("quadvis.output.elkjs.TIME_LIMIT", 0.01)
     with pytest.raises(QuadvisError, match="could not be laid out"):
         draw("slow", [block("a")], [], {}, TASKS)
 
 
 def test_importing_the_module_loads_no_engine() -> None:
-    program = "import sys, quadvis.draw; print('quickjs' in sys.modules)"
+    program = "import sys, quadvis.output.draw; print('quickjs' in sys.modules)"
     environment = {"PYTHONPATH": ":".join(sys.path)}
     answer = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True, env=environment)
     assert answer.stdout.strip() == b"False"
 
 
 def test_the_vendored_engine_is_the_file_that_its_readme_describes() -> None:
-    folder = Path(quadvis.elkjs.__file__).parent
+    folder = Path(quadvis.output.elkjs.__file__).parent
     digest = hashlib.sha256((folder / "elk-worker.min.js").read_bytes()).hexdigest()
     assert digest in (folder / "README.md").read_text("utf-8")

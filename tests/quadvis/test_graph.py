@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadvis.block import Block, In, Out, State
-from quadvis.graph import Constant, Graph, Node, Task, Wire, common_divisor, execution_order, selected
+from quadvis.engine.graph import Constant, Graph, Node, Task, Wire, common_divisor, execution_order, selected
 
 TASK = Task("main", Fraction(1, 10))
 TIMES = st.fractions(min_value=Fraction(1, 10**6), max_value=100, max_denominator=10**6)

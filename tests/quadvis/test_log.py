@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from quadvis.errors import QuadvisError, RunError
-from quadvis.log import Channel, Field, LogWriter, Recording, message_definition, read_log
+from quadvis.output.log import Channel, Field, LogWriter, Recording, message_definition, read_log
 
 PLANT = Channel(
     "/plant", (Field("position", "float64", (3,), "m"), Field("speed", "float64", (), "m/s")), "physics"
@@ -250,7 +250,7 @@ def test_a_damaged_file_gives_a_log_or_a_sentence(
 
 KILLED = """
 import struct, sys, time
-from quadvis.log import Channel, Field, LogWriter
+from quadvis.output.log import Channel, Field, LogWriter
 clock = Channel("/clock", (Field("elapsed"), Field("row", "int64")))
 log = LogWriter(sys.argv[1], [clock], {"diagram": "name: killed"})
 start = time.monotonic()
@@ -451,7 +451,7 @@ def test_rows_of_a_wrong_size_are_refused(tmp_path: Path) -> None:
 
 def test_importing_the_log_does_not_import_mcap() -> None:
     code = textwrap.dedent("""
-        import sys, quadvis.log
+        import sys, quadvis.output.log
         print(*[name for name in ("mcap", "lz4", "zstandard") if name in sys.modules])
     """)
     result = subprocess.run(

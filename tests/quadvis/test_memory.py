@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from quadvis.block import Block, Frame, In, Out, Param, State
-from quadvis.memory import SLOT, Memory, Record, Slot
+from quadvis.engine.memory import SLOT, Memory, Record, Slot
 
 
 class Mixed(Block):

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadvis.block import Block, In, Out, Param, Random, State
-from quadvis.graph import Constant, Graph, Node, Task, Wire
-from quadvis.memory import SLOT
-from quadvis.plan import STREAM_MODULUS, TIME, Plan, make_plan
+from quadvis.engine.graph import Constant, Graph, Node, Task, Wire
+from quadvis.engine.memory import SLOT
+from quadvis.engine.plan import STREAM_MODULUS, TIME, Plan, make_plan
 
 STEP = Fraction(1, 100)
 CONTINUOUS = Task("continuous", STEP, continuous=True)

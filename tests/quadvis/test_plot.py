@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from quadvis.errors import DiagramError, Faults, QuadvisError
-from quadvis.log import Channel, Field, LogWriter, read_log
-from quadvis.plot import (
+from quadvis.output.log import Channel, Field, LogWriter, read_log
+from quadvis.output.plot import (
     Figure,
     Panel,
     Trace,
@@ -373,7 +373,7 @@ def test_other_texts_are_no_signals(text: str) -> None:
 
 
 def test_importing_the_plotter_does_not_import_matplotlib() -> None:
-    code = "import sys, quadvis.plot; print('matplotlib' in sys.modules, 'yaml' in sys.modules)"
+    code = "import sys, quadvis.output.plot; print('matplotlib' in sys.modules, 'yaml' in sys.modules)"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     result = subprocess.run(
         [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quadvis.diagram import Diagram, load, load_text
+from quadvis.diagram.diagram import Diagram, load, load_text
 from quadvis.document import parse_yaml
 from quadvis.errors import DiagramError
-from quadvis.log import read_log
+from quadvis.output.log import read_log
 
 DIAGRAMS = Path(__file__).parents[2] / "diagrams"
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadvis.diagram import Diagram, load_text
+from quadvis.diagram.diagram import Diagram, load_text
 from quadvis.errors import RunError
-from quadvis.log import read_log
+from quadvis.output.log import read_log
 from quadvis.report import ProgressLine, summary_lines
 
 RAMP = """\

@@ -10,8 +10,8 @@ import yaml
 from jsonschema import Draft202012Validator
 
 from quadvis.catalogue import Catalogue
-from quadvis.diagram import load
-from quadvis.schema import diagram_schema
+from quadvis.diagram.diagram import load
+from quadvis.diagram.schema import diagram_schema
 
 from .corpus import all_cases
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from quadvis.diagram import load
+from quadvis.diagram.diagram import load
 from quadvis.errors import QuadvisError
 from quadvis.skeleton import new_block, new_diagram
 

@@ -60,8 +60,8 @@ def test_equal_units_are_equal_however_written(one, other):
 
 
 @pytest.mark.parametrize(
-    ("one", "other"), [("Hz", "rad/s"), ("m", "mm"), ("1", "%"), ("rad", "1"), ("px", "1"), ("a", "b"),
-    ("J", "W")],
+    ("one", "other"),
+    [("Hz", "rad/s"), ("m", "mm"), ("1", "%"), ("rad", "1"), ("px", "1"), ("a", "b"), ("J", "W")],
 )
 def test_different_units_differ(one, other):
     assert Unit.parse(one) != Unit.parse(other)
@@ -217,8 +217,8 @@ def test_rates_and_times_are_exact(text, value):
 
 
 @pytest.mark.parametrize(
-    ("text", "period"), [("10 Hz", "1/10"), ("50 ms", "1/20"), ("1/30 s", "1/30"), ("30 Hz", "1/30"),
-    ("3 kHz", "1/3000")],
+    ("text", "period"),
+    [("10 Hz", "1/10"), ("50 ms", "1/20"), ("1/30 s", "1/30"), ("30 Hz", "1/30"), ("3 kHz", "1/3000")],
 )
 def test_a_rate_and_its_period_are_the_same(text, period):
     assert parse_period(text) == Fraction(period)

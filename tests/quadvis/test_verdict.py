@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
+from quadvis.output.verdict import EXPECTATIONS, STATISTICS, Entry, Expectation, Outcome, Part, statistic
 from quadvis.units import Unit
-from quadvis.verdict import EXPECTATIONS, STATISTICS, Entry, Expectation, Outcome, Part, statistic
 
 METRE, CENTIMETRE, RADIAN, DEGREE = map(Unit.parse, ("m", "cm", "rad", "deg"))
 

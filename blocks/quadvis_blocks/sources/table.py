@@ -12,7 +12,7 @@ LINEAR, HOLD = range(2)
 
 
 class Table(Block):
-    """A vector that goes from row to row of a table; before the first and after the last it stays at that row.
+    """A vector that goes from row to row of a table, and stays at the first row before and the last after.
 
     ``interpolation: linear`` draws straight lines between the rows, ``hold`` steps from one to the next.
     """

@@ -11,8 +11,8 @@ from quadvis.errors import RunError
 class FrameWriter(Block, numeric=False):
     """Writes every new frame as a picture into a folder: ``000001.png``, ``000002.png``, ...
 
-    The number is the frame's sequence number, so `vision.image_folder` plays them in order. Pictures of the same
-    name are replaced; frames without pixels are passed over. RunError if a picture cannot be written.
+    The number is the frame's sequence number, so `vision.image_folder` plays them in order. Pictures of the
+    same name are replaced; frames without pixels are passed over. RunError if one cannot be written.
     """
 
     frame = In("frame", doc="the frames to write")

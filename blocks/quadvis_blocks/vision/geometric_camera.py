@@ -21,10 +21,11 @@ STAMP, SEQUENCE, PIXELS = 0, 1, slice(2, 10)
 class GeometricCamera(Block, numeric=False):
     """What `vision.rendered_camera` and `vision.circle_detector` would give, without rendering.
 
-    The centres of the four circles are projected, white noise is added, and a circle whose outline leaves the
-    picture is missing. It has the outputs of the detector, so either can fill the same slot; it is some 20 times
-    faster, and its noise is a parameter. Measurements are stamped when they are taken and delivered at the first
-    tick at or after stamp + latency; until the next one comes, the last stays, with ``fresh`` false.
+    The centres of the four circles are projected, white noise is added, and a circle whose outline leaves
+    the picture is missing. It has the outputs of the detector, so either can fill the same slot; it takes a
+    tenth of the time, and its noise is a parameter. Measurements are stamped when they are taken and
+    delivered at the first tick at or after stamp + latency; until the next one comes, the last stays, with
+    ``fresh`` false.
 
     Source: camera of equations (10) and (38); noise and latency of the reference experiment.
     """

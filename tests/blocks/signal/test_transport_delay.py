@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from quadvis.block import ParameterError
-from quadvis.engine import Engine
+from quadvis.engine.engine import Engine
+from quadvis.engine.graph import Constant, Graph, Node, Task, Wire
 from quadvis.errors import RunError
-from quadvis.graph import Constant, Graph, Node, Task, Wire
 from quadvis.testing import drive
 from quadvis_blocks.signal.integrator import Integrator
 from quadvis_blocks.signal.transport_delay import TransportDelay

@@ -37,5 +37,5 @@ def test_a_folder_that_is_a_file_is_refused(tmp_path):
 
 def test_a_picture_that_cannot_be_written_stops_the_run_with_a_sentence(tmp_path):
     (tmp_path / "000001.png").mkdir()
-    with pytest.raises(RunError, match="cannot write the picture .*000001.png"):
+    with pytest.raises(RunError, match=r"cannot write the picture .*000001.png"):
         drive(FrameWriter(folder=str(tmp_path)), frame=frames(1))

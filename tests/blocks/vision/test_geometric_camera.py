@@ -78,7 +78,7 @@ def test_circles_whose_outline_leaves_the_picture_are_missing():
 
 
 def test_a_latency_beyond_the_queue_is_refused():
-    with pytest.raises(ParameterError, match="latency must be at most 16 periods, 1.6 s, got 2 s"):
+    with pytest.raises(ParameterError, match=r"latency must be at most 16 periods, 1.6 s, got 2 s"):
         drive(camera(latency=2.0), position=HOVER, attitude=[0.0] * 3, rate="10 Hz", steps=1)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from quadvis.block import ParameterError
-from quadvis.engine import Engine
+from quadvis.engine.engine import Engine
 from quadvis.testing import Driven, drive
 from quadvis_blocks.vision.image_folder import ImageFolder
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from quadvis.block import Frame, ParameterError
-from quadvis.engine import Engine
+from quadvis.engine.engine import Engine
 from quadvis.errors import QuadvisError
 from quadvis.testing import Driven, drive
 from quadvis_blocks.vision.rendered_camera import RenderedCamera

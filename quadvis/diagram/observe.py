@@ -9,17 +9,17 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from quadvis import document as yaml
+from quadvis.diagram.flow import misfit
+from quadvis.diagram.reference import read_reference, wire_text
+from quadvis.diagram.times import read_duration
+from quadvis.diagram.unit_flow import words
+from quadvis.diagram.wiring import Wiring
 from quadvis.document import Node, Scalar
+from quadvis.engine.graph import Graph, Wire, selected
 from quadvis.errors import Faults, Place, suggestion
-from quadvis.flow import misfit
-from quadvis.graph import Graph, Wire, selected
-from quadvis.plot import read_figures
-from quadvis.reference import read_reference, wire_text
-from quadvis.times import read_duration
-from quadvis.unit_flow import words
+from quadvis.output.plot import read_figures
+from quadvis.output.verdict import EXPECTATIONS, STATISTICS, Entry, Expectation, Outcome, Part, Signals
 from quadvis.units import Unit, split_quantity
-from quadvis.verdict import EXPECTATIONS, STATISTICS, Entry, Expectation, Outcome, Part, Signals
-from quadvis.wiring import Wiring
 
 ONE = Unit()
 DEGREE = Unit.parse("deg")
@@ -218,7 +218,7 @@ class _Reader:
         self.result.summary.append(Entry(label, replace(part, shown=unit or part.shown), shown))
 
     def figures(self, node: Node) -> None:
-        """Read the figures as ``quadvis.plot`` will, and look for their signals."""
+        """Read the figures as ``quadvis.output.plot`` will, and look for their signals."""
         read_figures(node, self.faults)
         told = {fault.place for fault in self.faults}
         for panel in _panels(node):

@@ -10,12 +10,12 @@ from fractions import Fraction
 from typing import cast
 
 from quadvis.block import Block
+from quadvis.diagram.flow import Draft, Key, Link, ShapeFlow
+from quadvis.diagram.names import absent, remedy_for
+from quadvis.diagram.unit_flow import UnitFlow
+from quadvis.diagram.values import shape_text
+from quadvis.engine.graph import TOLD, Constant, Node, Task, Wire, execution_order
 from quadvis.errors import Faults, Place
-from quadvis.flow import Draft, Key, Link, ShapeFlow
-from quadvis.graph import TOLD, Constant, Node, Task, Wire, execution_order
-from quadvis.names import absent, remedy_for
-from quadvis.unit_flow import UnitFlow
-from quadvis.values import shape_text
 
 NO_TASK = Task("unknown", Fraction(1))  # of blocks whose rate has been told to be wrong
 

@@ -6,8 +6,8 @@ import re
 from dataclasses import dataclass
 
 from quadvis.document import Node
+from quadvis.engine.graph import Index, Wire
 from quadvis.errors import Faults, Place
-from quadvis.graph import Index, Wire
 
 REFERENCE = re.compile(
     r"(?P<block>[A-Za-z_][\w/]*)\.(?P<port>[A-Za-z_]\w*)(?:\[(?P<index>[^\]]*)\])?", re.ASCII

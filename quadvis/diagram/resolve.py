@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Param
+from quadvis.diagram.loader import CONTINUOUS, VERSION, FileSpec
+from quadvis.diagram.observe import Observation
+from quadvis.diagram.reference import wire_text
 from quadvis.document import dump_yaml
+from quadvis.engine.graph import Graph, Node, Wire
 from quadvis.errors import Faults, QuadvisError
-from quadvis.graph import Graph, Node, Wire
-from quadvis.loader import CONTINUOUS, VERSION, FileSpec
-from quadvis.observe import Observation
-from quadvis.reference import wire_text
 
 
 def resolved_text(

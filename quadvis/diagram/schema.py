@@ -12,8 +12,7 @@ from typing import Any
 from quadvis.block import Block, Declared, Param
 from quadvis.catalogue import Catalogue
 from quadvis.describe import default_text, first_line
-from quadvis.graph import CROSSINGS, SOLVERS
-from quadvis.loader import (
+from quadvis.diagram.loader import (
     BLOCK_KEYS,
     CONTINUOUS,
     DIAGRAM_KEYS,
@@ -25,11 +24,12 @@ from quadvis.loader import (
     VERSION,
     WIRE_KEYS,
 )
-from quadvis.observe import LOG_KEYS, STRETCH_KEYS, SUMMARY_KEYS
-from quadvis.plot import FIGURE_KEYS, PANEL_KEYS, TRACE_KEYS
-from quadvis.times import RATE_KEYS
-from quadvis.values import QUANTITY_KEYS
-from quadvis.verdict import EXPECTATIONS, STATISTICS
+from quadvis.diagram.observe import LOG_KEYS, STRETCH_KEYS, SUMMARY_KEYS
+from quadvis.diagram.times import RATE_KEYS
+from quadvis.diagram.values import QUANTITY_KEYS
+from quadvis.engine.graph import CROSSINGS, SOLVERS
+from quadvis.output.plot import FIGURE_KEYS, PANEL_KEYS, TRACE_KEYS
+from quadvis.output.verdict import EXPECTATIONS, STATISTICS
 
 Schema = dict[str, Any]
 

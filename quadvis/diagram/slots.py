@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from quadvis.block import Out
+from quadvis.diagram.loader import BlockSpec, FileSpec
 from quadvis.errors import Faults, suggestion
-from quadvis.loader import BlockSpec, FileSpec
 
 Outputs = Mapping[str, Mapping[str, Out]]  # by slot and port
 Refused = set[tuple[str, str]]  # slots and ports that another block should have, which is told

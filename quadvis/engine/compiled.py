@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from quadvis.block import Block
-from quadvis.memory import SLOT, Memory, Record, Slot, packed
+from quadvis.engine.memory import SLOT, Memory, Record, Slot, packed
 
 Compiled = Callable[[Memory, int], None]
 

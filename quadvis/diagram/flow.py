@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from quadvis.block import Block, In
+from quadvis.diagram.reference import index_text
+from quadvis.diagram.values import OpenUnits, shape_text
+from quadvis.engine.graph import Constant, Node, Task, Wire, selected
 from quadvis.errors import Faults, Place
-from quadvis.graph import Constant, Node, Task, Wire, selected
-from quadvis.reference import index_text
 from quadvis.units import Unit
-from quadvis.values import OpenUnits, shape_text
 
 ONE = Unit()
 Key = tuple[str, str]  # block and input

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.graph import Index
+from quadvis.engine.graph import Index
 from quadvis.units import Unit
 
 ONE = Unit()

@@ -9,11 +9,11 @@ from pathlib import Path
 
 from quadvis.block import Block
 from quadvis.catalogue import Catalogue, CatalogueError
+from quadvis.diagram.loader import BlockSpec, FileSpec, read_file
+from quadvis.diagram.names import absent, remedy_for
+from quadvis.diagram.values import substitute
 from quadvis.document import Node
 from quadvis.errors import DiagramError, Faults, Place, closest, suggestion
-from quadvis.loader import BlockSpec, FileSpec, read_file
-from quadvis.names import absent, remedy_for
-from quadvis.values import substitute
 
 MAX_BLOCKS = 5_000  # parts in parts multiply
 MAX_DEPTH = 30

@@ -1,7 +1,7 @@
 """Draw a block diagram as SVG: boxes with named ports, orthogonal wires, colours by rate.
 
 The Eclipse Layout Kernel's layered algorithm places the boxes and routes the wires; it is made for diagrams
-with ports (see `quadvis/elkjs`). This module states the sizes, and draws what the engine placed.
+with ports (see `quadvis/output/elkjs`). This module states the sizes, and draws what the engine placed.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from quadvis import _svg as svg
-from quadvis.elkjs import layout
 from quadvis.errors import QuadvisError
+from quadvis.output import _svg as svg
+from quadvis.output.elkjs import layout
 
 CONTINUOUS = "continuous"
 """The task name of the blocks that the solver integrates."""

@@ -6,14 +6,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from quadvis.block import Out
+from quadvis.diagram.expand import Expansion, FlatBlock, Scope
+from quadvis.diagram.loader import INSIDE, InputSpec
+from quadvis.diagram.reference import Reference
+from quadvis.diagram.slots import Refused
+from quadvis.diagram.values import substitute
 from quadvis.document import Node, Sequence
+from quadvis.engine.graph import Index, Wire
 from quadvis.errors import Faults, Place, suggestion
-from quadvis.expand import Expansion, FlatBlock, Scope
-from quadvis.graph import Index, Wire
-from quadvis.loader import INSIDE, InputSpec
-from quadvis.reference import Reference
-from quadvis.slots import Refused
-from quadvis.values import substitute
 
 MAX_PORTS = 50  # of parts, that a signal passes without meeting a block
 

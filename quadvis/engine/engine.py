@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.block import ParameterError
+from quadvis.engine.graph import Graph
+from quadvis.engine.plan import TIME, Bound, Call, Plan, make_plan
+from quadvis.engine.solver import Solver, Vector
 from quadvis.errors import QuadvisError, RunError
-from quadvis.graph import Graph
-from quadvis.plan import TIME, Bound, Call, Plan, make_plan
-from quadvis.solver import Solver, Vector
 
 Observer = Callable[[int], None]  # takes the tick, after the outputs of a step
 

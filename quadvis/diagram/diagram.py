@@ -11,24 +11,24 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from quadvis.build import Builder, Made
 from quadvis.catalogue import Catalogue
-from quadvis.check import WireCheck, rate_text
+from quadvis.diagram.build import Builder, Made
+from quadvis.diagram.check import WireCheck, rate_text
+from quadvis.diagram.expand import Expansion, Parts, Settings
+from quadvis.diagram.loader import FileSpec, read_file, read_text
+from quadvis.diagram.observe import Observation, read_observation
+from quadvis.diagram.slots import Outputs, check_slots, fill_slots
+from quadvis.diagram.times import read_duration
+from quadvis.diagram.values import read_constant
+from quadvis.diagram.wiring import Wiring
 from quadvis.document import Node, Scalar, parse_yaml
 from quadvis.document import Sequence as List
+from quadvis.engine.graph import Graph, Wire
 from quadvis.errors import DiagramError, Fault, Faults, Place, quoted
-from quadvis.expand import Expansion, Parts, Settings
-from quadvis.graph import Graph, Wire
-from quadvis.loader import FileSpec, read_file, read_text
-from quadvis.observe import Observation, read_observation
-from quadvis.slots import Outputs, check_slots, fill_slots
-from quadvis.times import read_duration
-from quadvis.values import read_constant
-from quadvis.wiring import Wiring
 
 if TYPE_CHECKING:
+    from quadvis.output.verdict import Entry, Outcome, Signals
     from quadvis.run import Progress, Result
-    from quadvis.verdict import Entry, Outcome, Signals
 
 COMMAND_LINE = "--set"
 
@@ -49,7 +49,7 @@ class Diagram:
     @cached_property
     def resolved(self) -> str:
         """The diagram written out: parts expanded, variant and settings applied, every parameter given."""
-        from quadvis.resolve import resolved_text
+        from quadvis.diagram.resolve import resolved_text
 
         return resolved_text(self.graph, self.stop_time, self.seed, self.observation, self.path.parent)
 
@@ -95,9 +95,9 @@ class Diagram:
 
     def draw(self) -> str:
         """Return a picture of the diagram as SVG."""
-        from quadvis.draw import DrawnBlock, DrawnWire, draw
-        from quadvis.reference import wire_text
-        from quadvis.resolve import constant_text
+        from quadvis.diagram.reference import wire_text
+        from quadvis.diagram.resolve import constant_text
+        from quadvis.output.draw import DrawnBlock, DrawnWire, draw
 
         nodes = [self.graph[path] for path in self.listing]
         blocks, wires, constants = [], [], {}
@@ -210,7 +210,7 @@ class _Assembly:
         stop = _stop_time(spec, stop_time, faults)
         observation = read_observation(spec.sections, wiring, graph, faults)
         if spec.files:
-            from quadvis.resolve import check_files
+            from quadvis.diagram.resolve import check_files
 
             check_files(spec, faults)
         seed = spec.seed if seed is None else _seed(seed, faults)

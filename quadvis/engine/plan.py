@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.block import NO_FRAME, Block, Random, Shape
-from quadvis.graph import Constant, Graph, Node, Wire, selected
-from quadvis.memory import SLOT, Memory, Record, Slot
+from quadvis.engine.graph import Constant, Graph, Node, Wire, selected
+from quadvis.engine.memory import SLOT, Memory, Record, Slot
 
 Call = Callable[[], None]
 Positions = NDArray[np.intp]  # in ``Memory.floats``

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from quadvis.block import Declared, Param
-from quadvis.flow import ONE, Flow, Link
-from quadvis.graph import Constant, selected
+from quadvis.diagram.flow import ONE, Flow, Link
+from quadvis.diagram.values import OpenUnits
+from quadvis.engine.graph import Constant, selected
 from quadvis.units import Unit, unify
-from quadvis.values import OpenUnits
 
 
 class Bindings:

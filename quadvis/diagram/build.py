@@ -8,15 +8,15 @@ from fractions import Fraction
 from typing import Any
 
 from quadvis.block import Block, Param, ParameterError
+from quadvis.diagram.expand import Expansion, FlatBlock
+from quadvis.diagram.flow import Connection, Draft
+from quadvis.diagram.loader import CONTINUOUS, FileSpec
+from quadvis.diagram.names import absent, remedy_for
+from quadvis.diagram.times import time_text
+from quadvis.diagram.values import OpenUnits, read_parameter, read_value
+from quadvis.diagram.wiring import Wiring
+from quadvis.engine.graph import Constant, Task, Wire, common_divisor
 from quadvis.errors import DiagramError, Fault, Faults, QuadvisError, suggestion
-from quadvis.expand import Expansion, FlatBlock
-from quadvis.flow import Connection, Draft
-from quadvis.graph import Constant, Task, Wire, common_divisor
-from quadvis.loader import CONTINUOUS, FileSpec
-from quadvis.names import absent, remedy_for
-from quadvis.times import time_text
-from quadvis.values import OpenUnits, read_parameter, read_value
-from quadvis.wiring import Wiring
 
 Made = dict[tuple[str, type[Block], str], Block]  # by path, class and parameters: variants share most
 NO_STEP = Fraction(1, 100)  # stands in for a solver step whose absence has been told

@@ -1,0 +1,1 @@
+"""From files to a checked graph: the format, parts and variants, and all checks."""

@@ -1,0 +1,1 @@
+"""From a checked graph to a running loop: memory, plan, solver, ticks."""
