@@ -9,4 +9,5 @@ TURN = 2.0 * math.pi
 
 def wrapped(angle: float) -> float:
     """Return the same direction in (-pi, pi]; an angle that is already there comes back bit for bit."""
-    return angle - TURN * math.ceil((angle - math.pi) / TURN)
+    turned = angle - TURN * math.ceil((angle - math.pi) / TURN)
+    return math.pi if turned > math.pi else turned  # one rounding step beyond pi is pi
