@@ -10,9 +10,9 @@ from __future__ import annotations
 import inspect
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ RESERVED = {"self", "time", "period", "interface", "numeric", "check", "open", "
 
 Shape = tuple[int, ...]
 Sizes = dict[str, Any]  # symbol -> int; "*" -> Shape
+_Read = TypeVar("_Read")
 _SIZE = r"(?:[1-9]\d*|[a-z]\w*)"
 
 
@@ -35,6 +36,14 @@ class ParameterError(QuadvisError):
     def __init__(self, parameter: str, message: str) -> None:
         super().__init__(message)
         self.parameter = parameter
+
+
+def read_parameter_file(name: str, path: str, read: Callable[[str], _Read]) -> _Read:
+    """Return ``read(path)`` of a parameter's file; ParameterError tells what is wrong with the file."""
+    try:
+        return read(path)
+    except QuadvisError as error:
+        raise ParameterError(name, f"{name} is not usable: {error}") from None
 
 
 @dataclass(frozen=True, eq=False)

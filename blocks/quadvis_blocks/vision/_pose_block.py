@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.block import Block, In, Out, Param, ParameterError
-from quadvis.errors import QuadvisError
+from quadvis.block import Block, In, Out, Param, read_parameter_file
 from quadvis_blocks.vision._calibration import CameraCalibration
 from quadvis_blocks.vision._lens import by_point
 from quadvis_blocks.vision._pose import Pose, camera_points, seen_centres
@@ -97,12 +96,9 @@ class PoseFromCircles:
         self._load()
 
     def _load(self) -> PinholeRays | TwoPlanesRays:
-        try:
-            return (
-                TwoPlanesRays(self.calibration) if self.rays == TWO_PLANES else PinholeRays(self.calibration)
-            )
-        except QuadvisError as error:
-            raise ParameterError("calibration", f"calibration is not usable: {error}") from None
+        if self.rays == TWO_PLANES:
+            return read_parameter_file("calibration", self.calibration, TwoPlanesRays)
+        return read_parameter_file("calibration", self.calibration, PinholeRays)
 
     def open(self) -> None:
         """Read the calibration."""

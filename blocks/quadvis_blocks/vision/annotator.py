@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, Frame, In, Out, Param, ParameterError
-from quadvis.errors import QuadvisError
+from quadvis.block import Block, Frame, In, Out, Param, read_parameter_file
 from quadvis_blocks.vision._calibration import CameraCalibration
 from quadvis_blocks.vision._overlay import Finding, Overlay
 from quadvis_blocks.vision._projection import RADIUS, SIDE
@@ -49,10 +48,7 @@ class Annotator(Block, numeric=False):
         self._load()
 
     def _load(self) -> CameraCalibration:
-        try:
-            return CameraCalibration.load(self.calibration)
-        except QuadvisError as error:
-            raise ParameterError("calibration", f"calibration is not usable: {error}") from None
+        return read_parameter_file("calibration", self.calibration, CameraCalibration.load)
 
     def open(self) -> None:
         """Read the calibration."""

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, ParameterError, Random, State
-from quadvis.errors import QuadvisError
+from quadvis.block import Block, In, Out, Param, ParameterError, Random, State, read_parameter_file
 from quadvis_blocks._random import normal, uniform
 from quadvis_blocks.vision._calibration import CameraCalibration
 from quadvis_blocks.vision._detect import NOT_FOUND, STALE, TWO_CIRCLES
@@ -62,10 +61,7 @@ class GeometricCamera(Block, numeric=False):
         self._load()
 
     def _load(self) -> CameraCalibration:
-        try:
-            return CameraCalibration.load(self.calibration)
-        except QuadvisError as error:
-            raise ParameterError("calibration", f"calibration is not usable: {error}") from None
+        return read_parameter_file("calibration", self.calibration, CameraCalibration.load)
 
     def open(self) -> None:
         """Read the calibration; ParameterError if the latency is too long for the period."""

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.block import Block, Frame, In, Out, Param, ParameterError, Random, State
-from quadvis.errors import QuadvisError
+from quadvis.block import Block, Frame, In, Out, Param, ParameterError, Random, State, read_parameter_file
 from quadvis_blocks._random import uniform
 from quadvis_blocks.vision._calibration import CameraCalibration
 from quadvis_blocks.vision._projection import RADIUS, SIDE
@@ -94,10 +93,7 @@ class RenderedCamera(Block, numeric=False):
             )
 
     def _load(self) -> CameraCalibration:
-        try:
-            return CameraCalibration.load(self.calibration)
-        except QuadvisError as error:
-            raise ParameterError("calibration", f"calibration is not usable: {error}") from None
+        return read_parameter_file("calibration", self.calibration, CameraCalibration.load)
 
     def open(self) -> None:
         """Prepare the renderer; ParameterError if the latency or the exposure does not go with the period."""
