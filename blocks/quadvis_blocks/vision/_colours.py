@@ -27,7 +27,7 @@ THRESHOLD = 0.74
 
 _DARK = 0.2  # a ratio far below this is as good as black
 _RATIO_MAX = 3.0
-_APART = 0.3  # least distance of two colours: a step of a third in one channel
+APART = 0.3  # least distance of two colours: a step of a third in one channel
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,17 +97,18 @@ class ColourCalibration:
         ceiling that is greyer than the calibrated one, weighs little; differences between dark tones
         weigh little too.
         """
-        tone = _tone(ratio)
-        distances = [math.dist(tone, other) for other in self._tones]
+        place = tone(ratio)
+        distances = [math.dist(place, other) for other in self._tones]
         least = min(distances)
         return distances.index(least), least
 
     @cached_property
     def _tones(self) -> tuple[Colour, ...]:
-        return tuple(_tone(ratio) for ratio in self.ratios)
+        return tuple(tone(ratio) for ratio in self.ratios)
 
 
-def _tone(ratio: Colour) -> Colour:
+def tone(ratio: Colour) -> Colour:
+    """Return a ratio as a point; the distance of two of them is that of the colours, see `nearest`."""
     blue, green, red = ratio
     return math.log(blue + _DARK), math.log(green + _DARK), math.log(red + _DARK)
 
@@ -129,7 +130,7 @@ def _problems(prototypes: Array, threshold: float, names: tuple[str, ...]) -> It
             good.append(index)
     for place, later in enumerate(good):
         for earlier in good[:place]:
-            if math.dist(_tone(tuple(prototypes[later])), _tone(tuple(prototypes[earlier]))) < _APART:
+            if math.dist(tone(tuple(prototypes[later])), tone(tuple(prototypes[earlier]))) < APART:
                 yield (
                     later,
                     f"{names[later]} cannot be told from {names[earlier]}",

@@ -79,16 +79,16 @@ def arrangement_cost(corners: Sequence[Blob], ratio: float) -> float:
         return math.inf
     sizes = [math.log(blob.radius / radius) for blob, radius in zip(corners, expected, strict=True)]
     mean = sum(sizes) / 4
-    spread = max(abs(size - mean) for size in sizes)
+    spread = max(max(sizes) - mean, mean - min(sizes))
     if abs(mean) > SIZE_MAX or spread > SPREAD_MAX:
         return math.inf
-    colour = sum(blob.distance for blob in corners) / 4
+    colour = (corners[0].distance + corners[1].distance + corners[2].distance + corners[3].distance) / 4
     return misfit / MISFIT_MAX + abs(mean) / SIZE_MAX + spread / SPREAD_MAX + colour
 
 
-def arrange(blobs: Sequence[Sequence[Blob]], ratio: float) -> tuple[Blob, Blob, Blob, Blob] | None:
-    """Choose one blob for each corner out of four lists so that they fit a square best; None if none do."""
-    best, least = None, math.inf
+def arrangements(blobs: Sequence[Sequence[Blob]], ratio: float, most: int) -> list[tuple[Blob, ...]]:
+    """Choose one blob for each corner out of four lists so that they fit a square; best first."""
+    found: list[tuple[float, tuple[Blob, ...]]] = []
     for first in blobs[0]:
         for third in blobs[2]:
             middle, half = (first.centre + third.centre) / 2, (third.centre - first.centre) / 2
@@ -100,21 +100,27 @@ def arrange(blobs: Sequence[Sequence[Blob]], ratio: float) -> tuple[Blob, Blob, 
                 for fourth in fourths:
                     corners = (first, second, third, fourth)
                     cost = arrangement_cost(corners, ratio)
-                    if cost < least:
-                        best, least = corners, cost
-    return best
+                    if cost < math.inf:
+                        found.append((cost, corners))
+    return [corners for _, corners in sorted(found, key=lambda pair: pair[0])[:most]]
 
 
 def motion(before: Sequence[complex], after: Sequence[complex]) -> tuple[complex, complex, float]:
     """Return the similarity `factor * before + shift` nearest to `after`, and the rms distance left (px)."""
     count = len(before)
     origin, target = sum(before) / count, sum(after) / count
-    size = sum(abs(p - origin) ** 2 for p in before)
+    size, turned = 0.0, 0j
+    for p, q in zip(before, after, strict=True):
+        arm = p - origin
+        size += arm.real * arm.real + arm.imag * arm.imag
+        turned += arm.conjugate() * (q - target)
     if not size > 0:
         return 1 + 0j, target - origin, math.inf
-    factor = sum((p - origin).conjugate() * (q - target) for p, q in zip(before, after, strict=True)) / size
-    shift = target - factor * origin
-    left = sum(abs(factor * p + shift - q) ** 2 for p, q in zip(before, after, strict=True))
+    factor = turned / size
+    shift, left = target - factor * origin, 0.0
+    for p, q in zip(before, after, strict=True):
+        off = factor * p + shift - q
+        left += off.real * off.real + off.imag * off.imag
     return factor, shift, math.sqrt(left / count)
 
 

@@ -30,20 +30,24 @@ class CircleDetector(Block, numeric=False):
     """Where the four coloured circles of the target are in a picture.
 
     Corners 1 to 4 are clockwise from the upper left of the picture at zero yaw: red, blue, green and
-    black in the paper. To find the target all four circles must be seen; once found, three or two of them
-    keep it. A circle that something hides in part is reported missing. Steps without a new picture repeat
-    the last result with `fresh` false, also its stamp and sequence number. A frame that is not a picture
-    is a target that is not found.
+    black in the paper. A target that was not there before is taken by four circles that make a square, or
+    by three or two (see `fewest`) if their sizes and ellipses agree to a few percent with their distances
+    and nothing else in the picture could be meant; once found, three or two that moved together keep it.
+    A circle that something hides in part, from about a tenth of its diameter on, has no centre, and its
+    quality says why. Steps without a new picture repeat the last result with `fresh` false, also its stamp
+    and sequence number. A frame that is not a picture is a target that is not found.
 
-    `status`: 0 four circles, 1 three, 2 two, 3 target not found, 4 four circles that are no square, 5 no
-    picture yet, 7 the frame is not a picture.
+    `status`: 0 four circles, 1 three, 2 two, 3 target not found, 4 circles of all colours that are no
+    square, 5 no picture yet, 7 the frame is not a picture.
 
     Source: sections 5 (centres of gravity, colour calibration, order of the corners) and 6.
     """
 
     frame = In("frame", doc="the newest picture")
     centres = Out("float64[4,2]", unit="px", nan=True, doc="u, v of circles 1 to 4; NaN rows are missing")
-    quality = Out("float64[4]", nan=True, doc="radius of each circle over what the square makes one expect")
+    quality = Out(
+        "float64[4]", nan=True, doc="1 for a whole circle, below 0.9 for one hidden in part, NaN for none"
+    )
     status = Out("int64", doc="0, 1, 2: four, three, two circles; 3 and above: no target, see above")
     found = Out("bool", doc="all four circles")
     lost = Out("bool", doc="a new frame in which there is no target")
@@ -56,6 +60,10 @@ class CircleDetector(Block, numeric=False):
     radius = Param(RADIUS, unit="m", above=0.0, doc="radius of the circles")
     radius_min = Param(2.0, unit="px", min=1.0, doc="smallest radius in the picture")
     radius_max = Param(80.0, unit="px", above=0.0, doc="largest radius in the picture")
+
+    fewest = Param(
+        2, type="int64", min=2, max=4, doc="circles that make a target that was not there before; 4 is safest"
+    )
 
     last_centres = State("float64[4,2]", math.nan)
     last_quality = State("float64[4]", math.nan)
@@ -118,5 +126,5 @@ class CircleDetector(Block, numeric=False):
             return nothing(UNUSABLE)
         pixels = np.ascontiguousarray(frame.pixels)
         if self.last_status <= TWO_CIRCLES and 0 < frame.stamp - self.last_stamp <= FOLLOW_MAX:
-            return follow(pixels, self._target, self.places)
-        return search(pixels, self._target)
+            return follow(pixels, self._target, self.places, self.fewest)
+        return search(pixels, self._target, self.fewest)

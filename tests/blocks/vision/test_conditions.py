@@ -1,0 +1,95 @@
+"""The detector in all kinds of light and among all kinds of things, on pictures it has no part in drawing."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quadvis_blocks.vision._calibration import CameraCalibration
+from quadvis_blocks.vision._circles import Target
+from quadvis_blocks.vision._colours import ColourCalibration
+from quadvis_blocks.vision._detect import follow, search
+from quadvis_blocks.vision._projection import camera_pose, ellipse_centres, target_corners
+from quadvis_blocks.vision._scenery import Condition, project
+from quadvis_blocks.vision._scenes import (
+    CONDITIONS,
+    CORNERS,
+    RADIUS,
+    draw_flight,
+    draw_pose,
+    homography,
+    shoot,
+)
+
+COLOURS = Path(__file__).parents[3] / "diagrams" / "calib" / "colours.yaml"
+TARGET = Target(ColourCalibration.load(COLOURS), 0.12, 2.0, 80.0)
+SIZES = [(320, 240), (640, 480)]
+CLEAN, COMBINED = 0.07, 0.10  # px rms, what is asked of centres
+
+
+def judge(size, condition, count, seed=1):
+    """Return the share of pictures seen rightly, and the rms error of the centres (px)."""
+    rng, right, squares = np.random.default_rng(seed), 0, []
+    for _ in range(count):
+        shot = shoot(rng, size, condition)
+        centres = search(shot.pixels, TARGET).centres
+        right += shot.right(centres)
+        squares += (shot.errors(centres) ** 2).tolist()
+    return right / count, np.sqrt(np.mean(squares)) if squares else 0.0
+
+
+@pytest.mark.parametrize("name", CONDITIONS)
+def test_every_condition_is_mastered(name):
+    right, rms = judge((320, 240), CONDITIONS[name], 6)
+    assert right == 1
+    assert rms <= COMBINED
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("name", CONDITIONS)
+def test_in_every_condition_99_of_100_pictures_are_seen_rightly(name, size):
+    right, rms = judge(size, CONDITIONS[name], 100, seed=2)
+    assert right >= 0.99
+    assert rms <= (CLEAN if name == "clean" else COMBINED)
+
+
+@pytest.mark.parametrize("covering", [None, (250, 250, 250), (60, 60, 60), (110, 140, 190), (20, 20, 20)])
+@pytest.mark.parametrize("share", [0.15, 0.3, 0.5])
+def test_a_circle_behind_something_of_any_colour_is_missing_and_the_others_are_there(covering, share):
+    right, rms = judge((320, 240), Condition(cover=share, covering=covering), 8)
+    assert right == 1
+    assert rms <= CLEAN
+
+
+@pytest.mark.parametrize("name", ["clean", "noise 20", "light x0.15", "light x1.7", "combined", "12 decoys"])
+def test_a_target_is_followed_in_bad_conditions(name):
+    rng, squares = np.random.default_rng(3), []
+    for _ in range(2):
+        places = None
+        for pose in draw_flight(rng, (320, 240), CONDITIONS[name], 8):
+            shot = shoot(rng, (320, 240), CONDITIONS[name], pose)
+            seen = search(shot.pixels, TARGET) if places is None else follow(shot.pixels, TARGET, places)
+            assert shot.right(seen.centres)
+            squares += (shot.errors(seen.centres) ** 2).tolist()
+            places = seen.places
+    assert np.sqrt(np.mean(squares)) <= COMBINED
+
+
+def test_discs_lie_where_the_closed_form_puts_the_centres_of_their_ellipses():
+    rng = np.random.default_rng(4)
+    for _ in range(5):
+        pose = draw_pose(rng, (452, 322), Condition(tilt=25.0))
+        expected = ellipse_centres(homography((452, 322), pose), CORNERS, RADIUS)
+        assert np.abs(shoot(rng, (452, 322), pose=pose).centres - expected).max() < 0.02
+
+
+def test_scenes_and_projection_mean_the_same_pose():
+    rng, matrix = np.random.default_rng(5), np.array([[430.0, 2, 225.5], [0, 438, 160.5], [0, 0, 1]])
+    camera = CameraCalibration((452, 322), matrix, np.zeros(5))
+    for _ in range(5):
+        x, y, z, roll, pitch, yaw = draw_pose(rng, (452, 322), Condition(tilt=25.0))
+        turn, shift = camera_pose(np.array([x, y, 4.5 - z]), np.array([roll, pitch, yaw]), 4.5)
+        expected = camera.project(target_corners(1.0) @ turn.T + shift)
+        h = homography((452, 322), (x, y, z, roll, pitch, yaw))
+        assert np.abs(project(h, CORNERS) - expected).max() < 1e-9
