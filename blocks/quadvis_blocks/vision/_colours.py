@@ -16,8 +16,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.document import Node, read_yaml
-from quadvis.errors import Faults, QuadvisError, sentence
+from quadvis.document import Node, dump_yaml, read_yaml
+from quadvis.errors import DiagramError, Fault, Faults, QuadvisError, sentence
+from quadvis_blocks.vision._colour_evidence import KEYS, ColourEvidence
+from quadvis_blocks.vision._evidence import CalibrationError
 
 Array = NDArray[np.float64]
 Colour = tuple[float, float, float]
@@ -29,18 +31,22 @@ _DARK = 0.2  # a ratio far below this is as good as black
 _RATIO_MAX = 3.0
 APART = 0.3  # least distance of two colours: a step of a third in one channel
 
+NOTHING_KNOWN = ColourEvidence()
+
 
 @dataclass(frozen=True, eq=False)
 class ColourCalibration:
     """Colours of circles 1..4; impossible values raise `QuadvisError`.
 
     `prototypes` (4, 3) are ratios circle over ceiling, blue-green-red. A pixel may belong to a circle if
-    a channel of it is below `threshold` times the ceiling. `names` serve messages only.
+    a channel of it is below `threshold` times the ceiling. `names` serve messages only. `evidence` says how
+    the colours were found, if known.
     """
 
     prototypes: Array
     threshold: float = THRESHOLD
     names: tuple[str, ...] = NAMES
+    evidence: ColourEvidence = NOTHING_KNOWN
 
     def __post_init__(self) -> None:
         """Make the array read-only and check everything."""
@@ -53,15 +59,18 @@ class ColourCalibration:
         object.__setattr__(self, "prototypes", prototypes)
         for _, problem, remedy in _problems(prototypes, self.threshold, self.names):
             raise QuadvisError(sentence(problem, remedy))
+        self.evidence.check(prototypes, self.distances)
 
     @classmethod
     def load(cls, path: str | Path) -> ColourCalibration:
         """Read a colour file; `DiagramError` with file, line and column of everything that is wrong in it.
 
         The file is YAML: `threshold: 0.74` and `circles`, a list of four `{colour: red, ratio: [blue,
-        green, red]}` in the order of corners 1 to 4.
+        green, red]}` in the order of corners 1 to 4; optionally also `date`, and `rms`, `errors: [of each
+        picture]` and `samples: [four ratios of each picture]`, which must agree with each other and with the
+        ratios.
         """
-        fields = read_yaml(str(path)).fields(required={"threshold", "circles"})
+        fields = read_yaml(str(path)).fields(("threshold", "circles"), KEYS)
         circles = fields["circles"].items()
         if len(circles) != 4:
             raise fields["circles"].wrong("a list of 4 circles", found=f"a list of {len(circles)}")
@@ -74,7 +83,11 @@ class ColourCalibration:
         for index, problem, remedy in _problems(prototypes, threshold, names):
             faults.add(places[index].place, problem, remedy, subject="colours")
         faults.check()
-        return cls(prototypes, threshold, names)
+        try:
+            return cls(prototypes, threshold, names, ColourEvidence.read(fields))
+        except CalibrationError as error:
+            fault = Fault(fields[error.field].place, "colours", error.problem, error.remedy)
+            raise DiagramError([fault]) from None
 
     def save(self, path: str | Path, comment: str = "") -> None:
         """Write the colours as YAML so that `load` returns the same numbers; `comment` goes on top."""
@@ -83,7 +96,9 @@ class ColourCalibration:
         for name, ratio in zip(self.names, self.prototypes, strict=True):
             parts = ", ".join(repr(float(part)) for part in ratio)
             lines.append(f"  - {{colour: {json.dumps(name)}, ratio: [{parts}]}}")
-        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        facts = self.evidence.facts()
+        text = "\n".join(lines) + "\n" + (dump_yaml(facts) if facts else "")
+        Path(path).write_text(text, encoding="utf-8")
 
     @cached_property
     def ratios(self) -> tuple[Colour, ...]:
@@ -101,6 +116,11 @@ class ColourCalibration:
         distances = [math.dist(place, other) for other in self._tones]
         least = min(distances)
         return distances.index(least), least
+
+    def distances(self, ratios: Array) -> Array:
+        """Return how far ratios (n, 4, 3) of circles 1 to 4 are from theirs, (n, 4); see `nearest`."""
+        off = np.log(ratios + _DARK) - np.log(self.prototypes + _DARK)
+        return np.asarray(np.linalg.norm(off, axis=-1))
 
     @cached_property
     def _tones(self) -> tuple[Colour, ...]:

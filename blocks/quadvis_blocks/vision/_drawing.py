@@ -16,7 +16,7 @@ PLATE: Colour = (32, 32, 32)
 _FARTHEST = 1e4  # px: what lies beyond is not in any picture, and whole numbers must hold it
 
 
-def sixteenths(pixels: Floats, zoom: int) -> NDArray[np.int32]:
+def sixteenths(pixels: Floats, zoom: float) -> NDArray[np.int32]:
     """Return pixels (n, 2) of a picture as whole sixteenths of a pixel of the same one `zoom` times larger.
 
     NaN and what is far outside become points outside.

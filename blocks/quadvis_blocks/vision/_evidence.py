@@ -94,7 +94,7 @@ class Evidence:
         if self.errors is not None:
             self._check_errors(self.errors)
         if self.date is not None:
-            _check_date(self.date)
+            check_date(self.date)
         if self.points is not None:
             self._check_points(self.points, project)
 
@@ -130,7 +130,8 @@ def _typical(squares: Floats) -> NDArray[np.int64]:
     return np.sort(order[((np.arange(MOST_POINTS) + 0.5) * len(squares) / MOST_POINTS).astype(int)])
 
 
-def _check_date(text: str) -> None:
+def check_date(text: str) -> None:
+    """Raise `CalibrationError` if a text is no day such as 2026-11-22."""
     try:
         date.fromisoformat(text)
     except ValueError:
