@@ -19,7 +19,7 @@ HUES = {  # deg
 }  # fmt: skip
 KNOWN = (*HUES, "black")
 CHROMA_MIN = 0.1  # largest minus smallest ratio of what is called a colour
-FIT_MAX = 1.2  # of a colour from what its name says: 72 deg of hue, or a black of 0.6 of the ceiling
+FIT_MAX = 0.8  # of a colour from what its name says: 48 deg of hue, or a black of 0.8 of the ceiling
 
 
 def check_order(order: Sequence[str]) -> None:
@@ -57,7 +57,7 @@ def _distance(ratio: Colour, name: str) -> float:
     blue, green, red = ratio
     chroma = max(ratio) - min(ratio)
     if name == "black":
-        return 3 * chroma + 2 * min(ratio)
+        return 2 * chroma + min(ratio)
     hue = math.degrees(math.atan2(math.sqrt(3) * (green - blue), 2 * red - green - blue))
     off = abs(math.remainder(hue - HUES[name], 360)) / 60
     return off + 10 * max(0.0, 2 * CHROMA_MIN - chroma)

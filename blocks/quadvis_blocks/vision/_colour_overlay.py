@@ -32,15 +32,16 @@ def draw_calibration(pictures: Sequence[Picture], found: Calibrated) -> Picture:
     """
     evidence = found.colours.evidence
     errors = [] if evidence.errors is None else evidence.errors.tolist()
-    panels = [
-        _panel(*of) for of in zip(pictures, found.sightings, found.names, errors, found.found, strict=True)
-    ]
+    parts = (pictures, found.sightings, found.samples.tolist(), found.names, errors, found.found)
+    panels = [_panel(*of) for of in zip(*parts, strict=True)]
     columns = 2 if len(panels) in (2, 4) else min(len(panels), 3)
     rows = [_beside(panels[i : i + columns], columns) for i in range(0, len(panels), columns)]
     return np.vstack((*rows, _legend(columns * WIDTH, found)))
 
 
-def _panel(pixels: Picture, seen: Sighting, name: str, error: float, again: bool) -> Picture:
+def _panel(
+    pixels: Picture, seen: Sighting, ratios: Sequence[Colour], name: str, error: float, again: int
+) -> Picture:
     """Return one picture with its circles, its name, and its colours."""
     import cv2
 
@@ -56,10 +57,10 @@ def _panel(pixels: Picture, seen: Sighting, name: str, error: float, again: bool
         x, y = min(max(x - 5, 4), WIDTH - 16), min(max(y + 6, 18), height - 6)
         write_on_plate(canvas, str(corner), (x, y), _LIGHT, 0.6)
     colours = [
-        (f"{corner}", np.multiply(disc.ratio, light) * seen.grey, light, disc.ratio)
-        for corner, (disc, light) in enumerate(zip(seen.discs, seen.lights, strict=True), 1)
+        (f"{corner}", np.multiply(disc.ratio, light), light, ratio)
+        for corner, (disc, light, ratio) in enumerate(zip(seen.discs, seen.lights, ratios, strict=True), 1)
     ]
-    told = ("found again", _GOOD) if again else ("not found again", _BAD)
+    told = (f"{again} found again", _GOOD if again == 4 else _BAD)
     return np.vstack((canvas, _title(WIDTH, f"{name}   rms off {error:.3f}", *told), _row(WIDTH, colours)))
 
 

@@ -44,7 +44,7 @@ def text(found: Calibrated) -> str:
         found.names, found.distances, evidence.errors.tolist(), found.found, strict=True
     ):
         numbers = "".join(f"{part:8.3f}" for part in (*row.tolist(), rms))
-        lines.append(f"{name:<{width}}{numbers}  {'yes' if again else 'no'}")
+        lines.append(f"{name:<{width}}{numbers}  {again} of 4")
     return "\n".join(lines)
 
 
@@ -56,12 +56,17 @@ def as_json(found: Calibrated) -> str:
             "name": name,
             "centres": [[disc.centre.real, disc.centre.imag] for disc in seen.discs],
             "radii": [disc.radius for disc in seen.discs],
-            "ratios": [list(ratio) for ratio in seen.ratios],
+            "ratios": ratios,
             "distances": row,
             "found_again": again,
         }
-        for name, seen, row, again in zip(
-            found.names, found.sightings, found.distances.tolist(), found.found, strict=True
+        for name, seen, ratios, row, again in zip(
+            found.names,
+            found.sightings,
+            found.samples.tolist(),
+            found.distances.tolist(),
+            found.found,
+            strict=True,
         )
     ]
     circles = [

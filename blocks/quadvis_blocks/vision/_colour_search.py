@@ -19,6 +19,7 @@ from quadvis_blocks.vision._blobs import Patch, find_patches
 from quadvis_blocks.vision._circles import SMALLEST, Ceiling, Disc, Pixels, locate
 from quadvis_blocks.vision._colour_names import cost, named, nearest_name
 from quadvis_blocks.vision._colours import APART, THRESHOLD, Colour, tone
+from quadvis_blocks.vision._detect import usable
 from quadvis_blocks.vision._square import Blob, arrangement_cost, expected_radii
 
 THRESHOLDS = (THRESHOLD, 0.9, 0.55)  # to find circles of unknown colours, one after the other
@@ -26,17 +27,14 @@ WIDTH = 400  # px: about the size to which a picture is reduced for a first look
 RADIUS_MIN = 3.0  # px
 RADIUS_MAX = 0.2  # of the picture's width
 CIRCLES_MAX = 60  # that are looked at; the time to arrange them grows with the square of their number
-SYMMETRY_MIN = 0.9  # of a whole circle
+SYMMETRY_MIN = (
+    0.75  # of a whole circle; compression takes more from one that is nearly as bright as the ceiling
+)
 SIZES_MAX = math.log(1.2)  # of one circle against the others
 NEIGHBOURS = 0.3  # of half a diagonal: how far a corner may be from where the opposite two put it
 INSIDE = 0.7  # of the radius: the part of a circle that its colour is taken from
 RING = (1.3, 1.7)  # of the radius: where the ceiling is taken from
 STAINED = 0.5  # of the ceiling's light: a ring that differs by more has something else in it
-
-# No paint is brighter than white. Beside a grey ceiling one may be; then all four look lighter than beside a
-# white one, where dark colours would be taken for black. So the ceiling is said to be as bright as the
-# brightest paint, but no more than this: the colours must fit the picture that they are from.
-GREY_MAX = 1.8
 
 
 @dataclass(frozen=True)
@@ -44,12 +42,10 @@ class Sighting:
     """The four circles of one picture, clockwise.
 
     `discs` are as measured, their `ratio` the mean colour over that of the ceiling around them (blue, green,
-    red), over `grey`: by how much the ceiling is taken to be darker than white. `lights` are the grey levels
-    of the ceiling around each (blue, green, red).
+    red); `lights` are the grey levels of the ceiling around each.
     """
 
     discs: tuple[Disc, ...]
-    grey: float
     lights: tuple[Colour, ...]
 
     @property
@@ -69,7 +65,7 @@ def find_circles(pixels: Pixels, name: str, ratio: float, order: Sequence[str]) 
     `name` is the picture's for messages, `ratio` a circle's radius over the square's side; `order` names the
     colours of corners 1 to 4. Of several squares that with these colours is taken.
     """
-    if pixels.ndim != 3 or pixels.shape[2] != 3 or min(pixels.shape[:2]) < SMALLEST:
+    if not usable(pixels):
         raise QuadvisError(f"{name}: this is no colour picture of {SMALLEST} x {SMALLEST} px or more")
     if np.ptp(pixels, axis=2).max() == 0:
         raise QuadvisError(f"{name}: the picture has no colours; take it with a colour camera")
@@ -162,14 +158,12 @@ def _squares(discs: Sequence[Disc], ratio: float) -> Iterator[tuple[tuple[Disc, 
 
 def _look(pixels: Pixels, ceiling: Ceiling, corners: Sequence[Disc]) -> Sighting:
     """Return four circles with their exact colours: the mean within each over the median of a ring around."""
-    ratios, lights = [], []
+    discs, lights = [], []
     for disc in corners:
         paint, light = _paint_and_light(pixels, disc, np.array(ceiling.at(disc.centre)))
-        ratios.append(paint / light)
+        discs.append(disc._replace(ratio=_colour(paint / light)))
         lights.append(_colour(light))
-    grey = min(max(1.0, float(np.max(ratios))), GREY_MAX)
-    discs = [disc._replace(ratio=_colour(ratio / grey)) for disc, ratio in zip(corners, ratios, strict=True)]
-    return Sighting(tuple(discs), grey, tuple(lights))
+    return Sighting(tuple(discs), tuple(lights))
 
 
 def _colour(levels: Any) -> Colour:
