@@ -128,7 +128,7 @@ def _warnings(
             yield f"{name}: the ceiling is over-exposed, so its colours are not exact; take it darker"
         elif min(map(min, sighting.lights)) < DARK:
             yield f"{name}: the ceiling is nearly black, so its colours are not exact; take it brighter"
-        if off > DISAGREE:
+        elif off > DISAGREE:
             yield f"{name}: its colours are up to {off:.2f} off those of all pictures; look for reflections"
         if again < 4:
             yield f"{name}: with these colours the detector finds {again} of its 4 circles again"
