@@ -215,6 +215,7 @@ def test_a_reader_that_stops_early_sees_no_traceback(scenes, tmp_path):
         (["clean.png", "--side", "0m"], "above 0"),
         (["clean.png", "-o", "absent/my.yaml"], "cannot write absent/my.yaml"),
         (["clean.png", "-o", "a folder"], "not a file"),
+        (["clean.png", "-o", "."], "not a file"),
         (["clean.png", "-o", "clean.yaml"], "clean.png is one of the frames"),
         (["clean.png", "-o", "my.png"], "both"),
         (["clean.png", "-o", "my.yaml", "--overlay", "absent/my.png"], "cannot write absent/my.png"),
