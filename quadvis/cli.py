@@ -18,7 +18,7 @@ from quadvis.errors import QuadvisError, RunError
 FAILED, INTERRUPTED, PIPE_BROKEN = 1, 130, 141
 
 JSON_HELP = """\
---json prints one object: diagram, variant, hash, seed, passed, duration_s, wall_s, cpu_s,
+--json prints one object: diagram, variant, params, hash, seed, passed, duration_s, wall_s, cpu_s,
 real_time_factor, log;
 summary: {label: {signal, unit, and the statistics by name}};
 expect: [{expectation, signal, kind, unit, limit, found, met}].
@@ -102,6 +102,8 @@ def _parser() -> argparse.ArgumentParser:
 def _diagram_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="the diagram")
     parser.add_argument("--variant", metavar="V", help="one of the diagram's variants")
+    words = "file of such settings, which apply before --set; repeat it for more, applied in their order"
+    parser.add_argument("--params", action="append", default=[], metavar="FILE", help=words)
     words = "replace a parameter, such as control/roll.bandwidth='2 rad/s'; repeat it for more"
     parser.add_argument("--set", action="append", default=[], metavar="BLOCK.PARAM=VALUE", help=words)
 
@@ -109,7 +111,8 @@ def _diagram_options(parser: argparse.ArgumentParser) -> None:
 def _load(options: argparse.Namespace, **more: Any) -> Any:
     from quadvis.diagram.diagram import load
 
-    return load(options.file, variant=options.variant, settings=options.set, **more)
+    given = {"variant": options.variant, "settings": options.set, "params": options.params}
+    return load(options.file, **given, **more)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -144,7 +147,8 @@ def _log_path(given: str | None, diagram: Any) -> Path | None:
         if given and not path.parent.is_dir():
             raise QuadvisError(f"cannot write the log '{given}': there is no folder '{path.parent}'")
         return path if given else None
-    name = "-".join(filter(None, (diagram.name, diagram.variant)))
+    sets = (file.name for file in diagram.parameter_files)
+    name = "-".join(filter(None, (diagram.name, diagram.variant, *sets)))
     path = Path("runs") / f"{re.sub(r'[^A-Za-z0-9_.-]+', '-', name).strip('-.') or 'run'}.mcap"
     try:
         path.parent.mkdir(exist_ok=True)
@@ -161,7 +165,7 @@ def _check(options: argparse.Namespace) -> int:
     from quadvis.errors import DiagramError
 
     try:
-        diagram = _load(options) if options.variant else check(options.file, options.set)
+        diagram = _load(options) if options.variant else check(options.file, options.set, options.params)
     except DiagramError as error:
         if not options.json:
             raise

@@ -44,7 +44,9 @@ def summary_lines(result: Result) -> list[str]:
     """Return the summary of a run, for people."""
     diagram, outcome = result.diagram, result.outcome
     variant = f" ({diagram.variant})" if diagram.variant else ""
-    lines = [f"{diagram.name}{variant}: {result.duration:g} s, seed {diagram.seed}"]
+    sets = ", ".join(file.name for file in diagram.parameter_files)
+    what = f"{diagram.name}{variant}{' with ' if sets else ''}{sets}"
+    lines = [f"{what}: {result.duration:g} s, seed {diagram.seed}"]
     lines += [f"  {line}" for line in table([_entry_row(entry, outcome) for entry in diagram.summary])]
     lines += [f"  {line}" for line in table([_verdict_row(verdict) for verdict in outcome.verdicts])]
     speed = f", {result.real_time_factor:.0f} x real time" if result.duration and result.wall else ""

@@ -69,11 +69,11 @@ class Result:
     def facts(self) -> dict[str, Any]:
         """Return the outcome as plain data: what `quadvis run --json` prints.
 
-        ``diagram``, ``variant`` (or None), ``hash``, ``seed``: what was run. ``passed``: whether all
-        expectations are met. ``duration_s`` simulated, in ``wall_s`` of wall time and ``cpu_s`` of processor
-        time; ``real_time_factor``. ``summary``: by label ``{signal, unit, rms, max, ...}``. ``expect``: list
-        of ``{expectation, signal, kind, unit, limit, found, met}``. Numbers are in the unit beside them, None
-        where there is none.
+        ``diagram``, ``variant`` (or None), ``params`` (the parameter files), ``hash``, ``seed``: what was
+        run. ``passed``: whether all expectations are met. ``duration_s`` simulated, in ``wall_s`` of wall
+        time and ``cpu_s`` of processor time; ``real_time_factor``. ``summary``: by label ``{signal, unit,
+        rms, max, ...}``. ``expect``: list of ``{expectation, signal, kind, unit, limit, found, met}``.
+        Numbers are in the unit beside them, None where there is none.
         """
         summary = {
             entry.label: {
@@ -86,6 +86,7 @@ class Result:
         return {
             "diagram": self.diagram.name,
             "variant": self.diagram.variant,
+            "params": [str(file.path) for file in self.diagram.parameter_files],
             "hash": self.diagram.hash,
             "seed": self.diagram.seed,
             "passed": self.passed,
@@ -168,6 +169,7 @@ def _metadata(diagram: Diagram) -> dict[str, str]:
         "quadvis": __version__,
         "name": diagram.name,
         "variant": diagram.variant or "",
+        "params": ", ".join(str(file.path) for file in diagram.parameter_files),
         "seed": str(diagram.seed),
         "hash": diagram.hash,
         "start": datetime.now(UTC).isoformat(timespec="seconds"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -14,23 +14,20 @@ from typing import TYPE_CHECKING, Any
 from quadvis.catalogue import Catalogue
 from quadvis.diagram.build import Builder, Made
 from quadvis.diagram.check import WireCheck, rate_text
-from quadvis.diagram.expand import Expansion, Parts, Settings
+from quadvis.diagram.expand import Expansion, Parts
 from quadvis.diagram.loader import FileSpec, read_file, read_text
 from quadvis.diagram.observe import Observation, read_observation
+from quadvis.diagram.settings import Files, Given, ParameterFile, Settings, read_settings
 from quadvis.diagram.slots import Outputs, check_slots, fill_slots
 from quadvis.diagram.times import read_duration
-from quadvis.diagram.values import read_constant
 from quadvis.diagram.wiring import Wiring
-from quadvis.document import Node, Scalar, parse_yaml
-from quadvis.document import Sequence as List
+from quadvis.document import Scalar
 from quadvis.engine.graph import Graph, Wire
 from quadvis.errors import DiagramError, Fault, Faults, Place, quoted
 
 if TYPE_CHECKING:
     from quadvis.output.verdict import Entry, Outcome, Signals
     from quadvis.run import Progress, Result
-
-COMMAND_LINE = "--set"
 
 
 @dataclass(frozen=True)
@@ -45,6 +42,7 @@ class Diagram:
     seed: int
     observation: Observation
     listing: tuple[str, ...]  # the blocks in the order of the files
+    parameter_files: tuple[ParameterFile, ...] = ()
 
     @cached_property
     def resolved(self) -> str:
@@ -125,21 +123,24 @@ def load(
     path: str | Path,
     *,
     variant: str | None = None,
-    settings: Mapping[str, Any] | Sequence[str] = (),
+    settings: Given = (),
+    params: Files = (),
     stop_time: str | float | None = None,
     seed: int | None = None,
 ) -> Diagram:
     """Load and check a diagram; DiagramError tells all its faults at once.
 
     ``settings`` replace parameters: ``{"control/roll.bandwidth": "2.5 rad/s"}``, or texts
-    ``control/roll.bandwidth=2.5 rad/s``; a name without a dot is a parameter of the diagram. ``stop_time``
+    ``control/roll.bandwidth=2.5 rad/s``; a name without a dot is a parameter of the diagram. ``params`` are
+    parameter files, which hold such settings; they apply in their order, before ``settings``. ``stop_time``
     (s, or a text such as "20 s") and ``seed`` replace the diagram's.
     """
     faults = Faults()
     with _told_once(faults):
-        given = _settings(settings, faults)
+        given, files = read_settings(settings, params, faults)
         spec = read_file(Path(path), faults, part=False)
-        return _Assembly(spec, faults).diagram(variant, given, stop_time, seed)
+        diagram = _Assembly(spec, faults).diagram(variant, given, stop_time, seed)
+        return replace(diagram, parameter_files=files)
 
 
 def load_text(text: str, folder: str | Path = ".", name: str = "diagram.yaml") -> Diagram:
@@ -149,11 +150,11 @@ def load_text(text: str, folder: str | Path = ".", name: str = "diagram.yaml") -
         return _Assembly(read_text(text, Path(folder) / name, faults), faults).diagram()
 
 
-def check(path: str | Path, settings: Mapping[str, Any] | Sequence[str] = ()) -> Diagram:
+def check(path: str | Path, settings: Given = (), params: Files = ()) -> Diagram:
     """Load a diagram, and with each of its variants in turn; DiagramError tells the faults of all of them."""
     faults = Faults()
     with _told_once(faults):
-        given = _settings(settings, faults)
+        given, _ = read_settings(settings, params, faults)
         spec = read_file(Path(path), faults, part=False)
         assembly = _Assembly(spec, faults)
         diagram = assembly.diagram(settings=given)
@@ -224,52 +225,6 @@ class _Assembly:
         if changed and self._base is None:
             self._base = Wiring(Expansion(spec, self.catalogue, {}, self.parts, Faults()), Faults())
         return {slot: self._base.outputs(slot) for slot in changed if self._base is not None}
-
-
-def _settings(
-    settings: Mapping[str, Any] | Sequence[str], faults: Faults
-) -> dict[str, dict[str, Node | None]]:
-    """Return the replaced parameters by block ("" for the diagram's own) and name; None if it is told."""
-    if isinstance(settings, Mapping):
-        settings = [f"{name}={_text(value)}" for name, value in settings.items()]
-    found: dict[str, dict[str, Node | None]] = {}
-    for setting in settings:
-        name, _, text = (part.strip() for part in setting.partition("="))
-        path, _, parameter = name.rpartition(".")
-        with faults.about(f"'{name}'"):
-            if not text or not parameter:
-                remedy = "write block.parameter=value, such as control/roll.bandwidth='2 rad/s'"
-                faults.add(
-                    Place(COMMAND_LINE), "there is no value" if parameter else "there is no parameter", remedy
-                )
-                continue
-            node = faults.collect(_setting, text, parameter)
-            found.setdefault(path, {})[parameter] = read_constant(node, faults) if node is not None else None
-    return found
-
-
-def _setting(text: str, parameter: str) -> Node:
-    """Read a value of the command line. A file named there is relative to the working directory."""
-    try:
-        node = parse_yaml(text, COMMAND_LINE)
-    except DiagramError as error:
-        raise DiagramError(replace(fault, place=Place(COMMAND_LINE)) for fault in error.faults) from None
-    node.key = parameter
-    _without_place(node)
-    return node
-
-
-def _without_place(node: Node) -> None:
-    node.line = node.column = 0
-    for child in node if isinstance(node, List) else ():
-        _without_place(child)
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    tolist = getattr(value, "tolist", None)
-    return str(tolist() if tolist else value)
 
 
 def _stop_time(spec: FileSpec, given: str | float | None, faults: Faults) -> Fraction:

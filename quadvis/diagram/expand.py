@@ -11,14 +11,13 @@ from quadvis.block import Block
 from quadvis.catalogue import Catalogue, CatalogueError
 from quadvis.diagram.loader import BlockSpec, FileSpec, read_file
 from quadvis.diagram.names import absent, remedy_for
+from quadvis.diagram.settings import Settings
 from quadvis.diagram.values import substitute
 from quadvis.document import Node
 from quadvis.errors import DiagramError, Faults, Place, closest, suggestion
 
 MAX_BLOCKS = 5_000  # parts in parts multiply
 MAX_DEPTH = 30
-
-Settings = Mapping[str, Mapping[str, Node | None]]  # block path, "" for the diagram -> parameter -> value
 
 
 @dataclass
@@ -48,6 +47,7 @@ class FlatBlock:
     scope: Scope
     kind: type[Block] | None
     parameters: dict[str, Node]
+    places: Mapping[str, Place]  # of the names of the parameters
 
     @property
     def rate(self) -> tuple[str, Place] | None:
@@ -65,7 +65,7 @@ class FlatBlock:
 
     def place(self, parameter: str) -> Place:
         """Where a parameter is given its value."""
-        return self.spec.parameter_places.get(parameter, self.parameters[parameter].place)
+        return self.places[parameter]
 
 
 class Parts:
@@ -103,22 +103,23 @@ class Expansion:
 
     def _setting(self, path: str, name: str) -> Node | None:
         self._used.add((path, name))
-        return self.settings.get(path, {}).get(name)
+        setting = self.settings.get(path, {}).get(name)
+        return setting.value if setting is not None else None
 
     def _tell_unused(self) -> None:
         for path, values in self.settings.items():
             broken = any(path == other or path.startswith(f"{other}/") for other in self.unknown)
-            for name, node in values.items():
-                if (path, name) in self._used or broken or node is None:
+            for name, setting in values.items():
+                if (path, name) in self._used or broken or setting.value is None:
                     continue
                 if path:
                     inner = [known for known in self.blocks if known.endswith(f"/{path}")]
                     remedy = f"did you mean '{inner[0]}'?" if inner else suggestion(path, self.blocks)
-                    self.faults.add(node.place, f"there is no block '{path}'", remedy)
+                    self.faults.add(setting.place, f"there is no block '{path}'", remedy)
                 else:
                     remedy = suggestion(name, self.root.spec.params)
                     remedy = remedy or "a parameter of a block is set by 'block.parameter=value'"
-                    self.faults.add(node.place, f"the diagram has no parameter '{name}'", remedy)
+                    self.faults.add(setting.place, f"the diagram has no parameter '{name}'", remedy)
 
     def _expand(self, scope: Scope, files: tuple[str, ...]) -> None:
         scope.broken |= scope.spec.broken
@@ -141,7 +142,9 @@ class Expansion:
                 elif path in self.blocks:
                     self.faults.add(block.place, f"there is a block '{path}' already", "choose another name")
                 else:
-                    self.blocks[path] = FlatBlock(path, block, scope, self._find_kind(block, path), values)
+                    kind = self._find_kind(block, path)
+                    places = self._places(block, path)
+                    self.blocks[path] = FlatBlock(path, block, scope, kind, values, places)
 
     def _values(self, scope: Scope, block: BlockSpec, path: str) -> dict[str, Node]:
         """Return the parameters of a block or part."""
@@ -157,6 +160,11 @@ class Expansion:
             if value is not None:
                 values[name] = value
         return values
+
+    def _places(self, block: BlockSpec, path: str) -> Mapping[str, Place]:
+        """Return where the parameters of a block or part are given their values."""
+        settings = self.settings.get(path, {})
+        return block.parameter_places | {name: setting.place for name, setting in settings.items()}
 
     def _find_kind(self, block: BlockSpec, path: str) -> type[Block] | None:
         try:
@@ -175,11 +183,11 @@ class Expansion:
             scope.broken.add(block.name)
             self.unknown.add(scope.prefix + block.name)
             return
-        for name, node in values.items():
+        places = self._places(block, scope.prefix + block.name)
+        for name in values:
             if name not in spec.params:
-                place = block.parameter_places.get(name, node.place)
                 problem = f"part '{block.kind}' has no parameter '{name}'"
-                self.faults.add(place, problem, remedy_for(name, values, spec.params))
+                self.faults.add(places[name], problem, remedy_for(name, values, spec.params))
         inputs = block.inputs or {}
         for name, given in inputs.items():
             if name not in spec.inputs:

@@ -118,12 +118,23 @@ def _read(path: Path, node: Node | None, faults: Faults, part: bool) -> FileSpec
     return spec
 
 
-def _is_ours(root: Mapping, faults: Faults, part: bool) -> bool:
-    """Tell a file of another version or of the other kind in one sentence, not by all that is odd in it."""
+def is_version(root: Mapping, faults: Faults) -> bool:
+    """Tell a file of another version in one sentence, not by all that is odd in it."""
     version = root.get("quadvis")
     if version is not None and faults.collect(version.integer) not in (VERSION, None):
         remedy = f"this quadvis reads version {VERSION}"
         faults.add(version.place, f"the file is of version {version.to_python()}", remedy)
+        return False
+    return True
+
+
+def _is_ours(root: Mapping, faults: Faults, part: bool) -> bool:
+    """Tell a file of another version or of another kind in one sentence."""
+    if not is_version(root, faults):
+        return False
+    if "set" in root and "blocks" not in root:
+        problem = "this is a parameter file, since it has 'set'"
+        faults.add(root.keys["set"].place, problem, "give the diagram, and this file with --params")
         return False
     if not part and "ports" in root:
         problem = "this is a part of a diagram, since it has 'ports'"

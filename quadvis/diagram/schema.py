@@ -1,6 +1,7 @@
-"""The JSON schema of diagrams and parts, made from the declarations: completion, hover and checks in editors.
+"""The JSON schema of diagrams, parts and parameter files: completion, hover and checks in editors.
 
-An editor checks the form as one types; `quadvis check` knows more: units, shapes, rates, loops.
+It is made from the declarations. An editor checks the form as one types; `quadvis check` knows more: units,
+shapes, rates, loops.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from quadvis.diagram.loader import (
     WIRE_KEYS,
 )
 from quadvis.diagram.observe import LOG_KEYS, STRETCH_KEYS, SUMMARY_KEYS
+from quadvis.diagram.settings import PARAMETERS_KEYS, PARAMETERS_REQUIRED
 from quadvis.diagram.times import RATE_KEYS
 from quadvis.diagram.values import QUANTITY_KEYS
 from quadvis.engine.graph import CROSSINGS, SOLVERS
@@ -37,6 +39,7 @@ TEXT: Schema = {"type": ["string", "number", "boolean"]}  # any scalar is a text
 QUANTITY: Schema = {"type": ["string", "number"]}
 CONSTANT: Schema = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": r"^[-+.$\d]"}]}
 NAME: Schema = {"pattern": "^[A-Za-z_][A-Za-z0-9_/]*$"}
+SETTING: Schema = {"pattern": r"^([A-Za-z_][A-Za-z0-9_/]*\.)?[A-Za-z_][A-Za-z0-9_]*$"}
 LIBRARY_BLOCK: Schema = {
     "type": "string",
     "pattern": "^[a-z][a-z0-9_]*:",
@@ -45,16 +48,20 @@ LIBRARY_BLOCK: Schema = {
 
 
 def diagram_schema(catalogue: Catalogue) -> Schema:
-    """Return the schema of diagrams and parts, with the ports and parameters of the catalogue's blocks."""
+    """Return the schema of all files, with the ports and parameters of the catalogue's blocks."""
     blocks = {name: catalogue.find(name) for name in catalogue.names()}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "quadvis diagram",
         "type": "object",
-        "required": list(REQUIRED_KEYS),
-        "if": {"required": ["ports"]},
-        "then": _closed((*REQUIRED_KEYS, *PART_KEYS), _top()),
-        "else": _closed((*REQUIRED_KEYS, *DIAGRAM_KEYS), _top()),
+        "if": {"required": ["set"]},
+        "then": _closed((*PARAMETERS_REQUIRED, *PARAMETERS_KEYS), _top(), PARAMETERS_REQUIRED),
+        "else": {
+            "required": list(REQUIRED_KEYS),
+            "if": {"required": ["ports"]},
+            "then": _closed((*REQUIRED_KEYS, *PART_KEYS), _top()),
+            "else": _closed((*REQUIRED_KEYS, *DIAGRAM_KEYS), _top()),
+        },
         "$defs": _definitions(blocks),
     }
 
@@ -112,6 +119,11 @@ def _top() -> dict[str, Schema]:
             "description": "lines of the summary by their labels",
         },
         "figures": _list_of(_ref("figure"), "what `quadvis plot` draws"),
+        "set": {
+            **_map_of(_ref("value"), "values of parameters, by block.parameter or by the diagram's names"),
+            "propertyNames": SETTING,
+        },
+        "base": {**TEXT, "description": "parameter file that this one builds on, relative to this file"},
     }  # fmt: skip
 
 

@@ -19,6 +19,7 @@ def faults(case: Case, folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[Fa
     monkeypatch.chdir(folder)
     parser = argparse.ArgumentParser()
     parser.add_argument("--set", action="append", default=[])
+    parser.add_argument("--params", action="append", default=[])
     parser.add_argument("--variant")
     parser.add_argument("--stop-time")
     parser.add_argument("--seed", type=int)
@@ -30,11 +31,12 @@ def faults(case: Case, folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[Fa
                 "case.yaml",
                 variant=options.variant,
                 settings=settings,
+                params=options.params,
                 stop_time=options.stop_time,
                 seed=options.seed,
             )
         else:
-            check("case.yaml", settings)
+            check("case.yaml", settings, options.params)
     except DiagramError as error:
         return error.faults
     return []

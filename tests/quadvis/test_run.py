@@ -113,8 +113,8 @@ def test_the_facts_are_plain_json_with_null_for_what_is_not_there() -> None:
     result = ramp(JUDGED).run()
     facts = json.loads(json.dumps(result.facts(), allow_nan=False))
     assert set(facts) == {
-        "diagram", "variant", "hash", "seed", "passed", "duration_s", "wall_s", "cpu_s", "real_time_factor",
-        "summary", "expect",
+        "diagram", "variant", "params", "hash", "seed", "passed", "duration_s", "wall_s", "cpu_s",
+        "real_time_factor", "summary", "expect",
     }  # fmt: skip
     assert (facts["diagram"], facts["variant"], facts["seed"], facts["passed"]) == ("ramp", None, 5, False)
     assert facts["duration_s"] == 2.0

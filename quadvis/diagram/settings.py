@@ -1,0 +1,171 @@
+"""Parameters replaced from outside the diagram: by settings of the command line, and by parameter files.
+
+A parameter file keeps settings under a name of their own, and may build on another:
+
+    quadvis: 1
+    name: S1
+    doc: S0, and an IMU that is not level
+    base: s0.yaml                                        # applied first; relative to this file
+    set:
+      imu.angle_bias: {value: [0.5, -0.5], unit: deg}    # block.parameter
+      bandwidth: 1 rad/s                                 # a parameter of the diagram
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from quadvis import document as yaml
+from quadvis.diagram.loader import is_version
+from quadvis.diagram.values import read_constant
+from quadvis.document import Node, parse_yaml, read_yaml
+from quadvis.errors import DiagramError, Faults, Place, closest
+
+COMMAND_LINE = "--set"
+PARAMETERS_REQUIRED = ("quadvis", "name", "set")
+PARAMETERS_KEYS = ("doc", "base")
+MAX_DEPTH = 30  # of files that build on files
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A value given from outside, and where its name stands; None: what is wrong with it has been told."""
+
+    place: Place
+    value: Node | None
+
+
+@dataclass(frozen=True)
+class ParameterFile:
+    """A file of settings that a diagram was loaded with."""
+
+    name: str
+    path: Path
+
+
+Settings = Mapping[str, Mapping[str, Setting]]  # block path, "" for the diagram -> parameter -> setting
+Files = Sequence[str | os.PathLike[str]] | str | os.PathLike[str]
+Given = Mapping[str, Any] | Sequence[str]
+
+
+def read_settings(given: Given, params: Files, faults: Faults) -> tuple[Settings, tuple[ParameterFile, ...]]:
+    """Return what is replaced, by block ("" for the diagram's own parameters) and name, and the files read.
+
+    The files apply in their order, then ``given``: the last value of a parameter counts.
+    """
+    paths = [params] if isinstance(params, str | os.PathLike) else params
+    found: dict[str, dict[str, Setting]] = {}
+    files = []
+    for path in map(Path, paths):
+        name = _read_file(path, (), found, faults)
+        files.append(ParameterFile(name or path.stem, path))
+    for path_and_name, setting in _command_line(given, faults):
+        _put(found, path_and_name, setting)
+    return found, tuple(files)
+
+
+def _put(found: dict[str, dict[str, Setting]], name: str, setting: Setting) -> None:
+    path, _, parameter = name.rpartition(".")
+    found.setdefault(path, {})[parameter] = setting
+
+
+def _read_file(
+    path: Path, users: tuple[str, ...], found: dict[str, dict[str, Setting]], faults: Faults
+) -> str | None:
+    """Add the settings of a file, after those of the file that it builds on; return its name."""
+    node = faults.collect(read_yaml, path, faults)
+    root = faults.collect(node.mapping) if node is not None else None
+    if root is None or not is_version(root, faults) or not _is_parameters(root, faults):
+        return None
+    faults.collect(root.fields, PARAMETERS_REQUIRED, PARAMETERS_KEYS, faults)
+    texts = {key: faults.collect(root[key].text) for key in ("name", "doc", "base") if key in root}
+    base = texts.get("base")
+    if base is not None:
+        inner = path.parent / base
+        problem, remedy = _wrong_base(inner, base, (*users, os.path.realpath(path)))
+        if problem:
+            faults.add(root["base"].place, problem, remedy)
+        else:
+            _read_file(inner, (*users, os.path.realpath(path)), found, faults)
+    settings = faults.collect(root["set"].mapping) if "set" in root else None
+    for key, value in settings.pairs() if settings is not None else ():
+        with faults.about(f"'{key.value}'"):
+            if not key.value.rpartition(".")[2]:
+                remedy = "write block.parameter, or the name of a parameter of the diagram"
+                faults.add(key.place, "this cannot name a parameter", remedy)
+            else:
+                _put(found, key.value, Setting(key.place, read_constant(value, faults)))
+    return texts.get("name")
+
+
+def _is_parameters(root: yaml.Mapping, faults: Faults) -> bool:
+    """Tell a diagram or a part in one sentence, not by all that is odd in it."""
+    if "set" in root or "blocks" not in root:
+        return True
+    problem = "this is a diagram or a part of one, since it has 'blocks'"
+    faults.add(root.keys["blocks"].place, problem, "give a file with 'set: {block.parameter: value}'")
+    return False
+
+
+def _wrong_base(path: Path, text: str, users: tuple[str, ...]) -> tuple[str, str]:
+    """Return what is wrong with the file that another builds on, and what would be right."""
+    if os.path.realpath(path) in users:
+        return f"'{text}' builds on itself", "name another file, or leave 'base' out"
+    if len(users) > MAX_DEPTH:
+        return f"files build on files more than {MAX_DEPTH} deep", "write their values into one"
+    if not path.is_file():
+        try:
+            others = sorted(name for name in os.listdir(path.parent) if name.endswith((".yaml", ".yml")))
+        except OSError:
+            others = []
+        near = closest(path.name, others[:1000])
+        remedy = f"did you mean '{near}'?" if near else "a path is relative to the file in which it stands"
+        return f"there is no file '{text}'", remedy
+    return "", ""
+
+
+def _command_line(given: Given, faults: Faults) -> Iterator[tuple[str, Setting]]:
+    """Yield the names and values of ``block.parameter=value``; what is wrong with them is told."""
+    texts: Iterable[str] = given
+    if isinstance(given, Mapping):
+        texts = [f"{name}={_text(value)}" for name, value in given.items()]
+    place = Place(COMMAND_LINE)
+    for setting in texts:
+        name, _, text = (part.strip() for part in setting.partition("="))
+        parameter = name.rpartition(".")[2]
+        with faults.about(f"'{name}'"):
+            if not text or not parameter:
+                problem = "there is no value" if parameter else "there is no parameter"
+                remedy = "write block.parameter=value, such as control/roll.bandwidth='2 rad/s'"
+                faults.add(place, problem, remedy)
+                continue
+            node = faults.collect(_value, text, parameter)
+            yield name, Setting(place, read_constant(node, faults) if node is not None else None)
+
+
+def _value(text: str, parameter: str) -> Node:
+    """Read a value of the command line. A file named there is relative to the working directory."""
+    try:
+        node = parse_yaml(text, COMMAND_LINE)
+    except DiagramError as error:
+        raise DiagramError(replace(fault, place=Place(COMMAND_LINE)) for fault in error.faults) from None
+    node.key = parameter
+    _without_place(node)
+    return node
+
+
+def _without_place(node: Node) -> None:
+    node.line = node.column = 0
+    for child in node if isinstance(node, yaml.Sequence) else ():
+        _without_place(child)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    tolist = getattr(value, "tolist", None)
+    return str(tolist() if tolist else value)
