@@ -25,6 +25,14 @@ expect: [{expectation, signal, kind, unit, limit, found, met}].
 Numbers are in the unit beside them, null where there is none.
 Exit code: 0 all expectations met, 1 one is not or the run stopped, 2 bad input, 130 interrupted."""
 
+SWEEP_HELP = """\
+With several --over all combinations are run, the last one changing fastest. A name is that of a parameter as
+for --set, or seed, variant, params (files); 'none' stands for no variant and no file. A range is 0..29, or
+with a step 1..3 step 0.5 rad/s. The table has the axes, the numbers of summary and expectations with their
+units, passed, failure (why a run stopped) and the hash of the diagram; it does not depend on the number of
+processes. Wall times do, so they stand in it only with --timings.
+Exit code: 0 all runs passed, 1 one did not, 2 bad input, 130 interrupted (what is done is in the table)."""
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code: 0 ok, 1 a run failed or missed what it should, 2 bad input."""
@@ -41,8 +49,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except QuadvisError as error:
         print(error, *getattr(error, "__notes__", ()), sep="\n", file=sys.stderr)
         return error.exit_code
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
+    except KeyboardInterrupt as error:
+        print("interrupted", *getattr(error, "__notes__", ()), sep="\n", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
         # The reader of the pipe has gone; Python would complain about what is still to be written.
@@ -77,6 +85,7 @@ def _parser() -> argparse.ArgumentParser:
         "--log", metavar="PATH", help="where to write the log; default runs/NAME.mcap, '' for none"
     )
     run.add_argument("--json", action="store_true", help="print one JSON object instead of the summary")
+    _sweep_options(add("sweep", _sweep, "run a diagram at every point of a grid", SWEEP_HELP))
     check = add("check", _check, "check a diagram and tell all its faults")
     _diagram_options(check)
     check.add_argument("--json", action="store_true", help="print the faults as JSON")
@@ -102,10 +111,35 @@ def _parser() -> argparse.ArgumentParser:
 def _diagram_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="the diagram")
     parser.add_argument("--variant", metavar="V", help="one of the diagram's variants")
+    _setting_options(parser)
+
+
+def _setting_options(parser: argparse.ArgumentParser) -> None:
     words = "file of such settings, which apply before --set; repeat it for more, applied in their order"
     parser.add_argument("--params", action="append", default=[], metavar="FILE", help=words)
     words = "replace a parameter, such as control/roll.bandwidth='2 rad/s'; repeat it for more"
     parser.add_argument("--set", action="append", default=[], metavar="BLOCK.PARAM=VALUE", help=words)
+
+
+def _sweep_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE", help="the diagram")
+    words = (
+        "seed=0..29, craft.lag='20 ms,50 ms', bandwidth='1..3 step 0.5 rad/s', variant=A,B; repeat for more"
+    )
+    parser.add_argument("--over", action="append", default=[], metavar="NAME=VALUES", help=words)
+    words = "one of the diagram's variants; several are swept over"
+    parser.add_argument("--variant", action="append", default=[], metavar="V", help=words)
+    _setting_options(parser)
+    parser.add_argument("--stop-time", metavar="T", help="such as '20 s'; replaces the diagram's")
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of every run; replaces the diagram's")
+    parser.add_argument("--workers", type=int, metavar="N", help="processes; default: one per processor")
+    words = "the table, .csv or .parquet; default runs/NAME-sweep.csv"
+    parser.add_argument("--output", "-o", metavar="TABLE", help=words)
+    words = "picture of the summary; default: beside the table, '' for none"
+    parser.add_argument("--plot", metavar="PNG", help=words)
+    parser.add_argument("--logs", metavar="FOLDER", help="write a log of every run; default: none")
+    parser.add_argument("--resume", action="store_true", help="keep the runs that the table has already")
+    parser.add_argument("--timings", action="store_true", help="add the wall time of each run to the table")
 
 
 def _load(options: argparse.Namespace, **more: Any) -> Any:
@@ -138,6 +172,32 @@ def _run(options: argparse.Namespace) -> int:
     return 0 if result.passed else FAILED
 
 
+def _sweep(options: argparse.Namespace) -> int:
+    from quadvis.sweeps.summary import SweepLine, sweep_lines
+    from quadvis.sweeps.sweep import sweep
+
+    several = len(options.variant) > 1
+    over = [f"variant={','.join(options.variant)}"] * several + options.over
+    table_path = Path(options.output or _runs_folder("table", "-o") / f"{Path(options.file).stem}-sweep.csv")
+    plot = table_path.with_suffix(".png") if options.plot is None else Path(options.plot)
+    if options.plot and plot.suffix != ".png":
+        raise QuadvisError(f"cannot write the plot '{plot}': its name must end in .png")
+    gc.enable()
+    with SweepLine() as progress:
+        table = sweep(
+            options.file, over, variant=None if several else next(iter(options.variant), None),
+            settings=options.set, params=options.params, stop_time=options.stop_time, seed=options.seed,
+            workers=options.workers, output=table_path, timings=options.timings, resume=options.resume,
+            logs=options.logs, progress=progress,
+        )  # fmt: skip
+    print("\n".join(sweep_lines(table, _width())))
+    print(f"table: {table_path}")
+    if options.plot != "":
+        table.plot(plot)
+        print(f"plot: {plot}")
+    return 0 if table.passed else FAILED
+
+
 def _log_path(given: str | None, diagram: Any) -> Path | None:
     """Return where the log goes: where it is wanted, or in a folder that is made for it."""
     if given is not None:
@@ -149,14 +209,18 @@ def _log_path(given: str | None, diagram: Any) -> Path | None:
         return path if given else None
     sets = (file.name for file in diagram.parameter_files)
     name = "-".join(filter(None, (diagram.name, diagram.variant, *sets)))
-    path = Path("runs") / f"{re.sub(r'[^A-Za-z0-9_.-]+', '-', name).strip('-.') or 'run'}.mcap"
+    file = f"{re.sub(r'[^A-Za-z0-9_.-]+', '-', name).strip('-.') or 'run'}.mcap"
+    return _runs_folder("log", "--log") / file
+
+
+def _runs_folder(what: str, option: str) -> Path:
+    """Return the folder for what a command leaves behind unless an option names another place."""
+    path = Path("runs")
     try:
-        path.parent.mkdir(exist_ok=True)
+        path.mkdir(exist_ok=True)
     except OSError as error:
-        problem = (
-            f"cannot make the folder '{path.parent}' for the log: {(error.strerror or str(error)).lower()}"
-        )
-        raise QuadvisError(f"{problem}; name another place with --log") from error
+        problem = f"cannot make the folder '{path}' for the {what}: {(error.strerror or str(error)).lower()}"
+        raise QuadvisError(f"{problem}; name another place with {option}") from error
     return path
 
 

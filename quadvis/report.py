@@ -11,26 +11,27 @@ from quadvis.output.verdict import Entry, Outcome, Verdict
 from quadvis.run import Result
 
 
-class ProgressLine:
-    """One line on standard error that is rewritten while a run goes on; nothing where no one watches."""
+class StatusLine:
+    """One line on standard error that is rewritten while something goes on; nothing where no one watches."""
 
-    def __init__(self, duration: float, stream: TextIO | None = None) -> None:
+    def __init__(self, stream: TextIO | None = None) -> None:
         self.stream = stream or sys.stderr
-        self.duration = duration
         self.shown = self.stream.isatty()
 
     def __enter__(self) -> Self:
         return self
 
-    def __call__(self, time: float, wall: float) -> None:
-        """Show the simulated time reached and how fast it goes."""
+    def show(self, text: str) -> None:
+        """Put a text in place of the one before."""
         if self.shown:
-            filled = int(24 * min(1.0, time / self.duration)) if self.duration else 24
-            bar = "#" * filled + "." * (24 - filled)
-            self.stream.write(
-                f"\r[{bar}] {time:6.1f} / {self.duration:g} s  {time / max(wall, 1e-9):.0f} x real time "
-            )
+            self.stream.write(f"\r\x1b[K{text} ")
             self.stream.flush()
+
+    @staticmethod
+    def bar(part: float) -> str:
+        """Return a bar that is filled up to a part of 0 to 1."""
+        filled = int(24 * min(1.0, part))
+        return f"[{'#' * filled}{'.' * (24 - filled)}]"
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -38,6 +39,19 @@ class ProgressLine:
         if self.shown:
             self.stream.write("\r\x1b[K")
             self.stream.flush()
+
+
+class ProgressLine(StatusLine):
+    """How far a run of so many seconds is, and how fast it goes."""
+
+    def __init__(self, duration: float, stream: TextIO | None = None) -> None:
+        super().__init__(stream)
+        self.duration = duration
+
+    def __call__(self, time: float, wall: float) -> None:
+        """Show the simulated time reached and how fast it goes."""
+        bar = self.bar(time / self.duration if self.duration else 1.0)
+        self.show(f"{bar} {time:6.1f} / {self.duration:g} s  {time / max(wall, 1e-9):.0f} x real time")
 
 
 def summary_lines(result: Result) -> list[str]:

@@ -132,7 +132,7 @@ def _command_line(given: Given, faults: Faults) -> Iterator[tuple[str, Setting]]
     """Yield the names and values of ``block.parameter=value``; what is wrong with them is told."""
     texts: Iterable[str] = given
     if isinstance(given, Mapping):
-        texts = [f"{name}={_text(value)}" for name, value in given.items()]
+        texts = [f"{name}={value_text(value)}" for name, value in given.items()]
     place = Place(COMMAND_LINE)
     for setting in texts:
         name, _, text = (part.strip() for part in setting.partition("="))
@@ -164,7 +164,8 @@ def _without_place(node: Node) -> None:
         _without_place(child)
 
 
-def _text(value: Any) -> str:
+def value_text(value: Any) -> str:
+    """Return a Python value as the command line writes it."""
     if isinstance(value, bool):
         return str(value).lower()
     tolist = getattr(value, "tolist", None)

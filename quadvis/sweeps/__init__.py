@@ -1,0 +1,1 @@
+"""Many runs of one diagram: the grid, the processes, the table and its summary."""

@@ -1,0 +1,81 @@
+"""The picture of a sweep: the first axis goes across, the other ones are told apart by colour."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.output.strips import Cloud, StripPanel, Strips, draw_strips
+from quadvis.sweeps.axes import SEED, Axis
+from quadvis.sweeps.summary import extent, shown_quantities
+from quadvis.sweeps.table import FAILURE, PASSED, Table
+from quadvis.sweeps.worker import Quantity
+
+Rows = list[list[NDArray[np.intp]]]  # by series, then by place
+
+
+def draw(table: Table, path: Path) -> None:
+    """Draw the numbers that people look at; QuadvisError if the file cannot be written."""
+    others = [axis for axis in table.axes if axis.name != SEED]
+    across = max(others, key=lambda axis: len(axis.values), default=None)
+    number = others.index(across) if across else 0
+    groups = table.groups()
+    series: list[tuple[int, ...]] = [()]
+    if across:
+        series = sorted({point[:number] + point[number + 1 :] for point, _ in groups})
+    rows: Rows = [[np.zeros(0, np.intp)] * (len(across.values) if across else 1) for _ in series]
+    for point, found in groups:
+        rows[series.index(point[:number] + point[number + 1 :])][point[number] if across else 0] = found
+    shown, same = _sorted_out(table)
+    rest = [axis for axis in others if axis is not across]
+    draw_strips(
+        Strips(
+            title=table.name,
+            subtitle=_subtitle(table, len(groups)),
+            axis=across.column if across else "",
+            places=_places(across) if across else ["all runs"],
+            series=[_label(rest, point) for point in series],
+            legend=", ".join(axis.name for axis in rest),
+            panels=[_panel(table, quantity, rows) for quantity in shown],
+            note=f"the same in all runs: {', '.join(same)}" if same else "",
+        ),
+        path,
+    )
+
+
+def _sorted_out(table: Table) -> tuple[list[Quantity], list[str]]:
+    """Return the numbers that differ between runs, and in words those that do not."""
+    varied, same = [], []
+    for quantity in shown_quantities(table):
+        values = table[quantity.column]
+        if len(values) > 1 and np.isfinite(values).all() and not np.ptp(values):
+            same.append(f"{quantity.label} {values[0]:.4g} {quantity.unit}".rstrip())
+        else:
+            varied.append(quantity)
+    return (varied, same) if varied else (shown_quantities(table), [])
+
+
+def _places(axis: Axis) -> list[str]:
+    """Return the labels along an axis; its unit stands in its title."""
+    if axis.numbers:
+        return [f"{number:g}" for number in axis.numbers]
+    return [axis.label(index) for index in range(len(axis.values))]
+
+
+def _label(axes: Sequence[Axis], point: Sequence[int]) -> str:
+    return ", ".join(axis.label(index) for axis, index in zip(axes, point, strict=True))
+
+
+def _subtitle(table: Table, points: int) -> str:
+    passed, stopped = int(np.count_nonzero(table[PASSED])), int(np.count_nonzero(table[FAILURE] != ""))
+    words = f"{extent(table, points)}: {passed} of {table.runs} runs passed"
+    return f"{words}, {stopped} stopped with an error" if stopped else words
+
+
+def _panel(table: Table, quantity: Quantity, rows: Rows) -> StripPanel:
+    values, passed = table[quantity.column], table[PASSED]
+    clouds = [[Cloud(values[found], passed[found]) for found in places] for places in rows]
+    return StripPanel(quantity.label, quantity.unit, clouds, quantity.limit)

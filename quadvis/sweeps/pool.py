@@ -1,0 +1,86 @@
+"""The processes of a sweep: started, fed, ended with the sweep however it ends.
+
+Workers are spawned: each begins as a fresh interpreter, so nothing of the first process (locks, threads of
+OpenCV, a diagram that was run before) leaks into a run, and the limits on threads stand before numpy is
+imported. A fork server would start them some 0.2 s earlier, but with what it had imported and set before.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Generator, Iterator, Sequence, Set
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
+from multiprocessing.process import BaseProcess
+from types import ModuleType
+
+from quadvis.errors import RunError
+from quadvis.sweeps.worker import ONE_THREAD, Job, Row, begin, perform
+
+
+def processors() -> int:
+    """Return how many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def perform_all(jobs: Sequence[Job], workers: int, known: Set[str]) -> Generator[Row, None, None]:
+    """Yield the rows as they come; closing the iterator ends the workers at once.
+
+    RunError if a worker is killed.
+    """
+    if not jobs:
+        return
+    before = set(multiprocessing.active_children())
+    executor = ProcessPoolExecutor(
+        min(workers, len(jobs)), multiprocessing.get_context("spawn"), initializer=begin, initargs=(known,)
+    )
+    children: set[BaseProcess] = set()
+    finished = False
+    try:
+        with _launching():
+            futures = [executor.submit(perform, job) for job in jobs]  # this starts the processes
+        children = set(multiprocessing.active_children()) - before
+        for future in as_completed(futures):
+            yield future.result()
+        finished = True
+    except BrokenProcessPool:
+        problem = "a worker process was killed, perhaps by the system for lack of memory"
+        raise RunError(f"{problem}; try fewer with --workers") from None
+    finally:
+        executor.shutdown(wait=finished, cancel_futures=True)
+        for child in children if not finished else ():
+            child.kill()
+        for child in children:
+            child.join()
+
+
+@contextmanager
+def _launching() -> Iterator[None]:
+    """Let processes begin with one thread for each library, deaf to Ctrl-C, and without the main script.
+
+    The workers need nothing of the script, which then works without `if __name__ == "__main__":`.
+    """
+    environment = {name: os.environ.get(name) for name in ONE_THREAD}
+    main = sys.modules["__main__"]
+    handler = None
+    os.environ.update(ONE_THREAD)
+    sys.modules["__main__"] = ModuleType("__main__")
+    with suppress(ValueError):  # signals belong to the main thread
+        handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        if handler is not None:
+            signal.signal(signal.SIGINT, handler)
+        sys.modules["__main__"] = main
+        for name, value in environment.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value

@@ -1,0 +1,196 @@
+"""Many runs of one diagram in parallel processes: one table that depends on nothing but the diagram."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from quadvis.diagram.settings import Files, Given, value_text
+from quadvis.errors import QuadvisError, quoted
+from quadvis.sweeps.axes import SEED, VARIANT, Axis, Over, points, read_axes
+from quadvis.sweeps.plan import Plan
+from quadvis.sweeps.pool import perform_all, processors
+from quadvis.sweeps.table import FAILURE, HASH, PASSED, WALL, Table, checked_kind, read_rows
+from quadvis.sweeps.worker import Configuration, Quantity, Row, quantities
+
+SAVE = 30.0  # s between two writings of what is finished
+
+Progress = Callable[[int, int, int], None]  # runs finished, runs in all, runs that did not pass
+
+
+def sweep(
+    path: str | Path,
+    over: Over,
+    *,
+    variant: str | None = None,
+    settings: Given = (),
+    params: Files = (),
+    stop_time: str | float | None = None,
+    seed: int | None = None,
+    workers: int | None = None,
+    output: str | Path | None = None,
+    timings: bool = False,
+    resume: bool = False,
+    logs: str | Path | None = None,
+    progress: Progress | None = None,
+) -> Table:
+    """Run a diagram at every point of a grid, and return what the runs gave as a table.
+
+    ``over`` maps what differs between the runs to its values: ``{"seed": range(30), "craft.lag": ["20 ms",
+    "50 ms"], "bandwidth": "1..3 step 0.5 rad/s"}``, or texts ``seed=0..29``. A name is that of a parameter
+    as in ``settings``, or ``seed``, ``variant``, ``params``; with several, all combinations are run, the last
+    one changing fastest. The other arguments are those of `quadvis.load`, for every run.
+
+    ``workers`` processes share the runs (as many as there are processors); the table is the same to the bit
+    for any number of them. It is written to ``output`` (.csv or .parquet), and what is finished also when the
+    sweep is interrupted or a worker is killed (RunError). ``resume`` takes what that file has for diagrams
+    of the same hash, and runs the rest. ``logs`` is a folder for a log of every run.
+
+    A run that stops with an error is a row that says so. QuadvisError if a value does not fit the diagram.
+    """
+    axes = read_axes(over)
+    _refuse_conflicts(axes, variant, settings, seed)
+    given = (str(path), variant, _texts(settings), _paths(params), stop_time)
+    grid = points(axes)
+    plan = Plan(axes, grid, Configuration(*given), seed)
+    diagram = plan.check()
+    target = Path(output) if output else None
+    if target is not None:
+        checked_kind(target)
+    found = quantities(diagram)
+    earlier = _earlier(target, found) if resume and target is not None and target.is_file() else {}
+    folder = _folder(logs)
+    collection = _Collection(diagram.name, axes, grid, found, earlier)
+    began = time.monotonic()
+    rows = perform_all(list(plan.jobs(folder)), _workers(workers), frozenset(earlier))
+    try:
+        with closing(rows):
+            for row in rows:
+                collection.add(row)
+                if progress:
+                    progress(len(collection.rows), len(grid), collection.failed)
+                if target is not None and time.monotonic() - began > SAVE:
+                    collection.table().save(target, timings=timings)
+                    began = time.monotonic()
+    except BaseException as error:
+        if target is not None and collection.rows:
+            collection.table().save(target, timings=timings)
+            error.add_note(
+                f"{len(collection.rows)} of {len(grid)} runs are in {target}; --resume does the rest"
+            )
+        raise
+    table = collection.table()
+    if target is not None:
+        table.save(target, timings=timings)
+    return table
+
+
+def _texts(settings: Given) -> tuple[str, ...]:
+    if isinstance(settings, Mapping):
+        return tuple(f"{name}={value_text(value)}" for name, value in settings.items())
+    return tuple(settings)
+
+
+def _paths(params: Files) -> tuple[str, ...]:
+    return (str(params),) if isinstance(params, str | os.PathLike) else tuple(map(str, params))
+
+
+def _workers(given: int | None) -> int:
+    if given is not None and given < 1:
+        raise QuadvisError(f"{given} worker processes cannot do anything; give 1 or more")
+    return given or processors()
+
+
+def _folder(logs: str | Path | None) -> Path | None:
+    if not logs:
+        return None
+    try:
+        Path(logs).mkdir(exist_ok=True)
+    except OSError as error:
+        raise QuadvisError(f"cannot make the folder '{logs}' for the logs: {error.strerror}") from error
+    return Path(logs)
+
+
+def _refuse_conflicts(axes: Sequence[Axis], variant: str | None, settings: Given, seed: int | None) -> None:
+    """Refuse what is swept over and given a value as well; an axis of parameter files adds to those given."""
+    names = {text.partition("=")[0].strip() for text in _texts(settings)}
+    names |= {SEED} if seed is not None else set()
+    names |= {VARIANT} if variant is not None else set()
+    for axis in axes:
+        if axis.name in names:
+            raise QuadvisError(f"'{axis.name}' is swept over and given a value as well; keep one of them")
+
+
+def _earlier(path: Path, quantities: Sequence[Quantity]) -> dict[str, Row]:
+    """Return the runs of an earlier table by hash; those that stopped with an error are done again."""
+    found = {}
+    for cells in read_rows(path):
+        names = (HASH, FAILURE, PASSED, *(quantity.column for quantity in quantities))
+        if any(name not in cells for name in names):
+            problem = f"cannot go on with '{path}': it is not a table of this sweep"
+            raise QuadvisError(f"{problem}; leave --resume out to begin anew")
+        if not cells[FAILURE]:
+            numbers = tuple(_number(cells[quantity.column]) for quantity in quantities)
+            units = tuple(quantity.unit for quantity in quantities)
+            passed = cells[PASSED] in (True, "true")
+            wall = _number(cells.get(WALL))
+            found[cells[HASH]] = Row(0, cells[HASH], units, numbers, passed, wall=wall)
+    return found
+
+
+def _number(cell: Any) -> float:
+    try:
+        return float(cell) if cell not in (None, "") else math.nan
+    except ValueError:
+        raise QuadvisError(f"the table holds {quoted(cell)} in place of a number") from None
+
+
+class _Collection:
+    """The rows that there are so far, and the table of them in the order of the grid."""
+
+    def __init__(
+        self,
+        name: str,
+        axes: Sequence[Axis],
+        grid: Sequence[tuple[int, ...]],
+        quantities: Sequence[Quantity],
+        earlier: Mapping[str, Row],
+    ) -> None:
+        self.name, self.axes, self.grid, self.quantities = name, axes, grid, quantities
+        self.earlier = earlier
+        self.units = tuple(quantity.unit for quantity in quantities)
+        self.rows: dict[int, Row] = {}
+        self.failed = 0
+
+    def add(self, row: Row) -> None:
+        """Take what a worker has done, or found to be done."""
+        if row.known:
+            row = replace(self.earlier[row.hash], index=row.index)
+        elif not row.failure and row.units != self.units:
+            row = Row(row.index, row.hash, failure="its numbers have other units than those of the first run")
+        self.rows[row.index] = row
+        self.failed += not row.passed
+
+    def table(self) -> Table:
+        """Return the table of the rows that are there."""
+        rows = [self.rows[index] for index in sorted(self.rows)]
+        indices = np.array([self.grid[row.index] for row in rows], np.int64).reshape(-1, len(self.axes))
+        columns = {
+            axis.column: axis.cells(indices[:, number].tolist()) for number, axis in enumerate(self.axes)
+        }
+        missing = (math.nan,) * len(self.quantities)
+        numbers = np.array([row.numbers or missing for row in rows]).reshape(len(rows), -1)
+        columns |= {quantity.column: numbers[:, number] for number, quantity in enumerate(self.quantities)}
+        columns[PASSED] = np.array([row.passed for row in rows], np.bool_)
+        columns[FAILURE] = np.array([row.failure for row in rows], np.str_)
+        columns[HASH] = np.array([row.hash for row in rows], np.str_)
+        wall = np.array([row.wall for row in rows], np.float64)
+        return Table(self.name, self.axes, self.quantities, indices, columns, wall)

@@ -1,0 +1,162 @@
+"""The table of a sweep: columns in memory, and files that other tools read, written whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.errors import QuadvisError
+from quadvis.sweeps.axes import SEED, Axis
+from quadvis.sweeps.worker import Quantity
+
+PASSED, FAILURE, HASH, WALL = "passed", "failure", "hash", "wall [s]"
+KINDS = (".csv", ".parquet")
+
+
+class Table(Mapping[str, NDArray[Any]]):
+    """The runs of a sweep, one a row: ``table["xy.rms [cm]"]`` is a column of N values.
+
+    The columns are the axes, the quantities (NaN where a run gave none), ``passed``, ``failure`` (why a run
+    stopped, or empty) and ``hash`` (of the resolved diagram, seed included). ``wall`` (s) is how long each
+    run took; it stands apart because it is the only thing that two sweeps do not share to the bit.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        axes: Sequence[Axis],
+        quantities: Sequence[Quantity],
+        indices: NDArray[np.int64],
+        columns: Mapping[str, NDArray[Any]],
+        wall: NDArray[np.float64],
+    ) -> None:
+        """Keep the columns; ``indices`` (N, axes) say which value of its axes a run has."""
+        self.name, self.axes, self.quantities = name, tuple(axes), tuple(quantities)
+        self.indices, self.columns, self.wall = indices, dict(columns), wall
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self.columns[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.columns)
+
+    def __len__(self) -> int:
+        return len(self.columns)
+
+    @property
+    def runs(self) -> int:
+        """The number of rows."""
+        return len(self.indices)
+
+    @property
+    def passed(self) -> bool:
+        """True if every run met all that is expected of it."""
+        return bool(self.columns[PASSED].all())
+
+    def groups(self) -> list[tuple[tuple[int, ...], NDArray[np.intp]]]:
+        """Return the points of the grid without the seed, as indices of values, each with its rows."""
+        others = [number for number, axis in enumerate(self.axes) if axis.name != SEED]
+        found: dict[tuple[int, ...], list[int]] = {}
+        for row, point in enumerate(self.indices[:, others].tolist()):
+            found.setdefault(tuple(point), []).append(row)
+        return [(point, np.array(found[point])) for point in sorted(found)]
+
+    def save(self, path: str | Path, *, timings: bool = False) -> None:
+        """Write a CSV or Parquet file, by the name's ending; ``timings`` adds the column ``wall [s]``.
+
+        The file is there when it is whole; before, what was there stays. QuadvisError if it cannot be.
+        """
+        path = Path(path)
+        columns = self.columns | ({WALL: self.wall} if timings else {})
+        temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+        try:
+            if checked_kind(path) == ".csv":
+                with temporary.open("w", encoding="utf-8", newline="") as file:
+                    _write_csv(columns, file)
+            else:
+                _write_parquet(columns, temporary)
+            os.replace(temporary, path)
+        except OSError as error:
+            raise QuadvisError(f"cannot write '{path}': {error.strerror or error}") from error
+        finally:
+            with suppress(OSError):
+                temporary.unlink()
+
+    def plot(self, path: str | Path) -> None:
+        """Draw the quantities of the summary over the axes, as PNG."""
+        from quadvis.sweeps.picture import draw
+
+        draw(self, Path(path))
+
+
+def checked_kind(path: Path) -> str:
+    """Return ".csv" or ".parquet"; QuadvisError if a table cannot be written to such a file."""
+    if path.suffix not in KINDS:
+        raise QuadvisError(f"cannot write the table '{path}': its name must end in .csv or .parquet")
+    if path.is_dir():
+        raise QuadvisError(f"cannot write the table '{path}': it is a folder")
+    if not path.parent.is_dir():
+        raise QuadvisError(f"cannot write the table '{path}': there is no folder '{path.parent}'")
+    if path.suffix == ".parquet":
+        _pyarrow()
+    return path.suffix
+
+
+def _pyarrow() -> Any:
+    try:
+        import pyarrow.parquet
+    except ImportError:
+        remedy = "pip install 'quadvis[parquet]', or end its name in .csv"
+        raise QuadvisError(f"a Parquet table needs the package pyarrow; {remedy}") from None
+    return pyarrow
+
+
+def _write_csv(columns: Mapping[str, NDArray[Any]], file: TextIO) -> None:
+    """Write rows of which numbers read back to the same bits."""
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(columns)
+    cells = [[_cell(value) for value in column.tolist()] for column in columns.values()]
+    writer.writerows(zip(*cells, strict=True))
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float):
+        return "" if math.isnan(value) else repr(value)
+    return str(value)
+
+
+def _write_parquet(columns: Mapping[str, NDArray[Any]], path: Path) -> None:
+    pyarrow = _pyarrow()
+    arrays = {name: pyarrow.array(column.tolist(), _arrow_type(column)) for name, column in columns.items()}
+    pyarrow.parquet.write_table(pyarrow.table(arrays), path)
+
+
+def _arrow_type(column: NDArray[Any]) -> Any:
+    pyarrow = _pyarrow()
+    kinds = {"f": pyarrow.float64, "i": pyarrow.int64, "b": pyarrow.bool_}
+    return kinds.get(column.dtype.kind, pyarrow.string)()
+
+
+def read_rows(path: Path) -> list[dict[str, Any]]:
+    """Return the rows of a table that was written before; QuadvisError if the file is none.
+
+    Of a CSV file all cells are texts.
+    """
+    try:
+        if checked_kind(path) == ".parquet":
+            rows: list[dict[str, Any]] = _pyarrow().parquet.read_table(path).to_pylist()
+            return rows
+        with path.open(encoding="utf-8", newline="") as file:
+            return list(csv.DictReader(file, strict=True))
+    except (OSError, ValueError, csv.Error) as error:
+        raise QuadvisError(f"cannot read the table '{path}': {str(error).splitlines()[0]}") from error

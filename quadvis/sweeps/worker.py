@@ -1,0 +1,191 @@
+"""One run of a sweep, as a worker process does it: it depends on file, settings and seed alone."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Set
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from multiprocessing import parent_process
+from typing import TYPE_CHECKING
+
+from quadvis.errors import QuadvisError
+from quadvis.output.verdict import EXPECTATIONS
+
+if TYPE_CHECKING:
+    from quadvis.diagram.diagram import Diagram
+    from quadvis.output.verdict import Outcome, Part
+
+COUNT = "count"  # the statistic that has no unit
+
+# Where runs share the processors, threads inside a run only take turns.
+ONE_THREAD = dict.fromkeys(
+    (
+        "MKL_NUM_THREADS",
+        "NUMBA_NUM_THREADS",
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "OPENCV_FOR_THREADS_NUM",
+        "VECLIB_MAXIMUM_THREADS",
+    ),
+    "1",
+)
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A diagram as it is to be loaded; the runs of one configuration differ in their seeds alone."""
+
+    file: str
+    variant: str | None = None
+    settings: tuple[str, ...] = ()
+    params: tuple[str, ...] = ()
+    stop_time: str | float | None = None
+
+    def load(self) -> Diagram:
+        """Return the diagram; DiagramError tells its faults."""
+        from quadvis.diagram.diagram import load
+
+        return load(
+            self.file,
+            variant=self.variant,
+            settings=self.settings,
+            params=self.params,
+            stop_time=self.stop_time,
+        )
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run: ``index`` is its row in the table, ``seed`` None stands for the diagram's."""
+
+    index: int
+    configuration: Configuration
+    seed: int | None = None
+    log: str | None = None
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number that every run gives: a statistic of the summary, or what an expectation looks at.
+
+    ``limit`` is what an expectation demands of this very number, in the same unit.
+    """
+
+    label: str
+    unit: str = ""
+    limit: float | None = None
+    summary: bool = True
+
+    @property
+    def column(self) -> str:
+        """The name of its column."""
+        return f"{self.label} [{self.unit}]" if self.unit else self.label
+
+
+@dataclass(frozen=True)
+class Row:
+    """What one run gave; ``known`` says that an earlier table has it under the same hash."""
+
+    index: int
+    hash: str = ""
+    units: tuple[str, ...] = ()
+    numbers: tuple[float, ...] = ()
+    passed: bool = False
+    failure: str = ""
+    wall: float = float("nan")
+    known: bool = False
+
+
+def quantities(diagram: Diagram) -> list[Quantity]:
+    """Return what the runs of a diagram give, in the order of `numbers`."""
+    found = [
+        Quantity(f"{entry.label}.{name}", _unit(entry.part, name), _limit(diagram, entry.part, name))
+        for entry in diagram.summary
+        for name in entry.show
+    ]
+    for expectation in diagram.observation.expectations:
+        part, name = expectation.part, EXPECTATIONS[expectation.kind].statistic
+        limit = expectation.limit * _scale(part, name)
+        found.append(Quantity(str(expectation), _unit(part, name), limit, summary=False))
+    return found
+
+
+def numbers(diagram: Diagram, outcome: Outcome) -> list[float]:
+    """Return what a run gave, in the units in which people read it."""
+    found = [
+        outcome.summary[entry.label][name] * _scale(entry.part, name)
+        for entry in diagram.summary
+        for name in entry.show
+    ]
+    for verdict in outcome.verdicts:
+        name = EXPECTATIONS[verdict.expectation.kind].statistic
+        found.append(verdict.found * _scale(verdict.expectation.part, name))
+    return found
+
+
+def _unit(part: Part, statistic: str) -> str:
+    return str(part.shown) if part.shown.symbols and statistic != COUNT else ""
+
+
+def _scale(part: Part, statistic: str) -> float:
+    return 1.0 if statistic == COUNT else part.unit.scale / part.shown.scale
+
+
+def _limit(diagram: Diagram, part: Part, statistic: str) -> float | None:
+    """Return what is expected of a number of the summary, if an expectation is about the same."""
+    for expectation in diagram.observation.expectations:
+        same = replace(expectation.part, shown=part.shown, text=part.text) == part
+        if same and EXPECTATIONS[expectation.kind].statistic == statistic:
+            return expectation.limit * _scale(part, statistic)
+    return None
+
+
+_known: Set[str] = frozenset()
+_loaded: tuple[Configuration, Diagram] | None = None
+
+
+def begin(known: Set[str]) -> None:
+    """Prepare a worker process; runs with a hash in ``known`` need not be done again."""
+    global _known
+    _known = known
+    with suppress(ValueError):
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all; the first process ends the others
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End when the first process has gone, however it ended: nobody is left to take the results."""
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def perform(job: Job) -> Row:
+    """Do one run. What is wrong with it, or stops it, becomes its row."""
+    from quadvis.run import run
+
+    digest = ""
+    try:
+        diagram = _load(job)
+        digest = diagram.hash
+        if digest in _known:
+            return Row(job.index, digest, known=True)
+        result = run(diagram, log=job.log)
+    except QuadvisError as error:
+        return Row(job.index, digest, failure=" | ".join(str(error).splitlines()))
+    units = tuple(quantity.unit for quantity in quantities(diagram))
+    found = tuple(numbers(diagram, result.outcome))
+    return Row(job.index, digest, units, found, result.passed, wall=result.wall)
+
+
+def _load(job: Job) -> Diagram:
+    """Return the diagram of a run; it is read once for runs of one configuration that follow each other."""
+    global _loaded
+    if _loaded is None or _loaded[0] != job.configuration:
+        _loaded = job.configuration, job.configuration.load()
+    diagram = _loaded[1]
+    return diagram if job.seed is None else replace(diagram, seed=job.seed)
