@@ -179,9 +179,11 @@ def _sweep(options: argparse.Namespace) -> int:
     several = len(options.variant) > 1
     over = [f"variant={','.join(options.variant)}"] * several + options.over
     table_path = Path(options.output or _runs_folder("table", "-o") / f"{Path(options.file).stem}-sweep.csv")
-    plot = table_path.with_suffix(".png") if options.plot is None else Path(options.plot)
-    if options.plot and plot.suffix != ".png":
-        raise QuadvisError(f"cannot write the plot '{plot}': its name must end in .png")
+    plot = table_path.parent / f"{table_path.stem}.png" if options.plot is None else Path(options.plot)
+    if options.plot and (plot.suffix != ".png" or not plot.parent.is_dir()):
+        raise QuadvisError(
+            f"cannot write the plot '{plot}': give a name that ends in .png in a folder there is"
+        )
     gc.enable()
     with SweepLine() as progress:
         table = sweep(

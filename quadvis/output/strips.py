@@ -68,17 +68,19 @@ def draw_strips(strips: Strips, path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Sheet
 
-    columns = min(len(WIDTHS), max(1, len(strips.panels)))
-    rows = max(1, math.ceil(len(strips.panels) / columns))
+    count = len(strips.panels)
+    columns = 2 if count == 4 else min(len(WIDTHS), max(1, count))
+    rows = max(1, math.ceil(count / columns))
     height = TOP + HEIGHT * rows + BOTTOM
     with mpl.rc_context({**STYLE, "axes.grid.axis": "y", "axes.axisbelow": True}):
         sheet = Sheet(figsize=(WIDTHS[columns - 1], height), dpi=120)
         FigureCanvasAgg(sheet)
-        sheet.set_layout_engine("constrained", rect=(0.0, BOTTOM / height, 1.0, HEIGHT * rows / height))
+        inside = (0.0, BOTTOM / height, 1.0, HEIGHT * rows / height)
+        sheet.set_layout_engine("constrained", rect=inside, w_pad=0.1)
         for number, panel in enumerate(strips.panels, 1):
             axes = sheet.add_subplot(rows, columns, number)
             _draw_panel(axes, strips, panel)
-            if number > len(strips.panels) - columns:
+            if number > count - columns:
                 axes.set_xlabel(strips.axis)
         _frame(sheet, strips, height)
         try:
@@ -95,16 +97,16 @@ def _frame(sheet: Sheet, strips: Strips, height: float) -> None:
     notes = [KEY] * spread + [strips.note] * bool(strips.note)
     sheet.text(MARGIN, 0.06 / height, "\n".join(notes), color="#555555", fontsize=8.5, linespacing=1.5)
     if len(strips.series) > 1 and sheet.axes:
-        handles, labels = sheet.axes[0].get_legend_handles_labels()
+        named = list(zip(*sheet.axes[0].get_legend_handles_labels(), strict=True))[:MOST_LABELS]
         sheet.legend(
-            handles, labels, title=strips.legend, loc="upper right", ncols=min(len(labels), 6),
+            *zip(*named, strict=True), title=strips.legend, loc="upper right", ncols=min(len(named), 6),
             bbox_to_anchor=(1.0 - MARGIN, 1.0 - 0.06 / height), title_fontsize=9, alignment="right",
         )  # fmt: skip
 
 
 def _draw_panel(axes: Axes, strips: Strips, panel: StripPanel) -> None:
     count = len(strips.series)
-    width = 0.72 / count
+    width = min(0.76 / count, 0.5 if len(strips.places) > 1 else 0.3)
     lonely = all(len(cloud.values) <= 1 for row in panel.clouds for cloud in row)
     for number, (row, colour) in enumerate(zip(panel.clouds, itertools.cycle(COLOURS), strict=False)):
         shift = 0.0 if lonely else (number - (count - 1) / 2) * width
@@ -112,12 +114,13 @@ def _draw_panel(axes: Axes, strips: Strips, panel: StripPanel) -> None:
         label = strips.series[number]
         if lonely:
             values = [cloud.values[0] if cloud.values.size else math.nan for cloud in row]
-            axes.plot(positions, values, "o-", color=colour, markersize=5, label=label)
+            good = [index for index, cloud in enumerate(row) if cloud.passed.all()]
+            axes.plot(positions, values, "o-", color=colour, markersize=5, label=label, markevery=good)
         else:
             axes.plot([], [], "s", color=colour, label=label)
             for position, cloud in zip(positions, row, strict=True):
-                _draw_cloud(axes, position, min(width, 0.5), cloud, colour)
-        _draw_failed(axes, positions, row, 0.0 if lonely else min(width, 0.5))
+                _draw_cloud(axes, position, 0.86 * width, cloud, colour)
+        _draw_failed(axes, positions, row, 0.0 if lonely else 0.86 * width)
     _finish(axes, strips, panel)
 
 
@@ -150,7 +153,9 @@ def _draw_failed(axes: Axes, positions: NDArray[np.floating], row: Sequence[Clou
     for position, cloud in zip(positions, row, strict=True):
         failed = np.isfinite(cloud.values) & ~cloud.passed
         places = position + _offsets(len(cloud.values), width)[failed]
-        axes.plot(places, cloud.values[failed], "x", color=FAILED, markersize=5, zorder=6)
+        axes.plot(
+            places, cloud.values[failed], "x", color=FAILED, markersize=5.5, markeredgewidth=1.4, zorder=6
+        )
 
 
 def _offsets(count: int, width: float) -> NDArray[np.floating]:

@@ -176,7 +176,8 @@ class Entry:
 
 def statistic(name: str, values: Samples) -> float:
     """Return one of STATISTICS; NaN if there are no samples, or if NaN is among them."""
-    return STATISTICS[name](values) if values.size else math.nan
+    with np.errstate(over="ignore"):  # what has run away far enough has an infinite RMS
+        return STATISTICS[name](values) if values.size else math.nan
 
 
 @dataclass(frozen=True)

@@ -73,6 +73,8 @@ def read_axes(over: Over) -> tuple[Axis, ...]:
             raise QuadvisError(f"'{name}' is swept over twice; give all its values at once")
         texts = _read(name, values) if isinstance(values, str) else [_text(name, value) for value in values]
         axes[name] = _axis(name, texts)
+    if not axes:
+        raise QuadvisError("there is nothing to sweep over; give --over, such as seed=0..29")
     count = math.prod(len(axis.values) for axis in axes.values())
     if count > MOST_RUNS:
         raise QuadvisError(f"these are {count} runs; at most {MOST_RUNS} go into one sweep")

@@ -51,7 +51,12 @@ class Plan:
         try:
             return self.configuration(point).load()
         except DiagramError as error:
-            raise DiagramError(self._placed(fault, point) for fault in error.faults) from None
+            found = DiagramError(self._placed(fault, point) for fault in error.faults)
+            if str(found) == str(error):  # no fault says which value of which axis brought it about
+                for axis, index in zip(self.axes, point, strict=True):
+                    if index and axis.name not in NOT_SET:
+                        found.add_note(f"with --over {axis.name}={axis.values[index]}")
+            raise found from None
 
     def _placed(self, fault: Fault, point: Sequence[int]) -> Fault:
         """Return a fault of a value that is swept over with the place where it was given."""

@@ -11,7 +11,7 @@ import multiprocessing
 import os
 import signal
 import sys
-from collections.abc import Generator, Iterator, Sequence, Set
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
@@ -29,7 +29,7 @@ def processors() -> int:
     return os.cpu_count() or 1
 
 
-def perform_all(jobs: Sequence[Job], workers: int, known: Set[str]) -> Generator[Row, None, None]:
+def perform_all(jobs: Sequence[Job], workers: int) -> Generator[Row, None, None]:
     """Yield the rows as they come; closing the iterator ends the workers at once.
 
     RunError if a worker is killed.
@@ -38,7 +38,7 @@ def perform_all(jobs: Sequence[Job], workers: int, known: Set[str]) -> Generator
         return
     before = set(multiprocessing.active_children())
     executor = ProcessPoolExecutor(
-        min(workers, len(jobs)), multiprocessing.get_context("spawn"), initializer=begin, initargs=(known,)
+        min(workers, len(jobs)), multiprocessing.get_context("spawn"), initializer=begin
     )
     children: set[BaseProcess] = set()
     finished = False

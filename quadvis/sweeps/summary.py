@@ -25,11 +25,12 @@ class SweepLine(StatusLine):
     def __init__(self) -> None:
         super().__init__()
         self.began = time.monotonic()
+        self.known: int | None = None  # runs that were there before
 
     def __call__(self, finished: int, count: int, failed: int) -> None:
         """Show how far the sweep is."""
-        spent = max(time.monotonic() - self.began, 1e-9)
-        left = duration_text((count - finished) * spent / finished)
+        self.known = finished - 1 if self.known is None else self.known
+        left = duration_text((count - finished) * (time.monotonic() - self.began) / (finished - self.known))
         words = f"  {failed} failed" if failed else ""
         self.show(f"{self.bar(finished / count)} {finished} / {count} runs{words}  {left} left")
 
@@ -71,8 +72,8 @@ def sweep_lines(table: Table, width: int | None = None) -> list[str]:
 def extent(table: Table, points: int) -> str:
     """Return how many seeds and points of the grid there are, in words."""
     seeds = next((len(axis.values) for axis in table.axes if axis.name == SEED), 0)
-    words = [_counted(seeds, "seed")] if seeds else []
-    return " at ".join([*words, _counted(points, "point")])
+    words = [_counted(seeds, "seed")] * bool(seeds) + [_counted(points, "point")] * (points > 1 or not seeds)
+    return " at ".join(words)
 
 
 def _counted(count: int, word: str) -> str:
@@ -85,13 +86,13 @@ def _passed(table: Table, rows: NDArray[np.intp]) -> str:
 
 def _spread(values: NDArray[np.float64]) -> str:
     """Return the mean and the range of what there is."""
-    finite = values[np.isfinite(values)]
-    if not finite.size:
+    found = values[~np.isnan(values)]
+    if not found.size:
         return "none"
-    mean = f"{np.mean(finite):.4g}"
-    if finite.size == 1 or not np.ptp(finite):
+    mean = f"{np.mean(found):.4g}"
+    if np.isinf(found).any() or not np.ptp(found):
         return mean
-    low, high = np.percentile(finite, (LOW, HIGH))
+    low, high = np.percentile(found, (LOW, HIGH))
     return f"{mean} ({low:.3g} to {high:.3g})"
 
 

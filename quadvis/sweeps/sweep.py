@@ -19,7 +19,7 @@ from quadvis.sweeps.axes import SEED, VARIANT, Axis, Over, points, read_axes
 from quadvis.sweeps.plan import Plan
 from quadvis.sweeps.pool import perform_all, processors
 from quadvis.sweeps.table import FAILURE, HASH, PASSED, WALL, Table, checked_kind, read_rows
-from quadvis.sweeps.worker import Configuration, Quantity, Row, quantities
+from quadvis.sweeps.worker import Configuration, Job, Quantity, Row, diagram_of, quantities
 
 SAVE = 30.0  # s between two writings of what is finished
 
@@ -56,7 +56,7 @@ def sweep(
 
     A run that stops with an error is a row that says so. QuadvisError if a value does not fit the diagram.
     """
-    axes = read_axes(over)
+    axes, processes = read_axes(over), _workers(workers)
     _refuse_conflicts(axes, variant, settings, seed)
     given = (str(path), variant, _texts(settings), _paths(params), stop_time)
     grid = points(axes)
@@ -66,31 +66,49 @@ def sweep(
     if target is not None:
         checked_kind(target)
     found = quantities(diagram)
-    earlier = _earlier(target, found) if resume and target is not None and target.is_file() else {}
-    folder = _folder(logs)
-    collection = _Collection(diagram.name, axes, grid, found, earlier)
-    began = time.monotonic()
-    rows = perform_all(list(plan.jobs(folder)), _workers(workers), frozenset(earlier))
+    jobs = list(plan.jobs(_folder(logs)))
+    collection = _Collection(diagram.name, axes, grid, found)
+    if resume and target is not None and target.is_file():
+        jobs = _not_known(jobs, _earlier(target, found), collection)
+    save = _Saving(collection, target, timings)
     try:
-        with closing(rows):
+        with closing(perform_all(jobs, processes)) as rows:
             for row in rows:
                 collection.add(row)
                 if progress:
                     progress(len(collection.rows), len(grid), collection.failed)
-                if target is not None and time.monotonic() - began > SAVE:
-                    collection.table().save(target, timings=timings)
-                    began = time.monotonic()
+                save.now_and_then()
     except BaseException as error:
-        if target is not None and collection.rows:
-            collection.table().save(target, timings=timings)
-            error.add_note(
-                f"{len(collection.rows)} of {len(grid)} runs are in {target}; --resume does the rest"
-            )
+        error.add_note(f"{len(collection.rows)} of {len(grid)} runs are finished{save.words}")
         raise
-    table = collection.table()
-    if target is not None:
-        table.save(target, timings=timings)
-    return table
+    finally:
+        save.now()
+    return collection.table()
+
+
+class _Saving:
+    """Writes what is finished to a file, if there is one."""
+
+    def __init__(self, collection: _Collection, path: Path | None, timings: bool) -> None:
+        self.collection, self.path, self.timings = collection, path, timings
+        self.last = time.monotonic()
+
+    @property
+    def words(self) -> str:
+        """How a sweep that was stopped goes on."""
+        kept = self.path is not None and self.collection.rows
+        return f" and in {self.path}; --resume does the rest" if kept else ""
+
+    def now(self) -> None:
+        """Write all that there is."""
+        if self.path is not None and self.collection.rows:
+            self.collection.table().save(self.path, timings=self.timings)
+        self.last = time.monotonic()
+
+    def now_and_then(self) -> None:
+        """Write if the last time is long ago: so much is left of a sweep after `kill -9`."""
+        if time.monotonic() - self.last > SAVE:
+            self.now()
 
 
 def _texts(settings: Given) -> tuple[str, ...]:
@@ -129,6 +147,21 @@ def _refuse_conflicts(axes: Sequence[Axis], variant: str | None, settings: Given
             raise QuadvisError(f"'{axis.name}' is swept over and given a value as well; keep one of them")
 
 
+def _not_known(jobs: Sequence[Job], earlier: Mapping[str, Row], collection: _Collection) -> list[Job]:
+    """Put the rows of an earlier table, by the hash of the diagram, where they belong; return the rest."""
+    rest = []
+    for job in jobs:
+        try:
+            row = earlier.get(diagram_of(job).hash)
+        except QuadvisError:
+            row = None  # the run will tell
+        if row is None:
+            rest.append(job)
+        else:
+            collection.add(replace(row, index=job.index))
+    return rest
+
+
 def _earlier(path: Path, quantities: Sequence[Quantity]) -> dict[str, Row]:
     """Return the runs of an earlier table by hash; those that stopped with an error are done again."""
     found = {}
@@ -162,19 +195,15 @@ class _Collection:
         axes: Sequence[Axis],
         grid: Sequence[tuple[int, ...]],
         quantities: Sequence[Quantity],
-        earlier: Mapping[str, Row],
     ) -> None:
         self.name, self.axes, self.grid, self.quantities = name, axes, grid, quantities
-        self.earlier = earlier
         self.units = tuple(quantity.unit for quantity in quantities)
         self.rows: dict[int, Row] = {}
         self.failed = 0
 
     def add(self, row: Row) -> None:
-        """Take what a worker has done, or found to be done."""
-        if row.known:
-            row = replace(self.earlier[row.hash], index=row.index)
-        elif not row.failure and row.units != self.units:
+        """Take what one run gave."""
+        if not row.failure and row.units != self.units:
             row = Row(row.index, row.hash, failure="its numbers have other units than those of the first run")
         self.rows[row.index] = row
         self.failed += not row.passed

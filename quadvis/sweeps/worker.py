@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections.abc import Set
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from multiprocessing import parent_process
@@ -87,7 +86,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Row:
-    """What one run gave; ``known`` says that an earlier table has it under the same hash."""
+    """What one run gave; no numbers if it stopped with an error."""
 
     index: int
     hash: str = ""
@@ -96,7 +95,6 @@ class Row:
     passed: bool = False
     failure: str = ""
     wall: float = float("nan")
-    known: bool = False
 
 
 def quantities(diagram: Diagram) -> list[Quantity]:
@@ -143,14 +141,11 @@ def _limit(diagram: Diagram, part: Part, statistic: str) -> float | None:
     return None
 
 
-_known: Set[str] = frozenset()
 _loaded: tuple[Configuration, Diagram] | None = None
 
 
-def begin(known: Set[str]) -> None:
-    """Prepare a worker process; runs with a hash in ``known`` need not be done again."""
-    global _known
-    _known = known
+def begin() -> None:
+    """Prepare a worker process."""
     with suppress(ValueError):
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all; the first process ends the others
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -170,10 +165,8 @@ def perform(job: Job) -> Row:
 
     digest = ""
     try:
-        diagram = _load(job)
+        diagram = diagram_of(job)
         digest = diagram.hash
-        if digest in _known:
-            return Row(job.index, digest, known=True)
         result = run(diagram, log=job.log)
     except QuadvisError as error:
         return Row(job.index, digest, failure=" | ".join(str(error).splitlines()))
@@ -182,7 +175,7 @@ def perform(job: Job) -> Row:
     return Row(job.index, digest, units, found, result.passed, wall=result.wall)
 
 
-def _load(job: Job) -> Diagram:
+def diagram_of(job: Job) -> Diagram:
     """Return the diagram of a run; it is read once for runs of one configuration that follow each other."""
     global _loaded
     if _loaded is None or _loaded[0] != job.configuration:
