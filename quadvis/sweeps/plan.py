@@ -13,6 +13,7 @@ from quadvis.errors import DiagramError, Fault, Place
 from quadvis.sweeps.axes import NONE, PARAMS, SEED, VARIANT, Axis
 from quadvis.sweeps.worker import Configuration, Job
 
+CHECKED = 50  # values at each end of an axis
 NOT_SET = (SEED, VARIANT, PARAMS)  # axes that are no parameters of the diagram
 
 
@@ -39,11 +40,15 @@ class Plan:
         )
 
     def check(self) -> Diagram:
-        """Load the diagram with each value of each axis, the others at their first; return the first one."""
+        """Load the diagram with each value of each axis, the others at their first; return the first one.
+
+        Of a long axis only the ends are looked at; what is wrong elsewhere becomes a row of the table.
+        """
         first = [0] * len(self.axes)
         diagram = self._load(first)
         for number, axis in enumerate(self.axes):
-            for index in range(1, len(axis.values)) if axis.name != SEED else ():
+            count = len(axis.values) if axis.name != SEED else 1
+            for index in sorted({*range(1, min(count, CHECKED)), *range(max(1, count - CHECKED), count)}):
                 self._load([*first[:number], index, *first[number + 1 :]])
         return diagram
 

@@ -105,6 +105,10 @@ def checked_kind(path: Path) -> str:
         raise QuadvisError(f"cannot write the table '{path}': it is a folder")
     if not path.parent.is_dir():
         raise QuadvisError(f"cannot write the table '{path}': there is no folder '{path.parent}'")
+    if not os.access(path.parent, os.W_OK):
+        raise QuadvisError(
+            f"cannot write the table '{path}': the folder '{path.parent}' cannot be written to"
+        )
     if path.suffix == ".parquet":
         _pyarrow()
     return path.suffix

@@ -266,6 +266,27 @@ def test_a_combination_that_does_not_load_is_a_row_as_well(here: list[int]) -> N
     assert "law" in table["failure"][3]
 
 
+def test_what_is_wrong_in_the_middle_of_a_long_axis_is_a_row_and_at_its_ends_a_fault(here: list[int]) -> None:
+    values = [f"{number} mm" for number in range(120)]
+    table = quadvis.sweep("loop.yaml", {"noise.sigma": [*values[:60], "-1 mm", *values[60:]]})
+    assert [row for row, failure in enumerate(table["failure"]) if failure] == [60]
+    assert "sigma must be at least 0" in table["failure"][60]
+    for wrong in ([*values, "-1 mm"], ["-1 mm", *values], [values[0], "-1 mm", *values[1:]]):
+        with pytest.raises(QuadvisError, match=r"--over noise.sigma=-1 mm: .* at least 0"):
+            quadvis.sweep("loop.yaml", {"noise.sigma": wrong})
+
+
+def test_numbers_of_another_unit_never_stand_in_one_column(here: list[int]) -> None:
+    Path("open.yaml").write_text(
+        "{quadvis: 1, name: open, rates: {fast: 10 Hz}, stop_time: 1 s, summary: {y: wave.y}, blocks: {"
+        "wave: {block: sources.sine, rate: fast, with: {amplitude: 1 m}}}}"
+    )
+    table = quadvis.sweep("open.yaml", {"wave.amplitude": ["1 m", "2 rad", "300 cm"]})
+    assert table["y.max [m]"][[0, 2]] == pytest.approx([0.951, 2.853], abs=1e-3)
+    assert math.isnan(table["y.max [m]"][1])
+    assert "other units" in table["failure"][1]
+
+
 def test_csv_reads_back_to_the_same_bits(here: list[int]) -> None:
     table = quadvis.sweep("loop.yaml", ["seed=0..4", "size=0.1..0.3 step 0.1 m"], output="x.csv")
     read = rows_of("x.csv")
