@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 HEIGHT, TOP, BOTTOM = 2.9, 0.7, 0.5  # inches of a row, and of what is above and below all of them
 MARGIN = 0.012  # of the width
 PERCENTILES = (5.0, 25.0, 75.0, 95.0)
+FEW = 5  # runs that have a spread worth a box
 MOST_LABELS = 12  # along an axis
 LONGEST_LABEL = 64  # characters of all labels of an axis, before they are turned
 FAILED = "#C0392B"
@@ -125,21 +126,22 @@ def _draw_panel(axes: Axes, strips: Strips, panel: StripPanel) -> None:
 
 
 def _draw_cloud(axes: Axes, position: float, width: float, cloud: Cloud, colour: str) -> None:
-    """Draw the dots of one place over a box of their quartiles."""
+    """Draw the dots of one place, over a box of their quartiles if there are enough."""
     from matplotlib.patches import Rectangle
 
     good = np.isfinite(cloud.values)
     values = cloud.values[good]
     if not values.size:
         return
-    low, first, third, high = np.percentile(values, PERCENTILES)
-    axes.plot([position, position], [low, high], color=colour, linewidth=1.2, zorder=2)
-    axes.add_patch(
-        Rectangle(
-            (position - width / 2, first), width, third - first,
-            facecolor=colour, edgecolor=colour, alpha=0.3, linewidth=1.0, zorder=2,
-        )
-    )  # fmt: skip
+    if values.size >= FEW:
+        low, first, third, high = np.percentile(values, PERCENTILES)
+        axes.plot([position, position], [low, high], color=colour, linewidth=1.2, zorder=2)
+        axes.add_patch(
+            Rectangle(
+                (position - width / 2, first), width, third - first,
+                facecolor=colour, edgecolor=colour, alpha=0.3, linewidth=1.0, zorder=2,
+            )
+        )  # fmt: skip
     shown = good & cloud.passed
     dots = position + _offsets(len(cloud.values), width)[shown]
     axes.plot(
