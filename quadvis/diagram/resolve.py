@@ -57,7 +57,7 @@ def _files(graph: Graph) -> list[str]:
         getattr(node.block, param.name)
         for node in graph.nodes
         for param in node.block.interface.params.values()
-        if param.is_file
+        if param.is_file and getattr(node.block, param.name)
     ]
 
 
@@ -117,7 +117,7 @@ def _parameter(node: Node, param: Param, folder: Path) -> Any:
     if param.choices:
         return param.choices[value]
     if param.is_text:
-        return _relative(value, folder) if param.is_file else value
+        return _relative(value, folder) if param.is_file and value else value
     return _quantity(node, param.name, value)
 
 

@@ -98,8 +98,9 @@ def read_parameter(param: Param, node: Node) -> tuple[Any, OpenUnits]:
     DiagramError if the value is of another kind, shape or unit.
     """
     if param.is_file:
-        # A path is relative to the file in which it stands, wherever the diagram is run from.
-        return str(Path(node.file).parent / node.text()), ()
+        # Relative to the file in which it stands, wherever the diagram is run from; none stays none.
+        text = node.text()
+        return (str(Path(node.file).parent / text) if text else ""), ()
     if param.is_text:
         return node.text(), ()
     if param.choices:

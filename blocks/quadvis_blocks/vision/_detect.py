@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 FOUR_CIRCLES, THREE_CIRCLES, TWO_CIRCLES, NOT_FOUND, INCONSISTENT, STALE, UNCALIBRATED, UNUSABLE = range(8)
 """Status: four, three or two circles seen; no target; four circles that are no square; no picture yet; no
-calibration; a picture that is empty, too small or not uint8 blue-green-red."""
+calibration; a picture that is empty, too small, of another size or not uint8 blue-green-red."""
 
 QUALITY_MIN = (
     0.9  # of the median: a circle that lost a fifth of its area, or a tenth of its diameter at an edge
@@ -62,11 +62,13 @@ class Place(NamedTuple):
     ratio: Colour
 
 
-def usable(pixels: object) -> bool:
-    """Return whether this is a picture that can be searched."""
+def usable(pixels: object, size: tuple[int, int] | None = None) -> bool:
+    """Return whether this is a picture that can be searched, of that width and height (px) if given."""
     if not isinstance(pixels, np.ndarray) or pixels.dtype != np.uint8 or pixels.ndim != 3:
         return False
     height, width, channels = pixels.shape
+    if size is not None and (width, height) != size:
+        return False
     return bool(channels == 3 and min(height, width) >= SMALLEST)
 
 

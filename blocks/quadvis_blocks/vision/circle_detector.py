@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, Frame, In, Out, Param, ParameterError, State
-from quadvis.errors import QuadvisError
+from quadvis.block import Block, Frame, In, Out, Param, ParameterError, State, read_parameter_file
+from quadvis_blocks.vision._calibration import CameraCalibration
 from quadvis_blocks.vision._circles import Target
 from quadvis_blocks.vision._colours import ColourCalibration
 from quadvis_blocks.vision._detect import (
@@ -38,7 +38,7 @@ class CircleDetector(Block, numeric=False):
     and sequence number. A frame that is not a picture is a target that is not found.
 
     `status`: 0 four circles, 1 three, 2 two, 3 target not found, 4 circles of all colours that are no
-    square, 5 no picture yet, 7 the frame is not a picture.
+    square, 5 no picture yet, 7 the frame is not a picture, or has not the size that `calibration` is for.
 
     Source: sections 5 (centres of gravity, colour calibration, order of the corners) and 6.
     """
@@ -60,7 +60,7 @@ class CircleDetector(Block, numeric=False):
     radius = Param(RADIUS, unit="m", above=0.0, doc="radius of the circles")
     radius_min = Param(2.0, unit="px", min=1.0, doc="smallest radius in the picture")
     radius_max = Param(80.0, unit="px", above=0.0, doc="largest radius in the picture")
-
+    calibration = Param("", type="file", doc="camera calibration file (YAML): pictures must have its size")
     fewest = Param(
         2, type="int64", min=2, max=4, doc="circles that make a target that was not there before; 4 is safest"
     )
@@ -73,8 +73,9 @@ class CircleDetector(Block, numeric=False):
     places = State("float64[4,6]")  # of all four circles, to follow them; see Detection
 
     def check(self) -> None:
-        """Read the colours, and compare the sizes."""
+        """Read the files, and compare the sizes."""
         self._load()
+        self._size()
         if 2 * self.radius >= self.side:
             raise ParameterError(
                 "radius", f"radius must be below half of side ({self.side / 2:g} m), or circles overlap"
@@ -85,13 +86,17 @@ class CircleDetector(Block, numeric=False):
             )
 
     def _load(self) -> ColourCalibration:
-        try:
-            return ColourCalibration.load(self.colours)
-        except QuadvisError as error:
-            raise ParameterError("colours", f"colours is not usable: {error}") from None
+        return read_parameter_file("colours", self.colours, ColourCalibration.load)
+
+    def _size(self) -> tuple[int, int] | None:
+        """Return the width and height that pictures must have, None for any."""
+        if not self.calibration:
+            return None
+        return read_parameter_file("calibration", self.calibration, CameraCalibration.load).size
 
     def open(self) -> None:
-        """Read the colours."""
+        """Read the files."""
+        self._picture = self._size()
         self._target = Target(self._load(), self.radius / self.side, self.radius_min, self.radius_max)
         self._key: tuple[Any, ...] = ()
         self._seen = nothing(STALE)
@@ -122,7 +127,7 @@ class CircleDetector(Block, numeric=False):
         return self._seen
 
     def _detect(self, frame: Frame) -> Detection:
-        if not usable(frame.pixels):
+        if not usable(frame.pixels, self._picture):
             return nothing(UNUSABLE)
         pixels = np.ascontiguousarray(frame.pixels)
         if self.last_status <= TWO_CIRCLES and 0 < frame.stamp - self.last_stamp <= FOLLOW_MAX:

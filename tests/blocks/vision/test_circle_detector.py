@@ -301,6 +301,24 @@ def test_a_circle_that_is_hidden_in_part_is_reported_missing():
     assert rms(seen.centres[0, [0, 2, 3]], truth[[0, 2, 3]]) < 0.07
 
 
+def test_a_picture_of_another_size_than_the_calibration_is_refused_and_the_next_one_is_seen():
+    first, _ = scene((0, 0, 3.0, 0, 0, 0))
+    rng = np.random.default_rng(24)
+    pictures = [expose(first, rng) for _ in range(3)]
+    pictures[1] = np.ascontiguousarray(pictures[1][:-2])
+    calibration = str(Path(COLOURS).parent / "camera.yaml")
+    seen = detect(pictures, calibration=calibration)
+    assert seen.status.tolist() == [0, UNUSABLE, 0]
+    assert np.isnan(seen.centres[1]).all()
+    assert detect(pictures).status.tolist() == [0, 0, 0]
+
+
+def test_a_calibration_that_is_no_calibration_is_refused_with_its_place(tmp_path):
+    (tmp_path / "camera.yaml").write_text("size: [452, 322]\nmatrix: 3\n")
+    with pytest.raises(ParameterError, match=r"calibration is not usable: .*camera\.yaml:\d+:\d+: "):
+        CircleDetector(colours=COLOURS, calibration=str(tmp_path / "camera.yaml"))
+
+
 def test_steps_without_a_new_picture_repeat_the_last_result():
     rng = np.random.default_rng(24)
     picture, _ = scene((0, 0, 3.0, 0, 0, 0))
