@@ -30,7 +30,7 @@ BLOCK_KEYS = ("block", "part", "rate", "slot", "with", "in")
 WIRE_KEYS = ("from", "across")
 SOLVER_KEYS = ("method", "step")
 PORT_KEYS = ("in", "out")
-VARIANT_KEYS = ("doc", "slots")
+VARIANT_KEYS = ("doc", "base", "slots")
 SECTIONS = ("log", "expect", "summary", "figures")
 
 
@@ -82,6 +82,7 @@ class FileSpec:
     seed: int = 0
     files: dict[str, Node] = field(default_factory=dict)
     variants: dict[str, dict[str, BlockSpec | None]] = field(default_factory=dict)
+    bases: dict[str, tuple[str, Place]] = field(default_factory=dict)  # the variant on which one builds
     sections: dict[str, Node] = field(default_factory=dict)  # those about signals
 
 
@@ -290,6 +291,10 @@ def _read_variants(spec: FileSpec, root: Mapping, faults: Faults) -> None:
             fields = faults.collect(value.fields, (), VARIANT_KEYS, faults)
             slots = fields.get("slots") if fields is not None else None
             mapping = faults.collect(slots.mapping) if slots is not None else None
+            if fields is not None and "base" in fields:
+                base = faults.collect(fields["base"].text)
+                if base is not None:
+                    spec.bases[variant] = base, fields["base"].place
         for key, entry in mapping.pairs() if mapping is not None else []:
             with faults.about(f"variant '{variant}', block '{key.value}'"):
                 spec.variants[variant][key.value] = read_block(key.value, key.place, entry, faults)

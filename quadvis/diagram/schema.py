@@ -102,7 +102,11 @@ def _top() -> dict[str, Schema]:
         "seed": {"type": "integer", "description": "seed of all noise"},
         "files": {"type": "object", "description": "SHA-256 of the files that blocks read"},
         "blocks": _map_of(_ref("block"), "all blocks by name"),
-        "variants": _map_of(_closed(VARIANT_KEYS, {"doc": TEXT, "slots": _map_of(_ref("block"), "by slot")}),
+        "variants": _map_of(_closed(VARIANT_KEYS, {
+            "doc": TEXT,
+            "base": {"type": "string", "description": "the variant on which this one builds"},
+            "slots": _map_of(_ref("block"), "by slot"),
+        }),
                             "other blocks for those marked 'slot: true'"),
         "ports": _closed(PORT_KEYS, {
             "in": _list_of(TEXT, "names of what comes in; inside the part 'in.name'"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from quadvis.block import Out
@@ -18,25 +18,49 @@ def fill_slots(spec: FileSpec, variant: str | None, faults: Faults) -> FileSpec:
     if variant is not None and variant not in spec.variants:
         remedy = suggestion(variant, spec.variants) or "the diagram has no variants"
         faults.add(spec.place, f"there is no variant '{variant}'", remedy)
+    lineages = {name: _lineage(spec, name, faults) for name in spec.variants}
     blocks = dict(spec.blocks)
-    for name, entries in spec.variants.items():
-        for slot, block in entries.items():
-            if block is None or slot in spec.broken:
-                continue
-            base = spec.blocks.get(slot)
-            if base is None:
-                remedy = suggestion(slot, [known for known, block in spec.blocks.items() if block.slot])
-                faults.add(
-                    block.place, f"variant '{name}' fills '{slot}', which is not in the diagram", remedy
-                )
-            elif base.slot is None and "slot" in base.told:
-                continue
-            elif base.slot is None:
-                problem = f"variant '{name}' fills '{slot}', which is not a slot"
-                faults.add(block.place, problem, f"write 'slot: true' in block '{slot}'")
-            elif name == variant:
-                blocks[slot] = _in_slot(base, block)
+    fitting = {name: dict(_fitting(spec, name, faults)) for name in spec.variants}
+    for name in reversed(lineages.get(variant or "", [])):
+        for slot, block in fitting[name].items():
+            blocks[slot] = _in_slot(spec.blocks[slot], block)
     return replace(spec, blocks=blocks)
+
+
+def _lineage(spec: FileSpec, variant: str, faults: Faults) -> list[str]:
+    """Return a variant, the one on which it builds, and so on; what is wrong with its own base is told."""
+    names = [variant]
+    while names[-1] in spec.bases:
+        base, place = spec.bases[names[-1]]
+        own = len(names) == 1
+        if base not in spec.variants:
+            if own:
+                remedy = suggestion(base, [name for name in spec.variants if name != variant])
+                faults.add(place, f"variant '{variant}' builds on '{base}', which is none", remedy)
+            return names
+        if base in names:
+            if base == variant:
+                faults.add(place if own else spec.bases[variant][1], f"variant '{variant}' builds on itself")
+            return names
+        names.append(base)
+    return names
+
+
+def _fitting(spec: FileSpec, variant: str, faults: Faults) -> Iterator[tuple[str, BlockSpec]]:
+    """Yield what a variant puts into slots that are there; the others are told."""
+    for slot, block in spec.variants[variant].items():
+        if block is None or slot in spec.broken:
+            continue
+        base = spec.blocks.get(slot)
+        if base is None:
+            remedy = suggestion(slot, [known for known, block in spec.blocks.items() if block.slot])
+            problem = f"variant '{variant}' fills '{slot}', which is not in the diagram"
+            faults.add(block.place, problem, remedy)
+        elif base.slot is not None:
+            yield slot, block
+        elif "slot" not in base.told:
+            problem = f"variant '{variant}' fills '{slot}', which is not a slot"
+            faults.add(block.place, problem, f"write 'slot: true' in block '{slot}'")
 
 
 def _in_slot(base: BlockSpec, block: BlockSpec) -> BlockSpec:

@@ -174,6 +174,20 @@ def test_a_variant_takes_the_wires_and_the_rate_of_its_slot(tmp_path: Path) -> N
     assert (slow.kind, slow.task.name) == ("signal.gain", "slow")
 
 
+def test_a_variant_builds_on_another_and_goes_before_it(tmp_path: Path) -> None:
+    (tmp_path / "case.yaml").write_text(
+        "quadvis: 1\nname: case\nrates: {fast: 100 Hz}\nstop_time: 1 s\nblocks:\n"
+        "  wave: {slot: true, block: sources.sine, rate: fast}\n"
+        "  law: {slot: true, block: signal.gain, rate: fast, in: {u: wave.y}}\n"
+        "variants:\n"
+        "  both: {base: ramped, slots: {law: {block: signal.difference, in: {plus: wave.y, minus: wave.y}}}}\n"
+        "  ramped: {slots: {wave: {block: sources.ramp}, law: {block: signal.unit_delay}}}\n"
+    )
+    kinds = {name: [type(load(tmp_path / "case.yaml", variant=name).graph[block].block).__name__
+                    for block in ("wave", "law")] for name in ("both", "ramped")}  # fmt: skip
+    assert kinds == {"both": ["Ramp", "Difference"], "ramped": ["Ramp", "UnitDelay"]}
+
+
 @pytest.mark.parametrize("path", sorted(DIAGRAMS.glob("*.yaml")), ids=lambda path: path.name)
 def test_every_diagram_of_the_repository_is_right_with_every_variant(path: Path) -> None:
     check(path)
