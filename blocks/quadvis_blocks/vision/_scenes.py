@@ -141,7 +141,7 @@ def shoot(
 
 
 def homography(size: tuple[int, int], pose: Pose) -> Array:
-    """Return H (3, 3) from target (x, y, 1) in m to pixels; K is that of the paper, scaled to the width."""
+    """Return H (3, 3) from target (x, y, 1) in m to pixels."""
     import cv2
 
     x, y, z, roll, pitch, yaw = pose
@@ -150,9 +150,14 @@ def homography(size: tuple[int, int], pose: Pose) -> Array:
         for turn in ((roll, 0.0, 0.0), (0.0, pitch, 0.0), (0.0, 0.0, yaw))
     )
     turn = np.diag([1.0, -1.0, -1.0]) @ (rz @ ry @ rx).T
+    return np.asarray(camera_matrix(size) @ np.column_stack((turn[:, 0], turn[:, 1], -turn @ (x, y, z))))
+
+
+def camera_matrix(size: tuple[int, int]) -> Array:
+    """Return K (3, 3) of the paper for pictures of `size` px: scaled to the width, and centred."""
     k = np.diag([size[0] / 452, size[0] / 452, 1.0]) @ _MATRIX
     k[:2, 2] = (size[0] - 1) / 2, (size[1] - 1) / 2
-    return np.asarray(k @ np.column_stack((turn[:, 0], turn[:, 1], -turn @ (x, y, z))))
+    return np.asarray(k)
 
 
 def draw_pose(rng: np.random.Generator, size: tuple[int, int], condition: Condition) -> Pose:
