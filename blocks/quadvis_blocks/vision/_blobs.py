@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
 from quadvis_blocks.vision._circles import Ceiling, Pixels, Target, mean, over
-from quadvis_blocks.vision._colours import Colour
 from quadvis_blocks.vision._square import Blob
 
 COLOUR_MAX = 1.0  # largest distance of a colour from the nearest of the four
@@ -18,34 +17,42 @@ PATCHES_MAX = 500  # those with the longest outlines; the time to look at them g
 BLOBS_MAX = 20  # of one colour; the time to arrange them grows with the fourth power of their number
 
 
-class Patch(NamedTuple):
-    """A compact patch: `centre` u + iv and `radius` in px, `ratio` its colour over the ceiling's."""
-
-    centre: complex
-    radius: float
-    ratio: Colour
-
-
 def reductions(pixels: Pixels) -> tuple[int, ...]:
     """Return by which factors to reduce a picture to search it, one after the other."""
     return (4, 2) if pixels.shape[1] > WIDE else (2,)
 
 
-def find_blobs(pixels: Pixels, ceiling: Ceiling, target: Target, reduction: int) -> list[list[Blob]]:
-    """Return, by corner, what has the colour of its circle, those of the best colour first."""
+def find_blobs(
+    pixels: Pixels, ceiling: Ceiling, target: Target, reduction: int
+) -> tuple[list[list[Blob]], bool]:
+    """Return, by corner, what has the colour of its circle, those of the best colour first.
+
+    The second value says whether there was so much in the picture that only a part of it was looked at.
+    """
     blobs: list[list[Blob]] = [[], [], [], []]
-    limits = (target.radius_min, target.radius_max)
-    for patch in find_patches(pixels, ceiling, target.colours.threshold, limits, reduction):
-        corner, distance = target.colours.nearest(patch.ratio)
+    limits = (target.radius_min / reduction, target.radius_max / reduction)
+    small, outlines = _outlines(pixels, ceiling, target.colours.threshold, reduction)
+    crowded = len(outlines) > PATCHES_MAX
+    if crowded:
+        outlines = sorted(outlines, key=len)[-PATCHES_MAX:]
+    middle = (reduction - 1) / 2
+    for outline in outlines:
+        shape = _shape(outline, *limits)
+        if shape is None:
+            continue
+        x, y, radius = shape
+        centre = complex(reduction * x + middle, reduction * y + middle)
+        ratio = over(mean(small, x, y, radius / 2), ceiling.at(centre))
+        corner, distance = target.colours.nearest(ratio)
         if distance < COLOUR_MAX:
-            blobs[corner].append(Blob(patch.centre, patch.radius, distance))
-    return [sorted(some, key=lambda blob: blob.distance)[:BLOBS_MAX] for some in blobs]
+            blobs[corner].append(Blob(centre, reduction * radius, distance))
+    return [sorted(some, key=lambda blob: blob.distance)[:BLOBS_MAX] for some in blobs], crowded
 
 
-def find_patches(
-    pixels: Pixels, ceiling: Ceiling, threshold: float, limits: tuple[float, float], reduction: int
-) -> Iterator[Patch]:
-    """Yield what has a radius within `limits` px and a channel below `threshold` times the ceiling."""
+def _outlines(
+    pixels: Pixels, ceiling: Ceiling, threshold: float, reduction: int
+) -> tuple[Pixels, Sequence[Any]]:
+    """Return the reduced picture, and in it the outlines of what has a channel darker than the ceiling."""
     import cv2
 
     # Odd last rows and columns are left out, so that a reduced picture is exactly that.
@@ -56,18 +63,7 @@ def find_patches(
     small: Any = cv2.resize(whole, size, interpolation=method)
     limit = cv2.resize(cv2.convertScaleAbs(ceiling.picture, alpha=threshold), size)
     mask = cv2.cvtColor(cv2.compare(small, limit, cv2.CMP_LT), cv2.COLOR_BGR2GRAY)
-    contours: Any = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)[0]
-    if len(contours) > PATCHES_MAX:
-        contours = sorted(contours, key=len)[-PATCHES_MAX:]
-    low, high = limits[0] / reduction, limits[1] / reduction
-    middle = (reduction - 1) / 2
-    for contour in contours:
-        shape = _shape(contour, low, high)
-        if shape is None:
-            continue
-        x, y, radius = shape
-        centre = complex(reduction * x + middle, reduction * y + middle)
-        yield Patch(centre, reduction * radius, over(mean(small, x, y, radius / 2), ceiling.at(centre)))
+    return small, cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)[0]
 
 
 def _shape(contour: Any, low: float, high: float) -> tuple[float, float, float] | None:
@@ -76,7 +72,7 @@ def _shape(contour: Any, low: float, high: float) -> tuple[float, float, float] 
 
     left, top, width, height = cv2.boundingRect(contour)
     radius = (width + height) / 4
-    if not low <= radius <= high or max(width, height) > BOX_MAX * min(width, height):
+    if not low <= radius <= high or width > BOX_MAX * height or height > BOX_MAX * width:
         return None
     # The outline runs through pixel centres, half a pixel inside the patch. OpenCV gives holes a positive
     # area.

@@ -17,7 +17,7 @@ from quadvis_blocks.vision._blobs import find_blobs, reductions
 from quadvis_blocks.vision._circles import SMALLEST, Ceiling, Disc, Pixels, Target, locate, measure
 from quadvis_blocks.vision._colours import Colour
 from quadvis_blocks.vision._partial import Known, three_of_four, two_of_four, whole
-from quadvis_blocks.vision._square import Blob, arrangement_cost, arrangements, expected_radii, motion
+from quadvis_blocks.vision._square import Blob, arrangements, expected_radii, motion, square_cost
 
 Array = NDArray[np.float64]
 
@@ -80,15 +80,17 @@ def nothing(status: int) -> Detection:
 def search(pixels: Pixels, target: Target, fewest: int = 2) -> Detection:
     """Look for the circles all over a picture; fewer than `fewest` are no target."""
     ceiling = Ceiling(pixels)
-    status, blobs = NOT_FOUND, []
+    status = NOT_FOUND
+    blobs: Sequence[Sequence[Blob]] = ()
     for reduction in reductions(pixels):
-        blobs = find_blobs(pixels, ceiling, target, reduction)
-        if not all(blobs):
-            continue
-        status = INCONSISTENT
-        found = _four(pixels, ceiling, target, arrangements(blobs, target.ratio, CHOICES))
-        if found is not None:
-            return found
+        blobs, crowded = find_blobs(pixels, ceiling, target, reduction)
+        if all(blobs):
+            status = INCONSISTENT
+            found = _four(pixels, ceiling, target, arrangements(blobs, target.ratio, CHOICES))
+            if found is not None:
+                return found
+        if crowded:  # at a larger size there is only more of it
+            break
     if fewest < 4 and sum(map(bool, blobs)) >= fewest:
         return _few(pixels, ceiling, target, blobs, fewest) or nothing(status)
     return nothing(status)
@@ -104,9 +106,8 @@ def _four(
         known = [disc for disc in discs if disc is not None]
         if len(known) < 4:
             continue
-        radii = expected_radii([disc.centre for disc in known], target.ratio)
-        cost = arrangement_cost(_blobs(known), target.ratio)
-        if radii is None or cost >= least:
+        radii, cost = _fit(known, target)
+        if cost >= least:
             continue
         sizes = sorted(math.log(disc.radius / radius) for disc, radius in zip(known, radii, strict=True))
         # One of the four may be hidden in part.
@@ -210,14 +211,17 @@ def _square(discs: Sequence[Disc | None], target: Target) -> Detection | None:
     known = [disc for disc in discs if disc is not None]
     if len(known) < 4:
         return None
-    radii = expected_radii([disc.centre for disc in known], target.ratio)
-    if radii is None or arrangement_cost(_blobs(known), target.ratio) == math.inf:
-        return None
-    return _detection(known, _places(known, radii))
+    radii, cost = _fit(known, target)
+    return None if cost == math.inf else _detection(known, _places(known, radii))
 
 
-def _blobs(discs: Sequence[Disc]) -> list[Blob]:
-    return [Blob(disc.centre, disc.radius, 0.0) for disc in discs]
+def _fit(discs: Sequence[Disc], target: Target) -> tuple[Sequence[float], float]:
+    """Return the radii (px) expected of four circles, and how badly they fit a square: infinity if not."""
+    points = [disc.centre for disc in discs]
+    radii = expected_radii(points, target.ratio)
+    if radii is None:
+        return (), math.inf
+    return radii, square_cost(points, [disc.radius for disc in discs], radii)
 
 
 def _places(discs: Sequence[Disc], radii: Sequence[float]) -> list[Place]:

@@ -77,13 +77,23 @@ def arrangement_cost(corners: Sequence[Blob], ratio: float) -> float:
     expected = expected_radii(points, ratio)
     if expected is None:
         return math.inf
-    sizes = [math.log(blob.radius / radius) for blob, radius in zip(corners, expected, strict=True)]
+    colour = (corners[0].distance + corners[1].distance + corners[2].distance + corners[3].distance) / 4
+    return misfit / MISFIT_MAX + _size_cost([blob.radius for blob in corners], expected) + colour
+
+
+def square_cost(points: Sequence[complex], radii: Sequence[float], expected: Sequence[float]) -> float:
+    """Return how badly four circles fit a square in which these radii are expected; as `arrangement_cost`."""
+    misfit = _misfit(points)
+    return math.inf if misfit > MISFIT_MAX else misfit / MISFIT_MAX + _size_cost(radii, expected)
+
+
+def _size_cost(radii: Sequence[float], expected: Sequence[float]) -> float:
+    sizes = [math.log(radius / other) for radius, other in zip(radii, expected, strict=True)]
     mean = sum(sizes) / 4
     spread = max(max(sizes) - mean, mean - min(sizes))
     if abs(mean) > SIZE_MAX or spread > SPREAD_MAX:
         return math.inf
-    colour = (corners[0].distance + corners[1].distance + corners[2].distance + corners[3].distance) / 4
-    return misfit / MISFIT_MAX + abs(mean) / SIZE_MAX + spread / SPREAD_MAX + colour
+    return abs(mean) / SIZE_MAX + spread / SPREAD_MAX
 
 
 def arrangements(blobs: Sequence[Sequence[Blob]], ratio: float, most: int) -> list[tuple[Blob, ...]]:
@@ -125,9 +135,15 @@ def motion(before: Sequence[complex], after: Sequence[complex]) -> tuple[complex
 
 
 def _misfit(points: Sequence[complex]) -> float:
-    """Return the rms distance of the points from the best square, over that square's side."""
-    factor, _, left = motion(CORNERS, points)
-    return left / abs(factor) if factor else math.inf
+    """Return the rms distance of the points from the best square, over that square's side.
+
+    Of the four parts of the points' discrete Fourier transform one is their middle and one a square; the
+    other two are what is left.
+    """
+    p1, p2, p3, p4 = points
+    along, across = p1 - p3, 1j * (p2 - p4)
+    side = abs(along - across) * math.sqrt(2)
+    return math.hypot(abs(along + across), abs(p1 + p3 - p2 - p4)) / side if side else math.inf
 
 
 def _sized(blob: Blob, half: complex, ratio: float) -> bool:
