@@ -33,6 +33,7 @@ CHOICES = 6  # squares that are looked at closely
 ROUGH = 1.0  # px: how badly a reduced picture may place a circle
 NEAR = 0.45  # largest distance of a colour from that of its circle where only two are seen
 FEW = 8  # circles of one colour that are looked at closely where no four make a square
+SLACK = 0.008  # of the picture's width: how far the first circle moves as a rule
 REACH = 0.025  # of the picture's width, and half a radius: how far a circle is followed
 GROWTH_MAX = math.log(1.33)  # of the square from one picture to the next
 TURN_MAX = 0.5  # rad, the same
@@ -157,11 +158,11 @@ def follow(pixels: Pixels, target: Target, places: Array, fewest: int = 2) -> De
     after: list[complex] = []
     for corner, place in enumerate(known):
         # The circles that are already found tell where to look for the next.
-        centre = place.centre
+        centre, slack = place.centre, SLACK * pixels.shape[1]
         if before:
             factor, shift, _ = motion(before, after)
-            centre = factor * centre + shift
-        disc = _near(pixels, ceiling, target, corner, place, centre)
+            centre, slack = factor * centre + shift, 0.0
+        disc = _near(pixels, ceiling, target, corner, place, centre, slack)
         if disc is not None:
             discs[corner] = disc
             before.append(place.centre)
@@ -184,11 +185,19 @@ def follow(pixels: Pixels, target: Target, places: Array, fewest: int = 2) -> De
 
 
 def _near(
-    pixels: Pixels, ceiling: Ceiling, target: Target, corner: int, place: Place, centre: complex
+    pixels: Pixels,
+    ceiling: Ceiling,
+    target: Target,
+    corner: int,
+    place: Place,
+    centre: complex,
+    slack: float = 0.0,
 ) -> Disc | None:
     """Return a corner's circle near a centre: at once if it is there, else around it by its last colour."""
     radius = place.radius
-    disc = locate(pixels, ceiling, centre, radius)
+    disc = locate(pixels, ceiling, centre, radius, slack)
+    if slack and (disc is None or disc.symmetry < QUALITY_MIN):  # there may be something else beside it
+        disc = locate(pixels, ceiling, centre, radius)
     if disc is not None and _same(disc, target, corner, radius):
         return disc
     light, ratio = ceiling.at(centre), place.ratio
@@ -267,10 +276,11 @@ def _detection(discs: Sequence[Disc | None], places: Sequence[Place]) -> Detecti
     if not order:
         return None
     limit = QUALITY_MIN * (order[(len(order) - 1) // 2] + order[len(order) // 2]) / 2
-    centres = [
-        (place.centre.real, place.centre.imag) if part >= limit else (math.nan, math.nan)
-        for place, part in zip(places, quality, strict=True)
-    ]
-    count = sum(part >= limit for part in quality)
+    hidden = [corner for corner, part in enumerate(quality) if not part >= limit]
+    if len(hidden) > 2:
+        return None
     table = np.array([(p.centre.real, p.centre.imag, p.radius, *p.ratio) for p in places])
-    return Detection(np.array(centres), np.array(quality), 4 - count, table) if count >= 2 else None
+    centres = table[:, :2].copy()
+    if hidden:
+        centres[hidden] = math.nan
+    return Detection(centres, np.array(quality), len(hidden), table)
