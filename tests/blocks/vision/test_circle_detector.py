@@ -14,7 +14,7 @@ from hypothesis.extra.numpy import arrays
 from quadvis.block import Frame, ParameterError
 from quadvis.testing import drive
 from quadvis_blocks.vision._detect import INCONSISTENT, NOT_FOUND, STALE, UNUSABLE
-from quadvis_blocks.vision._square import expected_radii, motion, square_homography
+from quadvis_blocks.vision._square import MISFIT_MAX, expected_radii, motion, square_cost, square_homography
 from quadvis_blocks.vision.circle_detector import CircleDetector
 
 REPO = Path(__file__).parents[3]
@@ -477,3 +477,26 @@ def test_motion_gives_back_the_similarity_that_moved_the_points(factor, shift, p
         return
     found, offset, left = motion(points, [factor * p + shift for p in points])
     assert abs(found - factor) < 1e-9 * 100 and abs(offset - shift) < 1e-6 and left < 1e-6
+
+
+@given(arrays(np.float64, (4, 2), elements=st.floats(-0.15, 0.15)), st.floats(0.1, 1000), st.floats(-3, 3))
+def test_circles_of_the_expected_sizes_cost_what_the_best_square_leaves_of_their_places(shifts, side, yaw):
+    corners = (
+        (CORNERS * (1, -1) + shifts)
+        * side
+        @ [[math.cos(yaw), math.sin(yaw)], [-math.sin(yaw), math.cos(yaw)]]
+    )
+    # The best square by least squares: u = a p - b q + c, v = b p + a q + d.
+    (p, q), one, nil = (CORNERS * (1, -1)).T, np.ones(4), np.zeros(4)
+    places = np.vstack((np.column_stack((p, -q, one, nil)), np.column_stack((q, p, nil, one))))
+    best, (left,), *_ = np.linalg.lstsq(places, corners.T.ravel())
+    misfit = math.sqrt(left / 4) / math.hypot(best[0], best[1])
+    cost = square_cost([complex(*point) for point in corners], [5.0] * 4, [5.0] * 4)
+    if misfit < 0.999 * MISFIT_MAX:
+        assert cost == pytest.approx(misfit / MISFIT_MAX, rel=1e-6, abs=1e-9)
+    elif misfit > 1.001 * MISFIT_MAX:
+        assert cost == math.inf
+
+
+def test_four_circles_in_one_place_are_no_square():
+    assert square_cost([3 + 4j] * 4, [5.0] * 4, [5.0] * 4) == math.inf
