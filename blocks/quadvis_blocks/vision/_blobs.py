@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from quadvis_blocks.vision._circles import Ceiling, Pixels, Target, mean, over
+from quadvis_blocks.vision._colours import Colour
 from quadvis_blocks.vision._square import Blob
 
 COLOUR_MAX = 1.0  # largest distance of a colour from the nearest of the four
@@ -15,6 +16,8 @@ FILL = (0.55, 1.25)  # area of a patch over that of the ellipse in its bounding 
 WIDE = 480  # px: a picture that is wider is first searched at a quarter of its size
 PATCHES_MAX = 500  # those with the longest outlines; the time to look at them grows with their number
 BLOBS_MAX = 20  # of one colour; the time to arrange them grows with the fourth power of their number
+
+Patch = tuple[complex, float, Colour]  # centre u + iv and radius in px, colour over the ceiling's
 
 
 def reductions(pixels: Pixels) -> tuple[int, ...]:
@@ -30,23 +33,36 @@ def find_blobs(
     The second value says whether there was so much in the picture that only a part of it was looked at.
     """
     blobs: list[list[Blob]] = [[], [], [], []]
-    limits = (target.radius_min / reduction, target.radius_max / reduction)
-    small, outlines = _outlines(pixels, ceiling, target.colours.threshold, reduction)
+    limits = (target.radius_min, target.radius_max)
+    patches, crowded = find_patches(pixels, ceiling, target.colours.threshold, limits, reduction)
+    for centre, radius, ratio in patches:
+        corner, distance = target.colours.nearest(ratio)
+        if distance < COLOUR_MAX:
+            blobs[corner].append(Blob(centre, radius, distance))
+    return [sorted(some, key=lambda blob: blob.distance)[:BLOBS_MAX] for some in blobs], crowded
+
+
+def find_patches(
+    pixels: Pixels, ceiling: Ceiling, threshold: float, limits: tuple[float, float], reduction: int
+) -> tuple[list[Patch], bool]:
+    """Return what has a radius within `limits` px and a channel below `threshold` times the ceiling.
+
+    The second value is that of `find_blobs`.
+    """
+    small, outlines = _outlines(pixels, ceiling, threshold, reduction)
     crowded = len(outlines) > PATCHES_MAX
     if crowded:
         outlines = sorted(outlines, key=len)[-PATCHES_MAX:]
-    middle = (reduction - 1) / 2
+    low, high, middle = limits[0] / reduction, limits[1] / reduction, (reduction - 1) / 2
+    patches = []
     for outline in outlines:
-        shape = _shape(outline, *limits)
-        if shape is None:
-            continue
-        x, y, radius = shape
-        centre = complex(reduction * x + middle, reduction * y + middle)
-        ratio = over(mean(small, x, y, radius / 2), ceiling.at(centre))
-        corner, distance = target.colours.nearest(ratio)
-        if distance < COLOUR_MAX:
-            blobs[corner].append(Blob(centre, reduction * radius, distance))
-    return [sorted(some, key=lambda blob: blob.distance)[:BLOBS_MAX] for some in blobs], crowded
+        shape = _shape(outline, low, high)
+        if shape is not None:
+            x, y, radius = shape
+            centre = complex(reduction * x + middle, reduction * y + middle)
+            ratio = over(mean(small, x, y, radius / 2), ceiling.at(centre))
+            patches.append((centre, reduction * radius, ratio))
+    return patches, crowded
 
 
 def _outlines(

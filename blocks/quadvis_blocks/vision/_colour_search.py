@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from quadvis.errors import QuadvisError
-from quadvis_blocks.vision._blobs import Patch, find_patches
+from quadvis_blocks.vision._blobs import find_patches
 from quadvis_blocks.vision._circles import SMALLEST, Ceiling, Disc, Pixels, locate
 from quadvis_blocks.vision._colour_names import cost, named, nearest_name
 from quadvis_blocks.vision._colours import APART, THRESHOLD, Colour, tone
@@ -122,12 +122,10 @@ def _discs(pixels: Pixels, ceiling: Ceiling, threshold: float) -> list[Disc]:
     """Return all whole circles, the largest first."""
     reduction = max(2, round(pixels.shape[1] / WIDTH))
     limits = (RADIUS_MIN, RADIUS_MAX * pixels.shape[1])
-    patches: list[Patch] = sorted(
-        find_patches(pixels, ceiling, threshold, limits, reduction), key=lambda patch: -patch.radius
-    )
+    patches, _ = find_patches(pixels, ceiling, threshold, limits, reduction)
     found: list[Disc] = []
-    for patch in patches:
-        disc = locate(pixels, ceiling, patch.centre, patch.radius, slack=reduction / 2)
+    for centre, radius, _ in sorted(patches, key=lambda patch: -patch[1]):
+        disc = locate(pixels, ceiling, centre, radius, slack=reduction / 2)
         new = disc and all(abs(disc.centre - other.centre) > disc.radius for other in found)
         if disc is not None and new and disc.symmetry >= SYMMETRY_MIN:
             found.append(disc)
