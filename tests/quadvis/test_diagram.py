@@ -180,7 +180,8 @@ def test_a_variant_builds_on_another_and_goes_before_it(tmp_path: Path) -> None:
         "  wave: {slot: true, block: sources.sine, rate: fast}\n"
         "  law: {slot: true, block: signal.gain, rate: fast, in: {u: wave.y}}\n"
         "variants:\n"
-        "  both: {base: ramped, slots: {law: {block: signal.difference, in: {plus: wave.y, minus: wave.y}}}}\n"
+        "  both:\n    base: ramped\n"
+        "    slots: {law: {block: signal.difference, in: {plus: wave.y, minus: wave.y}}}\n"
         "  ramped: {slots: {wave: {block: sources.ramp}, law: {block: signal.unit_delay}}}\n"
     )
     kinds = {name: [type(load(tmp_path / "case.yaml", variant=name).graph[block].block).__name__
