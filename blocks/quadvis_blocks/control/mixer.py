@@ -18,7 +18,9 @@ class Mixer(Block):
     limits it is the exact inverse of u = f0 + f1 + f2 + f3, Ix roll = l (f3 - f1), Iy pitch = l (f0 - f2),
     Iz yaw = c (f0 + f2 - f1 - f3). Beyond them yaw gives way first (to the other side if need be), then the
     collective, each by as little as possible; roll and pitch last and in proportion to each other.
-    Whatever the inputs, every thrust lies within the limits.
+    Whatever the inputs, every thrust lies within the limits. ``given`` is what the rotors then do, and
+    ``limited`` tells on which axes that is less than was wanted: integrators and disturbance estimates take
+    the one as their input, or stand still by the other.
 
     Source: section 3 in words; the numbering and the order of giving way are additions.
     """
@@ -36,6 +38,12 @@ class Mixer(Block):
     yaw = In(unit="rad/s^2", doc="yaw torque divided by inertia")
     thrust = Out("float64[4]", unit="N", doc="thrust of each rotor: front, right, rear, left")
     saturated = Out("bool", doc="whether something had to give way")
+    given = Out(
+        "float64[4]",
+        unit="N rad/s^2 rad/s^2 rad/s^2",
+        doc="what the thrusts amount to: collective; roll, pitch and yaw torque over inertia",
+    )
+    limited = Out("bool[4]", doc="which of them gave way: collective, roll, pitch, yaw")
 
     def check(self) -> None:
         """Refuse limits that leave nothing between them."""
@@ -43,17 +51,18 @@ class Mixer(Block):
             problem = f"thrust_min must be below thrust_max, {self.thrust_max:g} N, got {self.thrust_min:g} N"
             raise ParameterError("thrust_min", problem)
 
-    def output(self, collective: float, roll: float, pitch: float, yaw: float) -> tuple[Any, bool]:
-        """Return the four thrusts, and whether they give less than was wanted."""
-        least, most, inertia = self.thrust_min, self.thrust_max, self.inertia
-        side = 0.5 * inertia[0] * roll / self.arm
-        front = 0.5 * inertia[1] * pitch / self.arm
-        turn = 0.25 * inertia[2] * yaw / self.torque_ratio
-        mean = 0.25 * collective
+    def output(self, collective: float, roll: float, pitch: float, yaw: float) -> tuple[Any, bool, Any, Any]:
+        """Return the thrusts, whether something gave way, what they amount to, and what gave way."""
+        least, most = self.thrust_min, self.thrust_max
+        # Thrust of one rotor for one unit of torque over inertia.
+        per_roll = 0.5 * self.inertia[0] / self.arm
+        per_pitch = 0.5 * self.inertia[1] / self.arm
+        per_yaw = 0.25 * self.inertia[2] / self.torque_ratio
+        side, front, turn, mean = per_roll * roll, per_pitch * pitch, per_yaw * yaw, 0.25 * collective
         reach = max(abs(side), abs(front))
         half = 0.5 * (most - least)
-        limited = reach > half
-        if limited:
+        steep = reach > half
+        if steep:
             side, front = side * half / reach, front * half / reach
         # With yaw free to choose, opposite rotors share what roll and pitch leave them.
         room = half - 0.5 * (abs(side) + abs(front))
@@ -61,7 +70,7 @@ class Mixer(Block):
         lowest = max(least + abs(front) - allowed, allowed + abs(side) - most)
         highest = min(most - abs(front) - allowed, allowed - abs(side) - least)
         turned = _within(turn, lowest, highest)
-        limited = limited or abs(allowed - mean) > ROUNDING or abs(turned - turn) > ROUNDING
+        high, slow = abs(allowed - mean) > ROUNDING, abs(turned - turn) > ROUNDING
         thrusts = np.array(
             (
                 allowed + front + turned,
@@ -70,7 +79,12 @@ class Mixer(Block):
                 allowed + side - turned,
             )
         )
-        return np.minimum(np.maximum(thrusts, least), most), limited
+        return (
+            np.minimum(np.maximum(thrusts, least), most),
+            steep or high or slow,
+            np.array((4.0 * allowed, side / per_roll, front / per_pitch, turned / per_yaw)),
+            np.array((high, steep and side != 0.0, steep and front != 0.0, slow)),
+        )
 
 
 def _within(value: float, lower: float, upper: float) -> float:

@@ -31,6 +31,19 @@ def test_whatever_thrusts_the_rotors_can_give_are_found_again_from_their_effect(
     assert not saturated
 
 
+@given(st.floats(-5, 20), st.floats(-300, 300), st.floats(-300, 300), st.floats(-60, 60))
+def test_what_is_given_is_the_effect_of_the_thrusts_and_what_is_limited_is_where_it_differs(
+    collective: float, roll: float, pitch: float, yaw: float
+) -> None:
+    wanted = np.array([collective, roll, pitch, yaw])
+    result = drive(Mixer(), collective=collective, roll=roll, pitch=pitch, yaw=yaw, steps=1)
+    assert result.given[0] == pytest.approx(EFFECT @ result.thrust[0], abs=1e-9)
+    differs = np.abs(result.given[0] - wanted)
+    assert (result.limited[0] | (differs < 1e-8)).all()
+    assert (~result.limited[0] | (differs > 0.0)).all()
+    assert result.saturated[0] == result.limited[0].any()
+
+
 def test_right_side_down_needs_the_left_rotor_and_nose_up_the_front_one() -> None:
     thrusts, _ = mix(4.0, roll=10.0)
     assert thrusts[3] > thrusts[1]
