@@ -1,0 +1,1 @@
+"""Who flies: manual and automatic mode, stale data, what happens when the camera sees nothing, landing."""

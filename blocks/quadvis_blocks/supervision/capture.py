@@ -1,0 +1,78 @@
+"""The reference taken from where the craft is."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks._angles import wrapped
+
+COLLECTIVE, ROLL, PITCH, YAW = range(4)
+
+
+class Capture(Block):
+    """A reference that is shifted to where the craft is when the control law takes over.
+
+    When collective, roll or pitch, or yaw become automatic, the height, x and y, or the heading of the
+    reference become those of the craft. When vision comes back (``rearmed``) x and y do if the craft is
+    further than ``distance`` from them. The shift stays, so a moving reference moves on from there; with a
+    ``return_speed`` it shrinks at that speed, heading excepted.
+    """
+
+    distance = Param(0.5, unit="m", min=0.0, tune=True, doc="how far the craft may be off without a capture")
+    return_speed = Param(0.0, unit="m/s", min=0.0, tune=True, doc="speed at which the shift shrinks; 0 stays")
+    position_reference = In("float64[3]", unit="m", doc="where to be: x, y, h")
+    velocity_reference = In(
+        "float64[3]", unit="m/s", default=(0.0, 0.0, 0.0), doc="rate of change of the position reference"
+    )
+    heading_reference = In(unit="rad", doc="heading to hold")
+    position = In("float64[3]", unit="m", doc="where the craft is: x, y, h")
+    heading = In(unit="rad", doc="its heading")
+    engaged = In("bool[4]", doc="channels that the law gets at this tick: collective, roll, pitch, yaw")
+    rearmed = In("bool", default=False, doc="true at the tick at which vision comes back")
+    shifted_position = Out("float64[3]", unit="m", doc="where to be: x, y, h")
+    shifted_velocity = Out("float64[3]", unit="m/s", doc="rate of change of the shifted position")
+    shifted_heading = Out(unit="rad", doc="heading to hold, in (-pi, pi]")
+    captured = Out("bool", doc="whether x and y are taken at this tick")
+    shift = State("float64[3]")
+    turn = State()
+
+    def output(
+        self, position_reference: Any, velocity_reference: Any, heading_reference: float, position: Any,
+        heading: float, engaged: Any, rearmed: bool,
+    ) -> tuple[Any, Any, float, bool]:  # fmt: skip
+        """Return the shifted reference, and whether x and y are taken from the craft now."""
+        shift, taken = _shifted(self.shift, position - position_reference, engaged, rearmed, self.distance)
+        away = _length(shift)
+        speed = min(self.return_speed, away / self.period)
+        velocity = velocity_reference - shift * (speed / away) if away > 0.0 else 1.0 * velocity_reference
+        turn = heading - heading_reference if engaged[YAW] else self.turn
+        return position_reference + shift, velocity, wrapped(heading_reference + turn), taken
+
+    def update(
+        self, position_reference: Any, heading_reference: float, position: Any, heading: float, engaged: Any,
+        rearmed: bool,
+    ) -> None:  # fmt: skip
+        """Keep the shift, a little smaller if it shrinks."""
+        shift, _ = _shifted(self.shift, position - position_reference, engaged, rearmed, self.distance)
+        away = _length(shift)
+        step = min(self.return_speed * self.period, away)
+        self.shift = shift * (1.0 - step / away) if away > 0.0 else shift
+        if engaged[YAW]:
+            self.turn = heading - heading_reference
+
+
+def _shifted(shift: Any, error: Any, engaged: Any, rearmed: bool, distance: float) -> tuple[Any, bool]:
+    """Return the shift with what is captured now, and whether x and y are."""
+    taken = engaged[ROLL] or engaged[PITCH]
+    if rearmed:
+        taken = taken or math.hypot(error[0] - shift[0], error[1] - shift[1]) > distance
+    x, y = (error[0], error[1]) if taken else (shift[0], shift[1])
+    return np.array((x, y, error[2] if engaged[COLLECTIVE] else shift[2])), taken
+
+
+def _length(shift: Any) -> float:
+    return math.sqrt(shift[0] * shift[0] + shift[1] * shift[1] + shift[2] * shift[2])

@@ -1,0 +1,172 @@
+"""What is done when something that the control laws need is missing."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from quadvis.block import Block, In, Out, Param, State
+
+ROLL, PITCH = 1, 2
+FRESH, COAST, LEVEL, LOST = range(4)  # states of vision
+TO_LAND, TO_MANUAL = range(2)
+NEUTRAL, PILOT = range(2)
+ZERO, KEEP = range(2)
+MANUAL, MIXED, AUTOMATIC, COASTING, LEVELLED, LANDING = range(6)
+NONE, SWITCH, STICK, IMU_STALE, STICKS_STALE, NO_FRAMES, TARGET_LOST, REARMING, ASKED, SATURATED = range(10)
+
+
+class Failsafe(Block):
+    """Who has each channel, how much vision counts, and whether to land.
+
+    - Vision not FRESH: positions count as long as it coasts, and less and less over ``blend`` once it is
+      LEVEL; velocities not at all while the frames are stale (``coast_velocity: keep`` for an estimator that
+      reckons on by itself). When vision is FRESH again both come back over ``blend``.
+    - Vision given up (LAND): descend, and go on to the ground even if vision comes back; or hand all channels
+      to the pilot (``on_loss: manual``), until he has switched them off and on. If his sticks are stale too,
+      descend. ``land`` above 0.5 asks for the same at any time. Taking the collective in hand ends it.
+    - IMU stale: no automatic roll and pitch. They are neutral; with ``imu_lost: pilot``, right for a craft
+      that levels itself, they are the pilot's, if his sticks are not stale.
+
+    Modes: 0 MANUAL (no channel automatic), 1 MIXED (some), 2 AUTOMATIC (all), and with any channel automatic
+    3 COAST, 4 LEVEL, 5 LAND. Reasons, the first that holds: in LAND what began it; 3 IMU stale; of vision 5
+    no new frames, 6 target not found, 7 not enough good frames yet; 2 a stick took a channel back; 4 sticks
+    stale; 1 a switch is off; 9 a control gave way in the mixer; 0 none. 8: landing was asked for.
+
+    ``freeze`` is for integrators and disturbance estimates: channels that the law does not have, or on which
+    it does not get what it wants.
+    """
+
+    on_loss = Param("land", choices=("land", "manual"), doc="what to do when vision is given up")
+    imu_lost = Param("neutral", choices=("neutral", "pilot"), doc="whose roll and pitch are without an IMU")
+    coast_velocity = Param("zero", choices=("zero", "keep"), doc="velocities while frames are stale")
+    blend = Param(1.0, unit="s", above=0.0, tune=True, doc="time over which positions come and go")
+    automatic = In("bool[4]", doc="channels that the pilot leaves to the law: collective, roll, pitch, yaw")
+    overridden = In("bool[4]", default=(False,) * 4, doc="channels that a stick took back")
+    vision = In("int64", default=FRESH, doc="state of vision: 0 FRESH, 1 COAST, 2 LEVEL, 3 LAND")
+    vision_reason = In("int64", default=0, doc="0 none, 1 no frames, 2 target not found, 3 not enough yet")
+    vision_stale = In("bool", default=False, doc="whether the last good frame is too old")
+    imu_stale = In("bool", default=False, doc="whether the IMU's last news is too old")
+    sticks_stale = In("bool", default=False, doc="whether the sticks' last news is too old")
+    limited = In("bool[4]", default=(False,) * 4, doc="controls that gave way in the mixer")
+    land = In(default=0.0, doc="above 0.5 asks for a landing")
+    allowed = Out("bool[4]", doc="channels that the law has")
+    neutral = Out("bool[4]", doc="channels that nobody has")
+    engaged = Out("bool[4]", doc="channels that the law gets at this tick")
+    freeze = Out("bool[4]", doc="channels whose integrators and disturbance estimates must stand still")
+    position_weight = Out(doc="how much horizontal position and heading count, 0 to 1")
+    velocity_weight = Out(doc="how much horizontal velocity counts, 0 to 1")
+    descend = Out("bool", doc="whether to land")
+    mode = Out("int64", doc="0 MANUAL, 1 MIXED, 2 AUTOMATIC, 3 COAST, 4 LEVEL, 5 LAND")
+    reason = Out("int64", doc="why: 0 to 9, see above")
+    had = State("bool[4]")
+    begun = State("bool")
+    landing = State("bool")
+    cause = State("int64")
+    given_up = State("bool")
+    weight = State(init=1.0)
+
+    def output(
+        self, automatic: Any, overridden: Any, vision: int, vision_reason: int, vision_stale: bool,
+        imu_stale: bool, sticks_stale: bool, limited: Any, land: float,
+    ) -> tuple[Any, Any, Any, Any, float, float, bool, int, int]:  # fmt: skip
+        """Return who has what, what counts, and why."""
+        given_up = _given_up(self.given_up, self.on_loss, vision, sticks_stale, automatic)
+        allowed = automatic & (not given_up)
+        neutral = allowed & False
+        if imu_stale:
+            nobody = self.imu_lost == NEUTRAL or sticks_stale
+            allowed[ROLL], allowed[PITCH] = False, False
+            neutral[ROLL], neutral[PITCH] = nobody, nobody
+        descend, cause = _landing(self.landing, self.cause, allowed[0], vision, vision_reason, land)
+        weight = _weight(self.weight, vision, self.period / self.blend)
+        unknown = vision >= LEVEL or (vision_stale and self.coast_velocity == ZERO)
+        reason = _reason(
+            allowed.any() or given_up, automatic.all(), overridden.any(), vision_reason, imu_stale,
+            sticks_stale, limited.any(),
+        )  # fmt: skip
+        return (
+            allowed,
+            neutral,
+            allowed & ~self.had & self.begun,
+            limited | ~allowed,
+            weight,
+            0.0 if unknown else weight,
+            descend,
+            _mode(allowed, vision, descend),
+            cause if descend else reason,
+        )
+
+    def update(
+        self,
+        automatic: Any,
+        vision: int,
+        vision_reason: int,
+        imu_stale: bool,
+        sticks_stale: bool,
+        land: float,
+    ) -> None:
+        """Keep the decisions that last."""
+        self.given_up = _given_up(self.given_up, self.on_loss, vision, sticks_stale, automatic)
+        self.had = automatic & (not self.given_up)
+        self.landing, self.cause = _landing(
+            self.landing, self.cause, self.had[0], vision, vision_reason, land
+        )
+        if imu_stale:
+            self.had[ROLL], self.had[PITCH] = False, False
+        self.weight = _weight(self.weight, vision, self.period / self.blend)
+        self.begun = True
+
+
+def _given_up(given_up: bool, on_loss: int, vision: int, sticks_stale: bool, automatic: Any) -> bool:
+    """Return whether all channels are the pilot's until he has switched them off and on."""
+    if not automatic.any():
+        return False
+    return given_up or (on_loss == TO_MANUAL and vision == LOST and not sticks_stale)
+
+
+def _landing(
+    landing: bool, cause: int, allowed: bool, vision: int, vision_reason: int, land: float
+) -> tuple[bool, int]:
+    """Return whether to land, and why."""
+    if not allowed:
+        return False, NONE
+    if landing:
+        return True, cause
+    if vision == LOST:
+        return True, NO_FRAMES - 1 + max(vision_reason, 1)
+    return land > 0.5, (ASKED if land > 0.5 else NONE)
+
+
+def _weight(weight: float, vision: int, step: float) -> float:
+    """Return how much positions count one step later."""
+    return min(weight + step, 1.0) if vision <= COAST else max(weight - step, 0.0)
+
+
+def _mode(allowed: Any, vision: int, descend: bool) -> int:
+    if not allowed.any():
+        return MANUAL
+    if descend:
+        return LANDING
+    if vision == COAST:
+        return COASTING
+    if vision >= LEVEL:
+        return LEVELLED
+    return AUTOMATIC if allowed.all() else MIXED
+
+
+def _reason(
+    flown: bool, all_on: bool, overridden: bool, vision_reason: int, imu_stale: bool, sticks_stale: bool,
+    limited: bool,
+) -> int:  # fmt: skip
+    """Return the first reason that holds; vision matters to a channel that the law has or had to give up."""
+    if imu_stale:
+        return IMU_STALE
+    if flown and vision_reason > 0:
+        return NO_FRAMES - 1 + vision_reason
+    if overridden:
+        return STICK
+    if sticks_stale:
+        return STICKS_STALE
+    if not all_on:
+        return SWITCH
+    return SATURATED if limited else NONE

@@ -1,0 +1,139 @@
+"""The switch between the pilot's controls and the automatic ones."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, In, Out, Param, State
+
+CHANNELS = 4
+MANUAL, AUTOMATIC, NEUTRAL, IDLE = range(4)
+
+
+class ModeSwitch(Block):
+    """Each control from the pilot or from the control law, without a jump when it changes hands.
+
+    At the tick at which a channel changes hands its output stays what it was, to the bit. The difference from
+    the new source is an offset that then decays exponentially: with ``to_automatic`` when the law takes over,
+    with ``to_manual`` when the pilot does, or when ``neutral`` comes. What the new source does from that tick
+    on passes through at once, so the pilot has full authority from the first moment; only the difference in
+    trim is taken away smoothly. With ``to_manual`` 0 the stick counts at once as it stands: the output jumps
+    by the difference. ``idle`` goes before ``neutral``, and that before ``automatic``.
+
+    Source: section 4 ("the four control inputs can independently operate in either manual or automatic
+    modes"); the transfer is an addition.
+    """
+
+    to_automatic = Param(
+        0.5, unit="s", min=0.0, tune=True, doc="time constant of the transfer to the law; 0 jumps"
+    )
+    to_manual = Param(
+        0.2, unit="s", min=0.0, tune=True, doc="time constant of the transfer to pilot or neutral; 0 jumps"
+    )
+    weight = Param(4.905, unit="N", min=0.0, tune=True, doc="collective at neutral: m g; torques are 0")
+    idle_thrust = Param(0.0, unit="N", min=0.0, tune=True, doc="collective when idle; torques are 0")
+    manual = In(
+        "float64[4]",
+        unit="N rad/s^2 rad/s^2 rad/s^2",
+        doc="the pilot's controls: collective; roll, pitch and yaw torque over inertia",
+    )
+    collective = In(unit="N", doc="collective thrust of the control law")
+    roll = In(unit="rad/s^2", doc="roll torque of the control law")
+    pitch = In(unit="rad/s^2", doc="pitch torque of the control law")
+    yaw = In(unit="rad/s^2", doc="yaw torque of the control law")
+    automatic = In("bool[4]", doc="channels that the law has, not the pilot: collective, roll, pitch, yaw")
+    neutral = In(
+        "bool[4]", default=(False, False, False, False), doc="channels that neither has: neutral controls"
+    )
+    idle = In("bool", default=False, doc="true to let all rotors idle")
+    controls = Out(
+        "float64[4]",
+        unit="N rad/s^2 rad/s^2 rad/s^2",
+        doc="what goes to the mixer: collective; roll, pitch and yaw torque over inertia",
+    )
+    source = Out("int64[4]", doc="whose it is: 0 pilot, 1 control law, 2 neutral, 3 idle")
+    last = State("float64[4]")
+    offset = State("float64[4]")
+    owner = State("int64[4]")
+    begun = State("bool")
+
+    def output(
+        self,
+        manual: Any,
+        collective: float,
+        roll: float,
+        pitch: float,
+        yaw: float,
+        automatic: Any,
+        neutral: Any,
+        idle: bool,
+    ) -> tuple[Any, Any]:
+        """Return the controls and their sources."""
+        law = np.array((collective, roll, pitch, yaw))
+        controls, source = np.empty(CHANNELS), np.empty(CHANNELS, np.int64)
+        for channel in range(CHANNELS):
+            owner = _owner(automatic[channel], neutral[channel], idle)
+            value = _value(owner, channel, manual, law, self.weight, self.idle_thrust)
+            smooth = self.begun and (self.to_automatic if owner == AUTOMATIC else self.to_manual) > 0.0
+            changed = owner != self.owner[channel]
+            controls[channel] = _handed(value, smooth, changed, self.last[channel], self.offset[channel])[0]
+            source[channel] = owner
+        return controls, source
+
+    def update(
+        self,
+        manual: Any,
+        collective: float,
+        roll: float,
+        pitch: float,
+        yaw: float,
+        automatic: Any,
+        neutral: Any,
+        idle: bool,
+    ) -> None:
+        """Take the difference at a change of hands into the offset, and let it decay."""
+        law = np.array((collective, roll, pitch, yaw))
+        for channel in range(CHANNELS):
+            owner = _owner(automatic[channel], neutral[channel], idle)
+            value = _value(owner, channel, manual, law, self.weight, self.idle_thrust)
+            constant = self.to_automatic if owner == AUTOMATIC else self.to_manual
+            changed = owner != self.owner[channel]
+            control, offset = _handed(
+                value, self.begun and constant > 0.0, changed, self.last[channel], self.offset[channel]
+            )
+            self.last[channel] = control
+            self.offset[channel] = offset * math.exp(-self.period / constant) if constant > 0.0 else 0.0
+            self.owner[channel] = owner
+        self.begun = True
+
+
+def _owner(automatic: bool, neutral: bool, idle: bool) -> int:
+    """Return whose a channel is."""
+    if idle:
+        return IDLE
+    if neutral:
+        return NEUTRAL
+    return AUTOMATIC if automatic else MANUAL
+
+
+def _value(owner: int, channel: int, manual: Any, law: Any, weight: float, idle_thrust: float) -> float:
+    """Return what the owner wants on a channel."""
+    if owner == AUTOMATIC:
+        return float(law[channel])
+    if owner == MANUAL:
+        return float(manual[channel])
+    if channel > 0:
+        return 0.0
+    return idle_thrust if owner == IDLE else weight
+
+
+def _handed(value: float, smooth: bool, changed: bool, last: float, offset: float) -> tuple[float, float]:
+    """Return a control, and how far it is from what its owner wants."""
+    if not smooth:
+        return value, 0.0
+    if changed:
+        return last, last - value
+    return value + offset, offset

@@ -1,0 +1,73 @@
+"""How old the news of a signal is."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from quadvis.block import Block, In, Out, Param, State
+
+INSTANT = 1e-9  # s
+
+
+class Staleness(Block):
+    """How long ago a signal last brought news, and whether that is too long.
+
+    News is a stamp newer than all before, a sequence number other than the last, or a value of which an
+    element is other than the last; connect what there is. Inputs that are not connected, NaN, and stamps of
+    the future bring none. The age counts from the stamp of the news if it has one, else from the tick at
+    which it came; before the first news it counts from the start.
+    """
+
+    max_age = Param(
+        0.1,
+        unit="s",
+        min=0.0,
+        tune=True,
+        doc="greatest age (inclusive) that is not stale; 0.1 s suits an IMU",
+    )
+    stamp = In(unit="s", default=math.nan, doc="instant of the measurement")
+    sequence = In("int64", default=0, doc="number of the measurement")
+    value = In("float64[*]", unit="a", default=0.0, doc="the measurement, if it has noise: it never repeats")
+    age = Out(unit="s", doc="time since the last news")
+    stale = Out("bool", doc="whether that is more than ``max_age``")
+    newest = State(unit="s")
+    news = State(unit="s")
+    last_sequence = State("int64")
+    last_value = State("float64[*]")
+
+    def start(self) -> None:
+        """Know nothing yet."""
+        self.newest = -math.inf
+
+    def output(self, stamp: float, sequence: int, value: Any, time: float) -> tuple[float, bool]:
+        """Return the age, and whether it is too great."""
+        stamped = self.newest < stamp <= time + INSTANT
+        if stamped:
+            age = time - stamp
+        elif sequence != self.last_sequence or _differs(value, self.last_value):
+            age = 0.0
+        else:
+            age = time - self.news
+        return max(0.0, age), age > self.max_age + INSTANT
+
+    def update(self, stamp: float, sequence: int, value: Any, time: float) -> None:
+        """Keep what came."""
+        if self.newest < stamp <= time + INSTANT:
+            self.newest = stamp
+            self.news = stamp
+        elif sequence != self.last_sequence or _differs(value, self.last_value):
+            self.news = time
+        self.last_sequence = sequence
+        self.last_value = value
+
+
+def _differs(value: Any, last: Any) -> bool:
+    """Return whether an element is a number other than the last."""
+    if isinstance(value, float):
+        return value == value and value != last
+    for place in range(value.size):
+        element = value.flat[place]
+        if element == element and element != last.flat[place]:
+            return True
+    return False

@@ -1,0 +1,87 @@
+"""The pilot's switches, and sticks that take a channel back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, In, Out, Param, ParameterError, State
+
+CHANNELS = 4
+ENGAGEMENT, NEUTRAL = range(2)
+SWITCH_ON, SWITCH_OFF = 0.6, 0.4  # a switch counts as moved beyond the one or below the other
+
+
+class StickOverride(Block):
+    """Which channels the pilot leaves to the control law: his switches, unless he moves a stick.
+
+    A channel is automatic while its switch is on. A stick that moves by more than ``threshold`` from where it
+    stood when its switch came on takes its channel back at once, and it stays the pilot's until the switch
+    has been off. With ``origin: neutral`` the deflection counts from neutral instead, and a channel is not
+    given away while its stick is further out than ``release``. ``together`` lets one stick take back all.
+
+    While the sticks are stale nothing changes: a link that fails does not look like a pilot who moves.
+    """
+
+    threshold = Param(0.3, above=0.0, max=2.0, tune=True, doc="deflection that takes a channel back")
+    release = Param(
+        0.2, min=0.0, max=1.0, tune=True, doc="greatest deflection at which neutral lets a channel go"
+    )
+    origin = Param("engagement", choices=("engagement", "neutral"), doc="from where a deflection counts")
+    together = Param(False, type="bool", tune=True, doc="whether one stick takes back all channels")
+    sticks = In("float64[4]", doc="collective, roll, pitch, yaw, each -1 to 1")
+    switches = In("float64[4]", doc="one for each channel: 1 wants automatic, 0 manual")
+    stale = In("bool", default=False, doc="whether the sticks are too old to count")
+    automatic = Out("bool[4]", doc="channels that the law may have: collective, roll, pitch, yaw")
+    overridden = Out("bool[4]", doc="channels that a stick took back, until the switch has been off")
+    on = State("bool[4]")
+    taken = State("bool[4]")
+    origins = State("float64[4]")
+
+    def check(self) -> None:
+        """Refuse a release beyond the threshold."""
+        if self.release > self.threshold:
+            problem = f"release must be at most the threshold, {self.threshold:g}, got {self.release:g}"
+            raise ParameterError("release", problem)
+
+    def output(self, sticks: Any, switches: Any, stale: bool) -> tuple[Any, Any]:
+        """Return the channels that are automatic, and those that a stick took back."""
+        on, taken, _ = _decided(
+            sticks, switches, stale, self.on, self.taken, self.origins,
+            self.origin, self.threshold, self.release, self.together,
+        )  # fmt: skip
+        return on & ~taken, taken
+
+    def update(self, sticks: Any, switches: Any, stale: bool) -> None:
+        """Keep the decisions."""
+        on, taken, origins = _decided(
+            sticks, switches, stale, self.on, self.taken, self.origins,
+            self.origin, self.threshold, self.release, self.together,
+        )  # fmt: skip
+        self.on = on
+        self.taken = taken
+        self.origins = origins
+
+
+def _decided(
+    sticks: Any, switches: Any, stale: bool, on: Any, taken: Any, origins: Any,
+    origin: int, threshold: float, release: float, together: bool,
+) -> tuple[Any, Any, Any]:  # fmt: skip
+    """Return which switches are on, which channels are taken back, and where their sticks stood."""
+    on, taken, origins = on.copy(), taken.copy(), origins.copy()
+    if stale:
+        return on, taken, origins
+    for channel in range(CHANNELS):
+        was_on = on[channel]
+        on[channel] = switches[channel] > (SWITCH_OFF if was_on else SWITCH_ON)
+        if on[channel] and not was_on:
+            origins[channel] = sticks[channel] if origin == ENGAGEMENT else 0.0
+            taken[channel] = abs(sticks[channel] - origins[channel]) > release
+        elif on[channel] and abs(sticks[channel] - origins[channel]) > threshold:
+            taken[channel] = True
+        elif not on[channel]:
+            taken[channel] = False
+    if together and np.any(taken):
+        taken |= on
+    return on, taken, origins

@@ -1,0 +1,48 @@
+"""References that ask for no more than vision can be trusted with."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, In, Out
+from quadvis_blocks._angles import wrapped
+
+
+class TrustedReference(Block):
+    """The reference drawn towards the craft, so that errors count by a weight: ``e' = weight e``.
+
+    A horizontal position or heading that is known no more leaves no error with weight 0, and the laws behind
+    it level the craft; a velocity that is known no more counts as the reference's own. Height and climb pass.
+    """
+
+    position_reference = In("float64[3]", unit="m", doc="where to be: x, y, h")
+    velocity_reference = In("float64[3]", unit="m/s", default=(0.0, 0.0, 0.0), doc="its rate of change")
+    heading_reference = In(unit="rad", doc="heading to hold")
+    position = In("float64[3]", unit="m", doc="where the craft is: x, y, h")
+    velocity = In("float64[3]", unit="m/s", doc="rate of change of the position")
+    heading = In(unit="rad", doc="its heading")
+    position_weight = In(doc="how much horizontal position and heading count, 0 to 1")
+    velocity_weight = In(doc="how much horizontal velocity counts, 0 to 1")
+    trusted_position = Out("float64[3]", unit="m", doc="where to be: x, y, h")
+    trusted_velocity = Out("float64[3]", unit="m/s", doc="its rate of change")
+    trusted_heading = Out(unit="rad", doc="heading to hold, in (-pi, pi]")
+
+    def output(
+        self, position_reference: Any, velocity_reference: Any, heading_reference: float, position: Any,
+        velocity: Any, heading: float, position_weight: float, velocity_weight: float,
+    ) -> tuple[Any, Any, float]:  # fmt: skip
+        """Return the reference with its errors weighted."""
+        place = _drawn(position_reference, position, position_weight)
+        pace = _drawn(velocity_reference, velocity, velocity_weight)
+        turn = wrapped(heading - heading_reference)
+        return place, pace, wrapped(heading_reference + (1.0 - position_weight) * turn)
+
+
+def _drawn(reference: Any, value: Any, weight: float) -> Any:
+    """Return x and y drawn to the value; the third element passes. Exact at weight 1."""
+    rest = 1.0 - weight
+    x = reference[0] + rest * (value[0] - reference[0])
+    y = reference[1] + rest * (value[1] - reference[1])
+    return np.array((x, y, reference[2]))

@@ -1,0 +1,123 @@
+"""The state of vision, by the time stamps of its frames."""
+
+from __future__ import annotations
+
+import math
+
+from quadvis.block import Block, In, Out, Param, ParameterError, State
+
+FRESH, COAST, LEVEL, LAND = range(4)
+NONE, NO_FRAMES, TARGET_LOST, REARMING = range(4)
+INSTANT = 1e-9  # s
+
+
+class VisionWatchdog(Block):
+    """How far vision can be trusted, by the age of its last good frame.
+
+    ===== ===== ========================================= ============================================
+    state word  entered                                   meant for
+    ===== ===== ========================================= ============================================
+    0     FRESH see below                                 all of vision counts
+    1     COAST a good frame is older than ``coast``      no velocity by differences; dead reckoning
+    2     LEVEL and vision is gone for ``level``          no position errors: level, hold height
+    3     LAND  and vision is gone for ``land``           descend, or hand over to the pilot
+    ===== ===== ========================================= ============================================
+
+    The age counts from the stamp of the frame, not from its arrival. Vision is gone since the last good frame
+    of the FRESH state, or since the start; single frames in between do not stop that clock, they only put
+    off the next state for as long as they are fresh. It goes down at most one state a tick, and back to FRESH
+    only after ``frames`` good frames in a row, never stale in between, over at least ``proof``. It starts in
+    COAST: vision has to prove itself first.
+
+    Reasons: 0 none, 1 no new frames, 2 frames come but the target is not found, 3 too few good frames yet.
+
+    With a camera of 10 frames/s and the 20 Hz of the control the default ``coast`` lets one frame be lost,
+    and the state changes at most 0.3 s after the last good frame was taken.
+    """
+
+    coast = Param(0.25, unit="s", above=0.0, tune=True, doc="greatest age (inclusive) of a FRESH frame")
+    level = Param(2.0, unit="s", above=0.0, tune=True, doc="time without vision to LEVEL")
+    land = Param(5.0, unit="s", above=0.0, tune=True, doc="time without vision to LAND")
+    frames = Param(5, type="int64", min=1, tune=True, doc="good frames in a row to be FRESH again")
+    proof = Param(0.5, unit="s", min=0.0, tune=True, doc="least time from the first of them to the last")
+    stamp = In(unit="s", doc="instant of the newest frame; NaN for none yet")
+    valid = In("bool", doc="whether it gave a pose")
+    state = Out("int64", doc="0 FRESH, 1 COAST, 2 LEVEL, 3 LAND")
+    reason = Out("int64", doc="0 none, 1 no new frames, 2 target not found, 3 not enough good frames yet")
+    age = Out(unit="s", doc="time since the last good frame was taken, or since the start")
+    stale = Out("bool", doc="whether that is more than ``coast``")
+    rearmed = Out("bool", doc="true for the one tick at which it becomes FRESH")
+    now = State("int64", COAST)
+    newest = State(unit="s")  # stamp of any frame
+    good = State(unit="s")  # stamp of the last good frame
+    since = State(unit="s")  # stamp of the last good frame of the FRESH state
+    first = State(unit="s")  # stamp of the first good frame of the row
+    row = State("int64")
+
+    def check(self) -> None:
+        """Refuse times that do not follow on each other."""
+        for name, after, limit in (("level", "coast", self.coast), ("land", "level", self.level)):
+            if getattr(self, name) <= limit:
+                found = f"{getattr(self, name):g} s"
+                raise ParameterError(name, f"{name} must be above {after}, {limit:g} s, got {found}")
+
+    def start(self) -> None:
+        """Trust nothing yet."""
+        self.newest = -math.inf
+        self.now = COAST
+
+    def output(self, stamp: float, valid: bool, time: float) -> tuple[int, int, float, bool, bool]:
+        """Return state, reason, age, whether that is too great, and whether vision has just come back."""
+        newest, good, first, row = _counted(
+            stamp, valid, time, self.newest, self.good, self.first, self.row, self.coast
+        )
+        age = time - good
+        stale = row == 0 or age > self.coast + INSTANT
+        proven = row >= self.frames and good - first >= self.proof - INSTANT
+        state = _state(self.now, stale, proven, time - self.since, self.level, self.land)
+        if state == FRESH:
+            reason = NONE
+        elif not stale:
+            reason = REARMING
+        else:
+            reason = NO_FRAMES if time - newest > self.coast + INSTANT else TARGET_LOST
+        return state, reason, age, stale, state == FRESH and self.now != FRESH
+
+    def update(self, stamp: float, valid: bool, time: float) -> None:
+        """Keep the state."""
+        newest, good, first, row = _counted(
+            stamp, valid, time, self.newest, self.good, self.first, self.row, self.coast
+        )
+        stale = row == 0 or time - good > self.coast + INSTANT
+        proven = row >= self.frames and good - first >= self.proof - INSTANT
+        self.now = _state(self.now, stale, proven, time - self.since, self.level, self.land)
+        self.newest, self.good, self.first = newest, good, first
+        self.row = 0 if stale else row
+        if self.now == FRESH:
+            self.since = good
+
+
+def _counted(
+    stamp: float, valid: bool, time: float, newest: float, good: float, first: float, row: int, longest: float
+) -> tuple[float, float, float, int]:
+    """Return the stamps of newest and last good frame, and the first and number of good ones in a row."""
+    if not newest < stamp <= time + INSTANT:
+        return newest, good, first, row
+    if not valid:
+        return stamp, good, first, row
+    if row == 0 or stamp - good > longest + INSTANT:
+        return stamp, stamp, stamp, 1
+    return stamp, stamp, first, row + 1
+
+
+def _state(state: int, stale: bool, proven: bool, gone: float, level: float, land: float) -> int:
+    """Return the next state; ``gone`` is the time without vision."""
+    if not stale:
+        return FRESH if proven or state == FRESH else state
+    if state == FRESH:
+        return COAST
+    if state == COAST and gone > level + INSTANT:
+        return LEVEL
+    if state == LEVEL and gone > land + INSTANT:
+        return LAND
+    return state
