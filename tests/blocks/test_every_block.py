@@ -62,6 +62,7 @@ def subject(
         "file": str(_video(tmp_path / "video.avi")),
         "times": [0.0, 0.35, 1.0],
         "values": [[1.0, 2.0], [3.0, -1.0], [0.0, 0.0]],
+        "during": [[0.3, 0.6]],
     }
     given = {key: values[key] for key, param in block.interface.params.items() if param.required}
     if "latency" in block.interface.params:

@@ -55,6 +55,7 @@ class Failsafe(Block):
     freeze = Out("bool[4]", doc="channels whose integrators and disturbance estimates must stand still")
     position_weight = Out(doc="how much horizontal position and heading count, 0 to 1")
     velocity_weight = Out(doc="how much horizontal velocity counts, 0 to 1")
+    blind = Out("bool", doc="whether vision does not count now: stale, or not FRESH again since LEVEL")
     descend = Out("bool", doc="whether to land")
     mode = Out("int64", doc="0 MANUAL, 1 MIXED, 2 AUTOMATIC, 3 COAST, 4 LEVEL, 5 LAND")
     reason = Out("int64", doc="why: 0 to 9, see above")
@@ -68,7 +69,7 @@ class Failsafe(Block):
     def output(
         self, automatic: Any, overridden: Any, vision: int, vision_reason: int, vision_stale: bool,
         imu_stale: bool, sticks_stale: bool, limited: Any, land: float,
-    ) -> tuple[Any, Any, Any, Any, float, float, bool, int, int]:  # fmt: skip
+    ) -> tuple[Any, Any, Any, Any, float, float, bool, bool, int, int]:  # fmt: skip
         """Return who has what, what counts, and why."""
         given_up = _given_up(self.given_up, self.on_loss, vision, sticks_stale, automatic)
         allowed = automatic & (not given_up)
@@ -91,6 +92,7 @@ class Failsafe(Block):
             limited | ~allowed,
             weight,
             0.0 if unknown else weight,
+            vision_stale or vision >= LEVEL,
             descend,
             _mode(allowed, vision, descend),
             cause if descend else reason,

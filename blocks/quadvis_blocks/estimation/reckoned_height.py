@@ -1,0 +1,87 @@
+"""The height of a craft whose camera sees nothing."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, In, Out, Param, State
+
+
+class ReckonedHeight(Block):
+    """Position and velocity as measured; while blind, height and climb from the thrust that is given.
+
+    A model runs along all the time: ``m h'' = u cos(roll) cos(pitch) - m g - drag h' + m trim``, with the
+    motors' lag. Each new frame corrects height, climb and trim by fading memory, so the trim takes in a
+    thrust that is not what it should be. While ``blind`` the model alone counts, and horizontal position and
+    velocity pass as they come.
+
+    Error while blind: of the climb e at the beginning, e m / drag in the end; of the trim d, d t^2 / 2.
+    """
+
+    bandwidth = Param(1.5, unit="rad/s", above=0.0, tune=True, doc="how fast the model follows the frames")
+    mass = Param(0.5, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
+    drag = Param(0.1, unit="N*s/m", min=0.0, tune=True, doc="force per speed through the air")
+    lag = Param(0.08, unit="s", above=0.0, tune=True, doc="time constant of a motor")
+    gravity = Param(9.81, unit="m/s^2", above=0.0, doc="g")
+    position = In("float64[3]", unit="m", doc="measured position: x, y, h")
+    velocity = In("float64[3]", unit="m/s", doc="measured velocity")
+    stamp = In(unit="s", doc="instant of the newest frame; NaN for none yet")
+    blind = In("bool", doc="whether the measured height does not count")
+    collective = In(unit="N", doc="collective thrust that the rotors were told to give")
+    roll = In(unit="rad", doc="roll angle")
+    pitch = In(unit="rad", doc="pitch angle")
+    known_position = Out("float64[3]", unit="m", doc="x, y, and the height that counts")
+    known_velocity = Out("float64[3]", unit="m/s", doc="rates of x and y, and the climb that counts")
+    trim = Out(unit="m/s^2", doc="upward acceleration that the thrust does not explain")
+    h = State(unit="m")
+    climb = State(unit="m/s")
+    excess = State(unit="m/s^2")
+    lift = State(unit="N")
+    last = State(unit="s")
+
+    def start(self) -> None:
+        """Know nothing yet, in a trimmed hover."""
+        self.last = -math.inf
+        self.lift = self.mass * self.gravity
+
+    def output(self, position: Any, velocity: Any, blind: bool) -> tuple[Any, Any, float]:
+        """Return position and velocity with the height and climb that count."""
+        height = self.h if blind and self.last > -math.inf else position[2]
+        climb = self.climb if blind else velocity[2]
+        return (
+            np.array((position[0], position[1], height)),
+            np.array((velocity[0], velocity[1], climb)),
+            self.excess,
+        )
+
+    def update(
+        self,
+        position: Any,
+        stamp: float,
+        blind: bool,
+        collective: float,
+        roll: float,
+        pitch: float,
+        time: float,
+    ) -> None:
+        """Correct the model by a new frame, and let it run for one period."""
+        if stamp > self.last and not blind:
+            if self.last == -math.inf:
+                self.h = position[2]
+            else:
+                since, age = stamp - self.last, time - stamp
+                keep = math.exp(-self.bandwidth * since)
+                error = position[2] - (self.h - self.climb * age)
+                self.h += (1.0 - keep**3) * error
+                self.climb += 1.5 * (1.0 - keep) ** 2 * (1.0 + keep) / since * error
+                self.excess += (1.0 - keep) ** 3 / (since * since) * error
+            self.last = stamp
+        upright = math.cos(roll) * math.cos(pitch)
+        force = self.lift * upright - self.drag * self.climb
+        acceleration = force / self.mass - self.gravity + self.excess
+        self.h += self.period * self.climb + 0.5 * self.period * self.period * acceleration
+        self.climb += self.period * acceleration
+        self.lift -= math.expm1(-self.period / self.lag) * (collective - self.lift)

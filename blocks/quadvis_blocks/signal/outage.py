@@ -1,0 +1,48 @@
+"""A signal that fails for a while, on purpose."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from quadvis.block import Block, In, Out, Param, ParameterError, State
+
+INSTANT = 1e-9  # s; an outage begins and ends at ticks, which rounding must not move
+
+
+class Outage(Block):
+    """A signal that stands still, and says that it is not good, during stretches of time.
+
+    A camera that goes blind, an IMU that hangs or a pilot's link that is lost: ``y`` is the signal, and
+    ``ok`` says so as long as ``valid`` does; from each begin to each end ``y`` keeps the last value from
+    before and ``ok`` is false. Stamps that pass through it stand still too.
+    """
+
+    during = Param(type="float64[k,2]", unit="s", doc="begin (inclusive) and end of each outage")
+    u = In("float64[*]", unit="a", doc="any signal")
+    valid = In("bool", default=True, doc="whether it is good")
+    y = Out("float64[*]", unit="a", nan=True, doc="the signal, or its last value from before the outage")
+    ok = Out("bool", doc="whether it is good, and there is no outage")
+    last = State("float64[*]")
+
+    def check(self) -> None:
+        """Refuse outages that end before they begin."""
+        for begin, end in self.during:
+            if begin >= end:
+                problem = f"during must be rows of a begin and a later end, got {begin:g} s and {end:g} s"
+                raise ParameterError("during", problem)
+
+    def output(self, u: Any, valid: bool, time: float) -> tuple[Any, bool]:
+        """Return the signal or what is left of it."""
+        if _inside(self.during, time + INSTANT):
+            return 1.0 * self.last, False
+        return 1.0 * u, valid
+
+    def update(self, u: Any, time: float) -> None:
+        """Keep the last value."""
+        if not _inside(self.during, time + INSTANT):
+            self.last = u
+
+
+def _inside(during: Any, time: float) -> bool:
+    """Return whether a time lies in one of the stretches."""
+    return bool(((during[:, 0] <= time) & (time < during[:, 1])).any())
