@@ -1,0 +1,60 @@
+"""The pilot's controls, from his sticks."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, In, Out, Param
+
+ANGLE, DIRECT = range(2)
+
+
+class StickControl(Block):
+    """Collective thrust and torques that the sticks ask for.
+
+    Collective: the weight plus ``force`` times the stick, whatever the tilt. Roll and pitch with ``mode:
+    angle``: a torque that brings the angle to ``tilt`` times the stick, two poles at -bandwidth; yaw: one
+    that brings the rate to ``turn`` times the stick, one pole there. Sticks in the middle are a level craft.
+    With ``mode: direct`` a torque of ``torque`` times the stick, for a craft that steadies itself. Stick
+    right is right side down, and clockwise from above; stick back is nose up.
+    """
+
+    mode = Param("angle", choices=("angle", "direct"), doc="what roll, pitch and yaw sticks ask for")
+    bandwidth = Param(4.0, unit="rad/s", above=0.0, tune=True, doc="place of the poles of mode angle")
+    tilt = Param(0.26, unit="rad", above=0.0, tune=True, doc="angle at full stick, mode angle")
+    turn = Param(1.0, unit="rad/s", above=0.0, tune=True, doc="yaw rate at full stick, mode angle")
+    torque = Param(5.0, unit="rad/s^2", above=0.0, tune=True, doc="torque at full stick, mode direct")
+    force = Param(2.0, unit="N", above=0.0, tune=True, doc="force beyond the weight at full stick")
+    mass = Param(0.5, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
+    gravity = Param(9.81, unit="m/s^2", above=0.0, doc="g")
+    tilt_floor = Param(0.5, above=0.0, max=1.0, tune=True, doc="least cos(roll) cos(pitch) to divide by")
+    sticks = In("float64[4]", doc="collective, roll, pitch, yaw, each -1 to 1")
+    roll = In(unit="rad", doc="roll angle")
+    pitch = In(unit="rad", doc="pitch angle")
+    rates = In("float64[3]", unit="rad/s", doc="rates about roll, pitch and yaw axis")
+    controls = Out(
+        "float64[4]",
+        unit="N rad/s^2 rad/s^2 rad/s^2",
+        doc="collective; roll, pitch and yaw torque over inertia",
+    )
+
+    def output(self, sticks: Any, roll: float, pitch: float, rates: Any) -> Any:
+        """Return the controls."""
+        lift = self.mass * self.gravity + self.force * sticks[0]
+        collective = lift / max(math.cos(roll) * math.cos(pitch), self.tilt_floor)
+        if self.mode == DIRECT:
+            return np.array(
+                (collective, self.torque * sticks[1], self.torque * sticks[2], self.torque * sticks[3])
+            )
+        pole = self.bandwidth
+        return np.array(
+            (
+                collective,
+                -2.0 * pole * rates[0] - pole * pole * (roll - self.tilt * sticks[1]),
+                -2.0 * pole * rates[1] - pole * pole * (pitch - self.tilt * sticks[2]),
+                -pole * (rates[2] - self.turn * sticks[3]),
+            )
+        )
