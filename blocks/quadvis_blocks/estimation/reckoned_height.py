@@ -14,18 +14,22 @@ class ReckonedHeight(Block):
     """Position and velocity as measured; while blind, height and climb from the thrust that is given.
 
     A model runs along all the time: ``m h'' = u cos(roll) cos(pitch) - m g - drag h' + m trim``, with the
-    motors' lag. Each new frame corrects height, climb and trim by fading memory, so the trim takes in a
-    thrust that is not what it should be. While ``blind`` the model alone counts, and horizontal position and
-    velocity pass as they come.
+    motors' lag. Each new frame corrects height and climb by fading memory, and much more slowly the trim,
+    which takes in a thrust that is not what it should be but not the gusts. While ``blind`` the model alone
+    counts, and horizontal position and velocity pass as they come.
 
     Error while blind: of the climb e at the beginning, e m / drag in the end; of the trim d, d t^2 / 2.
     """
 
     bandwidth = Param(1.5, unit="rad/s", above=0.0, tune=True, doc="how fast the model follows the frames")
+    trim_bandwidth = Param(
+        0.05, unit="rad/s", min=0.0, tune=True, doc="how fast the trim follows; slower than gusts"
+    )
     mass = Param(0.5, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
     drag = Param(0.1, unit="N*s/m", min=0.0, tune=True, doc="force per speed through the air")
     lag = Param(0.08, unit="s", above=0.0, tune=True, doc="time constant of a motor")
     gravity = Param(9.81, unit="m/s^2", above=0.0, doc="g")
+    lowest = Param(-10.0, unit="m", tune=True, doc="where the model stops to sink, when the rotors idle")
     position = In("float64[3]", unit="m", doc="measured position: x, y, h")
     velocity = In("float64[3]", unit="m/s", doc="measured velocity")
     stamp = In(unit="s", doc="instant of the newest frame; NaN for none yet")
@@ -75,13 +79,17 @@ class ReckonedHeight(Block):
                 since, age = stamp - self.last, time - stamp
                 keep = math.exp(-self.bandwidth * since)
                 error = position[2] - (self.h - self.climb * age)
-                self.h += (1.0 - keep**3) * error
-                self.climb += 1.5 * (1.0 - keep) ** 2 * (1.0 + keep) / since * error
-                self.excess += (1.0 - keep) ** 3 / (since * since) * error
+                forget = 1.0 - keep
+                self.h += forget * (1.0 + keep) * error
+                self.climb += forget * forget / since * error
+                slow = -math.expm1(-self.trim_bandwidth * since)
+                self.excess += slow * forget * forget / (since * since) * error
             self.last = stamp
         upright = math.cos(roll) * math.cos(pitch)
         force = self.lift * upright - self.drag * self.climb
         acceleration = force / self.mass - self.gravity + self.excess
         self.h += self.period * self.climb + 0.5 * self.period * self.period * acceleration
         self.climb += self.period * acceleration
+        if self.h < self.lowest:
+            self.h, self.climb = self.lowest, max(self.climb, 0.0)
         self.lift -= math.expm1(-self.period / self.lag) * (collective - self.lift)

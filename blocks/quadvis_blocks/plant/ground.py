@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param
+from quadvis.block import Block, In, Out, Param, State
 
 SLIP = 0.01  # m/s; slower than this the friction is viscous
 
@@ -28,12 +28,23 @@ class Ground(Block):
     velocity = In("float64[3]", unit="m/s", doc="rate of change of the position")
     force = Out("float64[3]", unit="N", doc="force on the craft along x, y, h")
     contact = Out("bool", doc="whether the feet touch the ground")
+    impact = Out(unit="m/s", doc="greatest speed at which they came down on it so far")
+    touching = State("bool")
+    hardest = State(unit="m/s")
 
-    def output(self, position: Any, velocity: Any) -> tuple[Any, bool]:
-        """Return the force, and whether there is contact."""
+    def output(self, position: Any, velocity: Any) -> tuple[Any, bool, float]:
+        """Return the force, whether there is contact, and how hard it was."""
         depth = self.height - position[2]
         if depth <= 0.0:
-            return np.zeros(3), False
+            return np.zeros(3), False, self.hardest
+        impact = self.hardest if self.touching else max(self.hardest, -velocity[2])
         normal = max(0.0, self.stiffness * depth - self.damping * velocity[2])
         drag = self.friction * normal / max(SLIP, math.hypot(velocity[0], velocity[1]))
-        return np.array((-drag * velocity[0], -drag * velocity[1], normal)), True
+        return np.array((-drag * velocity[0], -drag * velocity[1], normal)), True, impact
+
+    def update(self, position: Any, velocity: Any) -> None:
+        """Keep the speed of a touch-down."""
+        touching = bool(position[2] < self.height)
+        if touching and not self.touching:
+            self.hardest = max(self.hardest, -velocity[2])
+        self.touching = touching

@@ -15,77 +15,90 @@ class Landing(Block):
     """A reference that descends, and the moment at which the craft stands on the ground.
 
     While ``descend`` is true x and y of the reference stay where they were when it became true (or where
-    ``recapture`` puts them) and the height falls at ``speed``. The craft has landed when for ``settle`` it
-    neither follows (it is more than ``gap`` above the reference) nor moves (``still``): this needs no height
-    of the ground. While its height is reckoned and not seen (``blind``), it has landed when the reference is
-    ``margin`` below ``ground``; there the reference stops. ``landed`` stays until ``descend`` is false.
+    ``recapture`` puts them) and the height falls at ``speed``, from ``flare`` above ``ground`` on at
+    ``touch_speed``. The craft has landed when it is more than
+    ``gap`` above the reference and for ``settle`` its height has kept within ``band``: it does not follow.
+    This needs neither the right height of the ground nor a rate. While the height is reckoned and not seen
+    (``blind``), it has landed when the reference is ``margin`` below ``ground``; there the reference stops.
+    When it is seen again the reference goes on from the craft. A craft that is more than
+    ``gap`` too high is not pushed sideways: x and y are its own. ``landed`` stays until ``descend`` is false.
     """
 
     speed = Param(0.3, unit="m/s", above=0.0, tune=True, doc="speed of the descent")
     gap = Param(0.15, unit="m", above=0.0, tune=True, doc="least height above the reference on the ground")
-    still = Param(0.1, unit="m/s", above=0.0, tune=True, doc="greatest rate of the height on the ground")
-    settle = Param(0.5, unit="s", min=0.0, tune=True, doc="how long both must hold")
+    band = Param(0.06, unit="m", above=0.0, tune=True, doc="greatest change of the height on the ground")
+    settle = Param(1.0, unit="s", min=0.0, tune=True, doc="how long the height must keep within it")
     ground = Param(0.0, unit="m", tune=True, doc="height of the craft as it stands on the ground")
-    margin = Param(0.5, unit="m", above=0.0, tune=True, doc="how far the reference goes below that")
+    flare = Param(0.5, unit="m", min=0.0, tune=True, doc="height above the ground at which it slows down")
+    touch_speed = Param(0.2, unit="m/s", above=0.0, tune=True, doc="speed of the rest of the descent")
+    margin = Param(
+        1.5, unit="m", above=0.0, tune=True, doc="how far the reference goes below the ground, in the dark"
+    )
     position_reference = In("float64[3]", unit="m", doc="where to be: x, y, h")
     velocity_reference = In(
         "float64[3]", unit="m/s", default=(0.0, 0.0, 0.0), doc="rate of change of the reference"
     )
     descend = In("bool", doc="whether to land")
     recapture = In("bool", default=False, doc="true to take x and y from the reference anew")
-    height = In(unit="m", doc="height of the craft")
-    climb = In(unit="m/s", doc="rate of change of the height")
+    current = In("float64[3]", unit="m", doc="where the craft is: x, y, h")
     blind = In("bool", default=False, doc="whether the height is reckoned, not seen")
     position = Out("float64[3]", unit="m", doc="where to be: x, y, h")
     velocity = Out("float64[3]", unit="m/s", doc="its rate of change")
     landed = Out("bool", doc="whether the craft stands on the ground: let the rotors idle")
     active = State("bool")
+    was_blind = State("bool")
     spot = State("float64[3]", unit="m")
-    resting = State(unit="s")
+    rest = State(unit="m")  # height from which the craft has not moved
+    since = State(unit="s")  # when it came there
     down = State("bool")
 
     def output(
-        self, position_reference: Any, velocity_reference: Any, descend: bool, recapture: bool, height: float,
-        climb: float, blind: bool,
+        self, position_reference: Any, velocity_reference: Any, descend: bool, recapture: bool, current: Any,
+        blind: bool, time: float,
     ) -> tuple[Any, Any, bool]:  # fmt: skip
         """Return the reference, and whether the craft has landed."""
         if not descend:
             return 1.0 * position_reference, 1.0 * velocity_reference, False
-        spot = _spot(self.active, self.spot, position_reference, recapture)
+        seen_again = self.was_blind and not blind
+        spot = _spot(self.active, self.spot, position_reference, recapture, seen_again, current, self.gap)
+        height = float(current[2])
         lowest = spot[2] <= self.ground - self.margin + INSTANT
-        rests = not blind and height - spot[2] > self.gap and abs(climb) < self.still
-        landed = (rests and self.resting >= self.settle - INSTANT) or (blind and lowest)
-        return spot, np.array((0.0, 0.0, 0.0 if lowest else -self.speed)), self.down or landed
+        rests = self.active and abs(height - self.rest) <= self.band and height - spot[2] > self.gap
+        landed = lowest if blind else rests and time - self.since >= self.settle - INSTANT
+        slow = spot[2] <= self.ground + self.flare
+        speed = 0.0 if lowest else self.speed
+        pace = np.array((0.0, 0.0, -min(speed, self.touch_speed) if slow else -speed))
+        return spot, pace, self.down or landed
 
     def update(
-        self,
-        position_reference: Any,
-        descend: bool,
-        recapture: bool,
-        height: float,
-        climb: float,
-        blind: bool,
+        self, position_reference: Any, descend: bool, recapture: bool, current: Any, blind: bool, time: float
     ) -> None:
         """Go down by one period."""
-        if descend:
-            spot = _spot(self.active, self.spot, position_reference, recapture)
-            lowest = spot[2] <= self.ground - self.margin + INSTANT
-            rests = not blind and height - spot[2] > self.gap and abs(climb) < self.still
-            landed = (rests and self.resting >= self.settle - INSTANT) or (blind and lowest)
-            self.down = self.down or landed
-            self.resting = self.resting + self.period if rests else 0.0
-            spot[2] = max(spot[2] - self.speed * self.period, min(spot[2], self.ground - self.margin))
-            self.spot = spot
-        else:
-            self.down = False
-            self.resting = 0.0
+        seen_again = self.was_blind and not blind
+        spot = _spot(self.active, self.spot, position_reference, recapture, seen_again, current, self.gap)
+        height = float(current[2])
+        lowest = spot[2] <= self.ground - self.margin + INSTANT
+        rests = self.active and abs(height - self.rest) <= self.band and height - spot[2] > self.gap
+        landed = lowest if blind else rests and time - self.since >= self.settle - INSTANT
+        if blind or not self.active or abs(height - self.rest) > self.band:
+            self.rest = height
+            self.since = time
+        slow = spot[2] <= self.ground + self.flare
+        step = (min(self.speed, self.touch_speed) if slow else self.speed) * self.period
+        spot[2] = max(spot[2] - step, min(spot[2], self.ground - self.margin))
+        self.spot = spot
+        self.down = descend and (self.down or landed)
         self.active = descend
+        self.was_blind = descend and blind
 
 
-def _spot(active: bool, spot: Any, reference: Any, recapture: bool) -> Any:
+def _spot(
+    active: bool, spot: Any, reference: Any, recapture: bool, seen_again: bool, current: Any, gap: float
+) -> Any:
     """Return the reference of the descent at this tick."""
     if not active:
         return 1.0 * reference
-    if recapture:
-        return np.array((reference[0], reference[1], spot[2]))
-    return 1.0 * spot
+    h = current[2] if seen_again else spot[2]
+    if current[2] - h > gap:
+        return np.array((current[0], current[1], h))
+    return np.array((reference[0], reference[1], h)) if recapture else np.array((spot[0], spot[1], h))

@@ -21,7 +21,8 @@ class ModeSwitch(Block):
     with ``to_manual`` when the pilot does, or when ``neutral`` comes. What the new source does from that tick
     on passes through at once, so the pilot has full authority from the first moment; only the difference in
     trim is taken away smoothly. With ``to_manual`` 0 the stick counts at once as it stands: the output jumps
-    by the difference. ``idle`` goes before ``neutral``, and that before ``automatic``.
+    by the difference. ``idle``, for a craft on the ground, counts at once. It goes before ``neutral``, and
+    that before ``automatic``.
 
     Source: section 4 ("the four control inputs can independently operate in either manual or automatic
     modes"); the transfer is an addition.
@@ -77,7 +78,7 @@ class ModeSwitch(Block):
         for channel in range(CHANNELS):
             owner = _owner(automatic[channel], neutral[channel], idle)
             value = _value(owner, channel, manual, law, self.weight, self.idle_thrust)
-            smooth = self.begun and (self.to_automatic if owner == AUTOMATIC else self.to_manual) > 0.0
+            smooth = self.begun and _time_constant(owner, self.to_automatic, self.to_manual) > 0.0
             changed = owner != self.owner[channel]
             controls[channel] = _handed(value, smooth, changed, self.last[channel], self.offset[channel])[0]
             source[channel] = owner
@@ -99,7 +100,7 @@ class ModeSwitch(Block):
         for channel in range(CHANNELS):
             owner = _owner(automatic[channel], neutral[channel], idle)
             value = _value(owner, channel, manual, law, self.weight, self.idle_thrust)
-            constant = self.to_automatic if owner == AUTOMATIC else self.to_manual
+            constant = _time_constant(owner, self.to_automatic, self.to_manual)
             changed = owner != self.owner[channel]
             control, offset = _handed(
                 value, self.begun and constant > 0.0, changed, self.last[channel], self.offset[channel]
@@ -128,6 +129,13 @@ def _value(owner: int, channel: int, manual: Any, law: Any, weight: float, idle_
     if channel > 0:
         return 0.0
     return idle_thrust if owner == IDLE else weight
+
+
+def _time_constant(owner: int, to_automatic: float, to_manual: float) -> float:
+    """Return the time constant of the transfer to an owner; 0 if it counts at once."""
+    if owner == IDLE:
+        return 0.0
+    return to_automatic if owner == AUTOMATIC else to_manual
 
 
 def _handed(value: float, smooth: bool, changed: bool, last: float, offset: float) -> tuple[float, float]:

@@ -31,7 +31,7 @@ class StickOverride(Block):
     origin = Param("engagement", choices=("engagement", "neutral"), doc="from where a deflection counts")
     together = Param(False, type="bool", tune=True, doc="whether one stick takes back all channels")
     sticks = In("float64[4]", doc="collective, roll, pitch, yaw, each -1 to 1")
-    switches = In("float64[4]", doc="one for each channel: 1 wants automatic, 0 manual")
+    switches = In("float64[4]", doc="one for each channel: 1 wants automatic, 0 or less manual")
     stale = In("bool", default=False, doc="whether the sticks are too old to count")
     automatic = Out("bool[4]", doc="channels that the law may have: collective, roll, pitch, yaw")
     overridden = Out("bool[4]", doc="channels that a stick took back, until the switch has been off")

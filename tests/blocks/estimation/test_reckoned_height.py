@@ -17,8 +17,9 @@ def fly(height: Any, collective: Any, blind: Any, seconds: float, **more: Any) -
     measured[:, 2] = height(stamp)
     blind = np.array([blind(t) for t in time])
     stamp[blind] = stamp[~blind][-1] if not blind.all() else np.nan
+    block = ReckonedHeight(trim_bandwidth=more.pop("trim_bandwidth", 0.05))
     return drive(
-        ReckonedHeight(), position=measured, velocity=[0.1, 0.2, 0.3], stamp=stamp, blind=blind,
+        block, position=measured, velocity=[0.1, 0.2, 0.3], stamp=stamp, blind=blind,
         collective=[collective(t) for t in time], rate="20 Hz", **{"roll": 0.0, "pitch": 0.0, **more},
     )  # fmt: skip
 
@@ -45,7 +46,9 @@ def test_a_climb_goes_on_blind_and_dies_away_in_the_air() -> None:
     def height(t: Any) -> Any:
         return 1.0 + 0.2 * t
 
-    found = fly(height, lambda t: WEIGHT + (0.02 if t < 8 else 0.0), lambda t: t >= 8, 12.0)
+    found = fly(
+        height, lambda t: WEIGHT + (0.02 if t < 8 else 0.0), lambda t: t >= 8, 12.0, trim_bandwidth=0.0
+    )
     late = found.time >= 8
     climb = 0.2 * np.exp(-(found.time[late] - 8) * DRAG / MASS)
     assert found.known_velocity[late, 2] == pytest.approx(climb, abs=0.02)
@@ -54,7 +57,7 @@ def test_a_climb_goes_on_blind_and_dies_away_in_the_air() -> None:
 
 def test_a_thrust_that_is_not_what_it_should_be_is_taken_in_as_trim() -> None:
     # The rotors are told 3 % more than the weight and yet the craft hovers.
-    found = fly(lambda s: 1.5 + 0.0 * s, lambda t: 1.03 * WEIGHT, lambda t: t >= 15, 20.0)
+    found = fly(lambda s: 1.5 + 0.0 * s, lambda t: 1.03 * WEIGHT, lambda t: t >= 120, 125.0)
     assert found.trim[-1] == pytest.approx(-0.03 * 9.81, rel=0.02)
     assert found.known_position[-1, 2] == pytest.approx(1.5, abs=0.1)
 
@@ -63,3 +66,9 @@ def test_horizontally_it_passes_what_comes_even_blind() -> None:
     found = fly(lambda s: 1.5 + 0.0 * s, lambda t: WEIGHT, lambda t: t >= 1, 2.0, roll=0.3)
     assert (found.known_position[:, :2] == 0.0).all()
     assert (found.known_velocity[:, :2] == [0.1, 0.2]).all()
+
+
+def test_a_model_whose_rotors_idle_does_not_sink_for_ever() -> None:
+    found = fly(lambda s: 0.5 + 0.0 * s, lambda t: 0.0 if t >= 5 else WEIGHT, lambda t: t >= 5, 10.0)
+    assert found.known_position[:, 2].min() == -10.0
+    assert found.known_position[-1, 2] == -10.0 and found.known_velocity[-1, 2] == 0.0

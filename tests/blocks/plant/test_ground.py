@@ -38,3 +38,10 @@ def test_a_craft_that_comes_down_gently_hardly_bounces() -> None:
     path = solve_ivp(motion, (0.0, 1.5), [0.0, -0.3], max_step=0.02)
     assert path.y[0].min() > -0.025 and path.y[0].max() < 0.005
     assert path.y[0, -1] == pytest.approx(-0.00981, abs=1e-3)
+
+
+def test_the_hardest_touch_down_is_told() -> None:
+    height = [0.1, -0.01, -0.01, 0.1, -0.01, 0.1, -0.01]
+    velocity = [[0.0, 0.0, -speed] for speed in (0.9, 0.3, 0.8, 0.0, 0.5, 0.0, 0.2)]
+    found = drive(Ground(), position=[[0.0, 0.0, h] for h in height], velocity=velocity)
+    assert found.impact.tolist() == [0.0, 0.3, 0.3, 0.3, 0.5, 0.5, 0.5]

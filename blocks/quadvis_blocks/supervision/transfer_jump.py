@@ -1,0 +1,41 @@
+"""How much a control jumps when it changes hands."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, In, Out, State
+
+
+class TransferJump(Block):
+    """The change of each control at the tick at which its source changes, and 0 at all others.
+
+    A gauge, to show that a mode switch is bumpless; it knows nothing of how that is done.
+    """
+
+    controls = In(
+        "float64[4]",
+        unit="N rad/s^2 rad/s^2 rad/s^2",
+        doc="collective; roll, pitch and yaw torque over inertia",
+    )
+    source = In("int64[4]", doc="whose each of them is")
+    jump = Out("float64[4]", unit="N rad/s^2 rad/s^2 rad/s^2", doc="their changes as they change hands")
+    changes = Out("int64", doc="how often a control has changed hands so far")
+    last = State("float64[4]")
+    owner = State("int64[4]")
+    begun = State("bool")
+    counted = State("int64")
+
+    def output(self, controls: Any, source: Any) -> tuple[Any, int]:
+        """Return the changes, and how many there have been."""
+        changed = (source != self.owner) & self.begun
+        return np.where(changed, controls - self.last, 0.0), self.counted + int(changed.sum())
+
+    def update(self, controls: Any, source: Any) -> None:
+        """Keep what is there now."""
+        self.counted += int(((source != self.owner) & self.begun).sum())
+        self.last = controls
+        self.owner = source
+        self.begun = True

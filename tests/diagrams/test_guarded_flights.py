@@ -1,0 +1,117 @@
+"""Flights with a failsafe: a blackout, landings, take-overs, and what fails besides vision."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import quadvis
+
+DIAGRAMS = Path(__file__).parents[2] / "diagrams"
+MANUAL, AUTOMATIC, NEUTRAL = 0, 1, 2
+IMU_STALE = 3
+# What one microsecond of a radio channel of 1000 us moves: collective, and three torques.
+LSB = np.array([4.0, 100.0, 100.0, 10.0]) / 1000
+
+
+def fly(name: str, variant: str | None = None, seed: int = 1, **more: Any) -> Any:
+    return quadvis.load(DIAGRAMS / f"{name}.yaml", variant=variant, seed=seed, **more).run()
+
+
+def jumps(result: Any) -> np.ndarray:
+    """Return how much a control moved at each tick at which its source changed."""
+    controls, source = result["control/switch.controls"], result["control/switch.source"]
+    changed = source[1:] != source[:-1]
+    assert changed.any()
+    return np.abs(np.diff(controls, axis=0)) * changed
+
+
+@pytest.mark.parametrize("name", ["step", "trajectory", "blackout", "landing", "takeover"])
+def test_the_flight_meets_what_its_diagram_expects(name: str) -> None:
+    assert fly(name).passed
+
+
+def test_a_blackout_of_eight_seconds_ends_softly_on_the_ground() -> None:
+    result = fly("landing", "blackout")
+    assert result.passed
+    assert result["craft/ground.impact"][-1] <= 0.35
+    assert result["supervision/landing.landed"][-1]
+
+
+def test_no_control_jumps_in_a_take_over_by_stick_or_by_switch() -> None:
+    found = jumps(fly("takeover"))
+    assert found.max() == 0.0
+    assert (np.round(found / LSB) == 0).all()
+
+
+def test_the_pilots_stick_counts_within_one_tick_of_the_control() -> None:
+    result = fly("takeover", stop_time=11)
+    times, stick = result.times("radio.y"), result["radio.y"][:, 1]
+    taken = result["control/switch.source"][:, 1] == MANUAL
+    assert times[np.argmax(taken)] == times[np.argmax(np.abs(stick) > 0.3)]
+
+
+def test_lost_vision_reaches_the_control_within_three_tenths_of_a_second() -> None:
+    result = fly("blackout", stop_time=21)
+    known = result["supervision/failsafe.velocity_weight"] == 0.0
+    times = result.times("supervision/failsafe.velocity_weight")
+    # The camera is blind from 20 s on; the last frame that gets through was taken before that.
+    assert 20.0 < times[(times > 5.0) & known][0] <= 20.3
+
+
+def test_a_hanging_imu_hands_roll_and_pitch_to_nobody_and_back_without_a_jump(tmp_path: Path) -> None:
+    text = (DIAGRAMS / "takeover.yaml").read_text().replace("parts/", f"{DIAGRAMS}/parts/")
+    gyro = "      rates: {from: craft.rates, across: sample}\n"
+    assert text.count(gyro) == 2
+    text = text.replace(gyro, "      rates: gyro.y\n").replace(
+        "  setpoint:\n",
+        "  gyro:\n    block: signal.outage\n    rate: control\n"
+        "    with: {during: {value: [[5, 5.4]], unit: s}}\n"
+        "    in: {u: {from: craft.rates, across: sample}}\n  setpoint:\n",
+    )
+    path = tmp_path / "hang.yaml"
+    path.write_text(text)
+    result = quadvis.load(path, stop_time=9).run()
+    times, source = result.times("control/switch.source"), result["control/switch.source"]
+    neutral = source[:, 1] == NEUTRAL
+    assert times[np.argmax(neutral)] == pytest.approx(5.1)  # the last news is of 4.95 s
+    assert (source[neutral] == [AUTOMATIC, NEUTRAL, NEUTRAL, AUTOMATIC]).all()
+    assert (result["supervision/failsafe.reason"][neutral] == IMU_STALE).all()
+    assert (source[times >= 5.4] == AUTOMATIC).all()
+    assert jumps(result).max() == 0.0
+    assert np.abs(result["craft/body.attitude"]).max() < 0.2
+
+
+def test_a_lost_radio_neither_stops_the_law_nor_looks_like_a_stick_that_moves() -> None:
+    result = fly("takeover")
+    times = result.times("supervision/sticks.stale")
+    stale = result["supervision/sticks.stale"]
+    assert times[stale][0] == pytest.approx(32.5, abs=0.051) and times[stale][-1] < 34.0
+    assert (result["control/switch.source"][stale] == AUTOMATIC).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(1, 9))
+def test_the_craft_outlasts_a_blackout_of_three_seconds_in_any_wind(seed: int) -> None:
+    result = fly("blackout", seed=seed)
+    times, position = result.times("craft/body.position"), result["craft/body.position"]
+    dark = (times >= 20.0) & (times <= 23.0)
+    assert np.abs(position[dark, :2]).max() <= 0.6
+    assert result["supervision/vision.state"][-1] == 0
+    assert result["supervision/failsafe.mode"][-1] == 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(1, 9))
+@pytest.mark.parametrize("variant", [None, "blackout"])
+def test_no_touch_down_is_harder_than_it_may_be(variant: str | None, seed: int) -> None:
+    assert fly("landing", variant, seed)["craft/ground.impact"][-1] <= 0.35
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(1, 5))
+def test_a_take_over_jumps_in_no_wind(seed: int) -> None:
+    result = fly("takeover", seed=seed)
+    assert result.passed
+    assert jumps(result).max() == 0.0
