@@ -21,9 +21,9 @@ class ReckonedHeight(Block):
     Error while blind: of the climb e at the beginning, e m / drag in the end; of the trim d, d t^2 / 2.
     """
 
-    bandwidth = Param(1.5, unit="rad/s", above=0.0, tune=True, doc="how fast the model follows the frames")
+    bandwidth = Param(4.0, unit="rad/s", above=0.0, tune=True, doc="how fast the model follows the frames")
     trim_bandwidth = Param(
-        0.05, unit="rad/s", min=0.0, tune=True, doc="how fast the trim follows; slower than gusts"
+        0.1, unit="rad/s", min=0.0, tune=True, doc="how fast the trim follows; slower than gusts"
     )
     mass = Param(0.5, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
     drag = Param(0.1, unit="N*s/m", min=0.0, tune=True, doc="force per speed through the air")

@@ -17,7 +17,7 @@ def fly(height: Any, collective: Any, blind: Any, seconds: float, **more: Any) -
     measured[:, 2] = height(stamp)
     blind = np.array([blind(t) for t in time])
     stamp[blind] = stamp[~blind][-1] if not blind.all() else np.nan
-    block = ReckonedHeight(trim_bandwidth=more.pop("trim_bandwidth", 0.05))
+    block = ReckonedHeight(trim_bandwidth=more.pop("trim_bandwidth", 0.1))
     return drive(
         block, position=measured, velocity=[0.1, 0.2, 0.3], stamp=stamp, blind=blind,
         collective=[collective(t) for t in time], rate="20 Hz", **{"roll": 0.0, "pitch": 0.0, **more},
@@ -57,7 +57,7 @@ def test_a_climb_goes_on_blind_and_dies_away_in_the_air() -> None:
 
 def test_a_thrust_that_is_not_what_it_should_be_is_taken_in_as_trim() -> None:
     # The rotors are told 3 % more than the weight and yet the craft hovers.
-    found = fly(lambda s: 1.5 + 0.0 * s, lambda t: 1.03 * WEIGHT, lambda t: t >= 120, 125.0)
+    found = fly(lambda s: 1.5 + 0.0 * s, lambda t: 1.03 * WEIGHT, lambda t: t >= 60, 65.0)
     assert found.trim[-1] == pytest.approx(-0.03 * 9.81, rel=0.02)
     assert found.known_position[-1, 2] == pytest.approx(1.5, abs=0.1)
 
