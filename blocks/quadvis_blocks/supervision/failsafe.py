@@ -22,8 +22,8 @@ class Failsafe(Block):
       LEVEL; velocities not at all while the frames are stale (``coast_velocity: keep`` for an estimator that
       reckons on by itself). When vision is FRESH again both come back over ``blend``.
     - Vision given up (LAND): descend, and go on to the ground even if vision comes back; or hand all channels
-      to the pilot (``on_loss: manual``), until he has switched them off and on. If his sticks are stale too,
-      descend. ``land`` above 0.5 asks for the same at any time. Taking the collective in hand ends it.
+      to the pilot (``on_loss: manual``) until he has switched them off and on, but descend while his sticks
+      are stale. ``land`` above 0.5 asks for the same at any time. Taking the collective in hand ends it.
     - IMU stale: no automatic roll and pitch. They are neutral; with ``imu_lost: pilot``, right for a craft
       that levels itself, they are the pilot's, if his sticks are not stale.
 
@@ -121,9 +121,9 @@ class Failsafe(Block):
 
 def _given_up(given_up: bool, on_loss: int, vision: int, sticks_stale: bool, automatic: Any) -> bool:
     """Return whether all channels are the pilot's until he has switched them off and on."""
-    if not automatic.any():
+    if sticks_stale or not automatic.any():
         return False
-    return given_up or (on_loss == TO_MANUAL and vision == LOST and not sticks_stale)
+    return given_up or (on_loss == TO_MANUAL and vision == LOST)
 
 
 def _landing(

@@ -12,15 +12,14 @@ FRESH, COAST, LEVEL, LOST = range(4)
 MANUAL, MIXED, AUTOMATIC, COASTING, LEVELLED, LANDING = range(6)
 NONE, SWITCH, STICK, IMU_STALE, STICKS_STALE, NO_FRAMES, TARGET_LOST, REARMING, ASKED, SATURATED = range(10)
 ALL, NOBODY = [True] * 4, [False] * 4
+PER_CHANNEL = ("automatic", "overridden", "limited")
 
 
 def fly(block: Failsafe | None = None, **inputs: Any) -> Driven:
-    """Drive at 20 Hz; all switches are on unless said otherwise."""
-    if not any(
-        np.ndim(value) > (name in ("automatic", "overridden", "limited")) for name, value in inputs.items()
-    ):
-        inputs["steps"] = 3
-    return drive(block or Failsafe(), rate="20 Hz", **{"automatic": ALL, **inputs})
+    """Drive at 20 Hz, three steps if no input is a series; all switches are on unless said otherwise."""
+    series = any(np.ndim(value) > (name in PER_CHANNEL) for name, value in inputs.items())
+    steps = None if series else 3
+    return drive(block or Failsafe(), rate="20 Hz", steps=steps, **{"automatic": ALL, **inputs})
 
 
 @pytest.mark.parametrize(
@@ -107,6 +106,13 @@ def test_vision_given_up_may_hand_all_to_the_pilot_until_he_has_switched_off_and
 def test_but_not_to_a_pilot_who_is_not_there() -> None:
     found = fly(Failsafe(on_loss="manual"), vision=LOST, vision_reason=1, sticks_stale=True)
     assert found.allowed.all() and found.descend.all()
+
+
+def test_nor_to_one_whose_radio_fails_after_he_has_taken_over() -> None:
+    block, stale = Failsafe(on_loss="manual"), [False, True, True, False]
+    found = fly(block, vision=[LOST] * 4, vision_reason=1, sticks_stale=stale)
+    assert found.allowed.all(axis=1).tolist() == [False, True, True, False]
+    assert found.descend.tolist() == [False, True, True, False]
 
 
 def test_channels_are_engaged_at_the_tick_at_which_the_law_gets_them() -> None:
