@@ -1,4 +1,4 @@
-"""Flights with a failsafe: a blackout, landings, take-overs, and what fails besides vision."""
+"""Flights of references that move, and with a failsafe: a blackout, landings, take-overs, a hanging IMU."""
 
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,22 @@ def jumps(result: Any) -> np.ndarray:
 @pytest.mark.parametrize("name", ["step", "trajectory", "blackout", "landing", "takeover"])
 def test_the_flight_meets_what_its_diagram_expects(name: str) -> None:
     assert fly(name).passed
+
+
+def test_without_noise_and_wind_the_steps_are_those_of_the_paper_s_poles() -> None:
+    quiet = {
+        "craft/gust.rms": "{value: [0, 0, 0], unit: m/s}", "craft/imu.drift": "0 rad",
+        "craft/imu.angle_noise": "0 rad", "craft/imu.rate_noise": "0 rad/s", "noise": "0 px",
+    }  # fmt: skip
+    result = fly("step", settings=quiet, stop_time=40)
+    times, x = result.times("craft/body.position"), result["craft/body.position"][:, 0]
+    elapsed = times[(times >= 10) & (times < 20)] - 10
+    s = 2.0 * elapsed  # four poles at -2 rad/s; motors, radio and camera are what the tolerance is for
+    left = np.exp(-s) * (1 + s + s**2 / 2 + s**3 / 6)
+    assert x[(times >= 10) & (times < 20)] == pytest.approx(0.2 - 0.4 * left, abs=0.03)
+    yaw = np.degrees(result["craft/body.attitude"][times >= 30, 2])
+    s = times[times >= 30] - 30
+    assert yaw == pytest.approx(30.0 * (1 - np.exp(-s) * (1 + s)), abs=2.0)
 
 
 def test_a_blackout_of_eight_seconds_ends_softly_on_the_ground() -> None:
