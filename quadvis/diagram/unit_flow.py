@@ -44,9 +44,16 @@ class Bindings:
         return bound.get(_variable(unit)) or unit.substitute(bound)
 
     def open(self, declared: Iterable[Declared]) -> list[str]:
-        """Return the variables of some ports and parameters that nothing has bound yet."""
+        """Return the variables of some ports and parameters that nothing has bound yet, in some element."""
         names = {name for item in declared for unit in item.units for name in unit.variables}
-        return sorted(names.difference(self.elements[0]))
+        return sorted(name for name in names if any(name not in bound for bound in self.elements))
+
+    def spread(self) -> None:
+        """Give elements that say nothing, such as a plain 0, the unit of the others if these agree."""
+        for name in {name for bound in self.elements for name in bound}:
+            units = {bound[name] for bound in self.elements if name in bound}
+            if len(units) == 1:
+                self.bind(name, units.pop())
 
     def bind(self, variable: str, unit: Unit) -> None:
         """Let a variable stand for a unit wherever it is open."""
@@ -137,6 +144,7 @@ class UnitFlow(Flow):
         doubtful = [port for name, port in interface.inputs.items() if (path, name) in self.lost]
         if bindings.open(doubtful) or not self.drafts[path].whole:
             return
+        bindings.spread()
         for variable in bindings.open(interface.inputs.values()):
             bindings.bind(variable, ONE)
             self._match_given(path)
