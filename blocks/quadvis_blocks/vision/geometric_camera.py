@@ -7,24 +7,32 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, ParameterError, Random, State, read_parameter_file
-from quadvis_blocks._random import normal, uniform
+from quadvis.block import In, Out, Param, Random, State, read_parameter_file
+from quadvis_blocks._random import fill_normal
 from quadvis_blocks.vision._calibration import CameraCalibration
+from quadvis_blocks.vision._delivery import CONTENT, QUEUE, SEQUENCE, STAMP, DeliveringCamera, Row
 from quadvis_blocks.vision._detect import NOT_FOUND, STALE, TWO_CIRCLES
-from quadvis_blocks.vision._projection import RADIUS, SIDE, camera_pose, target_corners
+from quadvis_blocks.vision._projection import (
+    RADIUS,
+    SIDE,
+    camera_pose,
+    ellipse_centres,
+    plane_homography,
+    target_corners,
+)
 
-QUEUE = 16  # measurements that can be on their way at once
-STAMP, SEQUENCE, PIXELS = 0, 1, slice(2, 10)
+WIDTH = CONTENT + 8  # of a row: u, v of four circles
+PICTURE, UNBOUNDED = range(2)
 
 
-class GeometricCamera(Block, numeric=False):
+class GeometricCamera(DeliveringCamera, numeric=False):
     """What `vision.rendered_camera` and `vision.circle_detector` would give, without rendering.
 
-    The centres of the four circles are projected, white noise is added, and a circle whose outline leaves
+    The centres of the four ellipses are projected, white noise is added, and a circle whose outline leaves
     the picture is missing. It has the outputs of the detector, so either can fill the same slot; it takes a
-    tenth of the time, and its noise is a parameter. Measurements are stamped when they are taken and
-    delivered at the first tick at or after stamp + latency; until the next one comes, the last stays, with
-    ``fresh`` false.
+    tenth of the time, and its noise is a parameter. Measurements are stamped when they are taken and arrive
+    as the frames of the rendered camera do: after latency and jitter, not all of them, the last to arrive on
+    the wire. Until another one comes the last one stays, with ``fresh`` false.
 
     Source: camera of equations (10) and (38); noise and latency of the reference experiment.
     """
@@ -45,15 +53,16 @@ class GeometricCamera(Block, numeric=False):
     side = Param(SIDE, unit="m", above=0.0, doc="distance between the centres of neighbouring circles")
     radius = Param(RADIUS, unit="m", above=0.0, doc="radius of the circles")
     noise = Param(0.3, unit="px", min=0.0, tune=True, doc="white noise of each coordinate, one sigma")
-    latency = Param(0.1, unit="s", min=0.0, doc="time from the measurement to its delivery")
-    drop_rate = Param(0.0, min=0.0, max=1.0, tune=True, doc="probability that a measurement is lost")
+    field_of_view = Param(
+        "picture",
+        choices=("picture", "unbounded"),
+        doc="unbounded: circles are seen beyond the edges of the picture too",
+    )
 
     stream = Random()
-    drawn = State("float64[9]")  # of the coming measurement: noise of the coordinates, lost or not
-    taken = State("int64")
-    pending = State(f"float64[{QUEUE},10]")  # measurements on their way, oldest first
-    waiting = State("int64")
-    shown = State("float64[10]", math.nan)
+    drawn = State("float64[8]")  # noise of the coming measurement
+    pending = State(f"float64[{QUEUE},{WIDTH}]")
+    shown = State(f"float64[{WIDTH}]")
     last_sequence = State("int64")
 
     def check(self) -> None:
@@ -64,80 +73,61 @@ class GeometricCamera(Block, numeric=False):
         return read_parameter_file("calibration", self.calibration, CameraCalibration.load)
 
     def open(self) -> None:
-        """Read the calibration; ParameterError if the latency is too long for the period."""
-        if self.latency > QUEUE * self.period:
-            longest = f"at most {QUEUE} periods, {QUEUE * self.period:g} s"
-            raise ParameterError("latency", f"latency must be {longest}, got {self.latency:g} s")
+        """Read the calibration; ParameterError if the latency is too long for the queue."""
+        super().open()
         self._camera = self._load()
         self._corners = target_corners(self.side)
 
     def start(self) -> None:
-        """Draw the chances of the first measurement."""
-        self.shown[SEQUENCE] = 0.0
-        self._draw()
+        """Draw the chances and the noise of the first measurement."""
+        super().start()
+        fill_normal(self.stream, self.drawn)
 
     def output(self, position: Any, attitude: Any, time: float) -> tuple[Any, ...]:
-        """Return the newest measurement that has arrived."""
-        row = self._arrived(self._queue(position, attitude, time), time)[0]
+        """Return the measurement that arrived last."""
+        row = self._arrived(self._taken(position, attitude, time), time)[0]
         sequence = int(row[SEQUENCE])
         fresh = sequence != self.last_sequence
-        centres = row[PIXELS].reshape(4, 2)
-        count = int(np.isfinite(centres[:, 0]).sum())
-        status = 4 - count if count >= 2 else NOT_FOUND
         if sequence == 0:
-            status = STALE
-        quality = np.where(np.isfinite(centres[:, 0]), 1.0, math.nan)
-        return (
-            centres,
-            quality,
-            status,
-            status == 0,
-            fresh and status > TWO_CIRCLES,
-            row[STAMP],
-            sequence,
-            fresh,
-        )
+            return np.full((4, 2), math.nan), np.full(4, math.nan), STALE, False, False, math.nan, 0, False
+        centres = row[CONTENT:].reshape(4, 2)
+        seen = np.isfinite(centres[:, 0])
+        count = int(seen.sum())
+        status = 4 - count if count >= 2 else NOT_FOUND
+        quality = np.where(seen, 1.0, math.nan)
+        lost = fresh and status > TWO_CIRCLES
+        return centres, quality, status, status == 0, lost, row[STAMP], sequence, fresh
 
     def update(self, position: Any, attitude: Any, time: float) -> None:
         """Keep what was measured at this tick, and what has arrived."""
-        shown, rest = self._arrived(self._queue(position, attitude, time), time)
-        self.last_sequence = int(shown[SEQUENCE])
-        self.shown[:] = shown
-        self.pending[: len(rest)] = np.reshape(rest, (-1, 10))
-        self.waiting = len(rest)
-        self.taken += 1
-        self._draw()
+        if self._is_captured():
+            taken = self._taken(position, attitude, time)
+            fill_normal(self.stream, self.drawn)
+        else:
+            taken = None
+        self._advance(taken, time)
+        self.last_sequence = int(self.shown[SEQUENCE])
 
-    def _draw(self) -> None:
-        for index in range(8):
-            self.drawn[index] = normal(self.stream)
-        self.drawn[8] = uniform(self.stream)
-
-    def _queue(self, position: Any, attitude: Any, time: float) -> list[Any]:
-        """Return the measurements on their way, with the one that is taken now unless it gets lost."""
-        queue = [row.copy() for row in self.pending[: self.waiting]]
-        if self.drawn[8] >= self.drop_rate:
-            queue.append(np.concatenate(([time, self.taken + 1], self._measure(position, attitude).ravel())))
-        return queue
+    def _taken(self, position: Any, attitude: Any, time: float) -> Row | None:
+        """Return what is measured at this tick, unless there is nothing or it gets lost."""
+        if not self._is_captured() or self._is_lost(time):
+            return None
+        return self._row(time, self._measure(position, attitude).ravel())
 
     def _measure(self, position: Any, attitude: Any) -> Any:
         """Return the four centres (4, 2) in px; NaN where a circle is not wholly in the picture."""
         turn, shift = camera_pose(position, attitude, self.ceiling)
-        points = self._corners @ turn.T + shift
+        depth = self._corners @ turn[2] + shift[2]
         pixels = np.full((4, 2), math.nan)
-        ahead = points[:, 2] > self.radius
+        ahead = depth > self.radius
         if ahead.any():
-            pixels[ahead] = self._camera.project(points[ahead])
-        width, height = self._camera.size
-        reach = self._camera.matrix[1, 1] * self.radius / np.maximum(points[:, 2], self.radius)
-        inside = (pixels >= reach[:, None]).all(axis=1) & (
-            pixels <= np.array([width - 1, height - 1]) - reach[:, None]
-        ).all(axis=1)
-        pixels[~inside] = math.nan
-        return pixels + self.noise * np.asarray(self.drawn[:8]).reshape(4, 2)
-
-    def _arrived(self, queue: list[Any], time: float) -> tuple[Any, list[Any]]:
-        """Return the measurement that is there at this time, and those that are still on their way."""
-        now = time + 1e-6 * self.period  # a sum of decimal times must not miss its tick by a rounding error
-        due = [row for row in queue if row[STAMP] + self.latency <= now]
-        return (due[-1] if due else self.shown.copy()), queue[len(due) :]
+            middles = ellipse_centres(plane_homography(turn, shift), self._corners[ahead], self.radius)
+            pixels[ahead] = self._camera.to_pixels(middles)
+        if self.field_of_view == PICTURE:
+            width, height = self._camera.size
+            reach = self._camera.matrix[1, 1] * self.radius / np.maximum(depth, self.radius)
+            inside = (pixels >= reach[:, None]).all(axis=1) & (
+                pixels <= np.array([width - 1, height - 1]) - reach[:, None]
+            ).all(axis=1)
+            pixels[~inside] = math.nan
+        return pixels + self.noise * np.asarray(self.drawn).reshape(4, 2)

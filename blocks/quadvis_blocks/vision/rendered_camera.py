@@ -6,24 +6,22 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from quadvis.block import Block, Frame, In, Out, Param, ParameterError, Random, State, read_parameter_file
+from quadvis.block import Frame, In, Out, Param, ParameterError, Random, State, read_parameter_file
 from quadvis_blocks._random import uniform
 from quadvis_blocks.vision._calibration import CameraCalibration
+from quadvis_blocks.vision._delivery import CONTENT, QUEUE, SEQUENCE, STAMP, DeliveringCamera, Row
 from quadvis_blocks.vision._projection import RADIUS, SIDE
 from quadvis_blocks.vision._renderer import Renderer, Scene
 
-QUEUE = 16  # frames that can be on their way at once
-
-# A captured frame as numbers: all that its picture depends on.
-SEQUENCE, STAMP, LIGHT, NOISE = range(4)
-START, END = slice(4, 10), slice(10, 16)  # pose at the beginning and the end of the exposure
-
-Row = NDArray[np.float64]
+# What a picture depends on, after the columns of every row.
+LIGHT, NOISE = CONTENT, CONTENT + 1
+START = slice(CONTENT + 2, CONTENT + 8)  # pose at the beginning and the end of the exposure
+END = slice(CONTENT + 8, CONTENT + 14)
+WIDTH = CONTENT + 14
 
 
-class RenderedCamera(Block, numeric=False):
+class RenderedCamera(DeliveringCamera, numeric=False):
     """What a camera on the craft sees of four coloured discs on a light ceiling.
 
     The camera looks straight up from the craft: picture right is the craft's front, picture top its right
@@ -32,9 +30,10 @@ class RenderedCamera(Block, numeric=False):
     light.
 
     A frame is exposed up to its tick and stamped with the middle of the exposure. It is delivered at the
-    first tick at or after stamp + latency; until the next one comes, the last frame stays on the wire, with
-    its old sequence number. Frames that are dropped leave a gap in the sequence numbers. Blur follows the
-    straight way from the pose at the tick before.
+    first tick at or after stamp + latency + extra, with an extra drawn from 0 to ``jitter``; until another
+    one comes, the last frame stays on the wire, with its old sequence number. Frames may overtake each other,
+    and those that get lost leave a gap in the sequence numbers. Blur follows the straight way from the pose
+    at the tick before.
 
     Source: pinhole camera of equations (9)-(10) and (38) with OpenCV's lens model; target of sections 5 and
     6.
@@ -73,16 +72,12 @@ class RenderedCamera(Block, numeric=False):
         2.0, min=0.0, max=60.0, doc="standard deviation of the sensor's noise in grey levels, added last"
     )
     exposure_time = Param(0.0, unit="s", min=0.0, doc="length of the exposure, for motion blur")
-    latency = Param(0.0, unit="s", min=0.0, doc="time from the middle of the exposure to the delivery")
-    drop_rate = Param(0.0, min=0.0, max=1.0, tune=True, doc="probability that a frame is lost")
 
     stream = Random()
-    draws = State("float64[2]")  # of the coming capture: lost or not, and its noise
-    captured = State("int64", 0)
+    grain = State()  # noise of the coming frame, from 0 to 1
     previous = State("float64[6]")  # pose one tick ago
-    pending = State("float64[16,16]")  # captured frames on their way, oldest first
-    waiting = State("int64", 0)  # how many of them there are
-    shown = State("float64[16]")  # the frame on the wire; sequence 0 before the first
+    pending = State(f"float64[{QUEUE},{WIDTH}]")
+    shown = State(f"float64[{WIDTH}]")
 
     def check(self) -> None:
         """Read the calibration and compare the sizes of the target."""
@@ -97,10 +92,7 @@ class RenderedCamera(Block, numeric=False):
 
     def open(self) -> None:
         """Prepare the renderer; ParameterError if the latency or the exposure does not go with the period."""
-        frames = math.ceil(self.latency / self.period - 1e-6)
-        if frames > QUEUE:
-            longest = f"at most {QUEUE} periods, {QUEUE * self.period:g} s"
-            raise ParameterError("latency", f"latency must be {longest}, got {self.latency:g} s")
+        super().open()
         if self.exposure_time > self.period:
             longest = f"at most the period, {self.period:g} s"
             raise ParameterError(
@@ -120,56 +112,34 @@ class RenderedCamera(Block, numeric=False):
         self._last: tuple[bytes, Frame] = (b"", Frame.none())
 
     def start(self) -> None:
-        """Draw the chances of the first capture."""
-        self._draw()
+        """Draw the chances and the noise of the first frame."""
+        super().start()
+        self.grain = uniform(self.stream)
 
     def output(self, position: Any, attitude: Any, time: float) -> Frame:
-        """Return the newest frame that has arrived."""
-        return self._picture(self._arrived(self._queue(position, attitude, time), time)[0])
+        """Return the frame that arrived last."""
+        return self._picture(self._arrived(self._capture(position, attitude, time), time)[0])
 
     def update(self, position: Any, attitude: Any, time: float) -> None:
         """Keep what was captured at this tick, and what is on the wire."""
-        queue = self._queue(position, attitude, time)
-        shown, rest = self._arrived(queue, time)
-        self.shown[:] = shown
-        self.pending[: len(rest)] = np.reshape(rest, (-1, 16))
-        self.waiting = len(rest)
+        fresh = self._capture(position, attitude, time)
+        if self._is_captured():
+            self.grain = uniform(self.stream)
+        self._advance(fresh, time)
         self.previous[:] = (*position, *attitude)
-        self.captured += 1
-        self._draw()
 
-    def _draw(self) -> None:
-        self.draws[0] = uniform(self.stream)
-        self.draws[1] = uniform(self.stream)
-
-    def _queue(self, position: Any, attitude: Any, time: float) -> list[Row]:
-        """Return the frames on their way, with the one that is captured now unless it gets lost."""
-        queue = [row.copy() for row in self.pending[: self.waiting]]
-        if self.draws[0] >= self.drop_rate:
-            queue.append(self._capture(np.array([*position, *attitude]), time))
-        return queue
-
-    def _capture(self, pose: Row, time: float) -> Row:
-        """Return the frame that is captured now; its exposure ends at the tick."""
-        row = np.zeros(16)
-        row[[SEQUENCE, STAMP, LIGHT, NOISE]] = (
-            self.captured + 1,
-            time - self.exposure_time / 2,
-            self.exposure,
-            self.draws[1],
-        )
+    def _capture(self, position: Any, attitude: Any, time: float) -> Row | None:
+        """Return the frame whose exposure ends at this tick, unless there is none or it gets lost."""
+        if not self._is_captured() or self._is_lost(time):
+            return None
+        pose = np.array([*position, *attitude])
         way = np.zeros(6)
-        if self.captured and self.exposure_time:
+        if self.ticks and self.exposure_time:
             way = pose - self.previous
             way[3:] -= 2 * math.pi * np.round(way[3:] / (2 * math.pi))  # the short way round
-        row[START], row[END] = pose - way * (self.exposure_time / self.period), pose
-        return row
-
-    def _arrived(self, queue: list[Row], time: float) -> tuple[Row, list[Row]]:
-        """Return the frame on the wire at this time and those that are still on their way."""
-        now = time + 1e-6 * self.period  # a sum of decimal times must not miss its tick by a rounding error
-        due = [row for row in queue if row[STAMP] + self.latency <= now]
-        return (due[-1] if due else self.shown.copy()), queue[len(due) :]
+        begin = pose - way * (self.exposure_time / self.period)
+        content = np.concatenate(([self.exposure, self.grain], begin, pose))
+        return self._row(time - self.exposure_time / 2, content)
 
     def _picture(self, row: Row) -> Frame:
         """Return the frame of a row; the last one is kept, since it may stay on the wire."""

@@ -19,8 +19,8 @@ def camera(**parameters):
     return GeometricCamera(calibration=CALIBRATION, **{"noise": 0.0, "latency": 0.0, **parameters})
 
 
-def projected(position, attitude, ceiling=4.5, side=1.0):
-    """The corners by OpenCV's own rotation and projection, skew by hand."""
+def projected(position, attitude, ceiling=4.5, side=1.0, radius=0.12):
+    """The centres of the ellipses, fitted to outlines that OpenCV turned and projected, skew by hand."""
     roll, pitch, yaw = attitude
     turns = [
         cv2.Rodrigues(np.array(axis))[0] for axis in ([roll, 0.0, 0.0], [0.0, pitch, 0.0], [0.0, 0.0, yaw])
@@ -30,13 +30,24 @@ def projected(position, attitude, ceiling=4.5, side=1.0):
     place = np.array([position[0], position[1], ceiling - position[2]])
     half = side / 2
     corners = np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
-    rays, _ = cv2.projectPoints(corners, cv2.Rodrigues(rotation)[0], -rotation @ place, np.eye(3), None)
-    homogeneous = np.column_stack((np.asarray(rays).reshape(-1, 2), np.ones(4)))
-    return (homogeneous @ K.T)[:, :2]
+    angles = np.linspace(0.0, 2 * np.pi, 90, endpoint=False)
+    circle = radius * np.column_stack((np.cos(angles), np.sin(angles), np.zeros(90)))
+    points = (corners[:, None] + circle).reshape(-1, 3)
+    rays, _ = cv2.projectPoints(points, cv2.Rodrigues(rotation)[0], -rotation @ place, np.eye(3), None)
+    homogeneous = np.column_stack((np.asarray(rays).reshape(-1, 2), np.ones(len(points))))
+    return np.array([ellipse_centre(outline) for outline in (homogeneous @ K.T)[:, :2].reshape(4, 90, 2)])
+
+
+def ellipse_centre(outline):
+    """The centre of the conic a u^2 + b u v + c v^2 + d u + e v = 1 through the points, about their mean."""
+    middle = outline.mean(axis=0)
+    u, v = (outline - middle).T / 10
+    a, b, c, d, e = np.linalg.lstsq(np.column_stack((u * u, u * v, v * v, u, v)), np.ones(len(u)))[0]
+    return middle + 10 * np.linalg.solve([[2 * a, b], [b, 2 * c]], [-d, -e])
 
 
 @pytest.mark.parametrize("attitude", [[0.0, 0.0, 0.0], [0.05, -0.03, 0.4]])
-def test_without_noise_the_centres_are_the_projected_corners(attitude):
+def test_without_noise_the_centres_are_those_of_the_projected_outlines(attitude):
     seen = drive(camera(), position=HOVER, attitude=attitude, rate="10 Hz", steps=1)
     assert seen.centres[0] == pytest.approx(projected(HOVER, attitude), abs=1e-6)
     assert (seen.status[0], seen.found[0], seen.lost[0]) == (0, True, False)
@@ -77,9 +88,17 @@ def test_circles_whose_outline_leaves_the_picture_are_missing():
     assert seen.lost.tolist() == [False, False, True]
 
 
-def test_a_latency_beyond_the_queue_is_refused():
-    with pytest.raises(ParameterError, match=r"latency must be at most 16 periods, 1.6 s, got 2 s"):
-        drive(camera(latency=2.0), position=HOVER, attitude=[0.0] * 3, rate="10 Hz", steps=1)
+def test_without_a_bounded_picture_circles_are_seen_beyond_its_edges():
+    places = [[x, 0.0, 1.5] for x in (1.0, 2.5, 6.0)]
+    seen = drive(camera(field_of_view="unbounded"), position=places, attitude=[0.0] * 3, rate="10 Hz")
+    assert seen.status.tolist() == [0, 0, 0]
+    for place, centres in zip(places, seen.centres, strict=True):
+        assert centres == pytest.approx(projected(place, [0.0] * 3), abs=1e-6)
+
+
+def test_even_without_a_bounded_picture_nothing_is_seen_behind_the_camera():
+    seen = drive(camera(field_of_view="unbounded"), position=[0.0, 0.0, 5.0], attitude=[0.0] * 3, steps=1)
+    assert seen.status[0] == 3
 
 
 def test_a_calibration_that_is_not_there_is_refused():

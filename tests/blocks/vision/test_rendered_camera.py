@@ -375,7 +375,7 @@ def test_impossible_targets_and_calibrations_are_refused(tmp_path: Path) -> None
 
 
 def test_a_latency_that_does_not_fit_and_a_long_exposure_are_refused() -> None:
-    with pytest.raises(QuadvisError, match=r"latency must be at most 16 periods, 1.6 s, got 1.7 s"):
+    with pytest.raises(QuadvisError, match=r"latency must be at most 16 frames, 1.6 s, got 1.7 s"):
         many(1, latency=1.7)
     with pytest.raises(QuadvisError, match=r"exposure_time must be at most the period, 0.1 s, got 0.2 s"):
         many(1, exposure_time=0.2)

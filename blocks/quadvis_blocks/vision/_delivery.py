@@ -1,0 +1,127 @@
+"""How what a simulated camera sees comes to those who look at it: frame rate, latency, jitter and losses."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.block import Block, Param, ParameterError, Random, State
+from quadvis_blocks._random import uniform
+
+QUEUE = 16  # frames that can be on their way at once
+SEQUENCE, STAMP, ARRIVAL = range(3)  # the first columns of a row, the rest is what was captured
+CONTENT = 3
+
+Row = NDArray[np.float64]
+
+
+class DeliveringCamera(Block, numeric=False):
+    """A camera whose frames take their time, do not all arrive, and may overtake each other.
+
+    A frame is captured at every ``every``-th tick, from the first on, and numbered from 1 whether it gets
+    through or not. It is delivered at the first tick at or after stamp + latency + extra, with an extra that
+    is uniform from 0 to ``jitter`` and drawn for each frame. One wire shows one frame, the one that arrived
+    last: with a jitter beyond the time between two frames an older frame can follow a newer one, with a
+    smaller sequence number and stamp. Of frames that arrive between two ticks the last to arrive is shown, of
+    those that arrive together the newest. With a latency of whole ticks any jitter costs a tick; a finer rate
+    and an ``every`` above 1 resolve it.
+
+    Losses are a two-state Markov chain: a frame is lost with probability ``drop_rate`` / ``drop_burst`` after
+    one that was not, with 1 - (1 - ``drop_rate``) / ``drop_burst`` after one that was. Their share is
+    ``drop_rate``, the mean length of a run of them ``drop_burst`` / (1 - ``drop_rate``) frames; a
+    ``drop_burst`` of 1 makes them independent. Frames captured in ``blackout`` are lost as well.
+
+    Chances of delivery have a random stream of their own, so that they leave the noise of a frame as it is.
+
+    Source of the chain: E. N. Gilbert, Capacity of a burst-noise channel, 1960.
+    """
+
+    every = Param(1, type="int64", min=1, doc="ticks of the block from one frame to the next")
+    latency = Param(0.0, unit="s", min=0.0, doc="time from the stamp to the delivery")
+    jitter = Param(0.0, unit="s", min=0.0, doc="greatest extra time of a frame; uniform from 0")
+    drop_rate = Param(0.0, min=0.0, max=1.0, tune=True, doc="share of the frames that get lost")
+    drop_burst = Param(
+        1.0, min=1.0, tune=True, doc="how many times longer runs of lost frames are than independent ones"
+    )
+    blackout = Param(
+        (0.0, 0.0),
+        type="float64[2]",
+        unit="s",
+        tune=True,
+        doc="begin and length of an interval whose frames are all lost",
+    )
+
+    delivery = Random()
+    chances = State("float64[2]")  # of the coming frame: lost or not, and its extra time
+    ticks = State("int64")
+    captured = State("int64")
+    dropped = State("bool")  # whether the last frame was lost by chance
+    pending = State(f"float64[{QUEUE},{CONTENT}]")  # rows on their way, oldest first; cameras widen it
+    waiting = State("int64")  # how many of them there are
+    shown = State(f"float64[{CONTENT}]")  # the row on the wire; sequence 0 before the first
+
+    def open(self) -> None:
+        """Refuse a latency that the queue cannot hold; ParameterError."""
+        longest = QUEUE * self.every * self.period
+        if self.latency + self.jitter > longest * (1 + 1e-9):
+            together = " and jitter together" if self.jitter else ""
+            bound = f"at most {QUEUE} frames, {longest:g} s"
+            problem = f"latency{together} must be {bound}, got {self.latency + self.jitter:g} s"
+            raise ParameterError("latency", problem)
+
+    def start(self) -> None:
+        """Draw the chances of the first frame."""
+        self._draw()
+
+    def _draw(self) -> None:
+        self.chances[0] = uniform(self.delivery)
+        self.chances[1] = uniform(self.delivery)
+
+    def _is_captured(self) -> bool:
+        """Return whether this tick has a frame, lost or not."""
+        return bool(self.ticks % self.every == 0)
+
+    def _is_dropped(self) -> bool:
+        """Return whether the frame of this tick gets lost by chance."""
+        rate, burst = self.drop_rate, self.drop_burst
+        if self.captured == 0:
+            return bool(self.chances[0] < rate)
+        return bool(self.chances[0] < (1 - (1 - rate) / burst if self.dropped else rate / burst))
+
+    def _is_lost(self, time: float) -> bool:
+        begin, length = self.blackout
+        after = time - begin + 1e-6 * self.period
+        return self._is_dropped() or (length > 0.0 and 0.0 <= after < length)
+
+    def _row(self, stamp: float, content: Any) -> Row:
+        """Return the frame of this tick as it goes into the queue."""
+        arrival = stamp + self.latency + self.jitter * self.chances[1]
+        return np.concatenate(([self.captured + 1, stamp, arrival], content))
+
+    def _arrived(self, fresh: Row | None, time: float) -> tuple[Row, list[Row]]:
+        """Return the row on the wire at this time and those that are still on their way.
+
+        ``fresh`` is the row of the frame that is captured now, if it is not lost.
+        """
+        now = time + 1e-6 * self.period  # a sum of decimal times must not miss its tick by a rounding error
+        queue = [row.copy() for row in self.pending[: self.waiting]] + ([] if fresh is None else [fresh])
+        due = [row for row in queue if row[ARRIVAL] <= now]
+        if not due:
+            return self.shown.copy(), queue
+        last = max(due, key=lambda row: (row[ARRIVAL], row[SEQUENCE]))
+        return last, [row for row in queue if row[ARRIVAL] > now]
+
+    def _advance(self, fresh: Row | None, time: float) -> None:
+        """Keep what is on the wire and on its way, and go on to the next tick."""
+        shown, rest = self._arrived(fresh, time)
+        self.shown[:] = shown
+        if rest:
+            self.pending[: len(rest)] = rest
+        self.waiting = len(rest)
+        if self._is_captured():
+            self.dropped = self._is_dropped()
+            self.captured += 1
+            self._draw()
+        self.ticks += 1
