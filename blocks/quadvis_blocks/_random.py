@@ -53,6 +53,12 @@ def fill_normal(stream: Stream, numbers: Any) -> None:
             numbers[index + 1] = radius * math.sin(angle)
 
 
+def random_signs(stream: Stream, numbers: Any) -> None:
+    """Fill a one-dimensional array with -1 and 1, each with probability one half."""
+    for index in range(numbers.size):
+        numbers[index] = -1.0 if uniform(stream) < 0.5 else 1.0
+
+
 def normal_like(stream: Stream, like: Any) -> Any:
     """Return independent standard normal numbers, as many as ``like`` (a float or an array) has elements."""
     if isinstance(like, float):

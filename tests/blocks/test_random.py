@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from quadvis_blocks._random import M1, M2, fill_normal, normal, normal_like, uniform
+from quadvis_blocks._random import M1, M2, fill_normal, normal, normal_like, random_signs, uniform
 
 
 def stream(*state: int) -> np.ndarray:
@@ -67,3 +67,11 @@ def test_an_array_is_filled_in_the_shape_of_the_model_and_a_float_gives_a_float(
 
 def test_equal_states_give_equal_numbers() -> None:
     assert normal_like(stream(), np.zeros(7)).tolist() == normal_like(stream(), np.zeros(7)).tolist()
+
+
+def test_signs_are_fair_and_independent() -> None:
+    signs = np.empty(10000)
+    random_signs(stream(), signs)
+    assert set(signs.tolist()) == {-1.0, 1.0}
+    assert abs(signs.mean()) < 4 / 100
+    assert abs(np.mean(signs[1:] * signs[:-1])) < 4 / 100

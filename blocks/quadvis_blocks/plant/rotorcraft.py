@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, ParameterError, State
+from quadvis.block import Block, In, Out, Param, ParameterError, Random, State
 from quadvis_blocks._angles import wrapped
+from quadvis_blocks._random import random_signs
 
 PAPER, RIGID_BODY = range(2)
+GIVEN, RANDOM = range(2)
 
 
 class Rotorcraft(Block):
@@ -20,7 +22,8 @@ class Rotorcraft(Block):
     above. Rotors: 0 front, 1 right, 2 rear, 3 left; front and rear turn counterclockwise seen from above.
     Each thrust follows its command, held to the limits, with a first-order lag; u is their sum, and the
     torques over inertia are l (f3 - f1) / Ix, l (f0 - f2) / Iy, c (f0 + f2 - f1 - f3) / Iz, each plus its
-    ``torque_bias``.
+    ``torque_bias``. With a ``bias_sign`` of ``random`` these biases are sizes: each takes a sign of its own at
+    the start of a run.
 
     Model ``paper``, equations (11)-(16): m x'' = -u sin(pitch), m y'' = u cos(pitch) sin(roll), m h'' = u
     cos(pitch) cos(roll) - m g, and the angles are double integrals of the torques (14 with its missing dots).
@@ -50,6 +53,9 @@ class Rotorcraft(Block):
         unit="rad/s^2",
         tune=True,
         doc="trim error about roll, pitch and yaw axis",
+    )
+    bias_sign = Param(
+        "given", choices=("given", "random"), doc="random: each torque bias with a sign drawn at the start"
     )
     gravity = Param(9.81, unit="m/s^2", above=0.0, doc="g")
     initial_position = Param((0.0, 0.0, 0.0), type="float64[3]", unit="m", doc="x, y, h at the start")
@@ -81,6 +87,8 @@ class Rotorcraft(Block):
     p = State(unit="rad/s", continuous=True)
     q = State(unit="rad/s", continuous=True)
     r = State(unit="rad/s", continuous=True)
+    signs = State("float64[3]")  # of the torque biases
+    sign_stream = Random()
 
     def check(self) -> None:
         """Refuse limits that leave nothing between them."""
@@ -97,6 +105,9 @@ class Rotorcraft(Block):
         self.vx, self.vy, self.vh = velocity[0], velocity[1], velocity[2]
         self.roll, self.pitch, self.yaw = attitude[0], attitude[1], attitude[2]
         self.p, self.q, self.r = 0.0, 0.0, 0.0
+        self.signs[:] = 1.0
+        if self.bias_sign == RANDOM:
+            random_signs(self.sign_stream, self.signs)
 
     def output(self) -> tuple[Any, Any, Any, Any]:
         """Return position, velocity, attitude and rates."""
@@ -113,11 +124,11 @@ class Rotorcraft(Block):
         roll, pitch, p, q, r = self.roll, self.pitch, self.p, self.q, self.r
         vx, vy, vh = self.vx, self.vy, self.vh
         least, most, lag = self.thrust_min, self.thrust_max, self.lag
-        arm, inertia, bias = self.arm, self.inertia, self.torque_bias
+        arm, inertia, bias, signs = self.arm, self.inertia, self.torque_bias, self.signs
         ix, iy, iz = float(inertia[0]), float(inertia[1]), float(inertia[2])
-        p_rate = arm * (left - right) / ix + float(bias[0])
-        q_rate = arm * (front - rear) / iy + float(bias[1])
-        r_rate = self.torque_ratio * (front + rear - right - left) / iz + float(bias[2])
+        p_rate = arm * (left - right) / ix + float(signs[0] * bias[0])
+        q_rate = arm * (front - rear) / iy + float(signs[1] * bias[1])
+        r_rate = self.torque_ratio * (front + rear - right - left) / iz + float(signs[2] * bias[2])
         if self.model == PAPER:
             roll_rate, pitch_rate, yaw_rate = p, q, r
             forward, rightward, upward = _paper_lift(roll, pitch)

@@ -6,17 +6,20 @@ import math
 from typing import Any
 
 from quadvis.block import Block, In, Out, Param, Random, State
-from quadvis_blocks._random import fill_normal
+from quadvis_blocks._random import fill_normal, random_signs
 
 DEGREE = math.pi / 180.0
+GIVEN, RANDOM = range(2)
 
 
 class Imu(Block):
     """Roll, pitch and angular rates as an inertial unit gives them: true value, bias, drift, white noise.
 
-    White noise is fresh at each tick of the block. The drift of each angle is a first-order Gauss-Markov
-    process, exact at the block's rate and stationary from the first sample. Yaw is not measured: the camera
-    does that.
+    White noise is fresh at each tick of the block. The drift of each angle and rate is a first-order
+    Gauss-Markov process, exact at the block's rate and stationary from the first sample. With a ``bias_sign``
+    of ``random`` the biases are sizes: each takes a sign of its own at the start of a run. Noise, drift of
+    the rates and signs have random streams of their own: turning one on leaves the others as they are. Yaw is
+    not measured: the camera does that.
 
     Source: section 6.2 (an IMU gives roll and pitch at a higher rate than the camera); the errors are a
     typical unit's, meant for 100 Hz.
@@ -26,39 +29,58 @@ class Imu(Block):
         0.1 * DEGREE, unit="rad", min=0.0, tune=True, doc="white noise of roll and pitch, one sigma"
     )
     drift = Param(0.2 * DEGREE, unit="rad", min=0.0, tune=True, doc="slow drift of roll and pitch, one sigma")
-    drift_time = Param(20.0, unit="s", above=0.0, tune=True, doc="correlation time of the drift")
+    drift_time = Param(20.0, unit="s", above=0.0, tune=True, doc="correlation time of the drifts")
     rate_noise = Param(
         0.5 * DEGREE, unit="rad/s", min=0.0, tune=True, doc="white noise of each rate, one sigma"
     )
+    rate_drift = Param(0.0, unit="rad/s", min=0.0, tune=True, doc="slow drift of each rate, one sigma")
     angle_bias = Param(
         (0.0, 0.0), type="float64[2]", unit="rad", tune=True, doc="constant error of roll and pitch"
     )
     rate_bias = Param(
         (0.0, 0.0, 0.0), type="float64[3]", unit="rad/s", tune=True, doc="constant error of each rate"
     )
+    bias_sign = Param(
+        "given", choices=("given", "random"), doc="random: each bias with a sign drawn at the start"
+    )
     attitude = In("float64[3]", unit="rad", doc="true roll, pitch, yaw")
     rates = In("float64[3]", unit="rad/s", doc="true rates about roll, pitch and yaw axis")
     roll = Out(unit="rad", doc="measured roll angle")
     pitch = Out(unit="rad", doc="measured pitch angle")
     gyro = Out("float64[3]", unit="rad/s", doc="measured rates about roll, pitch and yaw axis")
+    stamp = Out(unit="s", doc="instant of the measurement")
     drawn = State("float64[7]")  # fresh at each tick: roll, pitch, three rates, drift of roll and pitch
     wander = State("float64[2]")  # the drifts; all in standard deviations
+    rate_drawn = State("float64[3]")
+    rate_wander = State("float64[3]")
+    signs = State("float64[5]")  # of the biases of roll, pitch and three rates
     stream = Random()
+    rate_stream = Random()
+    sign_stream = Random()
 
     def start(self) -> None:
-        """Draw the first errors."""
+        """Draw the signs of the biases and the first errors."""
         fill_normal(self.stream, self.drawn)
         self.wander = self.drawn[5:]
+        fill_normal(self.rate_stream, self.rate_wander)
+        self.signs[:] = 1.0
+        if self.bias_sign == RANDOM:
+            random_signs(self.sign_stream, self.signs)
 
-    def output(self, attitude: Any, rates: Any) -> tuple[float, float, Any]:
-        """Return the measured angles and rates."""
-        drawn, wander, bias = self.drawn, self.wander, self.angle_bias
-        roll = attitude[0] + bias[0] + self.drift * wander[0] + self.angle_noise * drawn[0]
-        pitch = attitude[1] + bias[1] + self.drift * wander[1] + self.angle_noise * drawn[1]
-        return roll, pitch, rates + self.rate_bias + self.rate_noise * drawn[2:5]
+    def output(self, attitude: Any, rates: Any, time: float) -> tuple[float, float, Any, float]:
+        """Return the measured angles and rates, and when they were measured."""
+        drawn, wander, bias, signs = self.drawn, self.wander, self.angle_bias, self.signs
+        roll = attitude[0] + signs[0] * bias[0] + self.drift * wander[0] + self.angle_noise * drawn[0]
+        pitch = attitude[1] + signs[1] * bias[1] + self.drift * wander[1] + self.angle_noise * drawn[1]
+        slow = signs[2:] * self.rate_bias + self.rate_drift * self.rate_wander
+        return roll, pitch, rates + slow + self.rate_noise * drawn[2:5], time
 
     def update(self) -> None:
         """Draw the next errors."""
         keep = math.exp(-self.period / self.drift_time)
+        step = math.sqrt(1.0 - keep * keep)
         fill_normal(self.stream, self.drawn)
-        self.wander = keep * self.wander + math.sqrt(1.0 - keep * keep) * self.drawn[5:]
+        self.wander = keep * self.wander + step * self.drawn[5:]
+        if self.rate_drift > 0.0:
+            fill_normal(self.rate_stream, self.rate_drawn)
+            self.rate_wander = keep * self.rate_wander + step * self.rate_drawn

@@ -111,6 +111,18 @@ def test_a_trim_error_is_an_angular_acceleration() -> None:
     assert result.attitude[-1] == pytest.approx([0.0125, -0.025, 0.0375])
 
 
+def test_trim_errors_of_random_sign_have_their_size_and_every_pattern_of_signs_comes() -> None:
+    def rates(seed: int) -> Any:
+        craft = Rotorcraft(torque_bias=(0.1, 0.2, 0.3), bias_sign="random")
+        return drive(craft, thrust=HOVER, rate="10 Hz", steps=2, seed=seed).rates[-1]
+
+    found = np.array([rates(seed) for seed in range(100)])
+    assert np.abs(found) == pytest.approx(np.tile([0.01, 0.02, 0.03], (100, 1)))
+    assert np.array_equal(rates(7), rates(7))
+    assert len({tuple(row) for row in np.sign(found)}) == 8
+    assert np.abs(np.sign(found).mean(axis=0)).max() < 4 / 10
+
+
 def test_a_rigid_body_turned_about_a_fixed_axis_ends_where_the_rotation_matrix_says() -> None:
     bias = np.array([0.6, -0.9, 1.2])
     result = fly(

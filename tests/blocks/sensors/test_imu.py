@@ -58,8 +58,54 @@ def test_the_drift_is_there_from_the_first_sample() -> None:
     assert np.std(first) == pytest.approx(1.0, rel=4 / math.sqrt(600))
 
 
-def test_yaw_is_not_measured() -> None:
-    assert list(Imu.interface.outputs) == ["roll", "pitch", "gyro"]
+def test_the_rates_drift_apart_from_each_other_and_from_the_angles() -> None:
+    quiet = QUIET | {"drift": 0.1, "drift_time": 2.0}
+    result = measure(steps=100000, **quiet, rate_drift=0.02)
+    drift = result.gyro - RATES
+    samples = 1000 / (2 * 2.0)
+    assert drift.std(axis=0) == pytest.approx([0.02] * 3, rel=4 / math.sqrt(2 * samples))
+    lagged = [np.corrcoef(channel[200:], channel[:-200])[0, 1] for channel in drift.T]
+    assert lagged == pytest.approx([math.exp(-1.0)] * 3, abs=4 / math.sqrt(samples))
+    together = np.corrcoef(np.column_stack((drift, result.roll, result.pitch)).T)
+    assert np.abs(together - np.eye(5)).max() < 4 / math.sqrt(samples)
+
+
+def test_the_drift_of_the_rates_leaves_all_other_errors_as_they_are() -> None:
+    calm, drifting = measure(steps=20), measure(steps=20, rate_drift=0.1)
+    assert np.array_equal(calm.roll, drifting.roll) and np.array_equal(calm.pitch, drifting.pitch)
+    assert (calm.gyro != drifting.gyro).all()
+
+
+SIZES = {"angle_bias": (0.01, 0.02), "rate_bias": (0.1, 0.2, 0.3)}
+
+
+def signed_biases(seed: int, **parameters: Any) -> list[float]:
+    block = Imu(**(QUIET | SIZES | {"bias_sign": "random"} | parameters))
+    result = drive(block, attitude=ATTITUDE, rates=RATES, rate="100 Hz", steps=3, seed=seed)
+    errors = np.column_stack((result.roll - 0.1, result.pitch + 0.2, result.gyro - RATES))
+    assert errors[0] == pytest.approx(errors[2], abs=1e-15)  # for the whole run
+    return errors[0].tolist()
+
+
+def test_biases_of_random_sign_have_their_size_and_every_pattern_of_signs_comes() -> None:
+    found = np.array([signed_biases(seed) for seed in range(300)])
+    assert np.abs(found) == pytest.approx(np.tile([0.01, 0.02, 0.1, 0.2, 0.3], (300, 1)))
+    signs = np.sign(found)
+    assert np.abs(signs.mean(axis=0)).max() < 4 / math.sqrt(300)
+    assert np.abs(np.corrcoef(signs.T) - np.eye(5)).max() < 4 / math.sqrt(300)
+    assert len({tuple(row) for row in signs}) == 32
+
+
+def test_random_signs_leave_the_noise_as_it_is() -> None:
+    noisy = {"angle_noise": 0.1, "rate_noise": 0.2, "drift": 0.3}
+    block, plain = Imu(**noisy, **SIZES, bias_sign="random"), Imu(**noisy)
+    one, other = (drive(b, attitude=ATTITUDE, rates=RATES, rate="100 Hz", steps=50) for b in (block, plain))
+    assert np.ptp(one.roll - other.roll) < 1e-12 and np.ptp(one.gyro - other.gyro, axis=0).max() < 1e-12
+
+
+def test_yaw_is_not_measured_and_the_stamp_is_the_instant() -> None:
+    assert list(Imu.interface.outputs) == ["roll", "pitch", "gyro", "stamp"]
+    assert measure(steps=3).stamp == pytest.approx([0.0, 0.01, 0.02])
 
 
 def test_a_negative_noise_is_refused() -> None:
