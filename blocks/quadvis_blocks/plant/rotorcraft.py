@@ -22,8 +22,8 @@ class Rotorcraft(Block):
     above. Rotors: 0 front, 1 right, 2 rear, 3 left; front and rear turn counterclockwise seen from above.
     Each thrust follows its command, held to the limits, with a first-order lag; u is their sum, and the
     torques over inertia are l (f3 - f1) / Ix, l (f0 - f2) / Iy, c (f0 + f2 - f1 - f3) / Iz, each plus its
-    ``torque_bias``. With a ``bias_sign`` of ``random`` these biases are sizes: each takes a sign of its own at
-    the start of a run.
+    ``torque_bias``. With a ``bias_sign`` of ``random`` these biases are sizes: each takes a sign of its own
+    at the start of a run.
 
     Model ``paper``, equations (11)-(16): m x'' = -u sin(pitch), m y'' = u cos(pitch) sin(roll), m h'' = u
     cos(pitch) cos(roll) - m g, and the angles are double integrals of the torques (14 with its missing dots).
