@@ -8,7 +8,9 @@ import pytest
 
 from quadvis.block import ParameterError
 from quadvis.testing import drive
+from quadvis_blocks.vision.circle_detector import CircleDetector
 from quadvis_blocks.vision.geometric_camera import GeometricCamera
+from quadvis_blocks.vision.rendered_camera import RenderedCamera
 
 CALIBRATION = str(Path(__file__).parents[3] / "diagrams" / "calib" / "camera.yaml")
 K = np.array([[430.0, 2.0, 226.0], [0.0, 438.0, 161.0], [0.0, 0.0, 1.0]])
@@ -106,9 +108,21 @@ def test_a_calibration_that_is_not_there_is_refused():
         GeometricCamera(calibration="missing.yaml")
 
 
-def test_it_can_stand_in_for_camera_and_detector():
-    from quadvis_blocks.vision.circle_detector import CircleDetector
+def test_its_centres_are_those_that_the_detector_finds_in_rendered_pictures():
+    draw = np.random.default_rng(1).normal
+    places = {
+        "position": np.add([0.0, 0.0, 1.5], draw(0.0, 0.1, (20, 3))),
+        "attitude": draw(0.0, 0.03, (20, 3)),
+    }
+    frames = drive(RenderedCamera(calibration=CALIBRATION), rate="10 Hz", **places).frame
+    colours = str(Path(CALIBRATION).with_name("colours.yaml"))
+    detected = drive(CircleDetector(colours=colours), frame=frames, rate="10 Hz").centres
+    error = detected - drive(camera(), rate="10 Hz", **places).centres
+    assert np.isfinite(error).all()
+    assert np.sqrt(np.mean(error**2)) < 0.03
 
+
+def test_it_can_stand_in_for_camera_and_detector():
     outputs = [
         {name: (port.signal, port.units) for name, port in block.interface.outputs.items()}
         for block in (GeometricCamera, CircleDetector)

@@ -1,0 +1,67 @@
+"""The sets of errors: files of settings for the hover."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+import quadvis
+
+DIAGRAMS = Path(__file__).parents[2] / "diagrams"
+HOVER = DIAGRAMS / "hover.yaml"
+SETS = sorted(path.stem for path in (DIAGRAMS / "sets").glob("*.yaml"))
+
+
+def read(name: str) -> dict[str, Any]:
+    found: dict[str, Any] = yaml.safe_load((DIAGRAMS / "sets" / f"{name}.yaml").read_text())
+    return found
+
+
+def settings(name: str) -> dict[str, str]:
+    return {key: yaml.dump(value, default_flow_style=True) for key, value in read(name)["set"].items()}
+
+
+def errors(name: str, seed: int) -> np.ndarray:
+    """Roll and pitch as measured at the first instant of a flight, when both are zero."""
+    result = quadvis.load(HOVER, variant="geometric", settings=settings(name), stop_time=0.1, seed=seed).run()
+    return np.array([result["imu.roll"][0], result["imu.pitch"][0]])
+
+
+def test_there_are_the_three_sets_of_the_reference_experiment() -> None:
+    assert {"s0", "s1", "sq"} <= set(SETS)
+    assert all(read(name)["quadvis"] == 1 and read(name)["name"] == name.upper() for name in SETS)
+
+
+@pytest.mark.parametrize("variant", [None, "geometric"])
+@pytest.mark.parametrize("name", SETS)
+def test_a_set_fits_the_hover(name: str, variant: str | None) -> None:
+    assert quadvis.load(HOVER, variant=variant, settings=settings(name), stop_time=0.2).run().duration == 0.2
+
+
+def test_s1_is_s0_with_constant_errors() -> None:
+    nominal, constant = read("s0")["set"], read("s1")["set"]
+    differing = {key for key in constant if constant[key] != nominal.get(key)}
+    assert set(nominal) <= set(constant)
+    assert differing == {
+        "imu.angle_bias", "imu.rate_bias", "imu.bias_sign", "craft.torque_bias", "craft.bias_sign"
+    }  # fmt: skip
+
+
+def test_s0_is_what_the_hover_has_by_itself() -> None:
+    plain, with_set = (
+        quadvis.load(HOVER, variant="geometric", settings=given, stop_time=2.0).run()
+        for given in ({}, settings("s0"))
+    )
+    assert np.array_equal(plain["craft.position"], with_set["craft.position"])
+
+
+def test_on_the_same_seed_s1_adds_constant_errors_to_the_noise_of_s0() -> None:
+    added = np.array([errors("s1", seed) - errors("s0", seed) for seed in range(1, 9)])
+    assert np.degrees(np.abs(added)) == pytest.approx(np.full((8, 2), 0.5))
+    assert len(set(map(tuple, np.sign(added)))) > 2
+
+
+def test_in_sq_the_inertial_unit_tells_the_truth() -> None:
+    assert not errors("sq", 1).any()
