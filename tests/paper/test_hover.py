@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
 import quadvis
 
@@ -21,16 +20,12 @@ BANDWIDTHS = ("1 rad/s", "2 rad/s", "2.5 rad/s")
 WITHOUT_EDGES = {"eyes/camera.field_of_view": "unbounded"}
 
 
-def settings_of(name):
-    values = yaml.safe_load((DIAGRAMS / "sets" / f"{name}.yaml").read_text())["set"]
-    return {key: yaml.dump(value, default_flow_style=True) for key, value in values.items()}
-
-
-def flights(seeds, variant="geometric", **settings):
-    """RMS of x and y together (m) and of the yaw angle (rad) after 40 s, means over the seeds."""
+def flights(name, seeds, variant="geometric", **settings):
+    """RMS of x and y together (m) and of yaw (rad) after 40 s with a set of errors, means over the seeds."""
+    params = DIAGRAMS / "sets" / f"{name}.yaml"
     found = []
     for seed in seeds:
-        result = quadvis.load(HOVER, variant=variant, settings=settings, seed=seed).run()
+        result = quadvis.load(HOVER, variant=variant, settings=settings, params=[params], seed=seed).run()
         late = result.times("craft.position") >= 40
         position, yaw = result["craft.position"][late, :2], result["craft.attitude"][late, 2]
         found.append([np.sqrt(np.mean(position**2)), np.sqrt(np.mean(yaw**2))])
@@ -46,7 +41,7 @@ def flights(seeds, variant="geometric", **settings):
     ],
 )
 def test_each_set_of_errors_gives_the_hover_of_the_reference(name, bandwidth, expected):
-    position, yaw = flights(range(1, 11), bandwidth=bandwidth, **settings_of(name), **WITHOUT_EDGES)
+    position, yaw = flights(name, range(1, 11), bandwidth=bandwidth, **WITHOUT_EDGES)
     assert position == pytest.approx(expected, rel=0.25)
     if name == "s1":  # 0.025 rad/s^2 of trim error against a stiffness of 1 per s^2
         assert np.degrees(yaw) == pytest.approx(1.43, rel=0.25)
@@ -54,8 +49,8 @@ def test_each_set_of_errors_gives_the_hover_of_the_reference(name, bandwidth, ex
 
 def test_the_rendered_camera_and_the_geometric_one_hover_alike():
     # The detector's own error is 0.014 px at 2 grey levels of noise; 0.3 px is a far worse camera.
-    rendered = flights(range(1, 6), variant=None, **settings_of("s0"))
-    geometric = flights(range(1, 6), **settings_of("s0"), **{"eyes/camera.noise": "0.014 px"})
+    rendered = flights("s0", range(1, 6), variant=None)
+    geometric = flights("s0", range(1, 6), **{"eyes/camera.noise": "0.014 px"})
     assert rendered == pytest.approx(geometric, rel=0.2)
 
 
