@@ -92,20 +92,27 @@ class DeliveringCamera(Block, numeric=False):
 
     def _is_lost(self, time: float) -> bool:
         begin, length = self.blackout
-        after = time - begin + 1e-6 * self.period
+        after = self._now(time) - begin
         return self._is_dropped() or (length > 0.0 and 0.0 <= after < length)
+
+    def _now(self, time: float) -> float:
+        """Return a moment later: a sum of decimal times must not miss its tick by a rounding error."""
+        return time + 1e-6 * self.period
+
+    def _arrival(self, stamp: float) -> float:
+        """Return when the frame of this tick arrives."""
+        return float(stamp + self.latency + self.jitter * self.chances[1])
 
     def _row(self, stamp: float, content: Any) -> Row:
         """Return the frame of this tick as it goes into the queue."""
-        arrival = stamp + self.latency + self.jitter * self.chances[1]
-        return np.concatenate(([self.captured + 1, stamp, arrival], content))
+        return np.concatenate(([self.captured + 1, stamp, self._arrival(stamp)], content))
 
     def _arrived(self, fresh: Row | None, time: float) -> tuple[Row, list[Row]]:
         """Return the row on the wire at this time and those that are still on their way.
 
         ``fresh`` is the row of the frame that is captured now, if it is not lost.
         """
-        now = time + 1e-6 * self.period  # a sum of decimal times must not miss its tick by a rounding error
+        now = self._now(time)
         queue = [row.copy() for row in self.pending[: self.waiting]] + ([] if fresh is None else [fresh])
         due = [row for row in queue if row[ARRIVAL] <= now]
         if not due:

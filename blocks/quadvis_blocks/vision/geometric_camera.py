@@ -85,7 +85,8 @@ class GeometricCamera(DeliveringCamera, numeric=False):
 
     def output(self, position: Any, attitude: Any, time: float) -> tuple[Any, ...]:
         """Return the measurement that arrived last."""
-        row = self._arrived(self._taken(position, attitude, time), time)[0]
+        prompt = self._arrival(time) <= self._now(time)  # else what is measured now does not matter yet
+        row = self._arrived(self._taken(position, attitude, time) if prompt else None, time)[0]
         sequence = int(row[SEQUENCE])
         fresh = sequence != self.last_sequence
         if sequence == 0:
