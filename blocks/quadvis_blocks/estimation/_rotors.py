@@ -1,0 +1,92 @@
+"""What the rotors do with commands that reach them late: the model that estimators share.
+
+A command is a wrench (4,): collective thrust (N), then the torques about roll, pitch and yaw axis over the
+inertias (rad/s^2). It holds until the next one, arrives after a delay, and the rotors follow it with a
+first-order lag. Both are linear, so they act on a wrench as they do on the thrust of each rotor.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+CAPACITY = 64  # commands that can be on their way at once
+INSTANT = 1e-9  # s
+
+
+def wrench(thrust: Any, arm: float, inertia: Any, torque_ratio: float) -> Any:
+    """Return the wrench of four thrusts (N): front, right, rear, left, as equations (14) to (16) have it."""
+    front, right, rear, left = float(thrust[0]), float(thrust[1]), float(thrust[2]), float(thrust[3])
+    return np.array(
+        (
+            front + right + rear + left,
+            arm * (left - right) / float(inertia[0]),
+            arm * (front - rear) / float(inertia[1]),
+            torque_ratio * (front + rear - right - left) / float(inertia[2]),
+        )
+    )
+
+
+def start(times: Any, commands: Any, now: Any, collective: float) -> None:
+    """Begin with a collective thrust (N), no torque, and nothing on its way: a ring with one command."""
+    times[0] = -math.inf
+    for index in range(4):
+        commands[0, index] = now[index] = collective if index == 0 else 0.0
+
+
+def send(times: Any, commands: Any, count: int, time: float, command: Any) -> int:
+    """Put a command that arrives at a time (s) into the ring, unless it is the last one; return the count."""
+    if (commands[(count - 1) % CAPACITY] == command).all():
+        return count
+    times[count % CAPACITY] = time
+    commands[count % CAPACITY] = command
+    return count + 1
+
+
+def follow(
+    times: Any, commands: Any, count: int, now: Any, begin: float, end: float, lag: float, mean: Any
+) -> None:
+    """Carry the wrench `now` (4,) in place from one instant to a later one, and give its mean on the way.
+
+    The ring has the instants at which commands reach the rotors, and the commands.
+    """
+    for index in range(4):
+        mean[index] = 0.0
+    at = begin
+    place = count - 1
+    while place > max(count - CAPACITY, 0) and times[place % CAPACITY] > begin + INSTANT:
+        place -= 1
+    while at < end - INSTANT:
+        until = end
+        if place + 1 < count and times[(place + 1) % CAPACITY] < end - INSTANT:
+            until = float(times[(place + 1) % CAPACITY])
+        keep, time = math.exp((at - until) / lag), until - at
+        for index in range(4):
+            wanted = float(commands[place % CAPACITY, index])
+            off = float(now[index]) - wanted
+            mean[index] += wanted * time + off * lag * (1.0 - keep)
+            now[index] = wanted + off * keep
+        at = until
+        place += 1
+    for index in range(4):
+        mean[index] = mean[index] / (end - begin) if end > begin else now[index]
+
+
+def acceleration(collective: float, attitude: Any, mass: float, gravity: float) -> Any:
+    """Return the acceleration (3,) (m/s^2) along x, y, h that a collective thrust (N) and gravity give.
+
+    The attitude is roll, pitch and yaw. The thrust points along minus the third column of Rz(yaw) Ry(pitch)
+    Rx(roll), h up.
+    """
+    roll, pitch, yaw = float(attitude[0]), float(attitude[1]), float(attitude[2])
+    across, along = math.sin(roll), math.cos(roll) * math.sin(pitch)
+    cosine, sine, lift = math.cos(yaw), math.sin(yaw), collective / mass
+    return np.array(
+        (
+            -lift * (along * cosine + across * sine),
+            lift * (across * cosine - along * sine),
+            lift * math.cos(roll) * math.cos(pitch) - gravity,
+        )
+    )

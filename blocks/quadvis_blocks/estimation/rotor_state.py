@@ -1,0 +1,58 @@
+"""What the rotors give now, from the commands that were sent."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks.estimation._rotors import CAPACITY, follow, send, start, wrench
+
+
+class RotorState(Block):
+    """Thrust and torques that the rotors give now, by a model of radio and motors.
+
+    A command holds until the next one, arrives ``delay`` later, and the rotors follow with a first-order lag.
+    Exact between ticks, so the block may run faster than the commands come, and a command may arrive between
+    two ticks. Commands that came in at most a tick late are what a simulation's ``across: hold`` gives.
+
+    Error: none beyond the model's; at most 63 different commands may be on their way.
+    """
+
+    thrust = In("float64[4]", unit="N", doc="thrust commanded of each rotor: front, right, rear, left")
+    collective = Out(unit="N", doc="the sum of the thrusts, now")
+    torque = Out(
+        "float64[3]", unit="rad/s^2", doc="about roll, pitch, yaw over inertia: mean until the next tick"
+    )
+
+    delay = Param(0.022, unit="s", min=0.0, doc="time that a command takes to the rotors")
+    lag = Param(0.08, unit="s", above=0.0, doc="time constant of a motor")
+    arm = Param(0.24, unit="m", above=0.0, doc="l, from the centre to each rotor; default Draganfly IV")
+    inertia = Param(
+        (5e-3, 5e-3, 9e-3), type="float64[3]", unit="kg*m^2", above=0.0, doc="about roll, pitch and yaw axis"
+    )
+    torque_ratio = Param(0.016, unit="m", above=0.0, doc="c, a rotor's drag torque over its thrust")
+    initial = Param(4.905, unit="N", doc="collective thrust at the start; default the weight of 0.5 kg")
+    times = State(f"float64[{CAPACITY}]", unit="s")  # at which commands arrive
+    commands = State(f"float64[{CAPACITY},4]")
+    count = State("int64", 1)
+    now = State("float64[4]")
+
+    def start(self) -> None:
+        """Begin in a trimmed hover."""
+        start(self.times, self.commands, self.now, self.initial)
+        self.count = 1
+
+    def output(self, time: float) -> tuple[float, Any]:
+        """Return the collective thrust, and the torques of the coming period."""
+        now, mean = self.now.copy(), np.zeros(4)
+        follow(self.times, self.commands, self.count, now, time, time + self.period, self.lag, mean)
+        return float(self.now[0]), mean[1:]
+
+    def update(self, thrust: Any, time: float) -> None:
+        """Send a command on its way, and follow those that arrive until the next tick."""
+        command = wrench(thrust, self.arm, self.inertia, self.torque_ratio)
+        self.count = send(self.times, self.commands, self.count, time + self.delay, command)
+        mean = np.zeros(4)
+        follow(self.times, self.commands, self.count, self.now, time, time + self.period, self.lag, mean)

@@ -1,0 +1,34 @@
+"""The acceleration that the thrust gives a tilted craft."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, In, Out, Param
+from quadvis_blocks.estimation._rotors import acceleration
+
+
+class ThrustAcceleration(Block):
+    """Acceleration along x, y, h that the collective thrust and gravity give a craft of known attitude.
+
+    ``u / m`` along minus the third column of Rz(yaw) Ry(pitch) Rx(roll), less g along h: what
+    `estimation.position_filter` takes as known. Wind, drag and an error of the mass are left to the
+    disturbance that it estimates.
+
+    Source: equations (11) to (13), with the yaw that they leave out.
+    """
+
+    collective = In(unit="N", doc="collective thrust u that the rotors give")
+    roll = In(unit="rad", doc="right side down is positive")
+    pitch = In(unit="rad", doc="nose up is positive")
+    yaw = In(unit="rad", default=0.0, doc="clockwise from above is positive")
+    acceleration = Out("float64[3]", unit="m/s^2", doc="along x, y, h")
+
+    mass = Param(0.5, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
+    gravity = Param(9.81, unit="m/s^2", above=0.0, doc="g")
+
+    def output(self, collective: float, roll: float, pitch: float, yaw: float) -> Any:
+        """Return the acceleration."""
+        return acceleration(collective, np.array((roll, pitch, yaw)), self.mass, self.gravity)

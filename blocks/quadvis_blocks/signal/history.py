@@ -1,0 +1,51 @@
+"""The value of a signal at an earlier instant."""
+
+from __future__ import annotations
+
+import math
+
+from quadvis.block import Block, In, Out, State
+
+CAPACITY = 256
+
+
+class History(Block):
+    """The value that a signal had at an earlier instant: ``y = u(instant)``, straight between samples.
+
+    So what arrives late meets what was measured beside it at the time: a frame of a camera, and the angles of
+    an inertial unit when the frame was taken. The last 256 samples are kept. An instant before them gives the
+    oldest, one in the future or NaN the newest; ``ok`` is then false.
+
+    Error: at most ``M T^2 / 8`` for a signal with ``|u''| <= M``.
+    """
+
+    u = In(unit="a", doc="the signal; no angle that wraps")
+    instant = In(unit="s", doc="when its value is wanted, such as the stamp of a frame")
+    y = Out(unit="a", doc="its value then")
+    ok = Out("bool", doc="whether the instant lies between the oldest sample and now")
+    values = State(f"float64[{CAPACITY}]")  # of the ticks before this one; the newest stands at count - 1
+    count = State("int64")
+
+    def output(self, u: float, instant: float, time: float) -> tuple[float, bool]:
+        """Return the value at the instant."""
+        if math.isnan(instant):
+            return u, False
+        age = (time - instant) / self.period
+        if age < -1e-6:
+            return u, False
+        kept = min(self.count, CAPACITY)
+        if age > kept + 1e-6:
+            return (u if kept == 0 else float(self.values[(self.count - kept) % CAPACITY])), False
+        age = min(max(age, 0.0), float(kept))
+        steps = min(int(age), kept - 1)
+        if steps < 0:
+            return u, True
+        share = age - steps
+        later = u if steps == 0 else float(self.values[(self.count - steps) % CAPACITY])
+        earlier = float(self.values[(self.count - steps - 1) % CAPACITY])
+        return later + share * (earlier - later), True
+
+    def update(self, u: float) -> None:
+        """Keep this sample."""
+        self.values[self.count % CAPACITY] = u
+        self.count += 1
