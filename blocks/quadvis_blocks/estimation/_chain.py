@@ -1,0 +1,204 @@
+"""A Kalman filter for position, velocity and disturbance along three axes, that can go back to its past.
+
+Along an axis, with a known acceleration a that is straight between ticks and white noises w and n,
+
+    p' = v,    v' = a + d + w,    d' = -d / decay + n.
+
+Estimates stand in an array (3, 9), an axis a row: p, v, d, then the covariances pp, pv, pd, vv, vd, dd. The
+axes do not mix. The past is a ring of ticks: instant, acceleration, and the estimates with all frames before
+that instant. Running again from the tick before a frame that comes late, through the frames since, gives to
+the bit what the filter would have given had the frame come in time.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+TICKS = 64  # how many ticks are kept, and how many frames
+FRAMES = 64
+STAMP, VALUE, VARIANCE, WIDTH = 0, 1, 4, 7  # a frame: stamp, three positions, their variances
+INSTANT = 1e-9  # s
+NOTHING, TAKEN, REFUSED, LATE, RESET = range(5)  # what becomes of a frame
+
+
+def begin(chains: Any, position: Any, sigma: Any, disturbance: Any) -> None:
+    """Set estimates to rest at a position (3,); `sigma` (2,) are the deviations of position and velocity."""
+    for axis in range(3):
+        for column in range(9):
+            chains[axis, column] = 0.0
+        chains[axis, 0] = position[axis]
+        chains[axis, 3] = sigma[0] * sigma[0]
+        chains[axis, 6] = sigma[1] * sigma[1]
+        chains[axis, 8] = disturbance[axis] * disturbance[axis]
+
+
+def predict(chains: Any, before: Any, after: Any, step: float, model: Any) -> None:
+    """Carry estimates over a step (s) on which the known acceleration goes from `before` to `after` (3,).
+
+    `model` (7,) has the densities of w (m/s^2 / sqrt(Hz)) and the deviations of d for each axis, and the
+    decay time. The noise of d reaches p and v as if d did not decay within the step.
+    """
+    decay = float(model[6])
+    keep = math.exp(-step / decay)
+    pushed = -decay * math.expm1(-step / decay)  # velocity by disturbance
+    moved = decay * (step - pushed)  # position by disturbance
+    for axis in range(3):
+        row = chains[axis]
+        v, d, pv, pd = float(row[1]), float(row[2]), float(row[4]), float(row[5])
+        vv, vd, dd = float(row[6]), float(row[7]), float(row[8])
+        first, last = float(before[axis]), float(after[axis])
+        white, strength = float(model[axis]) ** 2, float(model[3 + axis]) ** 2
+        random = 2.0 * strength / decay
+        row[0] += step * v + moved * d + step * step * (2.0 * first + last) / 6.0
+        row[1] = v + pushed * d + 0.5 * step * (first + last)
+        row[2] = keep * d
+        new_pv, new_pd, new_vd = pv + step * vv + moved * vd, pd + step * vd + moved * dd, vd + pushed * dd
+        row[3] += step * (pv + new_pv) + moved * (pd + new_pd)
+        row[3] += white * step**3 / 3.0 + random * step**5 / 20.0
+        row[4] = new_pv + pushed * new_pd + white * step**2 / 2.0 + random * step**4 / 8.0
+        row[5] = keep * new_pd + random * step**3 / 6.0
+        row[6] = vv + pushed * (vd + new_vd) + white * step + random * step**3 / 3.0
+        row[7] = keep * new_vd + random * step**2 / 2.0
+        row[8] = keep * keep * dd + strength * (1.0 - keep * keep)
+
+
+def correct(chains: Any, frame: Any) -> None:
+    """Take the positions of a frame into account."""
+    for axis in range(3):
+        row = chains[axis]
+        pp, pv, pd = float(row[3]), float(row[4]), float(row[5])
+        spread = pp + float(frame[VARIANCE + axis])
+        off = float(frame[VALUE + axis]) - float(row[0])
+        by_p, by_v, by_d = pp / spread, pv / spread, pd / spread
+        row[0] += by_p * off
+        row[1] += by_v * off
+        row[2] += by_d * off
+        row[3] = pp - by_p * pp
+        row[4] = pv - by_p * pv
+        row[5] = pd - by_p * pd
+        row[6] -= by_v * pv
+        row[7] -= by_v * pd
+        row[8] -= by_d * pd
+
+
+def advance(chains: Any, begin: Any, end: Any, until: float, frames: Any, held: int, model: Any) -> None:
+    """Carry estimates from a tick towards the next one, up to an instant, through the frames on the way.
+
+    `begin` and `end` (4,) are the ticks: instant and acceleration. Frames at the first instant count, those
+    at `until` do not.
+    """
+    at, length = float(begin[0]), float(end[0] - begin[0])
+    slope = (end[1:] - begin[1:]) / length if length > 0.0 else 0.0 * begin[1:]
+    for index in range(held):
+        stamp = float(frames[index, STAMP])
+        if begin[0] <= stamp < until:
+            if stamp > at:
+                predict(chains, begin[1:] + slope * (at - begin[0]), begin[1:] + slope * (stamp - begin[0]),
+                        stamp - at, model)  # fmt: skip
+                at = stamp
+            correct(chains, frames[index])
+    if until > at:
+        predict(chains, begin[1:] + slope * (at - begin[0]), begin[1:] + slope * (until - begin[0]),
+                until - at, model)  # fmt: skip
+
+
+def place(ticks: Any, count: int, oldest: int, stamp: float) -> int:
+    """Return the number of the last tick that is not after a stamp; -1 if it is not kept any more."""
+    number = count - 1
+    while number >= oldest:
+        if ticks[number % TICKS, 0] <= stamp:
+            return number
+        number -= 1
+    return -1
+
+
+def filtered(
+    chains: Any, past: Any, ticks: Any, count: int, oldest: int, now: Any, frames: Any, held: int, frame: Any,
+    model: Any, sigma: Any, gate: float, believe: bool, keep: bool,
+) -> tuple[int, int, int, float]:  # fmt: skip
+    """Give the estimates at the tick `now`, before its own frames, with a new frame if that is believed.
+
+    `now` (4,) is number `count`, the ring has those before it, and `frame` has NaN for a stamp if there is
+    none. If `believe`, a frame beyond the gate resets the estimates. Returned are what became of the frame,
+    how many are held, the oldest tick of use, and the frame's squared innovation over its variance. Without
+    `keep` the past stays as it is.
+    """
+    first, verdict, nis = count - 1, NOTHING, math.nan
+    if not math.isnan(frame[STAMP]):
+        stamp = min(float(frame[STAMP]), float(now[0]))
+        found = place(ticks, count, oldest, stamp)
+        if found < 0 or frame[STAMP] > now[0] + INSTANT:
+            verdict = LATE
+        else:
+            first, frame[STAMP] = found, stamp
+            chains[:] = past[first % TICKS]
+            again(chains, past, ticks, first, count, now, stamp, frames, held, model, False)
+            nis, greatest = innovation(chains, frame)
+            verdict = TAKEN if greatest <= gate * gate else (RESET if believe else REFUSED)
+    chains[:] = past[first % TICKS]
+    if verdict == RESET:
+        held, oldest = 0, first
+        begin(chains, frame[VALUE:VARIANCE], sigma, model[3:6])
+        if keep:
+            past[first % TICKS] = chains
+    if verdict in (TAKEN, RESET):
+        held = insert(frames, held, frame, float(ticks[oldest % TICKS, 0]))
+    again(chains, past, ticks, first, count, now, float(now[0]), frames, held, model, keep)
+    return verdict, held, oldest, nis
+
+
+def again(
+    chains: Any, past: Any, ticks: Any, first: int, count: int, now: Any, until: float, frames: Any,
+    held: int, model: Any, keep: bool,
+) -> None:  # fmt: skip
+    """Run estimates at tick `first` on to an instant `until`; with `keep`, renew the past on the way.
+
+    `now` (4,) is the tick after the last one in the ring, number `count`.
+    """
+    for number in range(first, count):
+        start = ticks[number % TICKS]
+        end = now if number + 1 == count else ticks[(number + 1) % TICKS]
+        if start[0] >= until:
+            return
+        advance(chains, start, end, min(float(end[0]), until), frames, held, model)
+        if keep and number + 1 < count:
+            past[(number + 1) % TICKS] = chains
+
+
+def insert(frames: Any, held: int, frame: Any, horizon: float) -> int:
+    """Put a frame among those held, by their stamps, and return how many there are.
+
+    Those before a horizon are dropped, and the oldest if there is no place.
+    """
+    dropped = 0
+    while dropped < held and (frames[dropped, STAMP] < horizon or held - dropped >= FRAMES):
+        dropped += 1
+    if dropped > 0:
+        for index in range(dropped, held):
+            frames[index - dropped] = frames[index]
+    held -= dropped
+    index = held
+    while index > 0 and frames[index - 1, STAMP] > frame[STAMP]:
+        frames[index] = frames[index - 1]
+        index -= 1
+    frames[index] = frame
+    return held + 1
+
+
+def innovation(chains: Any, frame: Any) -> tuple[float, float]:
+    """Return the squared innovation of a frame over its variance: the sum over the axes, and the greatest."""
+    total = greatest = 0.0
+    for axis in range(3):
+        off = float(frame[VALUE + axis]) - float(chains[axis, 0])
+        share = off * off / (float(chains[axis, 3]) + float(frame[VARIANCE + axis]))
+        total += share
+        greatest = max(greatest, share)
+    return total, greatest
+
+
+def latest(chains: Any, frames: Any, held: int, now: float) -> None:
+    """Take the frames of this very instant into account."""
+    for index in range(held):
+        if frames[index, STAMP] >= now:
+            correct(chains, frames[index])

@@ -1,0 +1,164 @@
+"""Angle and rate about one axis, and what disturbs them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks._angles import wrapped
+
+CAPACITY = 128
+DEGREE = math.pi / 180.0
+
+
+class AttitudeFilter(Block):
+    """Angle, rate, torque disturbance and bias of the gyro about one axis: roll, pitch or yaw.
+
+    A Kalman filter for ``angle' = rate``, ``rate' = torque + disturbance``, with an angle and a rate that
+    are measured; the rate has a bias. The disturbance (a trim error) and the bias wander slowly. The torque
+    is what the rotors give from now to the next tick, as `estimation.rotor_state` tells.
+
+    An angle may be late, as the heading that a camera sees: with a ``stamp`` it is held against the estimate
+    of that instant, and the difference corrects the estimate of now. An angle is new if its stamp is not that
+    of the tick before; without a stamp it is new at each tick. Innovations count up to ``gate`` standard
+    deviations, so that a wrong measurement does little and a lasting one wins.
+
+    Error: an error of the measured angle that lasts goes into the estimate whole. A late angle corrects as
+    one in time does, which is good while the latency is short against the filter's own time; it is not used
+    if it is older than 127 ticks.
+    """
+
+    angle = In(unit="rad", doc="measured angle; NaN if there is none")
+    gyro = In(unit="rad/s", doc="measured angular rate; NaN if there is none")
+    torque = In(unit="rad/s^2", doc="torque over inertia until the next tick")
+    stamp = In(unit="s", default=math.nan, doc="instant at which the angle was measured; NaN for now")
+    valid = In("bool", default=True, doc="whether the angle is good")
+    estimate = Out(unit="rad", doc="angle in (-pi, pi]")
+    angular_rate = Out(unit="rad/s", doc="angular rate, without the gyro's bias")
+    disturbance = Out(unit="rad/s^2", doc="torque over inertia beside the known one")
+    bias = Out(unit="rad/s", doc="what the gyro reads at rest")
+    covariance = Out(
+        "float64[4,4]",
+        unit="rad^2 rad^2/s rad^2/s^2 rad^2/s rad^2/s rad^2/s^2 rad^2/s^3 rad^2/s^2 "
+        "rad^2/s^2 rad^2/s^3 rad^2/s^4 rad^2/s^3 rad^2/s rad^2/s^2 rad^2/s^3 rad^2/s^2",
+        doc="of the four",
+    )
+
+    angle_noise = Param(
+        0.1 * DEGREE, unit="rad", above=0.0, tune=True, doc="white noise of the angle, one sigma"
+    )
+    rate_noise = Param(
+        0.5 * DEGREE, unit="rad/s", above=0.0, tune=True, doc="white noise of the rate, one sigma"
+    )
+    torque_noise = Param(0.02, unit="rad/s^1.5", min=0.0, tune=True, doc="white noise of the torque")
+    disturbance_wander = Param(
+        0.01, unit="rad/s^2.5", min=0.0, tune=True, doc="how the disturbance wanders: deviation after 1 s"
+    )
+    bias_wander = Param(
+        0.01 * DEGREE, unit="rad/s^1.5", min=0.0, tune=True, doc="how the bias wanders: deviation after 1 s"
+    )
+    gate = Param(
+        5.0, above=0.0, tune=True, doc="standard deviations beyond which an innovation counts no more"
+    )
+    initial_sigma = Param(
+        (5.0 * DEGREE, 5.0 * DEGREE, 0.1, 0.5 * DEGREE),
+        type="float64[4]", unit="rad rad/s rad/s^2 rad/s", above=0.0, doc="deviations at the start",
+    )  # fmt: skip
+
+    mean = State("float64[4]")  # before the measurements of this tick
+    spread = State("float64[4,4]")
+    past = State(f"float64[{CAPACITY}]")  # angles, not wrapped, after the measurements
+    count = State("int64")
+    last_stamp = State("float64", math.nan)
+
+    def start(self) -> None:
+        """Begin with zeros, as uncertain as the parameter says."""
+        for index in range(4):
+            self.spread[index, index] = self.initial_sigma[index] ** 2
+
+    def output(
+        self, angle: float, gyro: float, stamp: float, valid: bool, time: float
+    ) -> tuple[float, float, float, float, Any]:
+        """Return the estimate with the measurements of now."""
+        mean, spread = self.mean.copy(), self.spread.copy()
+        new = valid and (math.isnan(stamp) or stamp != self.last_stamp)
+        late = 0.0 if math.isnan(stamp) else (time - stamp) / self.period
+        off = _off(angle, late, self.past, self.count, float(mean[0])) if new else math.nan
+        _measure(mean, spread, off, gyro, self.angle_noise, self.rate_noise, self.gate)
+        return wrapped(float(mean[0])), float(mean[1]), float(mean[2]), float(mean[3]), spread
+
+    def update(
+        self, angle: float, gyro: float, torque: float, stamp: float, valid: bool, time: float
+    ) -> None:
+        """Take the measurements into account, and carry the estimate to the next tick."""
+        mean, spread = self.mean, self.spread
+        new = valid and (math.isnan(stamp) or stamp != self.last_stamp)
+        late = 0.0 if math.isnan(stamp) else (time - stamp) / self.period
+        off = _off(angle, late, self.past, self.count, float(mean[0])) if new else math.nan
+        _measure(mean, spread, off, gyro, self.angle_noise, self.rate_noise, self.gate)
+        self.past[self.count % CAPACITY] = mean[0]
+        self.count += 1
+        self.last_stamp = stamp
+        _predict(
+            mean, spread, torque, self.period, self.torque_noise, self.disturbance_wander, self.bias_wander
+        )
+
+
+def _off(angle: float, late: float, past: Any, count: int, now: float) -> float:
+    """Return how far a measured angle is from the estimate of `late` ticks ago; NaN if that is not known."""
+    if not math.isfinite(angle) or late < -1e-6 or late > min(count, CAPACITY - 1) + 1e-6:
+        return math.nan
+    steps = int(late)
+    share = late - steps
+    newer = now if steps == 0 else float(past[(count - steps) % CAPACITY])
+    older = newer if share < 1e-6 else float(past[(count - steps - 1) % CAPACITY])
+    return wrapped(angle - newer - share * (older - newer))
+
+
+def _measure(
+    mean: Any, spread: Any, off: float, gyro: float, angle_noise: float, rate_noise: float, gate: float
+) -> None:
+    """Take an angle that is off by so much and a gyro into account, each unless it is NaN."""
+    if not math.isnan(off):
+        _correct(mean, spread, spread[0].copy(), float(spread[0, 0]), off, angle_noise, gate)
+    if math.isfinite(gyro):
+        towards = spread[1] + spread[3]
+        of_rate = float(towards[1] + towards[3])
+        _correct(mean, spread, towards, of_rate, gyro - float(mean[1] + mean[3]), rate_noise, gate)
+
+
+def _correct(
+    mean: Any, spread: Any, towards: Any, variance: float, off: float, noise: float, gate: float
+) -> None:
+    """Correct by one number that is off, whose covariance with the state is `towards` (4,)."""
+    total = variance + noise * noise
+    limit = gate * math.sqrt(total)
+    mean += towards * (min(max(off, -limit), limit) / total)
+    spread -= towards.reshape(4, 1) * (towards / total)
+
+
+def _predict(
+    mean: Any, spread: Any, torque: float, step: float, noise: float, wander: float, bias_wander: float
+) -> None:
+    """Carry the estimate over a step (s) with a torque (rad/s^2)."""
+    total = torque + float(mean[2])
+    mean[0] += step * float(mean[1]) + 0.5 * step * step * total
+    mean[1] += step * total
+    half = 0.5 * step * step
+    spread[0] += step * spread[1] + half * spread[2]
+    spread[1] += step * spread[2]
+    spread[:, 0] += step * spread[:, 1] + half * spread[:, 2]
+    spread[:, 1] += step * spread[:, 2]
+    white, random = noise * noise, wander * wander
+    spread[0, 0] += white * step**3 / 3.0 + random * step**5 / 20.0
+    spread[1, 1] += white * step + random * step**3 / 3.0
+    spread[2, 2] += random * step
+    spread[3, 3] += bias_wander * bias_wander * step
+    angle_rate = white * half + random * step**4 / 8.0
+    spread[0, 1] += angle_rate
+    spread[1, 0] += angle_rate
+    spread[0, 2] += random * step**3 / 6.0
+    spread[2, 0] += random * step**3 / 6.0
+    spread[1, 2] += random * half
+    spread[2, 1] += random * half

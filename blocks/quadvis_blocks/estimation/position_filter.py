@@ -1,0 +1,196 @@
+"""Where the craft is and how it moves, from frames that come late and in any order."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks.estimation._chain import (
+    FRAMES,
+    INSTANT,
+    LATE,
+    REFUSED,
+    RESET,
+    STAMP,
+    TAKEN,
+    TICKS,
+    VALUE,
+    VARIANCE,
+    WIDTH,
+    begin,
+    filtered,
+    latest,
+)
+
+
+class PositionFilter(Block):
+    """Position, velocity and disturbance of the craft, from known accelerations and frames that come late.
+
+    A Kalman filter: along each axis the acceleration is the known one, plus a disturbance that wanders with
+    the deviation ``wander`` and the correlation time ``decay``, plus white noise. A frame counts for the
+    instant of its stamp: the filter goes back to it and runs again through what it knows since, so frames
+    that are late and out of order give what they would have given in time. Without frames it goes on by the
+    accelerations alone. The last 64 ticks are kept; a frame from before them is refused.
+
+    A frame is refused if along an axis it is further than ``gate`` standard deviations from where it was
+    expected. When for ``reset_after`` nothing else came, the filter believes it, and begins anew there. A
+    frame is new if its stamp is not that of the tick before; it needs ``valid`` and finite numbers.
+
+    Of the libraries, filterpy is no longer kept, and neither it nor scipy takes frames out of order or
+    compiles.
+
+    Error: the covariance is true if the noise is what the parameters say; errors that outlast a frame, as
+    those of a tilt do, it does not see.
+    """
+
+    acceleration = In("float64[3]", unit="m/s^2", doc="known acceleration along x, y, h, now")
+    position = In("float64[3]", unit="m", doc="measured position x, y, h; NaN if there is none")
+    stamp = In(unit="s", doc="instant at which it was measured")
+    valid = In("bool", default=True, doc="whether it is good")
+    measured = In(
+        "float64[4,4]",
+        unit="m^2 m^2 m^2 m*rad " * 3 + "m*rad m*rad m*rad rad^2",
+        default=((0.0,) * 4,) * 4,
+        doc="its covariance beside noise, such as `vision.pose_imu` gives; the first three variances count",
+    )
+    estimate = Out("float64[3]", unit="m", doc="position now: x, y, h")
+    velocity = Out("float64[3]", unit="m/s", doc="rate of change of the position")
+    disturbance = Out("float64[3]", unit="m/s^2", doc="acceleration beside the known one")
+    covariance = Out(
+        "float64[3,3,3]",
+        unit="m^2 m^2/s m^2/s^2 m^2/s m^2/s^2 m^2/s^3 m^2/s^2 m^2/s^3 m^2/s^4 " * 3,
+        doc="by axis, of position, velocity and disturbance",
+    )
+    age = Out(
+        unit="s", doc="time since the newest frame that was believed, by its stamp; from the start if none"
+    )
+    ok = Out("bool", doc="whether there was one, and its age is at most max_age")
+    nis = Out(nan=True, doc="squared innovation over its variance, summed, of a new frame; else NaN")
+    refused = Out("int64", doc="how many frames were refused")
+
+    noise = Param(
+        (0.005, 0.005, 0.005), type="float64[3]", unit="m", above=0.0, tune=True,
+        doc="standard deviation of a measured position",
+    )  # fmt: skip
+    acceleration_noise = Param(
+        (0.02, 0.02, 0.02), type="float64[3]", unit="m/s^1.5", min=0.0, tune=True,
+        doc="white noise of the acceleration: velocity deviates by this times the root of the time",
+    )  # fmt: skip
+    wander = Param(
+        (0.05, 0.05, 0.05), type="float64[3]", unit="m/s^2", above=0.0, tune=True,
+        doc="standard deviation of the disturbance",
+    )  # fmt: skip
+    decay = Param(5.0, unit="s", above=0.0, tune=True, doc="correlation time of the disturbance")
+    gate = Param(5.0, above=0.0, tune=True, doc="greatest innovation in standard deviations")
+    reset_after = Param(1.0, unit="s", above=0.0, tune=True, doc="how long to refuse frames before believing")
+    max_age = Param(2.0, unit="s", above=0.0, tune=True, doc="how long accelerations alone are good enough")
+    initial = Param((0.0, 0.0, 0.0), type="float64[3]", unit="m", doc="position at the start")
+    initial_sigma = Param(
+        (1.0, 0.5), type="float64[2]", unit="m m/s", above=0.0, doc="deviation of position and velocity then"
+    )
+
+    ticks = State(f"float64[{TICKS},4]")  # instant and acceleration
+    past = State(f"float64[{TICKS},3,9]")  # estimates just before the frames of that instant
+    count = State("int64")
+    oldest = State("int64")  # the first tick that frames may go back to
+    frames = State(f"float64[{FRAMES},{WIDTH}]")
+    held = State("int64")
+    last_stamp = State("float64", math.nan)
+    newest = State("float64", math.nan)
+    refusing = State("float64", math.nan)  # since when
+    refusals = State("int64")
+
+    def start(self) -> None:
+        """Begin at rest at the initial position."""
+        begin(self.past[0], self.initial, self.initial_sigma, self.wander)
+
+    def output(
+        self, acceleration: Any, position: Any, stamp: float, valid: bool, measured: Any, time: float
+    ) -> tuple[Any, ...]:
+        """Return the estimate with what is known now."""
+        now = _tick(time, acceleration)
+        frame = _frame(position, stamp, valid, measured, self.noise, self.last_stamp)
+        frames, chains = self.frames.copy(), self.past[0].copy()
+        newest, refused, nis = self.newest, self.refusals, math.nan
+        if self.count > 0:
+            verdict, held, _, nis = filtered(
+                chains, self.past, self.ticks, self.count, self.oldest, now, frames, self.held, frame,
+                _model(self.acceleration_noise, self.wander, self.decay), self.initial_sigma, self.gate,
+                time - self.refusing >= self.reset_after, False,
+            )  # fmt: skip
+            latest(chains, frames, held, time)
+            newest = _newer(newest, stamp, verdict)
+            refused += 1 if verdict in (REFUSED, LATE) else 0
+        age = time - (0.0 if math.isnan(newest) else newest)
+        ok = not math.isnan(newest) and age <= self.max_age + INSTANT
+        return (
+            chains[:, 0].copy(), chains[:, 1].copy(), chains[:, 2].copy(), _covariance(chains),
+            age, ok, nis, refused,
+        )  # fmt: skip
+
+    def update(
+        self, acceleration: Any, position: Any, stamp: float, valid: bool, measured: Any, time: float
+    ) -> None:
+        """Keep what came in, and the estimates just before the frames of this instant."""
+        now = _tick(time, acceleration)
+        if self.count > 0:
+            frame = _frame(position, stamp, valid, measured, self.noise, self.last_stamp)
+            chains = np.zeros((3, 9))
+            verdict, self.held, self.oldest, _ = filtered(
+                chains, self.past, self.ticks, self.count, self.oldest, now, self.frames, self.held, frame,
+                _model(self.acceleration_noise, self.wander, self.decay), self.initial_sigma, self.gate,
+                time - self.refusing >= self.reset_after, True,
+            )  # fmt: skip
+            self.newest = _newer(self.newest, stamp, verdict)
+            self.refusals += 1 if verdict in (REFUSED, LATE) else 0
+            if verdict in (TAKEN, RESET):
+                self.refusing = math.nan
+            elif verdict == REFUSED and math.isnan(self.refusing):
+                self.refusing = time
+            self.last_stamp = stamp
+            self.past[self.count % TICKS] = chains
+        self.ticks[self.count % TICKS] = now
+        self.count += 1
+        self.oldest = max(self.oldest, self.count - TICKS)
+
+
+def _tick(time: float, acceleration: Any) -> Any:
+    return np.array((time, acceleration[0], acceleration[1], acceleration[2]))
+
+
+def _model(noise: Any, wander: Any, decay: float) -> Any:
+    return np.array((noise[0], noise[1], noise[2], wander[0], wander[1], wander[2], decay))
+
+
+def _frame(position: Any, stamp: float, valid: bool, measured: Any, noise: Any, last: float) -> Any:
+    """Return a frame; its stamp is NaN if it is the last one again, or not fit for use."""
+    frame = np.zeros(WIDTH)
+    fit = valid and stamp != last
+    for axis in range(3):
+        frame[VALUE + axis] = position[axis]
+        frame[VARIANCE + axis] = measured[axis, axis] + noise[axis] * noise[axis]
+        fit = fit and math.isfinite(position[axis]) and frame[VARIANCE + axis] > 0.0
+    frame[STAMP] = stamp if fit and math.isfinite(frame[VARIANCE:].sum()) else math.nan
+    return frame
+
+
+def _newer(newest: float, stamp: float, verdict: int) -> float:
+    """Return the stamp of the newest frame that was believed."""
+    if verdict != TAKEN and verdict != RESET:
+        return newest
+    return stamp if math.isnan(newest) else max(newest, stamp)
+
+
+def _covariance(chains: Any) -> Any:
+    """Return the covariances (3, 3, 3) by axis."""
+    full = np.zeros((3, 3, 3))
+    for axis in range(3):
+        column = 3
+        for row in range(3):
+            for other in range(row, 3):
+                full[axis, row, other] = full[axis, other, row] = chains[axis, column]
+                column += 1
+    return full

@@ -1,0 +1,119 @@
+"""The state of the craft when a command of now will act."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks._angles import wrapped
+from quadvis_blocks.estimation._rotors import CAPACITY, acceleration, follow, send, start, wrench
+
+STEP = 0.01  # s, at most
+
+
+class Predictor(Block):
+    """State of the craft when a command of now will act, by the commands that are on their way.
+
+    A command arrives ``delay`` later: until then the motion follows from the commands sent so far. The lag of
+    the motors is then made up for by ``x + lag x'``. For a law torque = K x that is just the command that a
+    first-order lag turns into K x, since ``command = torque + lag torque'``. So the law may be tuned as if
+    there were neither radio nor motors: at 20 Hz, 22 ms and 80 ms the laws of the paper are stable up to a
+    bandwidth of 10 rad/s in place of 3.3.
+
+    Disturbances stay as they are. Run it at the rate of the control, and let ``thrust`` be what that sends.
+
+    Source: for the delay, Artstein, Linear systems with delayed controls: a reduction (1982).
+    """
+
+    position = In("float64[3]", unit="m", doc="x, y, h, now")
+    velocity = In("float64[3]", unit="m/s", doc="rate of change of the position")
+    disturbance = In(
+        "float64[3]", unit="m/s^2", default=(0.0, 0.0, 0.0), doc="acceleration beside thrust and gravity"
+    )
+    roll = In(unit="rad", doc="right side down is positive")
+    pitch = In(unit="rad", doc="nose up is positive")
+    yaw = In(unit="rad", doc="clockwise from above is positive")
+    roll_rate = In(unit="rad/s", doc="rate of change of roll")
+    pitch_rate = In(unit="rad/s", doc="rate of change of pitch")
+    yaw_rate = In(unit="rad/s", doc="rate of change of yaw")
+    roll_disturbance = In(unit="rad/s^2", default=0.0, doc="roll torque beside that of the rotors")
+    pitch_disturbance = In(unit="rad/s^2", default=0.0, doc="pitch torque beside that of the rotors")
+    yaw_disturbance = In(unit="rad/s^2", default=0.0, doc="yaw torque beside that of the rotors")
+    thrust = In("float64[4]", unit="N", doc="thrust commanded of each rotor: front, right, rear, left")
+    later_position = Out("float64[3]", unit="m", doc="x, y, h, then")
+    later_velocity = Out("float64[3]", unit="m/s", doc="rate of change of the position, then")
+    later_roll = Out(unit="rad", doc="roll, then")
+    later_pitch = Out(unit="rad", doc="pitch, then")
+    later_yaw = Out(unit="rad", doc="yaw, then, in (-pi, pi]")
+    later_rates = Out("float64[3]", unit="rad/s", doc="rates of change of roll, pitch and yaw, then")
+
+    delay = Param(0.022, unit="s", min=0.0, max=1.0, doc="time that a command takes to the rotors")
+    lag = Param(0.08, unit="s", above=0.0, doc="time constant of a motor")
+    arm = Param(0.24, unit="m", above=0.0, doc="l, from the centre to each rotor; default Draganfly IV")
+    inertia = Param(
+        (5e-3, 5e-3, 9e-3), type="float64[3]", unit="kg*m^2", above=0.0, doc="about roll, pitch and yaw axis"
+    )
+    torque_ratio = Param(0.016, unit="m", above=0.0, doc="c, a rotor's drag torque over its thrust")
+    mass = Param(0.5, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
+    gravity = Param(9.81, unit="m/s^2", above=0.0, doc="g")
+
+    times = State(f"float64[{CAPACITY}]", unit="s")  # at which commands arrive
+    commands = State(f"float64[{CAPACITY},4]")
+    count = State("int64", 1)
+    now = State("float64[4]")  # the wrench of the rotors
+
+    def start(self) -> None:
+        """Begin in a trimmed hover."""
+        start(self.times, self.commands, self.now, self.mass * self.gravity)
+        self.count = 1
+
+    def output(
+        self,
+        position: Any,
+        velocity: Any,
+        disturbance: Any,
+        roll: float,
+        pitch: float,
+        yaw: float,
+        roll_rate: float,
+        pitch_rate: float,
+        yaw_rate: float,
+        roll_disturbance: float,
+        pitch_disturbance: float,
+        yaw_disturbance: float,
+        time: float,
+    ) -> tuple[Any, Any, float, float, float, Any]:
+        """Return the state when a command of now will act."""
+        place, speed, now, mean = position.copy(), velocity.copy(), self.now.copy(), np.zeros(4)
+        angles, rates = np.array((roll, pitch, yaw)), np.array((roll_rate, pitch_rate, yaw_rate))
+        trim = np.array((roll_disturbance, pitch_disturbance, yaw_disturbance))
+        count = int(self.delay / STEP) + 1
+        step = self.delay / count
+        for index in range(count):
+            at = time + index * step
+            follow(self.times, self.commands, self.count, now, at, at + step, self.lag, mean)
+            push = disturbance + acceleration(mean[0], angles + 0.5 * step * rates, self.mass, self.gravity)
+            turn = trim + mean[1:]
+            place += step * (speed + 0.5 * step * push)
+            speed += step * push
+            angles += step * (rates + 0.5 * step * turn)
+            rates += step * turn
+        push = disturbance + acceleration(now[0], angles, self.mass, self.gravity)
+        lead = angles + self.lag * rates
+        return (
+            place + self.lag * speed,
+            speed + self.lag * push,
+            float(lead[0]),
+            float(lead[1]),
+            wrapped(float(lead[2])),
+            rates + self.lag * (trim + now[1:]),
+        )
+
+    def update(self, thrust: Any, time: float) -> None:
+        """Send a command on its way, and follow those that arrive until the next tick."""
+        command = wrench(thrust, self.arm, self.inertia, self.torque_ratio)
+        self.count = send(self.times, self.commands, self.count, time + self.delay, command)
+        mean = np.zeros(4)
+        follow(self.times, self.commands, self.count, self.now, time, time + self.period, self.lag, mean)
