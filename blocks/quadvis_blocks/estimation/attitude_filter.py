@@ -51,7 +51,7 @@ class AttitudeFilter(Block):
     rate_noise = Param(
         0.5 * DEGREE, unit="rad/s", above=0.0, tune=True, doc="white noise of the rate, one sigma"
     )
-    torque_noise = Param(0.02, unit="rad/s^1.5", min=0.0, tune=True, doc="white noise of the torque")
+    torque_noise = Param(0.1, unit="rad/s^1.5", min=0.0, tune=True, doc="white noise of the torque")
     disturbance_wander = Param(
         0.01, unit="rad/s^2.5", min=0.0, tune=True, doc="how the disturbance wanders: deviation after 1 s"
     )
