@@ -115,7 +115,7 @@ def place(ticks: Any, count: int, oldest: int, stamp: float) -> int:
 
 def filtered(
     chains: Any, past: Any, ticks: Any, count: int, oldest: int, now: Any, frames: Any, held: int, frame: Any,
-    model: Any, sigma: Any, gate: float, believe: bool, keep: bool,
+    model: Any, sigma: Any, gate: float, tolerance: float, believe: bool, keep: bool,
 ) -> tuple[int, int, int, float]:  # fmt: skip
     """Give the estimates at the tick `now`, before its own frames, with a new frame if that is believed.
 
@@ -134,7 +134,7 @@ def filtered(
             first, frame[STAMP] = found, stamp
             chains[:] = past[first % TICKS]
             again(chains, past, ticks, first, count, now, stamp, frames, held, model, False)
-            nis, greatest = innovation(chains, frame)
+            nis, greatest = innovation(chains, frame, tolerance)
             verdict = TAKEN if greatest <= gate * gate else (RESET if believe else REFUSED)
     chains[:] = past[first % TICKS]
     if verdict == RESET:
@@ -186,14 +186,15 @@ def insert(frames: Any, held: int, frame: Any, horizon: float) -> int:
     return held + 1
 
 
-def innovation(chains: Any, frame: Any) -> tuple[float, float]:
-    """Return the squared innovation of a frame over its variance: the sum over the axes, and the greatest."""
+def innovation(chains: Any, frame: Any, tolerance: float) -> tuple[float, float]:
+    """Return the squared innovation over its variance, summed, and the greatest of what is beyond."""
     total = greatest = 0.0
     for axis in range(3):
         off = float(frame[VALUE + axis]) - float(chains[axis, 0])
-        share = off * off / (float(chains[axis, 3]) + float(frame[VARIANCE + axis]))
-        total += share
-        greatest = max(greatest, share)
+        variance = float(chains[axis, 3]) + float(frame[VARIANCE + axis])
+        total += off * off / variance
+        beyond = max(abs(off) - tolerance, 0.0)
+        greatest = max(greatest, beyond * beyond / variance)
     return total, greatest
 
 

@@ -35,9 +35,10 @@ class PositionFilter(Block):
     that are late and out of order give what they would have given in time. Without frames it goes on by the
     accelerations alone. The last 64 ticks are kept; a frame from before them is refused.
 
-    A frame is refused if along an axis it is further than ``gate`` standard deviations from where it was
-    expected. When for ``reset_after`` nothing else came, the filter believes it, and begins anew there. A
-    frame is new if its stamp is not that of the tick before; it needs ``valid`` and finite numbers.
+    A frame is refused if along an axis it is further than ``gate`` standard deviations, and ``tolerance`` for
+    what the model leaves out, from where it was expected. When for ``reset_after`` nothing else came, the
+    filter believes it, and begins anew there. A frame is new if its stamp is not that of the tick before; it
+    needs ``valid`` and finite numbers.
 
     Of the libraries, filterpy is no longer kept, and neither it nor scipy takes frames out of order or
     compiles.
@@ -85,6 +86,7 @@ class PositionFilter(Block):
     )  # fmt: skip
     decay = Param(5.0, unit="s", above=0.0, tune=True, doc="correlation time of the disturbance")
     gate = Param(5.0, above=0.0, tune=True, doc="greatest innovation in standard deviations")
+    tolerance = Param(0.0, unit="m", min=0.0, tune=True, doc="innovation that is never too great")
     reset_after = Param(1.0, unit="s", above=0.0, tune=True, doc="how long to refuse frames before believing")
     max_age = Param(2.0, unit="s", above=0.0, tune=True, doc="how long accelerations alone are good enough")
     initial = Param((0.0, 0.0, 0.0), type="float64[3]", unit="m", doc="position at the start")
@@ -119,7 +121,7 @@ class PositionFilter(Block):
             verdict, held, _, nis = filtered(
                 chains, self.past, self.ticks, self.count, self.oldest, now, frames, self.held, frame,
                 _model(self.acceleration_noise, self.wander, self.decay), self.initial_sigma, self.gate,
-                time - self.refusing >= self.reset_after, False,
+                self.tolerance, time - self.refusing >= self.reset_after, False,
             )  # fmt: skip
             latest(chains, frames, held, time)
             newest = _newer(newest, stamp, verdict)
@@ -142,7 +144,7 @@ class PositionFilter(Block):
             verdict, self.held, self.oldest, _ = filtered(
                 chains, self.past, self.ticks, self.count, self.oldest, now, self.frames, self.held, frame,
                 _model(self.acceleration_noise, self.wander, self.decay), self.initial_sigma, self.gate,
-                time - self.refusing >= self.reset_after, True,
+                self.tolerance, time - self.refusing >= self.reset_after, True,
             )  # fmt: skip
             self.newest = _newer(self.newest, stamp, verdict)
             self.refusals += 1 if verdict in (REFUSED, LATE) else 0

@@ -201,6 +201,15 @@ def test_one_wrong_frame_is_refused_and_counted() -> None:
     assert result.nis[60] > 25.0
 
 
+def test_a_tolerance_lets_pass_what_the_model_leaves_out() -> None:
+    times = STEP * np.arange(100)
+    position = np.zeros((100, 3))
+    position[60:62] = [[0.0, 0.3, 0.0], [0.0, 1.0, 0.0]]
+    result = estimate(np.zeros(3), position, times, tolerance=0.3)
+    assert result.refused.tolist() == [0] * 61 + [1] * 39
+    assert result.nis[60] > 25.0
+
+
 def test_after_a_second_of_refusals_it_begins_anew_where_the_frames_are() -> None:
     times = STEP * np.arange(120)
     position = np.where(times[:, None] < 3.0, 0.0, [5.0, -5.0, 1.0])
