@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from quadvis.catalogue import Catalogue
+from quadvis.diagram.analyse import QuestionReader, Questions
 from quadvis.diagram.build import Builder, Made
 from quadvis.diagram.check import WireCheck, rate_text
 from quadvis.diagram.expand import Expansion, Parts, Settings
@@ -27,6 +28,7 @@ from quadvis.engine.graph import Graph, Wire
 from quadvis.errors import DiagramError, Fault, Faults, Place, quoted
 
 if TYPE_CHECKING:
+    from quadvis.analysis.analyse import Analysis
     from quadvis.output.verdict import Entry, Outcome, Signals
     from quadvis.run import Progress, Result
 
@@ -45,6 +47,9 @@ class Diagram:
     seed: int
     observation: Observation
     listing: tuple[str, ...]  # the blocks in the order of the files
+    questions: Questions
+    variants: tuple[str, ...]
+    settings: tuple[str, ...] = ()  # the parameters that were replaced, block.parameter=value
 
     @cached_property
     def resolved(self) -> str:
@@ -93,6 +98,22 @@ class Diagram:
 
         return run(self, log=log, progress=progress)
 
+    def analyse(
+        self,
+        *,
+        cuts: Mapping[str, str | Sequence[str]] = MappingProxyType({}),
+        limits: Mapping[str, tuple[str, str, str]] = MappingProxyType({}),
+        at: float | None = None,
+    ) -> Analysis:
+        """Linearise the closed loop at its operating point; see ``quadvis.analysis.analyse.analyse``."""
+        from quadvis.analysis.analyse import analyse
+
+        return analyse(self, cuts, limits, at)
+
+    def varied(self, setting: str) -> Diagram:
+        """Return the diagram, loaded again with one more parameter replaced: ``block.parameter=value``."""
+        return load(self.path, variant=self.variant, settings=(*self.settings, setting), seed=self.seed)
+
     def draw(self) -> str:
         """Return a picture of the diagram as SVG."""
         from quadvis.diagram.reference import wire_text
@@ -137,9 +158,10 @@ def load(
     """
     faults = Faults()
     with _told_once(faults):
-        given = _settings(settings, faults)
+        texts = _texts(settings)
         spec = read_file(Path(path), faults, part=False)
-        return _Assembly(spec, faults).diagram(variant, given, stop_time, seed)
+        diagram = _Assembly(spec, faults).diagram(variant, _settings(texts, faults), stop_time, seed)
+        return replace(diagram, settings=texts)
 
 
 def load_text(text: str, folder: str | Path = ".", name: str = "diagram.yaml") -> Diagram:
@@ -153,7 +175,7 @@ def check(path: str | Path, settings: Mapping[str, Any] | Sequence[str] = ()) ->
     """Load a diagram, and with each of its variants in turn; DiagramError tells the faults of all of them."""
     faults = Faults()
     with _told_once(faults):
-        given = _settings(settings, faults)
+        given = _settings(_texts(settings), faults)
         spec = read_file(Path(path), faults, part=False)
         assembly = _Assembly(spec, faults)
         diagram = assembly.diagram(settings=given)
@@ -209,13 +231,18 @@ class _Assembly:
         graph = Graph(spec.name, WireCheck(drafts, faults).run(), spec.solver, builder.step)
         stop = _stop_time(spec, stop_time, faults)
         observation = read_observation(spec.sections, wiring, graph, faults)
+        nodes = {node.path: node for node in graph.nodes}
+        questions = QuestionReader(wiring, graph, nodes).read(spec.sections.get("analyse"), faults)
         if spec.files:
             from quadvis.diagram.resolve import check_files
 
             check_files(spec, faults)
         seed = spec.seed if seed is None else _seed(seed, faults)
         listing = tuple(draft.path for draft in drafts)
-        return Diagram(spec.name, spec.path, variant, graph, stop, seed, observation, listing)
+        variants = tuple(spec.variants)
+        return Diagram(
+            spec.name, spec.path, variant, graph, stop, seed, observation, listing, questions, variants
+        )
 
     def _promised(self, filled: FileSpec) -> Outputs:
         """Return the outputs of what stands in the slots that a variant fills."""
@@ -226,12 +253,14 @@ class _Assembly:
         return {slot: self._base.outputs(slot) for slot in changed if self._base is not None}
 
 
-def _settings(
-    settings: Mapping[str, Any] | Sequence[str], faults: Faults
-) -> dict[str, dict[str, Node | None]]:
-    """Return the replaced parameters by block ("" for the diagram's own) and name; None if it is told."""
+def _texts(settings: Mapping[str, Any] | Sequence[str]) -> tuple[str, ...]:
     if isinstance(settings, Mapping):
-        settings = [f"{name}={_text(value)}" for name, value in settings.items()]
+        return tuple(f"{name}={_text(value)}" for name, value in settings.items())
+    return tuple(settings)
+
+
+def _settings(settings: Sequence[str], faults: Faults) -> dict[str, dict[str, Node | None]]:
+    """Return the replaced parameters by block ("" for the diagram's own) and name; None if it is told."""
     found: dict[str, dict[str, Node | None]] = {}
     for setting in settings:
         name, _, text = (part.strip() for part in setting.partition("="))
