@@ -31,7 +31,7 @@ a sampled one is lifted over one hyperperiod. All signals of a cut are opened at
 --json prints one object: diagram, variant, hash, hyperperiod_s (0 if all is continuous), states, stable;
 poles: [[real, imaginary]] in 1/s; cuts: {name: {signals, gain_up, gain_down, phase_lag, phase_lead,
 delay, crossover}} in factors, rad, s and rad/s, null where nothing limits;
-limits: {name: {vary, unit, stable_to, reached}}.
+limits: {name: {vary, unit, stable_to, reached, reason}}.
 Exit code: 0 stable, 1 not stable, 2 bad input, or a loop that cannot be linearised."""
 
 

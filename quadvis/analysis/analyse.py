@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
@@ -12,20 +12,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.analysis.cut import with_breaks
-from quadvis.analysis.linearise import Linear, linearise
+from quadvis.analysis.linearise import Linear, linearised
 from quadvis.analysis.margins import Loop, rates
-from quadvis.analysis.probe import AnalysisError, Probe, silence
+from quadvis.analysis.probe import AnalysisError
 from quadvis.analysis.systems import closed_loop
 from quadvis.analysis.vary import STABLE, Tolerance, tolerance
 from quadvis.diagram.analyse import Cut, Limit
-from quadvis.engine.engine import Engine
-from quadvis.engine.graph import Graph
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
-
-MENTIONED = 8  # blocks in a message
 
 
 @dataclass(frozen=True)
@@ -80,6 +75,7 @@ class Analysis:
                 "unit": str(found.limit.variable.unit),
                 "stable_to": _finite(found.value),
                 "reached": found.reached,
+                "reason": found.reason or None,
             }
             for label, found in self.limits.items()
         }
@@ -116,30 +112,10 @@ def analyse(
     opened, sought = diagram.questions.more(cuts, limits)
     at = diagram.questions.at if at is None else at
     _check_pictures(diagram)
-    linear = _linearised(diagram.graph, opened, at)
+    linear = linearised(diagram.graph, opened, at)
     stable = bool((rates(linear).real < STABLE).all())
     loops = {cut.label: _loop(linear, cut, stable) for cut in opened}
     return Analysis(diagram, linear, loops, sought, at)
-
-
-def _linearised(graph: Graph, cuts: Sequence[Cut], at: float) -> Linear:
-    signals = {(signal.block, signal.port) for cut in cuts for signal in cut.signals}
-    engine = Engine(with_breaks(graph, signals))
-    silence(engine)
-    with engine:
-        probe = Probe(engine, cuts, at)
-        for cut in cuts:
-            for signal in cut.signals:
-                if signal.block not in probe.loop:
-                    problem = f"cut '{cut.label}': '{signal.text}' comes from a block that is on no loop"
-                    raise AnalysisError(f"{problem}; open the loop at one of {_some(probe.loop)}")
-        return linearise(probe)
-
-
-def _some(names: Iterable[str]) -> str:
-    """Name a few blocks."""
-    found = sorted(names)
-    return ", ".join(found[:MENTIONED]) + (", ..." if len(found) > MENTIONED else "")
 
 
 def _loop(linear: Linear, cut: Cut, stable: bool) -> Loop:

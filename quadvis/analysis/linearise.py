@@ -10,12 +10,17 @@ Source: lifting of multirate loops, Kranc (1957); Meyer and Burrus (1975).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.analysis.probe import STEP, AnalysisError, Channel, Probe, Vector
+from quadvis.analysis.cut import with_breaks
+from quadvis.analysis.probe import STEP, AnalysisError, Channel, Probe, Vector, silence
+from quadvis.diagram.analyse import Cut
+from quadvis.engine.engine import Engine
+from quadvis.engine.graph import Graph
 from quadvis.engine.plan import Positions
 
 Matrix = NDArray[np.float64]
@@ -27,6 +32,7 @@ TRIALS = 12
 CHECKED = 4  # hyperperiods that the matrix must foretell
 CLOSE = 0.01
 IDLE = 1e-9
+MENTIONED = 8  # blocks in a message
 
 
 @dataclass(frozen=True)
@@ -45,11 +51,31 @@ class Linear:
     channels: tuple[Channel, ...]
 
 
-def linearise(probe: Probe) -> Linear:
-    """Return the loop at its operating point, which Newton's method finds first.
+def linearised(graph: Graph, cuts: Sequence[Cut], at: float) -> Linear:
+    """Return the loop at its operating point, which Newton's method seeks from the state at a time (s).
 
-    AnalysisError if there is no steady state near, or if the loop is not smooth there.
+    AnalysisError if there is no steady state near, if the loop is not smooth there, or if a cut is not on it.
     """
+    signals = {(signal.block, signal.port) for cut in cuts for signal in cut.signals}
+    engine = Engine(with_breaks(graph, signals))
+    silence(engine)
+    with engine:
+        probe = Probe(engine, cuts, at)
+        for cut in cuts:
+            for signal in cut.signals:
+                if signal.block not in probe.loop:
+                    problem = f"cut '{cut.label}': '{signal.text}' comes from a block that is on no loop"
+                    known = [node.path for node in graph.nodes if node.path in probe.loop]
+                    raise AnalysisError(f"{problem}; open the loop behind one of {_some(known)}")
+        return _linearise(probe)
+
+
+def _some(names: Sequence[str]) -> str:
+    """Name a few blocks."""
+    return ", ".join(names[:MENTIONED]) + (", ..." if len(names) > MENTIONED else "")
+
+
+def _linearise(probe: Probe) -> Linear:
     for _ in range(TRIALS):
         places, columns = _columns(probe)
         if _is_continuous(probe, places):

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from quadvis.analysis.linearise import Linear, linearise
+from quadvis.analysis.linearise import linearised
 from quadvis.analysis.margins import growth
-from quadvis.analysis.probe import AnalysisError, Probe, silence
+from quadvis.analysis.probe import AnalysisError
 from quadvis.diagram.analyse import Limit
-from quadvis.engine.engine import Engine
-from quadvis.errors import QuadvisError
+from quadvis.errors import RunError
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
@@ -29,15 +28,17 @@ STABLE = -1e-6  # 1/s; slower decay is none
 class Tolerance:
     """How far a parameter can go: the last stable ``value`` (SI).
 
-    That is the end of the range if all of it is stable, and NaN if its start is not.
+    That is the end of the range if all of it is stable, and NaN if its start is not. ``reason`` says why
+    there is nothing to analyse beyond, if it is that and not a loop that becomes unstable.
     """
 
     limit: Limit
     value: float
+    reason: str = ""
 
     @property
     def reached(self) -> bool:
-        """Whether the loop becomes unstable in the range, or is from its start on."""
+        """Whether the loop is lost within the range."""
         return self.value != self.limit.end
 
     @property
@@ -46,7 +47,10 @@ class Tolerance:
         if math.isnan(self.value):
             return f"unstable from {self.shows(self.limit.start)} on"
         words = "up to" if self.limit.end > self.limit.start else "down to"
-        return f"stable {words} {self.shows(self.value)}{'' if self.reached else ' and perhaps further'}"
+        found = f"stable {words} {self.shows(self.value)}"
+        if self.reason:
+            return f"{found}; beyond: {self.reason}"
+        return found if self.reached else f"{found} and perhaps further"
 
     def shows(self, value: float) -> str:
         """Return a value of the parameter for people."""
@@ -56,35 +60,35 @@ class Tolerance:
 
 
 def tolerance(diagram: Diagram, limit: Limit, at: float) -> Tolerance:
-    """Search from the start of a range for the first value at which the loop is unstable.
+    """Search from the start of a range for the first value at which the loop is lost.
 
     Coarsely first, so an unstable stretch shorter than a twelfth of the range may be stepped over, then by
-    Brent's method. AnalysisError if the diagram has no operating point on the way.
+    Brent's method. AnalysisError if there is no loop to analyse at the start; DiagramError if the diagram
+    refuses a value.
     """
     from scipy.optimize import brentq
 
     excess = functools.cache(lambda value: _growth_at(diagram, limit, at, value) - STABLE)
     if excess(limit.start) >= 0.0:
         return Tolerance(limit, math.nan)
+    lost: dict[float, str] = {}
+
+    def distance(value: float) -> float:
+        try:
+            return excess(value)
+        except (AnalysisError, RunError) as error:
+            lost[value] = str(error)
+            return 1.0
+
     grid = np.linspace(limit.start, limit.end, STEPS + 1).tolist()
     for before, after in pairwise(grid):
-        if excess(after) >= 0.0:
+        if distance(after) >= 0.0:
             precision = PRECISION * abs(limit.end - limit.start)
-            return Tolerance(limit, float(brentq(excess, before, after, xtol=precision, rtol=PRECISION)))
+            found = float(brentq(distance, before, after, xtol=precision, rtol=PRECISION))
+            nearest = min(lost, key=lambda value: abs(value - found), default=math.inf)
+            return Tolerance(limit, found, lost[nearest] if abs(nearest - found) <= 2 * precision else "")
     return Tolerance(limit, limit.end)
 
 
 def _growth_at(diagram: Diagram, limit: Limit, at: float, value: float) -> float:
-    setting = limit.variable.setting(value)
-    try:
-        return growth(linear_of(diagram.varied(setting), at))
-    except QuadvisError as error:
-        raise AnalysisError(f"{limit.label}, at {setting}: {error}") from error
-
-
-def linear_of(diagram: Diagram, at: float) -> Linear:
-    """Return a diagram's loop without cuts."""
-    engine = Engine(diagram.graph)
-    silence(engine)
-    with engine:
-        return linearise(Probe(engine, (), at))
+    return growth(linearised(diagram.varied(limit.variable.setting(value)).graph, (), at))

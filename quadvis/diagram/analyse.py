@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -71,8 +71,9 @@ class Questions:
     ) -> tuple[tuple[Cut, ...], tuple[Limit, ...]]:
         """Return the cuts and limits with others added; DiagramError tells what is wrong with these."""
         faults = Faults()
-        found = [self.reader.cut(label, _list(signals), faults) for label, signals in cuts.items()]
-        sought = [self.reader.limit(label, _map(limit), faults) for label, limit in limits.items()]
+        reader = replace(self.reader, wiring=Wiring(self.reader.wiring.expansion, faults))
+        found = [reader.cut(label, _list(signals), faults) for label, signals in cuts.items()]
+        sought = [reader.limit(label, _map(limit), faults) for label, limit in limits.items()]
         faults.check()
         added = tuple(cut for cut in found if cut is not None)
         return self.cuts + added, self.limits + tuple(limit for limit in sought if limit is not None)
