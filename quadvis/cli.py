@@ -233,11 +233,14 @@ def _analyse(options: argparse.Namespace) -> int:
     diagram = _load(options)
     cuts, limits, at = read_cuts(options.cut), read_limits(options.vary), read_time(options.at)
     analysis = diagram.analyse(cuts=cuts, limits=limits, at=at)
-    paths = save_bode_plots(analysis, Path(options.output)) if options.output else []
+    if not options.json:
+        for line in analysis_lines(analysis):
+            print(line, flush=True)
+    paths = [str(path) for path in save_bode_plots(analysis, Path(options.output))] if options.output else []
     if options.json:
-        _print_json(analysis.facts() | {"plots": [str(path) for path in paths]})
-    else:
-        print("\n".join([*analysis_lines(analysis), *map(str, paths)]))
+        _print_json(analysis.facts() | {"plots": paths})
+    elif paths:
+        print("\n".join(paths))
     return 0 if analysis.stable else FAILED
 
 

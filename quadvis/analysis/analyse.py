@@ -16,8 +16,8 @@ from quadvis.analysis.linearise import Linear, linearised
 from quadvis.analysis.margins import Loop, rates
 from quadvis.analysis.probe import AnalysisError
 from quadvis.analysis.systems import closed_loop
-from quadvis.analysis.vary import STABLE, Tolerance, tolerance
-from quadvis.diagram.analyse import Cut, Limit
+from quadvis.analysis.vary import STABLE, Limits
+from quadvis.diagram.analyse import Cut
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 class Analysis:
     """The closed loop of a diagram around its operating point.
 
-    ``linear`` are its matrices, ``loops`` the same opened, by the names of the cut points.
+    ``linear`` are its matrices, ``loops`` the same opened, by the names of the cut points; ``limits`` say how
+    far parameters can go.
     """
 
     diagram: Diagram
     linear: Linear
     loops: Mapping[str, Loop]
-    questions: tuple[Limit, ...]
-    at: float
+    limits: Limits
 
     @property
     def period(self) -> float:
@@ -50,11 +50,6 @@ class Analysis:
     def stable(self) -> bool:
         """Whether all of them decay."""
         return bool((self.poles.real < STABLE).all())
-
-    @cached_property
-    def limits(self) -> Mapping[str, Tolerance]:
-        """How far parameters can go before the loop is unstable, by the names of the limits."""
-        return {limit.label: tolerance(self.diagram, limit, self.at) for limit in self.questions}
 
     @cached_property
     def system(self) -> Any:
@@ -115,7 +110,7 @@ def analyse(
     linear = linearised(diagram.graph, opened, at)
     stable = bool((rates(linear).real < STABLE).all())
     loops = {cut.label: _loop(linear, cut, stable) for cut in opened}
-    return Analysis(diagram, linear, loops, sought, at)
+    return Analysis(diagram, linear, loops, Limits(diagram, sought, at))
 
 
 def _loop(linear: Linear, cut: Cut, stable: bool) -> Loop:

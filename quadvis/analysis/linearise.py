@@ -27,7 +27,7 @@ Matrix = NDArray[np.float64]
 Columns = dict[
     int, tuple[Vector, Vector]
 ]  # by slot: derivative of the memory a hyperperiod later, of channels
-SETTLED = 1e-7  # of the state's size: what may still move at an operating point
+SETTLED = 1e-6  # of the state's size: what may still move at an operating point
 TRIALS = 12
 CHECKED = 4  # hyperperiods that the matrix must foretell
 CLOSE = 0.01

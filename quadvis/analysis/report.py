@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,39 +22,47 @@ if TYPE_CHECKING:
 
 SECOND = Unit.parse("s")
 SHOWN = 8  # poles
+REAL = 1e-3
 HEADS = ("loop opened at", "crossover", "phase margin", "delay margin", "gain margin")
 
 
-def analysis_lines(analysis: Analysis) -> list[str]:
-    """Return the analysis for people."""
+def analysis_lines(analysis: Analysis) -> Iterator[str]:
+    """Yield the analysis for people, line by line: limits take their time."""
     diagram = analysis.diagram
     variant = f" ({diagram.variant})" if diagram.variant else ""
     count = len(analysis.linear.states)
     way = f"lifted over {format_quantity(analysis.period, SECOND)}" if analysis.period else "continuous"
-    lines = [f"{diagram.name}{variant}: {count} states, {way}"]
-    lines += [
-        f"  {line}" for line in table([("closed loop poles", "frequency", "damping"), *_poles(analysis)])
-    ]
+    yield f"{diagram.name}{variant}: {count} states, {way}"
+    yield from _indented([("closed loop poles", "frequency", "damping"), *_poles(analysis)])
     if analysis.loops:
-        lines += [f"  {line}" for line in table([HEADS, *map(_row, analysis.loops.values())])]
-    elif not analysis.questions:
-        lines.append("  no cut points: name signals with --cut, or under 'analyse: {cuts: ...}'")
-    lines += [f"  {line}" for line in table([(name, found.text) for name, found in analysis.limits.items()])]
-    worst = float(analysis.poles.real.max()) if analysis.poles.size else -math.inf
-    verdict = "STABLE" if analysis.stable else f"NOT STABLE: a disturbance grows by {worst:.3g} 1/s"
-    return [*lines, verdict if analysis.stable else f"{verdict}, in {_grows(analysis)}"]
+        yield from _indented([HEADS, *map(_row, analysis.loops.values())])
+    elif not analysis.limits:
+        yield "  no cut points: name signals with --cut, or under 'analyse: {cuts: ...}'"
+    width = max(map(len, analysis.limits), default=0)
+    for label, found in analysis.limits.items():
+        yield f"  {label.ljust(width)}  {found.text}"
+    if analysis.stable:
+        yield "STABLE"
+    else:
+        worst = float(analysis.poles.real.max())
+        yield f"NOT STABLE: a disturbance grows by {worst:.3g} 1/s, in {_grows(analysis)}"
 
 
-def _poles(analysis: Analysis) -> list[tuple[str, str, str]]:
-    """Return the slowest poles, a pair in one row."""
-    upper = [pole for pole in analysis.poles if pole.imag >= -1e-9]
-    rows = []
+def _indented(rows: list[tuple[str, ...]]) -> Iterator[str]:
+    for line in table(rows):
+        yield f"  {line}"
+
+
+def _poles(analysis: Analysis) -> list[tuple[str, ...]]:
+    """Return the slowest poles, a pair in one row. A pole that is there many times is known to 1e-3 only."""
+    upper = [pole for pole in analysis.poles.tolist() if pole.imag >= -REAL * abs(pole)]
+    rows: list[tuple[str, ...]] = []
     for pole in upper[:SHOWN]:
-        imaginary = f" +- {pole.imag:.4g}j" if pole.imag > 1e-9 else ""
+        imaginary = f" +- {pole.imag:.4g}j" if pole.imag > REAL * abs(pole) else ""
         damping = -pole.real / abs(pole) if abs(pole) else 0.0
         rows.append((f"{pole.real:.4g}{imaginary}", f"{abs(pole):.4g} rad/s", f"{damping:.3f}"))
     if len(upper) > SHOWN:
-        rows.append((f"and {len(upper) - SHOWN} faster ones", "", ""))
+        rows.append((f"and {len(upper) - SHOWN} faster", "", ""))
     return rows
 
 

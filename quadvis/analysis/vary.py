@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -19,7 +20,7 @@ from quadvis.errors import RunError
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
 
-STEPS = 12  # of the search for an unstable value
+STEPS = 10  # of the search for an unstable value
 PRECISION = 1e-5  # of the value found, relative to it and to the range
 STABLE = -1e-6  # 1/s; slower decay is none
 
@@ -62,7 +63,7 @@ class Tolerance:
 def tolerance(diagram: Diagram, limit: Limit, at: float) -> Tolerance:
     """Search from the start of a range for the first value at which the loop is lost.
 
-    Coarsely first, so an unstable stretch shorter than a twelfth of the range may be stepped over, then by
+    Coarsely first, so an unstable stretch shorter than a tenth of the range may be stepped over, then by
     Brent's method. AnalysisError if there is no loop to analyse at the start; DiagramError if the diagram
     refuses a value.
     """
@@ -92,3 +93,23 @@ def tolerance(diagram: Diagram, limit: Limit, at: float) -> Tolerance:
 
 def _growth_at(diagram: Diagram, limit: Limit, at: float, value: float) -> float:
     return growth(linearised(diagram.varied(limit.variable.setting(value)).graph, (), at))
+
+
+class Limits(Mapping[str, Tolerance]):
+    """The answers to all questions about limits, by their names; each is sought when it is first wanted."""
+
+    def __init__(self, diagram: Diagram, limits: Sequence[Limit], at: float) -> None:
+        self._diagram, self._at = diagram, at
+        self._limits = {limit.label: limit for limit in limits}
+        self._found: dict[str, Tolerance] = {}
+
+    def __getitem__(self, label: str) -> Tolerance:
+        if label not in self._found:
+            self._found[label] = tolerance(self._diagram, self._limits[label], self._at)
+        return self._found[label]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._limits)
+
+    def __len__(self) -> int:
+        return len(self._limits)
