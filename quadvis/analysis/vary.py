@@ -72,24 +72,21 @@ def tolerance(diagram: Diagram, limit: Limit, at: float) -> Tolerance:
     excess = functools.cache(lambda value: _growth_at(diagram, limit, at, value) - STABLE)
     if excess(limit.start) >= 0.0:
         return Tolerance(limit, math.nan)
-    lost: dict[float, str] = {}  # by unstable values: why there is nothing to analyse, if so
+    reasons: dict[float, str] = {}  # why there is nothing to analyse at a value
 
     def distance(value: float) -> float:
         try:
-            found = excess(value)
+            return excess(value)
         except (AnalysisError, RunError) as error:
-            lost[value] = str(error)
+            reasons[value] = str(error)
             return 1.0
-        if found >= 0.0:
-            lost[value] = ""
-        return found
 
     grid = np.linspace(limit.start, limit.end, STEPS + 1).tolist()
     for before, after in pairwise(grid):
         if distance(after) >= 0.0:
             precision = PRECISION * abs(limit.end - limit.start)
             found = float(brentq(distance, before, after, xtol=precision, rtol=PRECISION))
-            return Tolerance(limit, found, lost[min(lost, key=lambda value: abs(value - found))])
+            return Tolerance(limit, found, reasons.get(after, ""))
     return Tolerance(limit, limit.end)
 
 
