@@ -88,10 +88,9 @@ class Loop:
         """Return frequencies (rad/s) and the loop's response there, as far as it is not lost below others."""
         found: dict[float, complex] = {}
         for omega in self._grid().tolist():
-            for value in self._values(omega).tolist():
-                located, true = self._located(omega, value)
-                if abs(value) > VISIBLE and abs(located) > abs(found.get(true, 0.0)):
-                    found[true] = located
+            for value, true in self._unfolded(omega):
+                if abs(value) > max(VISIBLE, abs(found.get(true, 0.0))):
+                    found[true] = value
         order = sorted(found)
         return np.array(order), np.array([found[true] for true in order])
 
@@ -119,22 +118,35 @@ class Loop:
         with np.errstate(all="ignore"):  # a pole on the way: the gain is infinite there
             return np.asarray(-values / (1.0 + values))
 
-    def _located(self, omega: float, value: complex) -> tuple[complex, float]:
-        """Return an eigenvalue with its true frequency, which the lifting folds into the lowest band.
+    def _unfolded(self, omega: float) -> list[tuple[complex, float]]:
+        """Return the eigenvalues with their true frequencies, which the lifting folds into the lowest band.
 
-        The eigenvector tells: it is a wave over the instants of the hyperperiod.
+        The eigenvectors tell: each is a wave over the instants of the hyperperiod.
         """
-        period = self.closed.period
-        times = np.array([channel.time for channel in self.closed.channels])
-        if not period or len(set(times.tolist())) == 1:
-            return value, omega
+        if self._instants == 1:
+            return [(value, omega) for value in self._values(omega).tolist()]
         values, vectors = np.linalg.eig(self._response(omega))
-        vector = vectors[:, int(np.argmin(np.abs(-values / (1.0 + values) - value)))]
-        texts = [(channel.text, channel.read) for channel in self.closed.channels]
-        half = len(set(times.tolist())) // 2
-        turns = max(range(-half, half + 1), key=lambda k: _agreement(vector, times, texts, omega, k, period))
-        true = float(omega + 2 * math.pi * turns / period)
-        return (value, true) if true >= 0 else (value.conjugate(), -true)
+        channels, period = self.closed.channels, self.closed.period
+        turns = np.arange(-(self._instants // 2), self._instants // 2 + 1)
+        true = omega + 2 * math.pi * turns / period
+        waves = np.exp(-1j * np.outer(true, [channel.time for channel in channels]))
+        strength = np.zeros((len(turns), len(values)))
+        for read in {channel.read for channel in channels}:
+            mine = [index for index, channel in enumerate(channels) if channel.read == read]
+            strength += np.abs(waves[:, mine] @ vectors[mine]) ** 2
+        with np.errstate(all="ignore"):
+            opened = (-values / (1.0 + values)).tolist()
+        found = zip(opened, true[strength.argmax(axis=0)].tolist(), strict=True)
+        return [(value, at) if at >= 0.0 else (value.conjugate(), -at) for value, at in found]
+
+    @property
+    def _instants(self) -> int:
+        return len({channel.time for channel in self.closed.channels})
+
+    def _located(self, omega: float, value: complex) -> tuple[complex, float]:
+        """Return an eigenvalue with its true frequency."""
+        found = self._unfolded(omega)
+        return min(found, key=lambda one: min(abs(one[0] - value), abs(one[0].conjugate() - value)))
 
     def _crossings(self) -> Iterator[tuple[str, float, complex]]:
         """Yield where a locus crosses gain 1 or the negative real axis: which, true frequency, value."""
@@ -182,15 +194,6 @@ def _log_gain(value: complex) -> float:
 
 def _imaginary(value: complex) -> float:
     return value.imag
-
-
-def _agreement(vector: Complexes, times: Any, texts: Any, omega: float, turns: int, period: float) -> float:
-    """Return how much of an eigenvector is a wave of that many turns more in a hyperperiod."""
-    wave = np.exp(-1j * (omega + 2 * math.pi * turns / period) * times)
-    parts: dict[Any, complex] = {}
-    for text, part in zip(texts, (vector * wave).tolist(), strict=True):
-        parts[text] = parts.get(text, 0.0) + part
-    return float(sum(abs(part) ** 2 for part in parts.values()))
 
 
 def _matched(before: Complexes, after: Complexes) -> NDArray[np.intp]:

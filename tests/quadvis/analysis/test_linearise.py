@@ -232,3 +232,61 @@ blocks:
         AnalysisError, match=r"repeat only after 100\.07 s.*choose rates that fit into each other"
     ):
         diagram.analyse()
+
+
+CROSSED = """
+quadvis: 1
+name: crossed
+rates: {fast: 20 Hz, slow: RATE}
+solver: {method: ode4, step: 10 ms}
+stop_time: 1 s
+blocks:
+  place:
+    block: signal.integrator
+    rate: continuous
+    with: {initial: 1 m}
+    in: {u: {from: law.y, across: ACROSS}}
+  law:
+    block: signal.gain
+    rate: slow
+    with: {factor: -3 1/s}
+    in: {u: {from: place.y, across: sample}}
+"""
+
+
+def test_an_offset_of_a_rate_does_not_move_the_poles(tmp_path) -> None:
+    """x[k+1] = (1 - 3 T) x[k], from wherever one begins to count."""
+    for rate in ("10 Hz", "{rate: 10 Hz, offset: 50 ms}"):
+        text = CROSSED.replace("RATE", rate).replace("ACROSS", "hold")
+        linear = quadvis.load(write(tmp_path, text)).analyse(cuts={"law": "law.y"}).linear
+        assert nonzero(linear.a) == pytest.approx([1 - 3 * 0.1], abs=1e-8)
+
+
+def test_a_wire_with_a_delay_holds_a_state(tmp_path) -> None:
+    """x[k+1] = x[k] - 3 T x[k-1]."""
+    text = CROSSED.replace("RATE", "10 Hz").replace("ACROSS", "delay")
+    found = nonzero(quadvis.load(write(tmp_path, text)).analyse().linear.a)
+    assert found == pytest.approx(np.sort_complex(np.roots([1.0, -1.0, 0.3])), abs=1e-8)
+
+
+def test_a_loop_that_grows_from_its_steady_state_is_linearised_too(tmp_path) -> None:
+    """The run to the operating point goes away by 1.5 a period; Newton's method goes back."""
+    text = CROSSED.replace("RATE", "10 Hz").replace("ACROSS", "hold").replace("-3 1/s", "-25 1/s")
+    analysis = quadvis.load(write(tmp_path, text)).analyse()
+    assert nonzero(analysis.linear.a) == pytest.approx([-1.5], abs=1e-8)
+    assert not analysis.stable
+
+
+def test_what_stands_beside_the_loop_is_no_part_of_it(tmp_path) -> None:
+    """A filter of the loop's signal, a sum of it for the log, a prefilter and noise: none has a pole here."""
+    text = (
+        CROSSED.replace("RATE", "10 Hz").replace("ACROSS", "hold")
+        + """
+  smooth: {block: signal.low_pass, rate: fast, in: {u: {from: place.y, across: sample}}}
+  total: {block: signal.integrator, rate: continuous, with: {initial: 0 m*s}, in: {u: place.y}}
+  noise: {block: sources.noise, rate: fast}
+  filtered: {block: signal.low_pass, rate: fast, in: {u: noise.y}}
+"""
+    )
+    linear = quadvis.load(write(tmp_path, text)).analyse().linear
+    assert linear.states == ("place.integral",)
