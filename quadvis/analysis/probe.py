@@ -80,6 +80,10 @@ class Probe:
             [place for bound in self.plan.steps for place in self._signals(bound)], np.intp
         )
         self.channels = [channel for cut in cuts for channel in self._channels(cut)]
+        self._read = np.array([channel.read for channel in self.channels], np.intp)
+        self._added = np.array([channel.added for channel in self.channels], np.intp)
+        self._ticks = np.array([channel.tick for channel in self.channels], np.intp)
+        self._moments = self._events()
         self._shaken = False
         self._shake()
         begin = max([Fraction(at), *(task.offset for task in self.graph.tasks)])
@@ -114,13 +118,12 @@ class Probe:
         engine.restore(self._start)
         floats[places] += deltas
         found = np.empty(len(self.channels))
-        for tick, length, mine in self._events():
+        for tick, length, mine in self._moments:
             if added is not None:
-                self._write(added, tick)
+                self._disturb(added, tick)
             engine.run(length)
-            for index in mine:
-                found[index] = floats[self.channels[index].read]
-        self._write(np.zeros(len(self.channels)), 0, everywhere=True)
+            found[mine] = floats[self._read[mine]]
+        floats[self._added] = 0.0
         if count > 1:
             engine.run(self.span * (count - 1))
         return floats.copy(), found
@@ -130,16 +133,15 @@ class Probe:
         self.engine.restore(self._start)
         self.floats[TIME.position] = self.engine.time
         self.floats[places] += deltas
-        self._write(added, 0)
+        self._disturb(added, 0)
         for step in self.plan.steps:
             if step.output is not None:
                 step.output()
         for derive in self.plan.derivatives:
             derive()
-        read = self.floats[[channel.read for channel in self.channels]]
         rates = np.zeros(self.floats.size)
         rates[self.plan.continuous] = self.floats[self.plan.slopes]
-        return rates, read
+        return rates, self.floats[self._read]
 
     def shaken(self) -> Vector:
         """Return the memory after a hyperperiod in which every signal of the loop is disturbed at random."""
@@ -149,22 +151,20 @@ class Probe:
         finally:
             self._shaken = False
 
-    def _write(self, added: Vector, tick: int, *, everywhere: bool = False) -> None:
-        for channel in self.channels:
-            self.floats[channel.added] = 0.0
-        for channel, value in zip(self.channels, added, strict=True):
-            if channel.tick == tick and value and not everywhere:
-                self.floats[channel.added] = value
+    def _disturb(self, added: Vector, tick: int) -> None:
+        """Add to the channels that are read at a tick, and to no other."""
+        now = self._ticks == tick
+        self.floats[self._added] = 0.0
+        np.add.at(self.floats, self._added[now], added[now])  # two cuts may share a signal
 
-    def _events(self) -> Iterator[tuple[int, int, list[int]]]:
-        """Yield the ticks at which channels are read, how far it is to the next, and which channels."""
-        ticks = sorted({0, *(channel.tick for channel in self.channels)})
-        for tick, following in zip(ticks, [*ticks[1:], self.span], strict=True):
-            yield (
-                tick,
-                following - tick,
-                [i for i, channel in enumerate(self.channels) if channel.tick == tick],
-            )
+    def _events(self) -> list[tuple[int, int, NDArray[np.intp]]]:
+        """Return the ticks at which channels are read, how far it is to the next, and which channels."""
+        ticks = sorted({0, *self._ticks.tolist()})
+        following = [*ticks[1:], self.span]
+        return [
+            (tick, end - tick, np.flatnonzero(self._ticks == tick))
+            for tick, end in zip(ticks, following, strict=True)
+        ]
 
     def _channels(self, cut: Cut) -> Iterator[Channel]:
         for signal in cut.signals:

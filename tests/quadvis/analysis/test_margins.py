@@ -141,8 +141,14 @@ def test_scaled_by_its_gain_margin_a_loop_of_several_rates_is_at_the_edge(margin
 
 
 def test_a_cut_before_the_camera_and_one_behind_it_have_the_same_margins() -> None:
-    """The position is sampled by the frames only, whatever it does at the solver's fifty steps between them."""
+    """The position is sampled by the frames only, whatever it does at the fifty steps between them."""
     cuts = {"craft": "craft.position", "frame": "frame.y[0]"}
     loops = quadvis.load(DIAGRAMS / "sampled_margins.yaml").analyse(cuts=cuts).loops
     assert len(loops["craft"].closed.channels) == 50 * len(loops["frame"].closed.channels)
     assert vars(loops["craft"].margins) == approx(vars(loops["frame"].margins), rel=1e-4)
+
+
+def test_two_cuts_may_share_a_signal(tmp_path) -> None:
+    loops = lifted(tmp_path).analyse(cuts={"again": "push.y", "both": ["spring.y", "damper.y"]}).loops
+    assert vars(loops["again"].margins) == approx(vars(loops["push"].margins), rel=1e-9)
+    assert vars(loops["both"].margins) == approx(vars(loops["push"].margins), rel=1e-6)
