@@ -24,9 +24,7 @@ from quadvis.engine.graph import Graph
 from quadvis.engine.plan import Positions
 
 Matrix = NDArray[np.float64]
-Columns = dict[
-    int, tuple[Vector, Vector]
-]  # by slot: derivative of the memory a hyperperiod later, of channels
+Columns = dict[int, tuple[Vector, Vector]]  # by slot: derivatives of the memory afterwards, of the channels
 SETTLED = 1e-6  # of the state's size: what may still move at an operating point
 TRIALS = 12
 CHECKED = 4  # hyperperiods that the matrix must foretell
@@ -107,9 +105,7 @@ def _unsettled(probe: Probe, places: Positions, residual: Vector) -> AnalysisErr
 
 
 def _is_continuous(probe: Probe, places: Positions) -> bool:
-    return all(task.continuous for task in probe.graph.tasks) and bool(
-        np.isin(places, probe.continuous).all()
-    )
+    return all(task.continuous for task in probe.tasks) and bool(np.isin(places, probe.continuous).all())
 
 
 def _columns(probe: Probe) -> tuple[Positions, Columns]:
@@ -166,7 +162,7 @@ def _stacked(columns: Columns, places: Positions) -> tuple[Matrix, Matrix]:
     """Return the derivatives of the state and of the channels by the state."""
     a = [columns[place][0][places] for place in places.tolist()]
     c = [columns[place][1] for place in places.tolist()]
-    return np.array(a).T.reshape(len(a), len(a)), np.array(c).T.reshape(-1, len(a))
+    return np.reshape(a, (len(a), len(a))).T, np.reshape(c, (len(a), -1 if c else 0)).T
 
 
 def _lifted(probe: Probe, places: Positions, columns: Columns) -> Linear:

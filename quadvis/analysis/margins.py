@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.analysis.linearise import Linear, Matrix
+from quadvis.analysis.systems import library, state_space
 
 Complexes = NDArray[np.complex128]
 DENSITY = 120  # frequencies in a decade
@@ -60,8 +61,6 @@ class Loop:
     @cached_property
     def system(self) -> Any:
         """The loop as `control.StateSpace`: one input and output for each signal and instant of the cut."""
-        from quadvis.analysis.systems import state_space
-
         closed = self.closed
         inverse = np.linalg.inv(np.eye(len(closed.channels)) + closed.d)
         back = inverse @ closed.c
@@ -200,11 +199,9 @@ def _matched(before: Complexes, after: Complexes) -> NDArray[np.intp]:
     """Return the order of the eigenvalues that carries each locus on."""
     if len(before) == 1:
         return np.zeros(1, np.intp)
-    from scipy.optimize import linear_sum_assignment
-
     size = np.abs(before)[:, None] + np.abs(after)[None, :] + FAINT
     cost = np.abs(before[:, None] - after[None, :]) / size
-    return np.asarray(linear_sum_assignment(cost)[1], np.intp)
+    return np.asarray(library("scipy.optimize").linear_sum_assignment(cost)[1], np.intp)
 
 
 def _margins(crossings: list[tuple[str, float, complex]]) -> Margins:

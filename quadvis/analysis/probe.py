@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import lcm
@@ -15,7 +15,7 @@ from quadvis.analysis.cut import break_path
 from quadvis.block import Random
 from quadvis.diagram.analyse import Cut
 from quadvis.engine.engine import Engine
-from quadvis.engine.graph import Graph
+from quadvis.engine.graph import Graph, Task
 from quadvis.engine.memory import Slot
 from quadvis.engine.plan import TIME, Bound, Positions
 from quadvis.errors import QuadvisError
@@ -52,12 +52,12 @@ def silence(engine: Engine) -> None:
                 engine.plan.memory.write(bound.field(name), 0)
 
 
-def hyperperiod(graph: Graph) -> int:
-    """Return after how many ticks all tasks are due together again."""
-    span = lcm(*(graph.ticks(task.period) for task in graph.tasks))
+def hyperperiod(graph: Graph, tasks: Iterable[Task]) -> int:
+    """Return after how many ticks these tasks are due together again."""
+    span = lcm(*(graph.ticks(task.period) for task in tasks))
     if span > LONGEST:
         time = float(span * graph.tick)
-        problem = f"the rates of the diagram repeat only after {time:g} s, {span} ticks"
+        problem = f"the rates of the loop repeat only after {time:g} s, {span} ticks"
         raise AnalysisError(f"{problem}; choose rates that fit into each other")
     return span
 
@@ -71,8 +71,9 @@ class Probe:
     def __init__(self, engine: Engine, cuts: Sequence[Cut], at: float) -> None:
         self.engine, self.graph = engine, engine.graph
         self.plan, self.floats = engine.plan, engine.plan.memory.floats
-        self.span = hyperperiod(self.graph)
         self.loop = _looped(self.graph)
+        self.tasks = {node.task for node in self.graph.nodes if node.path in self.loop}
+        self.span = hyperperiod(self.graph, self.tasks)
         self.names = dict(self._named())
         self.positions: Positions = np.array(sorted(self.names), np.intp)
         self.continuous = self._continuous()
@@ -86,7 +87,7 @@ class Probe:
         self._moments = self._events()
         self._shaken = False
         self._shake()
-        begin = max([Fraction(at), *(task.offset for task in self.graph.tasks)])
+        begin = max([Fraction(at), *(task.offset for task in self.tasks)])
         engine.run(self.span * -(-begin // (self.span * self.graph.tick)))
         self.keep()
 

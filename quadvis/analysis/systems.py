@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any
 
 from quadvis.analysis.linearise import Linear, Matrix
 from quadvis.errors import QuadvisError
 
 
-def library() -> Any:
-    """Return python-control; QuadvisError says how to install it."""
+def library(name: str = "control") -> Any:
+    """Return python-control, or a module of scipy that comes with it; QuadvisError says how to install it."""
     try:
-        import control
+        return import_module(name)
     except ImportError as error:
         raise QuadvisError(f"python-control is needed, but {error}; run 'pip install control'") from None
-    return control
 
 
 def state_space(linear: Linear, a: Matrix, b: Matrix, c: Matrix, d: Matrix) -> Any:

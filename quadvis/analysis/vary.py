@@ -14,6 +14,7 @@ import numpy as np
 from quadvis.analysis.linearise import linearised
 from quadvis.analysis.margins import growth
 from quadvis.analysis.probe import AnalysisError
+from quadvis.analysis.systems import library
 from quadvis.diagram.analyse import Limit
 from quadvis.errors import RunError
 
@@ -67,8 +68,6 @@ def tolerance(diagram: Diagram, limit: Limit, at: float) -> Tolerance:
     Brent's method. AnalysisError if there is no loop to analyse at the start; DiagramError if the diagram
     refuses a value.
     """
-    from scipy.optimize import brentq
-
     excess = functools.cache(lambda value: _growth_at(diagram, limit, at, value) - STABLE)
     if excess(limit.start) >= 0.0:
         return Tolerance(limit, math.nan)
@@ -85,7 +84,9 @@ def tolerance(diagram: Diagram, limit: Limit, at: float) -> Tolerance:
     for before, after in pairwise(grid):
         if distance(after) >= 0.0:
             precision = PRECISION * abs(limit.end - limit.start)
-            found = float(brentq(distance, before, after, xtol=precision, rtol=PRECISION))
+            found = float(
+                library("scipy.optimize").brentq(distance, before, after, xtol=precision, rtol=PRECISION)
+            )
             return Tolerance(limit, found, reasons.get(after, ""))
     return Tolerance(limit, limit.end)
 

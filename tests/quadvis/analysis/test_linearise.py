@@ -290,3 +290,30 @@ def test_what_stands_beside_the_loop_is_no_part_of_it(tmp_path) -> None:
     )
     linear = quadvis.load(write(tmp_path, text)).analyse().linear
     assert linear.states == ("place.integral",)
+
+
+def test_rates_beside_a_continuous_loop_leave_it_continuous(tmp_path) -> None:
+    text = (DIAGRAMS / "margins.yaml").read_text().replace("solver:", "rates: {log: 7 Hz}\nsolver:")
+    text = text.replace(
+        "blocks:",
+        "blocks:\n  seen: {block: signal.gain, rate: log, in: {u: {from: side.position, across: newest}}}",
+    )
+    linear = quadvis.load(write(tmp_path, text.replace("10 ms}", "1/700 s}"))).analyse().linear
+    assert linear.period == 0.0 and len(linear.states) == 8
+
+
+def test_a_chain_without_a_loop_is_linearised_as_it_is(tmp_path) -> None:
+    """A lag of 0.2 s sampled at 10 Hz: the pole is exp(-T / 0.2)."""
+    text = """
+quadvis: 1
+name: chain
+rates: {fast: 10 Hz}
+stop_time: 1 s
+blocks:
+  source: {block: sources.constant, rate: fast, with: {value: 1}}
+  lag: {block: signal.low_pass, rate: fast, with: {time_constant: 0.2 s}, in: {u: source.y}}
+"""
+    analysis = quadvis.load(write(tmp_path, text)).analyse()
+    assert analysis.poles == pytest.approx([-5.0], rel=1e-6)
+    nothing = quadvis.load(write(tmp_path, text.partition("  lag:")[0])).analyse()
+    assert nothing.stable and nothing.linear.states == () and nothing.poles.size == 0
