@@ -27,10 +27,15 @@ Matrix = NDArray[np.float64]
 Columns = dict[int, tuple[Vector, Vector]]  # by slot: derivatives of the memory afterwards, of the channels
 SETTLED = 1e-6  # of the state's size: what may still move at an operating point
 TRIALS = 12
+LATER = 8.0
 CHECKED = 4  # hyperperiods that the matrix must foretell
 CLOSE = 0.01
 IDLE = 1e-9
 MENTIONED = 8  # blocks in a message
+
+
+class Unsettled(AnalysisError):
+    """No steady state was found."""
 
 
 @dataclass(frozen=True)
@@ -52,8 +57,16 @@ class Linear:
 def linearised(graph: Graph, cuts: Sequence[Cut], at: float) -> Linear:
     """Return the loop at its operating point, which Newton's method seeks from the state at a time (s).
 
-    AnalysisError if there is no steady state near, if the loop is not smooth there, or if a cut is not on it.
+    If it does not find one, it tries again from a later time. AnalysisError if there is no steady state near,
+    if the loop is not smooth there, or if a cut is not on it.
     """
+    try:
+        return _linearised(graph, cuts, at)
+    except Unsettled:
+        return _linearised(graph, cuts, LATER * max(at, 1.0))
+
+
+def _linearised(graph: Graph, cuts: Sequence[Cut], at: float) -> Linear:
     signals = {(signal.block, signal.port) for cut in cuts for signal in cut.signals}
     engine = Engine(with_breaks(graph, signals))
     silence(engine)
@@ -98,10 +111,10 @@ def _small(residual: Vector, probe: Probe, places: Positions) -> bool:
     return bool((np.abs(residual) <= SETTLED * probe.scale[places]).all())
 
 
-def _unsettled(probe: Probe, places: Positions, residual: Vector) -> AnalysisError:
+def _unsettled(probe: Probe, places: Positions, residual: Vector) -> Unsettled:
     worst = int(np.argmax(np.abs(residual) / probe.scale[places]))
     problem = f"no steady state was found: '{probe.names[int(places[worst])]}' goes on moving"
-    return AnalysisError(f"{problem}; begin near one, or let the diagram run longer before ('at')")
+    return Unsettled(f"{problem}; begin near one, or let the diagram run longer before ('at')")
 
 
 def _is_continuous(probe: Probe, places: Positions) -> bool:
@@ -238,4 +251,4 @@ def _check(probe: Probe, places: Positions, a: Matrix) -> None:
         problem = (
             f"the loop has an edge at its operating point, '{name}' is not proportional to small changes"
         )
-        raise AnalysisError(f"{problem}; begin elsewhere, away from limits")
+        raise AnalysisError(f"{problem}; begin elsewhere, away from limits and with full queues ('at')")

@@ -166,6 +166,12 @@ blocks:
     assert linear.a[row, column] == pytest.approx(9.81 * (1.0 + (0.5 / 9.81) ** 2), rel=1e-6)
 
 
+def test_a_loop_that_begins_saturated_far_away_is_run_until_it_is_not() -> None:
+    """At 20 rad/s the law flies 0.09 m/s at most, so the metre from the start takes 11 s."""
+    diagram = quadvis.load(DIAGRAMS / "margins.yaml", settings={"bandwidth": "20 rad/s"})
+    assert np.poly(diagram.analyse().linear.a / 20) == pytest.approx(np.poly(-np.ones(8)), rel=1e-5)
+
+
 def test_the_state_space_of_the_closed_loop_is_one_of_python_control(tmp_path) -> None:
     system = sampled(tmp_path).analyse().system
     assert isinstance(system, control.StateSpace)
