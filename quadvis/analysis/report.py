@@ -126,6 +126,8 @@ def _file(text: str) -> str:
 
 
 def _draw(loop: Loop, gain: Axes, phase: Axes) -> None:
+    from matplotlib.ticker import MultipleLocator
+
     omega, values = loop.bode()
     angles = np.degrees(np.unwrap(np.angle(values)))
     middle = int(np.argmin(np.abs(np.log(np.abs(values) + 1e-300))))
@@ -143,6 +145,7 @@ def _draw(loop: Loop, gain: Axes, phase: Axes) -> None:
     gain.set_title(words)
     for axis in (gain.yaxis, phase.xaxis):
         axis.set_major_formatter(lambda value, _: f"{value:g}")
+    phase.yaxis.set_major_locator(MultipleLocator(45.0 if np.ptp(angles) < 400.0 else 90.0))
     gain.set_ylabel("gain")
     phase.set_ylabel("phase (deg)")
     phase.set_xlabel("frequency (rad/s)")
