@@ -33,6 +33,15 @@ units, passed, failure (why a run stopped) and the hash of the diagram; it does 
 processes. Wall times do, so they stand in it only with --timings.
 Exit code: 0 all runs passed, 1 one did not, 2 bad input, 130 interrupted (what is done is in the table)."""
 
+ANALYSE_HELP = """\
+Noise is taken away, Newton's method finds the steady state near, and the loop is linearised there;
+a sampled one is lifted over one hyperperiod. All signals of a cut are opened at once.
+--json prints one object: diagram, variant, hash, hyperperiod_s (0 if all is continuous), states, stable;
+poles: [[real, imaginary]] in 1/s; cuts: {name: {signals, gain_up, gain_down, phase_lag, phase_lead,
+delay, crossover}} in factors, rad, s and rad/s, null where nothing limits;
+limits: {name: {vary, unit, stable_to, reached, reason}}.
+Exit code: 0 stable, 1 not stable, 2 bad input, or a loop that cannot be linearised."""
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code: 0 ok, 1 a run failed or missed what it should, 2 bad input."""
@@ -94,6 +103,15 @@ def _parser() -> argparse.ArgumentParser:
     describe = add("describe", _describe, "describe a block: ports, parameters, source")
     describe.add_argument("block", metavar="BLOCK", help="such as signal.derivative")
     describe.add_argument("--json", action="store_true", help="print its declarations as JSON")
+    analyse = add("analyse", _analyse, "linearise the closed loop: poles, margins, limits", ANALYSE_HELP)
+    _diagram_options(analyse)
+    words = "a cut point more: one signal or several, such as torque=control/roll.torque; repeat it for more"
+    analyse.add_argument("--cut", action="append", default=[], metavar="[NAME=]SIGNAL,...", help=words)
+    words = "how far a parameter can go, such as eyes/camera.latency='100 ms..2 s'; repeat it for more"
+    analyse.add_argument("--vary", action="append", default=[], metavar="PARAM=FROM..TO", help=words)
+    analyse.add_argument("--at", metavar="T", help="run so long before the operating point is sought")
+    analyse.add_argument("--json", action="store_true", help="print one JSON object instead of the tables")
+    analyse.add_argument("--output", "-o", metavar="FOLDER", help="write Bode plots there, as PNG")
     draw = add("draw", _draw, "draw a diagram as SVG")
     _diagram_options(draw)
     draw.add_argument("--output", "-o", metavar="PATH", help="default NAME.svg; '-' for standard output")
@@ -276,6 +294,24 @@ def _describe(options: argparse.Namespace) -> int:
     else:
         print(description(options.block, block, _width()))
     return 0
+
+
+def _analyse(options: argparse.Namespace) -> int:
+    from quadvis.analysis.questions import read_cuts, read_limits, read_time
+    from quadvis.analysis.report import analysis_lines, save_bode_plots
+
+    diagram = _load(options)
+    cuts, limits, at = read_cuts(options.cut), read_limits(options.vary), read_time(options.at)
+    analysis = diagram.analyse(cuts=cuts, limits=limits, at=at)
+    if not options.json:
+        for line in analysis_lines(analysis):
+            print(line, flush=True)
+    paths = [str(path) for path in save_bode_plots(analysis, Path(options.output))] if options.output else []
+    if options.json:
+        _print_json(analysis.facts() | {"plots": paths})
+    elif paths:
+        print("\n".join(paths))
+    return 0 if analysis.stable else FAILED
 
 
 def _draw(options: argparse.Namespace) -> int:

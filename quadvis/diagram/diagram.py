@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -12,12 +12,13 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from quadvis.catalogue import Catalogue
+from quadvis.diagram.analyse import QuestionReader, Questions
 from quadvis.diagram.build import Builder, Made
 from quadvis.diagram.check import WireCheck, rate_text
 from quadvis.diagram.expand import Expansion, Parts
 from quadvis.diagram.loader import FileSpec, read_file, read_text
 from quadvis.diagram.observe import Observation, read_observation
-from quadvis.diagram.settings import Files, Given, ParameterFile, Settings, read_settings
+from quadvis.diagram.settings import Files, Given, ParameterFile, Settings, read_settings, setting_texts
 from quadvis.diagram.slots import Outputs, check_slots, fill_slots
 from quadvis.diagram.times import read_duration
 from quadvis.diagram.wiring import Wiring
@@ -26,6 +27,7 @@ from quadvis.engine.graph import Graph, Wire
 from quadvis.errors import DiagramError, Fault, Faults, Place, quoted
 
 if TYPE_CHECKING:
+    from quadvis.analysis.analyse import Analysis
     from quadvis.output.verdict import Entry, Outcome, Signals
     from quadvis.run import Progress, Result
 
@@ -42,7 +44,10 @@ class Diagram:
     seed: int
     observation: Observation
     listing: tuple[str, ...]  # the blocks in the order of the files
+    questions: Questions
+    variants: tuple[str, ...]
     parameter_files: tuple[ParameterFile, ...] = ()
+    settings: tuple[str, ...] = ()  # the parameters that were replaced, block.parameter=value
 
     @cached_property
     def resolved(self) -> str:
@@ -91,6 +96,23 @@ class Diagram:
 
         return run(self, log=log, progress=progress)
 
+    def analyse(
+        self,
+        *,
+        cuts: Mapping[str, str | Sequence[str]] = MappingProxyType({}),
+        limits: Mapping[str, tuple[str, str, str]] = MappingProxyType({}),
+        at: float | None = None,
+    ) -> Analysis:
+        """Linearise the closed loop at its operating point; see ``quadvis.analysis.analyse.analyse``."""
+        from quadvis.analysis.analyse import analyse
+
+        return analyse(self, cuts, limits, at)
+
+    def varied(self, setting: str) -> Diagram:
+        """Return the diagram, loaded again with one more parameter replaced: ``block.parameter=value``."""
+        params, settings = [file.path for file in self.parameter_files], (*self.settings, setting)
+        return load(self.path, variant=self.variant, settings=settings, params=params, seed=self.seed)
+
     def draw(self) -> str:
         """Return a picture of the diagram as SVG."""
         from quadvis.diagram.reference import wire_text
@@ -137,10 +159,11 @@ def load(
     """
     faults = Faults()
     with _told_once(faults):
-        given, files = read_settings(settings, params, faults)
+        texts = setting_texts(settings)
+        given, files = read_settings(texts, params, faults)
         spec = read_file(Path(path), faults, part=False)
         diagram = _Assembly(spec, faults).diagram(variant, given, stop_time, seed)
-        return replace(diagram, parameter_files=files)
+        return replace(diagram, parameter_files=files, settings=texts)
 
 
 def load_text(text: str, folder: str | Path = ".", name: str = "diagram.yaml") -> Diagram:
@@ -210,13 +233,18 @@ class _Assembly:
         graph = Graph(spec.name, WireCheck(drafts, faults).run(), spec.solver, builder.step)
         stop = _stop_time(spec, stop_time, faults)
         observation = read_observation(spec.sections, wiring, graph, faults)
+        nodes = {node.path: node for node in graph.nodes}
+        questions = QuestionReader(wiring, graph, nodes).read(spec.sections.get("analyse"), faults)
         if spec.files:
             from quadvis.diagram.resolve import check_files
 
             check_files(spec, faults)
         seed = spec.seed if seed is None else _seed(seed, faults)
         listing = tuple(draft.path for draft in drafts)
-        return Diagram(spec.name, spec.path, variant, graph, stop, seed, observation, listing)
+        variants = tuple(spec.variants)
+        return Diagram(
+            spec.name, spec.path, variant, graph, stop, seed, observation, listing, questions, variants
+        )
 
     def _promised(self, filled: FileSpec) -> Outputs:
         """Return the outputs of what stands in the slots that a variant fills."""

@@ -23,7 +23,7 @@ PATH = re.compile(rf"{NAME.pattern}(?:/{NAME.pattern})*", re.ASCII)  # a resolve
 REQUIRED_KEYS = ("quadvis", "name", "blocks")
 DIAGRAM_KEYS = (
     "doc", "params", "rates", "solver", "stop_time", "seed", "files", "variants",
-    "log", "expect", "summary", "figures",
+    "log", "expect", "summary", "figures", "analyse",
 )  # fmt: skip
 PART_KEYS = ("doc", "params", "ports")
 BLOCK_KEYS = ("block", "part", "rate", "slot", "with", "in")
@@ -31,7 +31,7 @@ WIRE_KEYS = ("from", "across")
 SOLVER_KEYS = ("method", "step")
 PORT_KEYS = ("in", "out")
 VARIANT_KEYS = ("doc", "base", "slots")
-SECTIONS = ("log", "expect", "summary", "figures")
+SECTIONS = ("log", "expect", "summary", "figures", "analyse")
 
 
 @dataclass(frozen=True)

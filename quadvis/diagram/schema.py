@@ -13,6 +13,7 @@ from typing import Any
 from quadvis.block import Block, Declared, Param
 from quadvis.catalogue import Catalogue
 from quadvis.describe import default_text, first_line
+from quadvis.diagram.analyse import ANALYSE_KEYS, LIMIT_KEYS
 from quadvis.diagram.loader import (
     BLOCK_KEYS,
     CONTINUOUS,
@@ -123,6 +124,21 @@ def _top() -> dict[str, Schema]:
             "description": "lines of the summary by their labels",
         },
         "figures": _list_of(_ref("figure"), "what `quadvis plot` draws"),
+        "analyse": _closed(ANALYSE_KEYS, {
+            "at": {**QUANTITY, "description": "run so long before the operating point is sought"},
+            "cuts": {
+                "type": "object",
+                "additionalProperties": {
+                    "anyOf": [_ref("signal"), _list_of(_ref("signal"), "opened at once")]
+                },
+                "description": "where `quadvis analyse` opens the loop, by name",
+            },
+            "limits": {
+                "type": "object",
+                "additionalProperties": _ref("limit"),
+                "description": "how far a parameter can go before the loop is unstable, by name",
+            },
+        }),
         "set": {
             **_map_of(_ref("value"), "values of parameters, by block.parameter or by the diagram's names"),
             "propertyNames": SETTING,
@@ -157,6 +173,15 @@ def _definitions(blocks: Mapping[str, type[Block]]) -> dict[str, Schema]:
         ),
         "entry": _closed(
             ("signal", *SUMMARY_KEYS), {"signal": signal, **stretch, "show": shown, "unit": TEXT}, ["signal"]
+        ),
+        "limit": _closed(
+            LIMIT_KEYS,
+            {
+                "vary": {**TEXT, "description": "block.parameter, a parameter of the diagram, or an element"},
+                "from": {**QUANTITY, "description": "where the search begins; the loop is stable there"},
+                "to": {**QUANTITY, "description": "where it ends"},
+            },
+            LIMIT_KEYS,
         ),
         **_figures(signal),
         "block": _any_block(blocks),

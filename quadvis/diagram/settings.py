@@ -63,9 +63,16 @@ def read_settings(given: Given, params: Files, faults: Faults) -> tuple[Settings
     for path in map(Path, paths):
         name = _read_file(path, (), found, faults)
         files.append(ParameterFile(name or path.stem, path))
-    for path_and_name, setting in _command_line(given, faults):
+    for path_and_name, setting in _command_line(setting_texts(given), faults):
         _put(found, path_and_name, setting)
     return found, tuple(files)
+
+
+def setting_texts(given: Given) -> tuple[str, ...]:
+    """Return settings as the command line writes them: ``block.parameter=value``."""
+    if isinstance(given, Mapping):
+        return tuple(f"{name}={value_text(value)}" for name, value in given.items())
+    return tuple(given)
 
 
 def _put(found: dict[str, dict[str, Setting]], name: str, setting: Setting) -> None:
@@ -128,11 +135,8 @@ def _wrong_base(path: Path, text: str, users: tuple[str, ...]) -> tuple[str, str
     return "", ""
 
 
-def _command_line(given: Given, faults: Faults) -> Iterator[tuple[str, Setting]]:
+def _command_line(texts: Iterable[str], faults: Faults) -> Iterator[tuple[str, Setting]]:
     """Yield the names and values of ``block.parameter=value``; what is wrong with them is told."""
-    texts: Iterable[str] = given
-    if isinstance(given, Mapping):
-        texts = [f"{name}={value_text(value)}" for name, value in given.items()]
     place = Place(COMMAND_LINE)
     for setting in texts:
         name, _, text = (part.strip() for part in setting.partition("="))

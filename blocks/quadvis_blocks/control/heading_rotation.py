@@ -17,6 +17,9 @@ class HeadingRotation(Block):
     """
 
     enabled = Param(True, type="bool", tune=True, doc="false to give the errors unturned, as in the paper")
+    offset = Param(
+        0.0, unit="rad", tune=True, doc="added to the heading, e.g. for a camera that is mounted askew"
+    )
     position = In("float64[3]", unit="m", doc="x, y, h")
     velocity = In("float64[3]", unit="m/s", doc="rate of change of the position")
     heading = In(unit="rad", doc="yaw angle psi, clockwise from above")
@@ -33,8 +36,7 @@ class HeadingRotation(Block):
         self, position: Any, velocity: Any, heading: float, position_reference: Any, velocity_reference: Any
     ) -> tuple[float, float, float, float]:
         """Return the errors: forward, right and their rates."""
-        if not self.enabled:
-            heading = 0.0
+        heading = heading + self.offset if self.enabled else 0.0
         cosine, sine = math.cos(heading), math.sin(heading)
         x = float(position[0] - position_reference[0])
         y = float(position[1] - position_reference[1])

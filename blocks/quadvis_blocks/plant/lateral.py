@@ -14,7 +14,8 @@ class Lateral(Block):
     """Lateral motion by roll (or forward motion by pitch) without rotors, drag or yaw, for exact checks.
 
     Roll: y'' = g tilt(phi) + acceleration, phi'' = torque. Pitch: x'' = -g tilt(theta) + acceleration,
-    theta'' = torque. ``tilt`` is the angle itself (``linear``) or its tangent (``tangent``).
+    theta'' = torque. ``tilt`` is the angle itself (``linear``) or its tangent (``tangent``). With a ``lag``
+    the torque follows its input like the thrust of a motor, ``1 / (lag s + 1)``.
 
     Source: equations (20) and (21), and their counterpart for pitch.
     """
@@ -24,6 +25,7 @@ class Lateral(Block):
         "linear", choices=("linear", "tangent"), doc="acceleration over g as a function of the angle"
     )
     gravity = Param(9.81, unit="m/s^2", above=0.0, doc="g")
+    lag = Param(0.0, unit="s", min=0.0, doc="time constant of the motors; 0 for torque at once")
     initial_position = Param(0.0, unit="m", doc="position at the start")
     initial_velocity = Param(0.0, unit="m/s", doc="velocity at the start")
     initial_angle = Param(0.0, unit="rad", doc="angle at the start")
@@ -38,6 +40,7 @@ class Lateral(Block):
     speed = State(unit="m/s", continuous=True)
     lean = State(unit="rad", continuous=True)
     spin = State(unit="rad/s", continuous=True)
+    pushed = State(unit="rad/s^2", continuous=True)  # the torque behind the lag
 
     def start(self) -> None:
         """Begin at the initial values."""
@@ -48,7 +51,10 @@ class Lateral(Block):
         """Return position, velocity, angle and rate."""
         return self.place, self.speed, self.lean, self.spin
 
-    def deriv(self, torque: float, acceleration: float) -> tuple[float, float, float, float]:
-        """Return the rates of change of position, velocity, angle and rate."""
+    def deriv(self, torque: float, acceleration: float) -> tuple[float, float, float, float, float]:
+        """Return the rates of change of position, velocity, angle, rate and torque."""
         pull = self.gravity * (math.tan(self.lean) if self.tilt == TANGENT else self.lean)
-        return self.speed, (pull if self.axis == ROLL else -pull) + acceleration, self.spin, torque
+        pull = pull if self.axis == ROLL else -pull
+        if self.lag == 0.0:
+            return self.speed, pull + acceleration, self.spin, torque, 0.0
+        return self.speed, pull + acceleration, self.spin, self.pushed, (torque - self.pushed) / self.lag

@@ -19,7 +19,7 @@ class TransportDelay(Block):
     costs the solver an error of up to half that step times the change. At a discrete rate it changes at
     ticks: with the block at the solver's rate and a delay of a whole number of steps, nothing is lost.
 
-    Error: OverflowError if more than 511 changes of the input are on their way at once.
+    Error: OverflowError if the delay is longer than 511 ticks of the block.
     """
 
     delay = Param(
@@ -29,39 +29,39 @@ class TransportDelay(Block):
     u = In("float64[n]", unit="a", doc="a held signal")
     y = Out("float64[n]", unit="a", doc="the signal of ``delay`` seconds ago")
     since = State(f"float64[{CAPACITY}]", unit="s")
-    values = State(f"float64[{CAPACITY},n]")
-    oldest = State("int64", 0)
-    newest = State("int64", 0)
+    values = State(f"float64[{CAPACITY},n]")  # the one that arrived last, then those on their way
+    waiting = State("int64")
 
     def start(self) -> None:
         """Forget everything on its way."""
         self.since[0] = -math.inf
         self.values[0, :] = self.initial
-        self.oldest = 0
-        self.newest = 0
+        self.waiting = 0
 
     def output(self, time: float) -> Any:
         """Return the newest value that has had time to arrive."""
-        return self.values[_arrived(self.since, self.oldest, self.newest, time - self.delay)]
+        return self.values[_arrived(self.since, self.waiting, time - self.delay)]
 
     def update(self, u: Any, time: float) -> None:
-        """Send a change on its way."""
-        self.oldest = _arrived(self.since, self.oldest, self.newest, time - self.delay)
-        if (u == self.values[self.newest]).all():
-            return
-        following = (self.newest + 1) % CAPACITY
-        if following == self.oldest:
+        """Send the input on its way, every one of them: what waits must not depend on the values."""
+        first = _arrived(self.since, self.waiting, time - self.delay)
+        if first > 0:
+            kept = self.waiting + 1 - first
+            self.since[:kept] = self.since[first : first + kept].copy()
+            self.values[:kept] = self.values[first : first + kept].copy()
+            self.waiting -= first
+        if self.waiting + 1 == CAPACITY:
             raise OverflowError(
-                "more than 511 changes are on their way; give the block a slower rate or a shorter delay"
+                "more than 511 values are on their way; give the block a slower rate or a shorter delay"
             )
-        self.since[following] = time
-        self.values[following, :] = u
-        self.newest = following
+        self.waiting += 1
+        self.since[self.waiting] = time
+        self.values[self.waiting, :] = u
 
 
-def _arrived(since: Any, oldest: int, newest: int, instant: float) -> int:
-    """Return the place of the last value sent by ``instant``; ``oldest`` was there already."""
-    place = oldest
-    while place != newest and since[(place + 1) % CAPACITY] <= instant + INSTANT:
-        place = (place + 1) % CAPACITY
+def _arrived(since: Any, waiting: int, instant: float) -> int:
+    """Return the place of the last value sent by ``instant``; the first was there already."""
+    place = 0
+    while place < waiting and since[place + 1] <= instant + INSTANT:
+        place += 1
     return place

@@ -18,6 +18,16 @@ def test_at_heading_zero_forward_is_x_and_right_is_y() -> None:
     assert found == (1.0, 2.0, 3.0, 4.0)
 
 
+def test_an_offset_is_added_to_the_heading() -> None:
+    inputs = {"position": [1.0, 2.0, 9.0], "velocity": [3.0, 4.0, 9.0], "steps": 1}
+    given, turned = (
+        drive(HeadingRotation(offset=offset), heading=heading, **inputs)
+        for offset, heading in ((0.0, 0.7), (0.4, 0.3))
+    )
+    for name in ("forward", "right", "forward_velocity", "right_velocity"):
+        assert turned.signals[name] == pytest.approx(given.signals[name])
+
+
 def test_turned_clockwise_by_a_quarter_the_craft_looks_to_the_right() -> None:
     # Looking along y, it has x on its left hand.
     result = drive(

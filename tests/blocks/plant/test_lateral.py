@@ -1,5 +1,6 @@
 import math
 
+import numpy as np
 import pytest
 
 from quadvis.block import ParameterError
@@ -30,6 +31,12 @@ def test_a_disturbance_is_an_acceleration_and_initial_values_count() -> None:
     block = Lateral(initial_position=1.0, initial_velocity=2.0, initial_rate=0.0)
     result = drive(block, torque=0.0, acceleration=0.4, rate="10 Hz", steps=11)
     assert result.position[-1] == pytest.approx(1.0 + 2.0 + 0.2)
+
+
+def test_with_a_lag_the_torque_comes_like_that_of_a_motor() -> None:
+    result = drive(Lateral(lag=0.08), torque=0.5, rate="200 Hz", steps=101)
+    t = result.time
+    assert result.angular_rate == pytest.approx(0.5 * (t - 0.08 * -np.expm1(-t / 0.08)), abs=1e-8)
 
 
 def test_an_unknown_axis_is_refused() -> None:

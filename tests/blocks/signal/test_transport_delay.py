@@ -63,7 +63,16 @@ def integral_of_a_delayed_one(step: Fraction, delay: float, *, continuous: bool)
         return float(engine.read("integral", "y"))
 
 
-def test_too_many_changes_on_their_way_stop_the_run_with_a_reason() -> None:
+def test_what_waits_does_not_depend_on_the_values() -> None:
+    still, moving = (
+        drive(TransportDelay(delay=0.0215), u=u[:, None], rate="1 kHz")
+        for u in (np.ones(100), np.arange(100.0))
+    )
+    assert still.state("waiting") == moving.state("waiting") == 22
+    assert np.array_equal(still.state("since"), moving.state("since"))
+
+
+def test_too_many_values_on_their_way_stop_the_run_with_a_reason() -> None:
     with pytest.raises(RunError, match="slower rate or a shorter delay"):
         drive(TransportDelay(delay=1.0), u=np.arange(2000.0)[:, None], rate="1 kHz")
 

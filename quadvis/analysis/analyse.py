@@ -1,0 +1,143 @@
+"""`quadvis analyse`: a diagram's closed loop, linearised; its poles, margins at cut points, and limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.analysis.linearise import Linear, linearised
+from quadvis.analysis.margins import Loop, rates
+from quadvis.analysis.probe import AnalysisError
+from quadvis.analysis.systems import closed_loop
+from quadvis.analysis.vary import STABLE, Limits
+from quadvis.diagram.analyse import Cut
+
+if TYPE_CHECKING:
+    from quadvis.diagram.diagram import Diagram
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """The closed loop of a diagram around its operating point.
+
+    ``linear`` are its matrices, ``loops`` the same opened, by the names of the cut points; ``limits`` say how
+    far parameters can go.
+    """
+
+    diagram: Diagram
+    linear: Linear
+    loops: Mapping[str, Loop]
+    limits: Limits
+
+    @property
+    def period(self) -> float:
+        """The hyperperiod (s) over which a sampled loop is lifted; 0 if all is continuous."""
+        return self.linear.period
+
+    @cached_property
+    def poles(self) -> NDArray[np.complex128]:
+        """The closed loop's poles (1/s), slowest first; a lifted loop's by their logarithms."""
+        return rates(self.linear)
+
+    @property
+    def stable(self) -> bool:
+        """Whether all of them decay."""
+        return bool((self.poles.real < STABLE).all())
+
+    @cached_property
+    def system(self) -> Any:
+        """The closed loop as `control.StateSpace`, from what disturbs the cut signals to these signals."""
+        return closed_loop(self.linear)
+
+    def facts(self) -> dict[str, Any]:
+        """Return the analysis as plain data: what `quadvis analyse --json` prints."""
+        loops = {
+            label: {"signals": list(loop.signals), **{
+                key: _finite(value) for key, value in vars(loop.margins).items()
+            }}
+            for label, loop in self.loops.items()
+        }  # fmt: skip
+        limits = {
+            label: {
+                "vary": found.limit.variable.name,
+                "unit": str(found.limit.variable.unit),
+                "stable_to": _finite(found.value),
+                "reached": found.reached,
+                "reason": found.reason or None,
+            }
+            for label, found in self.limits.items()
+        }
+        return {
+            "diagram": self.diagram.name,
+            "variant": self.diagram.variant,
+            "hash": self.diagram.hash,
+            "hyperperiod_s": self.period,
+            "states": list(self.linear.states),
+            "stable": self.stable,
+            "poles": [[float(pole.real), float(pole.imag)] for pole in self.poles],
+            "cuts": loops,
+            "limits": limits,
+        }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def analyse(
+    diagram: Diagram,
+    cuts: Mapping[str, str | Sequence[str]] = MappingProxyType({}),
+    limits: Mapping[str, tuple[str, str, str]] = MappingProxyType({}),
+    at: float | None = None,
+) -> Analysis:
+    """Linearise a diagram's closed loop, and answer what its section ``analyse`` and the arguments ask.
+
+    ``cuts`` are signals by the name of the cut point; ``limits`` are by name a parameter, the value where the
+    search begins and the one where it ends: ``("eyes/camera.latency", "50 ms", "2 s")``. ``at`` (s) is when
+    the operating point is sought. AnalysisError if there is none, or if the loop has no derivative;
+    DiagramError if a cut or a limit names nothing.
+    """
+    opened, sought = diagram.questions.more(cuts, limits)
+    at = diagram.questions.at if at is None else at
+    _check_pictures(diagram)
+    linear = linearised(diagram.graph, opened, at)
+    stable = bool((rates(linear).real < STABLE).all())
+    loops = {cut.label: _loop(linear, cut, stable) for cut in opened}
+    return Analysis(diagram, linear, loops, Limits(diagram, sought, at))
+
+
+def _loop(linear: Linear, cut: Cut, stable: bool) -> Loop:
+    mine = [index for index, channel in enumerate(linear.channels) if channel.cut == cut.label]
+    closed = Linear(
+        linear.a, linear.b[:, mine], linear.c[mine], linear.d[np.ix_(mine, mine)],
+        linear.period, linear.states,
+        tuple(linear.channels[index] for index in mine),
+    )  # fmt: skip
+    return Loop(cut.label, tuple(signal.text for signal in cut.signals), closed, stable)
+
+
+def _check_pictures(diagram: Diagram) -> None:
+    """Refuse pictures: they change in steps of a pixel's value, so they have no derivative."""
+    for node in diagram.graph.nodes:
+        if any(port.signal.scalar == "frame" for port in node.block.interface.outputs.values()):
+            problem = f"block '{node.path}' gives pictures, and these cannot be linearised"
+            raise AnalysisError(f"{problem}; {_way_out(diagram)}")
+
+
+def _way_out(diagram: Diagram) -> str:
+    from quadvis.diagram.diagram import load
+
+    for variant in diagram.variants:
+        params = [file.path for file in diagram.parameter_files]
+        nodes = load(diagram.path, variant=variant, settings=diagram.settings, params=params).graph.nodes
+        outputs = [port for node in nodes for port in node.block.interface.outputs.values()]
+        if all(port.signal.scalar != "frame" for port in outputs):
+            return f"the variant '{variant}' has none: --variant {variant}"
+    return "use a camera without pictures, such as vision.geometric_camera"

@@ -1,0 +1,57 @@
+"""The signals of a graph where an analysis opens it: each passes a block that adds what one wants."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, In, Out
+from quadvis.engine.graph import Constant, Graph, Node, Wire
+
+
+class Break(Block):
+    """A signal with something added on its way to all who read it."""
+
+    u = In("float64[*]", unit="a", doc="the signal as its block gives it")
+    added = In("float64[*]", unit="a", default=0.0, doc="what is added to it")
+    y = Out("float64[*]", unit="a", nan=True, doc="the signal as others read it")
+
+    def output(self, u: Any, added: Any) -> Any:
+        """Return the sum."""
+        return u + added
+
+
+def break_path(block: str, port: str) -> str:
+    """Return the path of the block in a signal's wires; no block of a diagram can have it."""
+    return f"{block}.{port}"
+
+
+def with_breaks(graph: Graph, signals: Iterable[tuple[str, str]]) -> Graph:
+    """Return the graph with a break behind each of the signals (block, port), else the same."""
+    opened = set(signals)
+    nodes = []
+    for node in graph.nodes:
+        inputs = {name: _rerouted(source, opened) for name, source in node.inputs.items()}
+        nodes.append(replace(node, inputs=inputs))
+        for block, port in sorted(opened):
+            if block == node.path:
+                nodes.append(_break(node, port))
+    return Graph(graph.name, nodes, graph.solver, graph.step)
+
+
+def _rerouted(source: Wire | Constant, opened: set[tuple[str, str]]) -> Wire | Constant:
+    if isinstance(source, Wire) and (source.block, source.port) in opened:
+        return replace(source, block=break_path(source.block, source.port), port="y")
+    return source
+
+
+def _break(node: Node, port: str) -> Node:
+    shape = node.shape(port)
+    inputs: dict[str, Wire | Constant] = {
+        "u": Wire(node.path, port),
+        "added": Constant(np.zeros(shape) if shape else 0.0),
+    }
+    return Node(break_path(node.path, port), "break", Break(), node.task, inputs, {"*": shape})

@@ -1,0 +1,254 @@
+"""A diagram's closed loop as matrices, by central differences of what the engine runs.
+
+A wholly continuous loop gives the derivative of its states. Any other is lifted over one hyperperiod: its
+state is all that lives in memory between two hyperperiods and that a disturbance of some signal can reach.
+Delay lines, queues of measurements and held values count like any other; stamps, counters and random streams
+follow the clock and do not.
+
+Source: lifting of multirate loops, Kranc (1957); Meyer and Burrus (1975).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.analysis.cut import with_breaks
+from quadvis.analysis.probe import STEP, AnalysisError, Channel, Probe, Vector, silence
+from quadvis.diagram.analyse import Cut
+from quadvis.engine.engine import Engine
+from quadvis.engine.graph import Graph
+from quadvis.engine.plan import Positions
+
+Matrix = NDArray[np.float64]
+Columns = dict[int, tuple[Vector, Vector]]  # by slot: derivatives of the memory afterwards, of the channels
+SETTLED = 1e-6  # of the state's size: what may still move at an operating point
+TRIALS = 12
+LATER = 8.0
+CHECKED = 4  # hyperperiods that the matrix must foretell
+CLOSE = 0.01
+IDLE = 1e-9
+MENTIONED = 8  # blocks in a message
+
+
+class Unsettled(AnalysisError):
+    """No steady state was found."""
+
+
+@dataclass(frozen=True)
+class Linear:
+    """x+ = a x + b d, y = c x + d d over a hyperperiod ``period`` (s); x' = a x + b d if that is 0.
+
+    Each channel is disturbed by its element of d on the way to its readers; y is what comes back there.
+    """
+
+    a: Matrix
+    b: Matrix
+    c: Matrix
+    d: Matrix
+    period: float
+    states: tuple[str, ...]
+    channels: tuple[Channel, ...]
+
+
+def linearised(graph: Graph, cuts: Sequence[Cut], at: float) -> Linear:
+    """Return the loop at its operating point, which Newton's method seeks from the state at a time (s).
+
+    If it does not find one, it tries again from a later time. AnalysisError if there is no steady state near,
+    if the loop is not smooth there, or if a cut is not on it.
+    """
+    try:
+        return _linearised(graph, cuts, at)
+    except Unsettled:
+        return _linearised(graph, cuts, LATER * max(at, 1.0))
+
+
+def _linearised(graph: Graph, cuts: Sequence[Cut], at: float) -> Linear:
+    signals = {(signal.block, signal.port) for cut in cuts for signal in cut.signals}
+    engine = Engine(with_breaks(graph, signals))
+    silence(engine)
+    with engine:
+        probe = Probe(engine, cuts, at)
+        for cut in cuts:
+            for signal in cut.signals:
+                if signal.block not in probe.loop:
+                    problem = f"cut '{cut.label}': '{signal.text}' comes from a block that is on no loop"
+                    known = [node.path for node in graph.nodes if node.path in probe.loop]
+                    raise AnalysisError(f"{problem}; open the loop behind one of {_some(known)}")
+        return _linearise(probe)
+
+
+def _some(names: Sequence[str]) -> str:
+    """Name a few blocks."""
+    return ", ".join(names[:MENTIONED]) + (", ..." if len(names) > MENTIONED else "")
+
+
+def _linearise(probe: Probe) -> Linear:
+    for _ in range(TRIALS):
+        places, columns = _columns(probe)
+        if _is_continuous(probe, places):
+            places = places[np.isin(places, probe.continuous)]
+            return _continuous(probe, places)
+        residual = probe.after(places[:0], 0.0)[0][places] - probe.start[places]
+        if _small(residual, probe, places):
+            linear = _lifted(probe, places, columns)
+            _check(probe, places, linear.a)
+            return _without_idle(linear)
+        a = _stacked(columns, places)[0]
+        probe.move(places, _solved(np.eye(len(places)) - a, residual))
+    raise _unsettled(probe, places, residual)
+
+
+def _solved(matrix: Matrix, vector: Vector) -> Vector:
+    """Return the least solution: what nothing holds in place stays where it is."""
+    return np.asarray(np.linalg.lstsq(matrix, vector, rcond=None)[0], np.float64)
+
+
+def _small(residual: Vector, probe: Probe, places: Positions) -> bool:
+    return bool((np.abs(residual) <= SETTLED * probe.scale[places]).all())
+
+
+def _unsettled(probe: Probe, places: Positions, residual: Vector) -> Unsettled:
+    worst = int(np.argmax(np.abs(residual) / probe.scale[places]))
+    problem = f"no steady state was found: '{probe.names[int(places[worst])]}' goes on moving"
+    return Unsettled(f"{problem}; begin near one, or let the diagram run longer before ('at')")
+
+
+def _is_continuous(probe: Probe, places: Positions) -> bool:
+    return all(task.continuous for task in probe.tasks) and bool(np.isin(places, probe.continuous).all())
+
+
+def _columns(probe: Probe) -> tuple[Positions, Columns]:
+    """Return the slots of the state, and by slot the derivatives of what follows."""
+    still = probe.after(probe.positions[:0], 0.0)
+    known: set[int] = set()
+    columns: Columns = {}
+    fresh = np.union1d(_changed(probe, probe.shaken(), still[0]), probe.continuous).astype(np.intp)
+    while fresh.size:
+        known.update(fresh.tolist())
+        reached: set[int] = set()
+        passing = np.isin(fresh, probe.signals)
+        for place in [*fresh[~passing].tolist(), *_influential(probe, fresh[passing], still)]:
+            step = STEP * probe.scale[place]
+            one = np.array([place], np.intp)
+            above, below = (probe.after(one, sign * step) for sign in (1.0, -1.0))
+            changed = _changed(probe, above[0], below[0])
+            if changed.size or not np.array_equal(above[1], below[1]):
+                columns[place] = _slope(above[0], below[0], step), _slope(above[1], below[1], step)
+                reached.update(changed.tolist())
+        fresh = np.array(sorted(reached - known), np.intp)
+    return np.array(sorted(columns), np.intp), columns
+
+
+@np.errstate(invalid="ignore")  # a parameter may be infinite, and a signal missing
+def _slope(above: Vector, below: Vector, step: float) -> Vector:
+    return np.asarray((above - below) / (2 * step), np.float64)
+
+
+def _changed(probe: Probe, one: Vector, other: Vector) -> Positions:
+    """Return the slots that hold other bits."""
+    places = probe.positions
+    return np.asarray(places[one[places].view(np.int64) != other[places].view(np.int64)], np.intp)
+
+
+def _influential(probe: Probe, places: Positions, still: tuple[Vector, Vector]) -> list[int]:
+    """Return those of the signals that matter a hyperperiod later, by halves: most are computed anew."""
+    random = np.random.default_rng(2)
+    found: list[int] = []
+    waiting = [places] if places.size else []
+    while waiting:
+        group = waiting.pop()
+        memory, read = probe.after(group, STEP * probe.scale[group] * random.uniform(0.5, 1.0, group.size))
+        if not _changed(probe, memory, still[0]).size and np.array_equal(read, still[1]):
+            continue
+        if group.size == 1:
+            found.append(int(group[0]))
+        else:
+            waiting += [group[: group.size // 2], group[group.size // 2 :]]
+    return found
+
+
+def _stacked(columns: Columns, places: Positions) -> tuple[Matrix, Matrix]:
+    """Return the derivatives of the state and of the channels by the state."""
+    a = [columns[place][0][places] for place in places.tolist()]
+    c = [columns[place][1] for place in places.tolist()]
+    return np.reshape(a, (len(a), len(a))).T, np.reshape(c, (len(a), -1 if c else 0)).T
+
+
+def _lifted(probe: Probe, places: Positions, columns: Columns) -> Linear:
+    count, none = len(probe.channels), places[:0]
+    a, c = _stacked(columns, places)
+    b, d = np.zeros((len(places), count)), np.zeros((count, count))
+    for column, channel in enumerate(probe.channels):
+        added = np.zeros(count)
+        added[column] = STEP * probe.scale[channel.read]
+        above, below = (probe.after(none, 0.0, sign * added) for sign in (1.0, -1.0))
+        b[:, column] = _slope(above[0], below[0], added[column])[places]
+        d[:, column] = _slope(above[1], below[1], added[column])
+    return Linear(a, b, c, d, probe.period, _states(probe, places), tuple(probe.channels))
+
+
+def _without_idle(linear: Linear) -> Linear:
+    """Leave out the states that never move and matter to nothing, such as that of a lag of zero."""
+    moves = linear.a - (np.eye(len(linear.a)) if linear.period else 0.0)
+    busy = [(np.abs(part) > IDLE).any(axis=axis) for part, axis in
+            ((moves, 0), (moves, 1), (linear.b, 1), (linear.c, 0))]  # fmt: skip
+    kept = np.flatnonzero(np.logical_or.reduce(busy))
+    states = tuple(linear.states[index] for index in kept)
+    return replace(
+        linear, a=linear.a[np.ix_(kept, kept)], b=linear.b[kept], c=linear.c[:, kept], states=states
+    )
+
+
+def _continuous(probe: Probe, places: Positions) -> Linear:
+    """Return the derivative where nothing is sampled."""
+    for _ in range(TRIALS):
+        linear = _derivative(probe, places)
+        residual = probe.slopes(places[:0], 0.0, np.zeros(len(probe.channels)))[0][places]
+        if _small(residual, probe, places):
+            return _without_idle(linear)
+        probe.move(places, _solved(linear.a, -residual))
+    raise _unsettled(probe, places, residual)
+
+
+def _derivative(probe: Probe, places: Positions) -> Linear:
+    states, count = len(places), len(probe.channels)
+    matrix = np.zeros((states + count, states + count))
+    for column in range(states + count):
+        added, place = np.zeros(count), places[:0]
+        if column < states:
+            place = places[column : column + 1]
+            step = float(STEP * probe.scale[place[0]])
+        else:
+            step = float(STEP * probe.scale[probe.channels[column - states].read])
+            added[column - states] = step
+        above, below = (probe.slopes(place, sign * step, sign * added) for sign in (1.0, -1.0))
+        matrix[:states, column] = _slope(above[0], below[0], step)[places]
+        matrix[states:, column] = _slope(above[1], below[1], step)
+    a, b = matrix[:states, :states], matrix[:states, states:]
+    c, d = matrix[states:, :states], matrix[states:, states:]
+    return Linear(a, b, c, d, 0.0, _states(probe, places), tuple(probe.channels))
+
+
+def _states(probe: Probe, places: Positions) -> tuple[str, ...]:
+    return tuple(probe.names[int(place)] for place in places)
+
+
+def _check(probe: Probe, places: Positions, a: Matrix) -> None:
+    """Refuse a loop that does not go where its matrix says: one with an edge at its operating point."""
+    if not places.size:
+        return
+    size = STEP * probe.scale[places]
+    delta = size * np.random.default_rng(3).uniform(-1.0, 1.0, places.size)
+    above, below = (probe.after(places, sign * delta, count=CHECKED)[0] for sign in (1.0, -1.0))
+    found = _slope(above, below, 1.0)[places]
+    wrong = np.abs(found - np.linalg.matrix_power(a, CHECKED) @ delta) / size
+    if not wrong.max() <= CLOSE * max(1.0, float((np.abs(found) / size).max())):
+        name = probe.names[int(places[int(np.nanargmax(wrong))])]
+        problem = (
+            f"the loop has an edge at its operating point, '{name}' is not proportional to small changes"
+        )
+        raise AnalysisError(f"{problem}; begin elsewhere, away from limits and with full queues ('at')")

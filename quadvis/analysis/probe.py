@@ -1,0 +1,266 @@
+"""An engine that is asked, again and again, what comes of a small change to its memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import lcm
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.analysis.cut import break_path
+from quadvis.block import Random
+from quadvis.diagram.analyse import Cut
+from quadvis.engine.engine import Engine
+from quadvis.engine.graph import Graph, Task
+from quadvis.engine.memory import Slot
+from quadvis.engine.plan import TIME, Bound, Positions
+from quadvis.errors import QuadvisError
+
+Vector = NDArray[np.float64]
+STEP = 1e-5  # of a central difference, relative to values above 1: errors near 1e-10
+LONGEST = 20_000  # ticks of a hyperperiod
+
+
+class AnalysisError(QuadvisError):
+    """A diagram that cannot be linearised: what stands in the way, and the way out."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One element of a cut signal at one tick of the hyperperiod: where it is read and where it is disturbed.
+
+    ``time`` (s) counts from the start of the hyperperiod.
+    """
+
+    cut: str
+    text: str
+    read: int
+    added: int
+    tick: int
+    time: float
+
+
+def silence(engine: Engine) -> None:
+    """Take the noise away: a random stream of zeros stays zero and gives 2e-5 sigma at every draw."""
+    for bound in engine.plan.steps:
+        for name, state in bound.node.block.interface.states.items():
+            if isinstance(state, Random):
+                engine.plan.memory.write(bound.field(name), 0)
+
+
+def hyperperiod(graph: Graph, tasks: Iterable[Task]) -> int:
+    """Return after how many ticks these tasks are due together again."""
+    span = lcm(*(graph.ticks(task.period) for task in tasks))
+    if span > LONGEST:
+        time = float(span * graph.tick)
+        problem = f"the rates of the loop repeat only after {time:g} s, {span} ticks"
+        raise AnalysisError(f"{problem}; choose rates that fit into each other")
+    return span
+
+
+class Probe:
+    """Answers what a hyperperiod makes of the memory; the run stands at its beginning, without noise.
+
+    ``positions`` are the 8-byte slots that can hold a part of the loop's state, with ``names`` for people.
+    """
+
+    def __init__(self, engine: Engine, cuts: Sequence[Cut], at: float) -> None:
+        self.engine, self.graph = engine, engine.graph
+        self.plan, self.floats = engine.plan, engine.plan.memory.floats
+        self.loop = _looped(self.graph)
+        self.tasks = {node.task for node in self.graph.nodes if node.path in self.loop}
+        self.span = hyperperiod(self.graph, self.tasks)
+        self.names = dict(self._named())
+        self.positions: Positions = np.array(sorted(self.names), np.intp)
+        self.continuous = self._continuous()
+        self.signals: Positions = np.array(
+            [place for bound in self.plan.steps for place in self._signals(bound)], np.intp
+        )
+        self.channels = [channel for cut in cuts for channel in self._channels(cut)]
+        self._read = np.array([channel.read for channel in self.channels], np.intp)
+        self._added = np.array([channel.added for channel in self.channels], np.intp)
+        self._ticks = np.array([channel.tick for channel in self.channels], np.intp)
+        self._moments = self._events()
+        self._shaken = False
+        self._shake()
+        begin = max([Fraction(at), *(task.offset for task in self.tasks)])
+        engine.run(self.span * -(-begin // (self.span * self.graph.tick)))
+        self.keep()
+
+    @property
+    def period(self) -> float:
+        """The hyperperiod (s)."""
+        return float(self.span * self.graph.tick)
+
+    def keep(self) -> None:
+        """Take the present memory as that from which all questions start."""
+        self._start = self.engine.snapshot()
+        self.start: Vector = self.floats.copy()
+        self.scale: Vector = np.maximum(1.0, np.abs(np.nan_to_num(self.start)))
+
+    def move(self, places: Positions, deltas: Vector) -> None:
+        """Change the memory from which all questions start."""
+        self.engine.restore(self._start)
+        self.floats[places] += deltas
+        self.keep()
+
+    def after(
+        self, places: Positions, deltas: Vector | float, added: Vector | None = None, count: int = 1
+    ) -> tuple[Vector, Vector]:
+        """Return the memory some hyperperiods after a change, and what the channels read in the first.
+
+        ``added`` is what the channels are disturbed by, in the first.
+        """
+        engine, floats = self.engine, self.floats
+        engine.restore(self._start)
+        floats[places] += deltas
+        found = np.empty(len(self.channels))
+        for tick, length, mine in self._moments:
+            if added is not None:
+                self._disturb(added, tick)
+            engine.run(length)
+            found[mine] = floats[self._read[mine]]
+        floats[self._added] = 0.0
+        if count > 1:
+            engine.run(self.span * (count - 1))
+        return floats.copy(), found
+
+    def slopes(self, places: Positions, deltas: Vector | float, added: Vector) -> tuple[Vector, Vector]:
+        """Return the derivatives of the continuous states after a change, and what the channels read."""
+        self.engine.restore(self._start)
+        self.floats[TIME.position] = self.engine.time
+        self.floats[places] += deltas
+        self._disturb(added, 0)
+        for step in self.plan.steps:
+            if step.output is not None:
+                step.output()
+        for derive in self.plan.derivatives:
+            derive()
+        rates = np.zeros(self.floats.size)
+        rates[self.plan.continuous] = self.floats[self.plan.slopes]
+        return rates, self.floats[self._read]
+
+    def shaken(self) -> Vector:
+        """Return the memory after a hyperperiod in which every signal of the loop is disturbed at random."""
+        self._shaken = True
+        try:
+            return self.after(self.positions[:0], 0.0)[0]
+        finally:
+            self._shaken = False
+
+    def _disturb(self, added: Vector, tick: int) -> None:
+        """Add to the channels that are read at a tick, and to no other."""
+        now = self._ticks == tick
+        self.floats[self._added] = 0.0
+        np.add.at(self.floats, self._added[now], added[now])  # two cuts may share a signal
+
+    def _events(self) -> list[tuple[int, int, NDArray[np.intp]]]:
+        """Return the ticks at which channels are read, how far it is to the next, and which channels."""
+        ticks = sorted({0, *self._ticks.tolist()})
+        following = [*ticks[1:], self.span]
+        return [
+            (tick, end - tick, np.flatnonzero(self._ticks == tick))
+            for tick, end in zip(ticks, following, strict=True)
+        ]
+
+    def _channels(self, cut: Cut) -> Iterator[Channel]:
+        for signal in cut.signals:
+            task = self.graph[signal.block].task
+            every, offset = self.graph.ticks(task.period), self.graph.ticks(task.offset)
+            read = self.plan[signal.block].outputs[signal.port].position
+            added = self.plan[break_path(signal.block, signal.port)].inputs["added"].position
+            for element in signal.elements:
+                for tick in range(offset % every, self.span, every):
+                    time = float(tick * self.graph.tick)
+                    yield Channel(cut.label, signal.text, read + element, added + element, tick, time)
+
+    def _named(self) -> Iterator[tuple[int, str]]:
+        """Yield the slots of real numbers that blocks of the loop own, with their names.
+
+        Signals in seconds are instants and ages. They follow the clock, so they are no part of the state.
+        """
+        for bound in self.plan.steps:
+            if bound.node.path not in self.loop:
+                continue
+            interface, path = bound.node.block.interface, bound.node.path
+            for port, slot in bound.outputs.items():
+                if slot.scalar == "float64" and not _is_time(interface.outputs[port].units):
+                    yield from _elements(slot, f"{path}.{port}")
+            for name, state in interface.states.items():
+                if state.signal.scalar == "float64":
+                    yield from _elements(bound.field(name), f"{path}.{name}")
+            for port, wire in bound.node.wires():
+                if wire.crossing == "delay" and bound.inputs[port].scalar == "float64":
+                    yield from _elements(bound.inputs[port], f"{path}.{port}")
+
+    def _continuous(self) -> Positions:
+        """Return where the continuous states of the loop are."""
+        return np.array(
+            [
+                position
+                for bound in self.plan.steps
+                if bound.node.path in self.loop
+                for state in bound.node.block.interface.continuous
+                for position, _ in _elements(bound.field(state.name), "")
+            ],
+            np.intp,
+        )
+
+    def _shake(self) -> None:
+        """Have every signal of the loop disturbed at each tick, when it is asked for."""
+        by_task: dict[str, list[int]] = {}
+        for bound in self.plan.steps:
+            by_task.setdefault(bound.node.task.name, []).extend(self._signals(bound))
+        for task, found in by_task.items():
+            places = np.array(found, np.intp)
+            random = np.random.default_rng(1)
+
+            def disturb(_: int, places: Positions = places, random: Any = random) -> None:
+                if self._shaken:
+                    size = STEP * np.maximum(1.0, np.abs(np.nan_to_num(self.floats[places])))
+                    self.floats[places] += size * random.uniform(0.5, 1.0, places.size)
+
+            self.engine.observe(task, disturb)
+
+    def _signals(self, bound: Bound) -> list[int]:
+        return [
+            position
+            for slot in bound.outputs.values()
+            if slot.scalar == "float64"
+            for position, _ in _elements(slot, "")
+            if position in self.names
+        ]
+
+
+def _is_time(units: Sequence[Any]) -> bool:
+    return all(str(unit) == "s" for unit in units)
+
+
+def _elements(slot: Slot, name: str) -> Iterator[tuple[int, str]]:
+    for flat, index in enumerate(np.ndindex(*slot.shape)):
+        yield slot.position + flat, f"{name}[{','.join(map(str, index))}]" if slot.shape else name
+
+
+def _looped(graph: Graph) -> set[str]:
+    """Return the blocks that lie on a loop of wires; all of them if there is no loop."""
+    readers: dict[str, set[str]] = {node.path: set() for node in graph.nodes}
+    for node in graph.nodes:
+        for _, wire in node.wires():
+            readers[wire.block].add(node.path)
+    found = {path for path in readers if path in _downstream(readers, path)}
+    return found or set(readers)
+
+
+def _downstream(readers: dict[str, set[str]], path: str) -> set[str]:
+    found: set[str] = set()
+    waiting = list(readers[path])
+    while waiting:
+        reader = waiting.pop()
+        if reader not in found:
+            found.add(reader)
+            waiting.extend(readers[reader])
+    return found

@@ -1,0 +1,51 @@
+"""Cuts and limits as the command line writes them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from quadvis.diagram.times import read_duration
+from quadvis.document import Scalar
+from quadvis.errors import QuadvisError
+
+
+def read_cuts(texts: Sequence[str]) -> dict[str, list[str]]:
+    """Read ``torque=control/roll.torque`` or ``a.y,b.y``, which is its own name."""
+    found: dict[str, list[str]] = {}
+    for text in texts:
+        name, equals, signals = text.partition("=")
+        if not equals:
+            name, signals = text, text
+        found[name.strip()] = _listed(signals)
+    return found
+
+
+def _listed(text: str) -> list[str]:
+    """Split at the commas that stand in no index."""
+    parts = [""]
+    depth = 0
+    for letter in text:
+        depth += (letter == "[") - (letter == "]")
+        if letter == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return [part.strip() for part in parts]
+
+
+def read_limits(texts: Sequence[str]) -> dict[str, tuple[str, str, str]]:
+    """Read ``eyes/camera.latency=100 ms..2 s``; QuadvisError if it is something else."""
+    found = {}
+    for text in texts:
+        name, _, span = (part.strip() for part in text.partition("="))
+        start, dots, end = (part.strip() for part in span.partition(".."))
+        if not name or not dots or not start or not end:
+            remedy = "write a parameter and its range, such as eyes/camera.latency='100 ms..2 s'"
+            raise QuadvisError(f"--vary: '{text}' is not understood; {remedy}")
+        found[name] = (name, start, end)
+    return found
+
+
+def read_time(text: str | None) -> float | None:
+    """Read ``5 s``; DiagramError if it is no time."""
+    return None if text is None else float(read_duration(Scalar(text, False, "--at", 0, 0)))

@@ -1,0 +1,115 @@
+"""How far a parameter can go before the loop is unstable: the diagram is loaded again for each value."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from quadvis.analysis.linearise import linearised
+from quadvis.analysis.margins import growth
+from quadvis.analysis.probe import AnalysisError
+from quadvis.analysis.systems import library
+from quadvis.diagram.analyse import Limit
+from quadvis.errors import RunError
+
+if TYPE_CHECKING:
+    from quadvis.diagram.diagram import Diagram
+
+STEPS = 10  # of the search for an unstable value
+PRECISION = 1e-5  # of the value found, relative to it and to the range
+STABLE = -1e-6  # 1/s; slower decay is none
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How far a parameter can go: the last stable ``value`` (SI).
+
+    That is the end of the range if all of it is stable, and NaN if its start is not. ``reason`` says why
+    there is nothing to analyse beyond, if it is that and not a loop that becomes unstable.
+    """
+
+    limit: Limit
+    value: float
+    reason: str = ""
+
+    @property
+    def reached(self) -> bool:
+        """Whether the loop is lost within the range."""
+        return self.value != self.limit.end
+
+    @property
+    def text(self) -> str:
+        """The answer in words."""
+        if math.isnan(self.value):
+            return f"unstable from {self.shows(self.limit.start)} on"
+        words = "up to" if self.limit.end > self.limit.start else "down to"
+        found = f"stable {words} {self.shows(self.value)}"
+        if self.reason:
+            return f"{found}; beyond: {self.reason}"
+        return found if self.reached else f"{found} and perhaps further"
+
+    def shows(self, value: float) -> str:
+        """Return a value of the parameter for people."""
+        unit = self.limit.shown
+        number = f"{value / unit.scale:.4g}"
+        return f"{number} {unit}" if unit.symbols else number
+
+
+def tolerance(diagram: Diagram, limit: Limit, at: float) -> Tolerance:
+    """Search from the start of a range for the first value at which the loop is lost.
+
+    Coarsely first, so an unstable stretch shorter than a tenth of the range may be stepped over, then by
+    Brent's method. AnalysisError if there is no loop to analyse at the start; DiagramError if the diagram
+    refuses a value.
+    """
+    excess = functools.cache(lambda value: _growth_at(diagram, limit, at, value) - STABLE)
+    if excess(limit.start) >= 0.0:
+        return Tolerance(limit, math.nan)
+    reasons: dict[float, str] = {}  # why there is nothing to analyse at a value
+
+    def distance(value: float) -> float:
+        try:
+            return excess(value)
+        except (AnalysisError, RunError) as error:
+            reasons[value] = str(error)
+            return 1.0
+
+    grid = np.linspace(limit.start, limit.end, STEPS + 1).tolist()
+    for before, after in pairwise(grid):
+        if distance(after) >= 0.0:
+            precision = PRECISION * abs(limit.end - limit.start)
+            found = float(
+                library("scipy.optimize").brentq(distance, before, after, xtol=precision, rtol=PRECISION)
+            )
+            return Tolerance(limit, found, reasons.get(after, ""))
+    return Tolerance(limit, limit.end)
+
+
+def _growth_at(diagram: Diagram, limit: Limit, at: float, value: float) -> float:
+    return growth(linearised(diagram.varied(limit.variable.setting(value)).graph, (), at))
+
+
+class Limits(Mapping[str, Tolerance]):
+    """The answers to all questions about limits, by their names; each is sought when it is first wanted."""
+
+    def __init__(self, diagram: Diagram, limits: Sequence[Limit], at: float) -> None:
+        self._diagram, self._at = diagram, at
+        self._limits = {limit.label: limit for limit in limits}
+        self._found: dict[str, Tolerance] = {}
+
+    def __getitem__(self, label: str) -> Tolerance:
+        if label not in self._found:
+            self._found[label] = tolerance(self._diagram, self._limits[label], self._at)
+        return self._found[label]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._limits)
+
+    def __len__(self) -> int:
+        return len(self._limits)
