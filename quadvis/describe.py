@@ -13,8 +13,8 @@ import numpy as np
 from quadvis.block import Block, Declared, In, Out, Param, State
 from quadvis.catalogue import Catalogue, CatalogueError
 
-LEAST = 30  # columns left for the words about a port, however narrow the terminal
-WIDEST = 34  # columns for a parameter's default
+LEAST = 20  # columns left for the words about a port, however narrow the terminal
+WIDEST = 30  # columns for a default value
 LINE = 90  # columns of an example
 
 
@@ -54,7 +54,8 @@ def description(name: str, block: type[Block], width: int | None = None) -> str:
 def _input_row(port: In, direct: bool) -> tuple[str, ...]:
     words = [] if direct else ["no direct feedthrough"]
     if port.default is not None:
-        words.append("optional" if _is_nan(port.default) else f"optional, {value_text(port, port.default)}")
+        default = "" if _is_nan(port.default) else f", {_short(value_text(port, port.default))}"
+        words.append(f"optional{default}")
     return port.name, _kind(port), "; ".join(words), port.doc
 
 
@@ -65,13 +66,17 @@ def _output_row(port: Out) -> tuple[str, ...]:
 def _param_row(param: Param) -> tuple[str, ...]:
     default = default_text(param)
     given = "required" if default is None else f"= {default}"
-    given = given if len(given) <= WIDEST else f"{given[: WIDEST - 3]}..."
     words = [" | ".join(param.choices), bounds(param), "tunable" if param.tune else ""]
-    return param.name, "" if param.choices else _kind(param), given, "; ".join(filter(None, words)), param.doc
+    kind = "" if param.choices else _kind(param)
+    return param.name, kind, _short(given), "; ".join(filter(None, words)), param.doc
 
 
 def _state_row(state: State) -> tuple[str, ...]:
     return state.name, _kind(state), "continuous" if state.continuous else "", state.doc
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= WIDEST else f"{text[: WIDEST - 3]}..."
 
 
 def _kind(item: Declared) -> str:
