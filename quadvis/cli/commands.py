@@ -1,0 +1,239 @@
+"""What the commands do. They take the options as they are typed and return the exit code."""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+from quadvis.errors import QuadvisError, RunError
+
+FAILED = 1
+
+
+def _load(options: argparse.Namespace, **more: Any) -> Any:
+    from quadvis.diagram.diagram import load
+
+    given = {"variant": options.variant, "settings": options.set, "params": options.params}
+    return load(options.file, **given, **more)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run a diagram and print how it went; 1 if it misses what is expected."""
+    from quadvis.report import ProgressLine, summary_lines
+    from quadvis.run import run as run_diagram
+
+    diagram = _load(options, stop_time=options.stop_time, seed=options.seed)
+    log = _log_path(options.log, diagram)
+    gc.enable()
+    try:
+        with ProgressLine(diagram.duration) as progress:
+            result = run_diagram(diagram, log=log, progress=progress)
+    except (RunError, KeyboardInterrupt):
+        if log is not None and log.is_file():
+            print(f"log up to there: {log}", file=sys.stderr)
+        raise
+    if options.json:
+        _print_json(result.facts() | {"log": str(log) if log else None})
+    else:
+        print("\n".join(summary_lines(result)))
+        if log:
+            print(f"log: {log}")
+    return 0 if result.passed else FAILED
+
+
+def sweep(options: argparse.Namespace) -> int:
+    """Run a diagram at every point of a grid; 1 if a run fails."""
+    from quadvis.sweeps.summary import SweepLine, sweep_lines
+    from quadvis.sweeps.sweep import sweep as run_sweep
+
+    several = len(options.variant) > 1
+    over = [f"variant={','.join(options.variant)}"] * several + options.over
+    table_path = Path(options.output or _runs_folder("table", "-o") / f"{Path(options.file).stem}-sweep.csv")
+    plot = table_path.parent / f"{table_path.stem}.png" if options.plot is None else Path(options.plot)
+    if options.plot and (plot.suffix != ".png" or not plot.parent.is_dir()):
+        raise QuadvisError(
+            f"cannot write the plot '{plot}': give a name that ends in .png in a folder there is"
+        )
+    gc.enable()
+    with SweepLine() as progress:
+        table = run_sweep(
+            options.file, over, variant=None if several else next(iter(options.variant), None),
+            settings=options.set, params=options.params, stop_time=options.stop_time, seed=options.seed,
+            workers=options.workers, output=table_path, timings=options.timings, resume=options.resume,
+            logs=options.logs, progress=progress,
+        )  # fmt: skip
+    print("\n".join(sweep_lines(table, _width())))
+    print(f"table: {table_path}")
+    if options.plot != "":
+        table.plot(plot)
+        print(f"plot: {plot}")
+    return 0 if table.passed else FAILED
+
+
+def _log_path(given: str | None, diagram: Any) -> Path | None:
+    """Return where the log goes: where it is wanted, or in a folder that is made for it."""
+    if given is not None:
+        path = Path(given)
+        if given and path.is_dir():
+            raise QuadvisError(f"cannot write the log '{given}': it is a folder")
+        if given and not path.parent.is_dir():
+            raise QuadvisError(f"cannot write the log '{given}': there is no folder '{path.parent}'")
+        return path if given else None
+    sets = (file.name for file in diagram.parameter_files)
+    name = "-".join(filter(None, (diagram.name, diagram.variant, *sets)))
+    file = f"{re.sub(r'[^A-Za-z0-9_.-]+', '-', name).strip('-.') or 'run'}.mcap"
+    return _runs_folder("log", "--log") / file
+
+
+def _runs_folder(what: str, option: str) -> Path:
+    """Return the folder for what a command leaves behind unless an option names another place."""
+    path = Path("runs")
+    try:
+        path.mkdir(exist_ok=True)
+    except OSError as error:
+        problem = f"cannot make the folder '{path}' for the {what}: {(error.strerror or str(error)).lower()}"
+        raise QuadvisError(f"{problem}; name another place with {option}") from error
+    return path
+
+
+def check(options: argparse.Namespace) -> int:
+    """Tell all faults of a diagram; 2 if there are some."""
+    from quadvis.diagram.diagram import check as check_diagram
+    from quadvis.errors import DiagramError
+
+    try:
+        diagram = (
+            _load(options) if options.variant else check_diagram(options.file, options.set, options.params)
+        )
+    except DiagramError as error:
+        if not options.json:
+            raise
+        faults = [
+            {"file": fault.place.file, "line": fault.place.line, "column": fault.place.column,
+             "subject": fault.subject, "problem": fault.problem, "remedy": fault.remedy}
+            for fault in error.faults
+        ]  # fmt: skip
+        _print_json({"ok": False, "faults": faults})
+        return error.exit_code
+    tasks = ", ".join(task.name for task in diagram.graph.tasks)
+    count = len(diagram.graph.nodes)
+    if options.json:
+        _print_json({"ok": True, "diagram": diagram.name, "blocks": count, "hash": diagram.hash})
+    else:
+        print(f"{options.file}: {count} blocks in {tasks}: no fault")
+    return 0
+
+
+def list_blocks(options: argparse.Namespace) -> int:
+    """Print all blocks; 2 if a library cannot be loaded."""
+    from quadvis.catalogue import Catalogue
+    from quadvis.describe import catalogue_lines, facts
+
+    catalogue = Catalogue(Path())
+    if options.json:
+        _print_json([facts(name, catalogue.find(name)) for name in catalogue.names()])
+        return 0
+    lines, failures = catalogue_lines(catalogue, _width())
+    print("\n".join(lines))
+    if failures:
+        raise QuadvisError("\n".join(failures))
+    return 0
+
+
+def describe(options: argparse.Namespace) -> int:
+    """Print what a block declares."""
+    from quadvis.catalogue import Catalogue
+    from quadvis.describe import description, facts
+
+    block = Catalogue(Path()).find(options.block)
+    if options.json:
+        _print_json(facts(options.block, block))
+    else:
+        print(description(options.block, block, _width()))
+    return 0
+
+
+def analyse(options: argparse.Namespace) -> int:
+    """Print poles, margins and limits of a diagram's loop; 1 if it is not stable."""
+    from quadvis.analysis.questions import read_cuts, read_limits, read_time
+    from quadvis.analysis.report import analysis_lines, save_bode_plots
+
+    diagram = _load(options)
+    cuts, limits, at = read_cuts(options.cut), read_limits(options.vary), read_time(options.at)
+    analysis = diagram.analyse(cuts=cuts, limits=limits, at=at)
+    if not options.json:
+        for line in analysis_lines(analysis):
+            print(line, flush=True)
+    paths = [str(path) for path in save_bode_plots(analysis, Path(options.output))] if options.output else []
+    if options.json:
+        _print_json(analysis.facts() | {"plots": paths})
+    elif paths:
+        print("\n".join(paths))
+    return 0 if analysis.stable else FAILED
+
+
+def draw(options: argparse.Namespace) -> int:
+    """Write a diagram as SVG."""
+    diagram = _load(options)
+    text = diagram.draw()
+    return _write(text, options.output or f"{Path(options.file).stem}.svg")
+
+
+def plot(options: argparse.Namespace) -> int:
+    """Draw the figures of a log."""
+    from quadvis.output.log import read_log
+    from quadvis.output.plot import plot_log
+
+    for path in plot_log(read_log(options.log), Path(options.output) if options.output else None):
+        print(path)
+    return 0
+
+
+def schema(options: argparse.Namespace) -> int:
+    """Write the JSON schema of diagrams."""
+    from quadvis.catalogue import Catalogue
+    from quadvis.diagram.schema import diagram_schema
+
+    return _write(_json(diagram_schema(Catalogue(Path())), indent=1) + "\n", options.output or "-")
+
+
+def new(options: argparse.Namespace) -> int:
+    """Write the skeleton of a block or of a diagram."""
+    from quadvis.skeleton import new_block, new_diagram
+
+    for path in (new_block if options.kind == "block" else new_diagram)(options.name):
+        print(path)
+    return 0
+
+
+def _print_json(data: Any) -> None:
+    print(_json(data))
+
+
+def _json(data: Any, indent: int | None = None) -> str:
+    import json
+
+    return json.dumps(data, indent=indent, allow_nan=False)
+
+
+def _width() -> int | None:
+    """Return the width of the terminal; None where text goes elsewhere."""
+    from shutil import get_terminal_size
+
+    return get_terminal_size().columns if sys.stdout.isatty() else None
+
+
+def _write(text: str, output: str) -> int:
+    if output == "-":
+        sys.stdout.write(text)
+        return 0
+    try:
+        Path(output).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise QuadvisError(f"cannot write '{output}': {error.strerror}") from error
+    print(output)
+    return 0

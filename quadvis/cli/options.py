@@ -1,0 +1,124 @@
+"""What can be typed after `quadvis`."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from quadvis.cli import commands
+
+JSON_HELP = """\
+--json prints one object: diagram, variant, params, hash, seed, passed, duration_s, wall_s, cpu_s,
+real_time_factor, log;
+summary: {label: {signal, unit, and the statistics by name}};
+expect: [{expectation, signal, kind, unit, limit, found, met}].
+Numbers are in the unit beside them, null where there is none.
+Exit code: 0 all expectations met, 1 one is not or the run stopped, 2 bad input, 130 interrupted."""
+
+SWEEP_HELP = """\
+With several --over all combinations are run, the last one changing fastest. A name is that of a parameter as
+for --set, or seed, variant, params (files); 'none' stands for no variant and no file. A range is 0..29, or
+with a step 1..3 step 0.5 rad/s. The table has the axes, the numbers of summary and expectations with their
+units, passed, failure (why a run stopped) and the hash of the diagram; it does not depend on the number of
+processes. Wall times do, so they stand in it only with --timings.
+Exit code: 0 all runs passed, 1 one did not, 2 bad input, 130 interrupted (what is done is in the table)."""
+
+ANALYSE_HELP = """\
+Noise is taken away, Newton's method finds the steady state near, and the loop is linearised there;
+a sampled one is lifted over one hyperperiod. All signals of a cut are opened at once.
+--json prints one object: diagram, variant, hash, hyperperiod_s (0 if all is continuous), states, stable;
+poles: [[real, imaginary]] in 1/s; cuts: {name: {signals, gain_up, gain_down, phase_lag, phase_lead,
+delay, crossover}} in factors, rad, s and rad/s, null where nothing limits;
+limits: {name: {vary, unit, stable_to, reached, reason}}.
+Exit code: 0 stable, 1 not stable, 2 bad input, or a loop that cannot be linearised."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return what reads a command and its options."""
+    made = argparse.ArgumentParser(
+        prog="quadvis", description="Block diagrams in YAML that fly a four-rotor craft."
+    )
+    subparsers = made.add_subparsers(required=True, metavar="COMMAND")
+
+    def add(name: str, command: Any, words: str, epilog: str = "") -> argparse.ArgumentParser:
+        added: argparse.ArgumentParser = subparsers.add_parser(
+            name, help=words, description=f"{words[:1].upper()}{words[1:]}.", epilog=epilog,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )  # fmt: skip
+        added.set_defaults(command=command)
+        return added
+
+    run = add("run", commands.run, "run a diagram and judge it by what it expects", JSON_HELP)
+    _diagram_options(run)
+    run.add_argument("--stop-time", metavar="T", help="such as '20 s'; replaces the diagram's")
+    run.add_argument("--seed", type=int, metavar="N", help="seed of all noise; replaces the diagram's")
+    run.add_argument(
+        "--log", metavar="PATH", help="where to write the log; default runs/NAME.mcap, '' for none"
+    )
+    run.add_argument("--json", action="store_true", help="print one JSON object instead of the summary")
+    _sweep_options(add("sweep", commands.sweep, "run a diagram at every point of a grid", SWEEP_HELP))
+    check = add("check", commands.check, "check a diagram and tell all its faults")
+    _diagram_options(check)
+    check.add_argument("--json", action="store_true", help="print the faults as JSON")
+    blocks = add("list", commands.list_blocks, "list all blocks")
+    blocks.add_argument("--json", action="store_true", help="print all declarations as JSON")
+    describe = add("describe", commands.describe, "describe a block: ports, parameters, source")
+    describe.add_argument("block", metavar="BLOCK", help="such as signal.derivative")
+    describe.add_argument("--json", action="store_true", help="print its declarations as JSON")
+    analyse = add(
+        "analyse", commands.analyse, "linearise the closed loop: poles, margins, limits", ANALYSE_HELP
+    )
+    _diagram_options(analyse)
+    words = "a cut point more: one signal or several, such as torque=control/roll.torque; repeat it for more"
+    analyse.add_argument("--cut", action="append", default=[], metavar="[NAME=]SIGNAL,...", help=words)
+    words = "how far a parameter can go, such as eyes/camera.latency='100 ms..2 s'; repeat it for more"
+    analyse.add_argument("--vary", action="append", default=[], metavar="PARAM=FROM..TO", help=words)
+    analyse.add_argument("--at", metavar="T", help="run so long before the operating point is sought")
+    analyse.add_argument("--json", action="store_true", help="print one JSON object instead of the tables")
+    analyse.add_argument("--output", "-o", metavar="FOLDER", help="write Bode plots there, as PNG")
+    draw = add("draw", commands.draw, "draw a diagram as SVG")
+    _diagram_options(draw)
+    draw.add_argument("--output", "-o", metavar="PATH", help="default NAME.svg; '-' for standard output")
+    plot = add("plot", commands.plot, "draw the figures that a log's diagram declares, as PNG")
+    plot.add_argument("log", metavar="LOG")
+    plot.add_argument("--output", "-o", metavar="FOLDER", help="default: beside the log")
+    schema = add("schema", commands.schema, "print the JSON schema of diagrams, for editors")
+    schema.add_argument("--output", "-o", metavar="PATH", help="default: standard output")
+    new = add("new", commands.new, "write the skeleton of a block or of a diagram")
+    new.add_argument("kind", choices=("block", "diagram"))
+    new.add_argument("name", metavar="NAME", help="a block as group.block, a diagram as FILE.yaml")
+    return made
+
+
+def _diagram_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE", help="the diagram")
+    parser.add_argument("--variant", metavar="V", help="one of the diagram's variants")
+    _setting_options(parser)
+
+
+def _setting_options(parser: argparse.ArgumentParser) -> None:
+    words = "file of such settings, which apply before --set; repeat it for more, applied in their order"
+    parser.add_argument("--params", action="append", default=[], metavar="FILE", help=words)
+    words = "replace a parameter, such as control/roll.bandwidth='2 rad/s'; repeat it for more"
+    parser.add_argument("--set", action="append", default=[], metavar="BLOCK.PARAM=VALUE", help=words)
+
+
+def _sweep_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE", help="the diagram")
+    words = (
+        "seed=0..29, craft.lag='20 ms,50 ms', bandwidth='1..3 step 0.5 rad/s', variant=A,B; repeat for more"
+    )
+    parser.add_argument("--over", action="append", default=[], metavar="NAME=VALUES", help=words)
+    words = "one of the diagram's variants; several are swept over"
+    parser.add_argument("--variant", action="append", default=[], metavar="V", help=words)
+    _setting_options(parser)
+    parser.add_argument("--stop-time", metavar="T", help="such as '20 s'; replaces the diagram's")
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of every run; replaces the diagram's")
+    parser.add_argument("--workers", type=int, metavar="N", help="processes; default: one per processor")
+    words = "the table, .csv or .parquet; default runs/NAME-sweep.csv"
+    parser.add_argument("--output", "-o", metavar="TABLE", help=words)
+    words = "picture of the summary; default: beside the table, '' for none"
+    parser.add_argument("--plot", metavar="PNG", help=words)
+    parser.add_argument("--logs", metavar="FOLDER", help="write a log of every run; default: none")
+    parser.add_argument("--resume", action="store_true", help="keep the runs that the table has already")
+    parser.add_argument("--timings", action="store_true", help="add the wall time of each run to the table")
