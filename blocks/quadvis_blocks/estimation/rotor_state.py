@@ -33,7 +33,10 @@ class RotorState(Block):
         (5e-3, 5e-3, 9e-3), type="float64[3]", unit="kg*m^2", above=0.0, doc="about roll, pitch and yaw axis"
     )
     torque_ratio = Param(0.016, unit="m", above=0.0, doc="c, a rotor's drag torque over its thrust")
-    initial = Param(4.905, unit="N", doc="collective thrust at the start; default the weight of 0.5 kg")
+    mass = Param(
+        0.5, unit="kg", above=0.0, doc="mass of the craft, whose weight the rotors carry at the start"
+    )
+    gravity = Param(9.81, unit="m/s^2", above=0.0, doc="g")
     times = State(f"float64[{CAPACITY}]", unit="s")  # at which commands arrive
     commands = State(f"float64[{CAPACITY},4]")
     count = State("int64", 1)
@@ -41,7 +44,7 @@ class RotorState(Block):
 
     def start(self) -> None:
         """Begin in a trimmed hover."""
-        start(self.times, self.commands, self.now, self.initial)
+        start(self.times, self.commands, self.now, self.mass * self.gravity)
         self.count = 1
 
     def output(self, time: float) -> tuple[float, Any]:

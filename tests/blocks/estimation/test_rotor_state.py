@@ -40,7 +40,7 @@ def test_it_turns_as_the_simulated_craft_does_behind_its_radio() -> None:
 
 
 def test_the_weight_is_carried_before_any_command() -> None:
-    result = drive(RotorState(initial=3.0, delay=0.5), thrust=np.ones(4), rate="100 Hz", steps=50)
+    result = drive(RotorState(mass=0.3, gravity=10.0, delay=0.5), thrust=np.ones(4), rate="100 Hz", steps=50)
     assert (result.collective == 3.0).all() and (result.torque == 0.0).all()
 
 
