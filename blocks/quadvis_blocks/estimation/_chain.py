@@ -36,14 +36,14 @@ def begin(chains: Any, position: Any, sigma: Any, disturbance: Any) -> None:
 def predict(chains: Any, before: Any, after: Any, step: float, model: Any) -> None:
     """Carry estimates over a step (s) on which the known acceleration goes from `before` to `after` (3,).
 
-    `model` (7,) has the densities of w (m/s^2 / sqrt(Hz)) and the deviations of d for each axis, and the
+    `model` (9,) has for each axis the density of w (m/s^2 / sqrt(Hz)), then the deviation of d, then its
     decay time. The noise of d reaches p and v as if d did not decay within the step.
     """
-    decay = float(model[6])
-    keep = math.exp(-step / decay)
-    pushed = -decay * math.expm1(-step / decay)  # velocity by disturbance
-    moved = decay * (step - pushed)  # position by disturbance
     for axis in range(3):
+        decay = float(model[6 + axis])
+        keep = math.exp(-step / decay)
+        pushed = -decay * math.expm1(-step / decay)  # velocity by disturbance
+        moved = decay * (step - pushed)  # position by disturbance
         row = chains[axis]
         v, d, pv, pd = float(row[1]), float(row[2]), float(row[4]), float(row[5])
         vv, vd, dd = float(row[6]), float(row[7]), float(row[8])

@@ -81,10 +81,13 @@ class PositionFilter(Block):
         doc="white noise of the acceleration: velocity deviates by this times the root of the time",
     )  # fmt: skip
     wander = Param(
-        (0.05, 0.05, 0.05), type="float64[3]", unit="m/s^2", above=0.0, tune=True,
+        (0.1, 0.1, 0.1), type="float64[3]", unit="m/s^2", above=0.0, tune=True,
         doc="standard deviation of the disturbance",
     )  # fmt: skip
-    decay = Param(5.0, unit="s", above=0.0, tune=True, doc="correlation time of the disturbance")
+    decay = Param(
+        (10.0, 10.0, 10.0), type="float64[3]", unit="s", above=0.0, tune=True,
+        doc="correlation time of the disturbance; one that lasts is pulled to zero by it a little",
+    )  # fmt: skip
     gate = Param(5.0, above=0.0, tune=True, doc="greatest innovation in standard deviations")
     tolerance = Param(0.0, unit="m", min=0.0, tune=True, doc="innovation that is never too great")
     reset_after = Param(1.0, unit="s", above=0.0, tune=True, doc="how long to refuse frames before believing")
@@ -163,8 +166,8 @@ def _tick(time: float, acceleration: Any) -> Any:
     return np.array((time, acceleration[0], acceleration[1], acceleration[2]))
 
 
-def _model(noise: Any, wander: Any, decay: float) -> Any:
-    return np.array((noise[0], noise[1], noise[2], wander[0], wander[1], wander[2], decay))
+def _model(noise: Any, wander: Any, decay: Any) -> Any:
+    return np.concatenate((noise, wander, decay))
 
 
 def _frame(position: Any, stamp: float, valid: bool, measured: Any, noise: Any, last: float) -> Any:

@@ -14,7 +14,7 @@ RATE = "20 Hz"
 NOISE, WHITE, WANDER, DECAY = 0.02, 0.05, 0.3, 40.0
 START = (0.5, 0.4)
 MODEL: dict[str, Any] = {
-    "noise": (NOISE,) * 3, "acceleration_noise": (WHITE,) * 3, "wander": (WANDER,) * 3, "decay": DECAY,
+    "noise": (NOISE,) * 3, "acceleration_noise": (WHITE,) * 3, "wander": (WANDER,) * 3, "decay": (DECAY,) * 3,
     "initial_sigma": START,
 }  # fmt: skip
 
