@@ -14,9 +14,11 @@ INSTANT = 1e-9  # s
 class HoldValid(Block):
     """The last valid value of a measurement, how old it is, and whether that is young enough.
 
-    A value is valid if ``valid`` is true and all its elements are finite, so NaN never passes. The age counts
-    from the value's ``stamp``, or from the tick at which it came if no stamp is connected. Before the first
-    valid value the output is ``initial``, the age counts from the start and ``ok`` is false.
+    A value is valid if ``valid`` is true and all its elements are finite, so NaN never passes, and if its
+    ``stamp`` is not older than that of the value held: what was overtaken on its way comes too late. The age
+    counts from the stamp, or from the tick at which the value came if no stamp is connected; a stamp that is
+    ahead of the time counts as now. Before the first valid value the output is ``initial``, the age counts
+    from the start and ``ok`` is false.
     """
 
     max_age = Param(0.25, unit="s", min=0.0, tune=True, doc="greatest age (inclusive) that is ok")
@@ -35,23 +37,25 @@ class HoldValid(Block):
         self, value: Any, valid: bool, stamp: float, initial: Any, time: float
     ) -> tuple[Any, float, bool]:
         """Return the value if it is valid, else the last one that was."""
-        if valid and all_finite(value):
-            held, measured, seen = 1.0 * value, _instant(stamp, time), True
+        made = _instant(stamp, time)
+        if valid and all_finite(value) and not (self.seen and made < self.measured):
+            held, measured, seen = 1.0 * value, made, True
         elif self.seen:
             held, measured, seen = 1.0 * self.last, self.measured, True
         else:
             held, measured, seen = 1.0 * initial, 0.0, False
-        age = max(0.0, time - measured)
+        age = time - measured
         return held, age, seen and age <= self.max_age + INSTANT
 
     def update(self, value: Any, valid: bool, stamp: float, time: float) -> None:
         """Keep the value if it is valid."""
-        if valid and all_finite(value):
+        made = _instant(stamp, time)
+        if valid and all_finite(value) and not (self.seen and made < self.measured):
             self.last = value
-            self.measured = _instant(stamp, time)
+            self.measured = made
             self.seen = True
 
 
 def _instant(stamp: float, time: float) -> float:
-    """Return the stamp, or now if there is none."""
-    return time if math.isnan(stamp) else stamp
+    """Return the stamp, or now if there is none or it is ahead of the time."""
+    return time if math.isnan(stamp) else min(stamp, time)

@@ -34,6 +34,17 @@ def test_the_age_counts_from_the_stamp_of_the_measurement() -> None:
     assert result.age == pytest.approx([0.1, 0.1, 0.2])
 
 
+def test_a_value_that_was_overtaken_on_its_way_is_left_out() -> None:
+    result = drive(HoldValid(), value=[1.0, 3.0, 2.0, 4.0], stamp=[-0.2, 0.0, -0.1, 0.1], rate="10 Hz")
+    assert result.held.tolist() == [1.0, 3.0, 3.0, 4.0]
+    assert result.age == pytest.approx([0.2, 0.1, 0.2, 0.2])
+
+
+def test_a_clock_that_was_ahead_once_does_not_shut_out_what_comes_later() -> None:
+    result = drive(HoldValid(), value=[1.0, 2.0, 3.0], stamp=[100.0, 0.1, 0.2], rate="10 Hz")
+    assert result.held.tolist() == [1.0, 2.0, 3.0]
+
+
 def test_one_missing_element_makes_the_whole_array_invalid() -> None:
     result = drive(HoldValid(), value=[[1.0, 2.0], [3.0, NAN], [5.0, 6.0]])
     assert np.array_equal(result.held, [[1.0, 2.0], [1.0, 2.0], [5.0, 6.0]])
