@@ -27,9 +27,15 @@ def jumps(result: Any) -> np.ndarray:
     return np.abs(np.diff(controls, axis=0)) * changed
 
 
-@pytest.mark.parametrize("name", ["step", "trajectory", "blackout", "landing", "takeover"])
-def test_the_flight_meets_what_its_diagram_expects(name: str) -> None:
-    assert fly(name).passed
+@pytest.mark.parametrize(
+    ("name", "variant"),
+    [
+        ("step", None), ("trajectory", None), ("blackout", None), ("blackout", "fused"), ("landing", None),
+        ("landing", "fused"), ("takeover", None),
+    ],
+)  # fmt: skip
+def test_the_flight_meets_what_its_diagram_expects(name: str, variant: str | None) -> None:
+    assert fly(name, variant).passed
 
 
 def test_without_noise_and_wind_the_steps_are_those_of_the_paper_s_poles() -> None:
@@ -119,8 +125,25 @@ def test_the_craft_outlasts_a_blackout_of_three_seconds_in_any_wind(seed: int) -
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", range(1, 6))
+def test_the_better_design_outlasts_it_within_six_decimetres_of_its_target(seed: int) -> None:
+    result = fly("blackout", "fused", seed=seed)
+    assert result.passed
+    assert result["excursion.y"].max() <= 0.6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(1, 11))
+def test_the_better_design_lands_after_eight_seconds_of_blackout_within_two_metres(seed: int) -> None:
+    result = fly("landing", "fused_blackout", seed=seed)
+    assert result["craft/ground.impact"][-1] <= 0.35
+    assert result["supervision/landing.landed"][-1]
+    assert result["excursion.y"].max() <= 2.0
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(1, 9))
-@pytest.mark.parametrize("variant", [None, "blackout"])
+@pytest.mark.parametrize("variant", [None, "blackout", "fused"])
 def test_no_touch_down_is_harder_than_it_may_be(variant: str | None, seed: int) -> None:
     assert fly("landing", variant, seed)["craft/ground.impact"][-1] <= 0.35
 

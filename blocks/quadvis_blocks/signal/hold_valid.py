@@ -15,10 +15,10 @@ class HoldValid(Block):
     """The last valid value of a measurement, how old it is, and whether that is young enough.
 
     A value is valid if ``valid`` is true and all its elements are finite, so NaN never passes, and if its
-    ``stamp`` is not older than that of the value held: what was overtaken on its way comes too late. The age
-    counts from the stamp, or from the tick at which the value came if no stamp is connected; a stamp that is
-    ahead of the time counts as now. Before the first valid value the output is ``initial``, the age counts
-    from the start and ``ok`` is false.
+    ``stamp`` is newer than that of the value held: a frame that was overtaken on its way comes too late, and
+    one that is there still is no news. The age counts from the stamp, or from the tick at which the value
+    came if no stamp is connected; a stamp that is ahead of the time counts as now. Before the first valid
+    value the output is ``initial``, the age counts from the start and ``ok`` is false.
     """
 
     max_age = Param(0.25, unit="s", min=0.0, tune=True, doc="greatest age (inclusive) that is ok")
@@ -38,7 +38,7 @@ class HoldValid(Block):
     ) -> tuple[Any, float, bool]:
         """Return the value if it is valid, else the last one that was."""
         made = _instant(stamp, time)
-        if valid and all_finite(value) and not (self.seen and made < self.measured):
+        if valid and all_finite(value) and not (self.seen and made <= self.measured):
             held, measured, seen = 1.0 * value, made, True
         elif self.seen:
             held, measured, seen = 1.0 * self.last, self.measured, True
@@ -50,7 +50,7 @@ class HoldValid(Block):
     def update(self, value: Any, valid: bool, stamp: float, time: float) -> None:
         """Keep the value if it is valid."""
         made = _instant(stamp, time)
-        if valid and all_finite(value) and not (self.seen and made < self.measured):
+        if valid and all_finite(value) and not (self.seen and made <= self.measured):
             self.last = value
             self.measured = made
             self.seen = True

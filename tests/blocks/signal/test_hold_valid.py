@@ -40,6 +40,12 @@ def test_a_value_that_was_overtaken_on_its_way_is_left_out() -> None:
     assert result.age == pytest.approx([0.2, 0.1, 0.2, 0.2])
 
 
+def test_a_frame_that_is_there_still_is_no_news() -> None:
+    result = drive(HoldValid(), value=[1.0, 2.0, 3.0], stamp=[-0.1, -0.1, 0.1], rate="10 Hz")
+    assert result.held.tolist() == [1.0, 1.0, 3.0]
+    assert result.age == pytest.approx([0.1, 0.2, 0.1])
+
+
 def test_a_clock_that_was_ahead_once_does_not_shut_out_what_comes_later() -> None:
     result = drive(HoldValid(), value=[1.0, 2.0, 3.0], stamp=[100.0, 0.1, 0.2], rate="10 Hz")
     assert result.held.tolist() == [1.0, 2.0, 3.0]
