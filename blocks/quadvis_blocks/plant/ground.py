@@ -13,38 +13,73 @@ SLIP = 0.01  # m/s; slower than this the friction is viscous
 
 
 class Ground(Block):
-    """The force of level ground on the craft: a spring and a damper that only push, and dry friction.
+    """Force and torque of level ground on the craft: four feet with springs and dampers that only push.
 
-    With d = height - h > 0 the normal force is ``max(0, stiffness d - damping h')``; friction opposes the
-    horizontal velocity with ``friction`` times that. Above the ground the force is zero. It acts on the
-    centre of mass: the ground does not level the craft. The defaults carry 0.5 kg on 1 cm, well damped.
+    The feet stand at ``feet`` from the centre, under the rotors. One that is d = ``height`` - h below the
+    ground is pushed up with ``max(0, stiffness d - damping h') / 4``, and its height h is that of the craft
+    and what roll and pitch add: so the ground levels a craft that stands on it. Dry friction opposes the
+    horizontal velocity, and the turning about the yaw axis, with ``friction`` times the force of all feet.
+    Above the ground all is zero. The defaults carry 0.5 kg on 1 cm, well damped, upright as well as about
+    roll and pitch. Without ``attitude`` and ``rates`` the craft is level.
+
+    Error: friction acts at the height of the centre of mass, so it tips nothing over.
     """
 
     height = Param(0.0, unit="m", tune=True, doc="height of the craft as its feet touch the ground")
+    feet = Param(0.15, unit="m", min=0.0, doc="distance of each foot from the centre; 0 levels nothing")
     stiffness = Param(500.0, unit="N/m", above=0.0, tune=True, doc="force for each metre of its feet bent")
     damping = Param(20.0, unit="N*s/m", min=0.0, tune=True, doc="force for each m/s of sinking")
     friction = Param(0.6, min=0.0, tune=True, doc="friction over normal force")
     position = In("float64[3]", unit="m", doc="x, y, h of the craft")
     velocity = In("float64[3]", unit="m/s", doc="rate of change of the position")
+    attitude = In("float64[3]", unit="rad", default=(0.0, 0.0, 0.0), doc="its roll, pitch, yaw")
+    rates = In("float64[3]", unit="rad/s", default=(0.0, 0.0, 0.0), doc="about roll, pitch and yaw axis")
     force = Out("float64[3]", unit="N", doc="force on the craft along x, y, h")
-    contact = Out("bool", doc="whether the feet touch the ground")
-    impact = Out(unit="m/s", doc="greatest speed at which they came down on it so far")
+    torque = Out("float64[3]", unit="N*m", doc="torque on the craft about roll, pitch and yaw axis")
+    contact = Out("bool", doc="whether a foot touches the ground")
+    impact = Out(unit="m/s", doc="greatest speed at which the craft came down on it so far")
     touching = State("bool")
     hardest = State(unit="m/s")
 
-    def output(self, position: Any, velocity: Any) -> tuple[Any, bool, float]:
-        """Return the force, whether there is contact, and how hard it was."""
-        depth = self.height - position[2]
-        if depth <= 0.0:
-            return np.zeros(3), False, self.hardest
-        impact = self.hardest if self.touching else max(self.hardest, -velocity[2])
-        normal = max(0.0, self.stiffness * depth - self.damping * velocity[2])
+    def output(self, position: Any, velocity: Any, attitude: Any, rates: Any) -> tuple[Any, Any, bool, float]:
+        """Return force and torque, whether there is contact, and how hard it was."""
+        depth, climb = self.height - float(position[2]), float(velocity[2])
+        if depth + self.feet <= 0.0:
+            return np.zeros(3), np.zeros(3), False, self.hardest
+        nose, side, upright = _tilt(attitude)
+        span, spring, damper = self.feet, 0.25 * self.stiffness, 0.25 * self.damping
+        if depth + span * max(abs(nose), abs(side)) <= 0.0:
+            return np.zeros(3), np.zeros(3), False, self.hardest
+        impact = self.hardest if self.touching else max(self.hardest, -climb)
+        arm = span * upright
+        pitching, rolling = arm * float(rates[1]), arm * float(rates[0])
+        front = max(0.0, spring * (depth - span * nose) - damper * (climb + pitching))
+        rear = max(0.0, spring * (depth + span * nose) - damper * (climb - pitching))
+        right = max(0.0, spring * (depth + span * side) - damper * (climb - rolling))
+        left = max(0.0, spring * (depth - span * side) - damper * (climb + rolling))
+        normal = front + right + rear + left
         drag = self.friction * normal / max(SLIP, math.hypot(velocity[0], velocity[1]))
-        return np.array((-drag * velocity[0], -drag * velocity[1], normal)), True, impact
+        turning = span * float(rates[2])
+        brake = self.friction * normal * span * turning / max(SLIP, abs(turning))
+        return (
+            np.array((-drag * velocity[0], -drag * velocity[1], normal)),
+            np.array((arm * (left - right), arm * (front - rear), -brake)),
+            True,
+            impact,
+        )
 
-    def update(self, position: Any, velocity: Any) -> None:
+    def update(self, position: Any, velocity: Any, attitude: Any) -> None:
         """Keep the speed of a touch-down."""
-        touching = bool(position[2] < self.height)
+        nose, side, _ = _tilt(attitude)
+        lowest = float(position[2]) - self.feet * max(abs(nose), abs(side))
+        touching = lowest < self.height
         if touching and not self.touching:
-            self.hardest = max(self.hardest, -velocity[2])
+            self.hardest = max(self.hardest, -float(velocity[2]))
         self.touching = touching
+
+
+def _tilt(attitude: Any) -> tuple[float, float, float]:
+    """Return how much nose and left side rise for each metre from the centre, and how upright it is."""
+    roll, pitch = float(attitude[0]), float(attitude[1])
+    cosine = math.cos(pitch)
+    return math.sin(pitch), math.sin(roll) * cosine, math.cos(roll) * cosine

@@ -23,7 +23,8 @@ class Rotorcraft(Block):
     Each thrust follows its command, held to the limits, with a first-order lag; u is their sum, and the
     torques over inertia are l (f3 - f1) / Ix, l (f0 - f2) / Iy, c (f0 + f2 - f1 - f3) / Iz, each plus its
     ``torque_bias``. With a ``bias_sign`` of ``random`` these biases are sizes: each takes a sign of its own
-    at the start of a run.
+    at the start of a run. What else pulls and turns the craft, such as the ground or a tether, comes in as
+    ``force`` and ``torque``.
 
     Model ``paper``, equations (11)-(16): m x'' = -u sin(pitch), m y'' = u cos(pitch) sin(roll), m h'' = u
     cos(pitch) cos(roll) - m g, and the angles are double integrals of the torques (14 with its missing dots).
@@ -65,6 +66,12 @@ class Rotorcraft(Block):
     )
     thrust = In("float64[4]", unit="N", doc="commanded thrust of each rotor: front, right, rear, left")
     wind = In("float64[3]", unit="m/s", default=(0.0, 0.0, 0.0), doc="velocity of the air along x, y, h")
+    force = In(
+        "float64[3]", unit="N", default=(0.0, 0.0, 0.0), doc="other force on its centre of mass along x, y, h"
+    )
+    torque = In(
+        "float64[3]", unit="N*m", default=(0.0, 0.0, 0.0), doc="other torque about roll, pitch and yaw axis"
+    )
     position = Out("float64[3]", unit="m", doc="x, y, h")
     velocity = Out("float64[3]", unit="m/s", doc="rate of change of the position")
     attitude = Out("float64[3]", unit="rad", doc="roll, pitch, yaw; yaw in (-pi, pi]")
@@ -118,7 +125,7 @@ class Rotorcraft(Block):
             np.array((self.p, self.q, self.r)),
         )
 
-    def deriv(self, thrust: Any, wind: Any) -> tuple[float, ...]:
+    def deriv(self, thrust: Any, wind: Any, force: Any, torque: Any) -> tuple[float, ...]:
         """Return the rates of change of rotors, position, velocity, attitude and rates."""
         front, right, rear, left = self.front, self.right, self.rear, self.left
         roll, pitch, p, q, r = self.roll, self.pitch, self.p, self.q, self.r
@@ -126,9 +133,10 @@ class Rotorcraft(Block):
         least, most, lag = self.thrust_min, self.thrust_max, self.lag
         arm, inertia, bias, signs = self.arm, self.inertia, self.torque_bias, self.signs
         ix, iy, iz = float(inertia[0]), float(inertia[1]), float(inertia[2])
-        p_rate = arm * (left - right) / ix + float(signs[0] * bias[0])
-        q_rate = arm * (front - rear) / iy + float(signs[1] * bias[1])
-        r_rate = self.torque_ratio * (front + rear - right - left) / iz + float(signs[2] * bias[2])
+        p_rate = (arm * (left - right) + float(torque[0])) / ix + float(signs[0] * bias[0])
+        q_rate = (arm * (front - rear) + float(torque[1])) / iy + float(signs[1] * bias[1])
+        turning = self.torque_ratio * (front + rear - right - left) + float(torque[2])
+        r_rate = turning / iz + float(signs[2] * bias[2])
         if self.model == PAPER:
             roll_rate, pitch_rate, yaw_rate = p, q, r
             forward, rightward, upward = _paper_lift(roll, pitch)
@@ -138,16 +146,17 @@ class Rotorcraft(Block):
             r_rate += (ix - iy) / iz * p * q
             roll_rate, pitch_rate, yaw_rate = _angle_rates(roll, pitch, p, q, r)
             forward, rightward, upward = _lift(roll, pitch, self.yaw)
-        lift, drag = (front + right + rear + left) / self.mass, self.drag / self.mass
+        mass, drag = self.mass, self.drag
+        lift = front + right + rear + left
         return (
             (_within(float(thrust[0]), least, most) - front) / lag,
             (_within(float(thrust[1]), least, most) - right) / lag,
             (_within(float(thrust[2]), least, most) - rear) / lag,
             (_within(float(thrust[3]), least, most) - left) / lag,
             vx, vy, vh,
-            lift * forward + drag * (float(wind[0]) - vx),
-            lift * rightward + drag * (float(wind[1]) - vy),
-            lift * upward + drag * (float(wind[2]) - vh) - self.gravity,
+            (lift * forward + drag * (float(wind[0]) - vx) + float(force[0])) / mass,
+            (lift * rightward + drag * (float(wind[1]) - vy) + float(force[1])) / mass,
+            (lift * upward + drag * (float(wind[2]) - vh) + float(force[2])) / mass - self.gravity,
             roll_rate, pitch_rate, yaw_rate,
             p_rate, q_rate, r_rate,
         )  # fmt: skip

@@ -16,11 +16,13 @@ angles = st.tuples(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8), st.floats(-3.0, 3
 
 
 def fly(
-    thrust: Any = HOVER, seconds: float = 1.0, rate: int = 200, wind: Any = (0, 0, 0), **parameters: Any
-) -> Driven:
+    thrust: Any = HOVER, seconds: float = 1.0, rate: int = 200, wind: Any = (0, 0, 0),
+    force: Any = (0, 0, 0), torque: Any = (0, 0, 0), **parameters: Any,
+) -> Driven:  # fmt: skip
     return drive(
-        Rotorcraft(**parameters), thrust=thrust, wind=wind, rate=f"{rate} Hz", steps=round(seconds * rate) + 1
-    )
+        Rotorcraft(**parameters), thrust=thrust, wind=wind, force=force, torque=torque,
+        rate=f"{rate} Hz", steps=round(seconds * rate) + 1,
+    )  # fmt: skip
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
@@ -63,6 +65,15 @@ def test_signs_nose_up_goes_back_right_side_down_goes_right(model: str) -> None:
     right = fly(model=model, initial_attitude=(0.1, 0.0, 0.0)).velocity[-1]
     assert back[0] < -0.5 and abs(back[1]) < 1e-9
     assert right[1] > 0.5 and abs(right[0]) < 1e-9
+
+
+@BOTH
+def test_another_force_accelerates_it_by_its_mass_and_another_torque_by_its_inertia(model: str) -> None:
+    pulled = fly(model=model, drag=0.0, force=[0.1, -0.2, 0.3])
+    assert pulled.velocity[-1] == pytest.approx([0.2, -0.4, 0.6], abs=1e-9)
+    for axis, inertia in enumerate((5e-3, 5e-3, 9e-3)):
+        turned = fly(model=model, torque=1e-3 * np.eye(3)[axis])
+        assert turned.rates[-1] == pytest.approx(1e-3 / inertia * np.eye(3)[axis], abs=1e-9)
 
 
 @BOTH
