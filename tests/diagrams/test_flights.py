@@ -31,7 +31,7 @@ def jumps(result: Any) -> np.ndarray:
     ("name", "variant"),
     [
         ("step", None), ("trajectory", None), ("blackout", None), ("blackout", "fused"), ("landing", None),
-        ("landing", "fused"), ("takeover", None),
+        ("landing", "fused"), ("takeover", None), ("takeover", "fused"),
     ],
 )  # fmt: skip
 def test_the_flight_meets_what_its_diagram_expects(name: str, variant: str | None) -> None:
@@ -61,8 +61,9 @@ def test_a_blackout_of_eight_seconds_ends_softly_on_the_ground() -> None:
     assert result["supervision/landing.landed"][-1]
 
 
-def test_no_control_jumps_in_a_take_over_by_stick_or_by_switch() -> None:
-    found = jumps(fly("takeover"))
+@pytest.mark.parametrize("variant", [None, "fused"])
+def test_no_control_jumps_in_a_take_over_by_stick_or_by_switch(variant: str | None) -> None:
+    found = jumps(fly("takeover", variant))
     assert found.max() == 0.0
     assert (np.round(found / LSB) == 0).all()
 
@@ -84,9 +85,9 @@ def test_lost_vision_reaches_the_control_within_three_tenths_of_a_second() -> No
 
 def test_a_hanging_imu_hands_roll_and_pitch_to_nobody_and_back_without_a_jump(tmp_path: Path) -> None:
     text = (DIAGRAMS / "takeover.yaml").read_text().replace("parts/", f"{DIAGRAMS}/parts/")
-    gyro = "      rates: {from: craft.rates, across: sample}\n"
+    gyro = "\n      rates: {from: craft.rates, across: sample}\n"
     assert text.count(gyro) == 2
-    text = text.replace(gyro, "      rates: gyro.y\n").replace(
+    text = text.replace(gyro, "\n      rates: gyro.y\n").replace(
         "  setpoint:\n",
         "  gyro:\n    block: signal.outage\n    rate: control\n"
         "    with: {during: {value: [[5, 5.4]], unit: s}}\n"
@@ -111,6 +112,23 @@ def test_a_lost_radio_neither_stops_the_law_nor_looks_like_a_stick_that_moves() 
     stale = result["supervision/sticks.stale"]
     assert times[stale][0] == pytest.approx(32.5, abs=0.051) and times[stale][-1] < 34.0
     assert (result["control/switch.source"][stale] == AUTOMATIC).all()
+
+
+def test_commands_that_nobody_renews_are_not_sent_for_long(tmp_path: Path) -> None:
+    text = (DIAGRAMS / "takeover.yaml").read_text().replace("parts/", f"{DIAGRAMS}/parts/")
+    gate = "    in: {u: control.thrust, stamp: control.stamp}\n"
+    assert text.count(gate) == 1
+    text = text.replace(gate, gate.replace("control.stamp", "sender.y")).replace(
+        "  gate:\n",
+        "  sender:\n    block: signal.outage\n    rate: control\n"
+        "    with: {during: {value: [[5, 5.2], [6, 6.5]], unit: s}}\n    in: {u: control.stamp}\n  gate:\n",
+    )
+    path = tmp_path / "silent.yaml"
+    path.write_text(text)
+    result = quadvis.load(path, stop_time=7).run()
+    times, sent = result.times("gate.y"), result["gate.y"]
+    idle = times[(sent == 0.0).all(axis=1)]
+    assert idle == pytest.approx([6.25, 6.3, 6.35, 6.4, 6.45])  # the last command was made at 5.95 s
 
 
 @pytest.mark.slow

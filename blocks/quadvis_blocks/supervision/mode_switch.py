@@ -56,6 +56,7 @@ class ModeSwitch(Block):
         doc="what goes to the mixer: collective; roll, pitch and yaw torque over inertia",
     )
     source = Out("int64[4]", doc="whose it is: 0 pilot, 1 control law, 2 neutral, 3 idle")
+    stamp = Out(unit="s", doc="instant at which they were made: now")
     last = State("float64[4]")
     offset = State("float64[4]")
     owner = State("int64[4]")
@@ -71,8 +72,9 @@ class ModeSwitch(Block):
         automatic: Any,
         neutral: Any,
         idle: bool,
-    ) -> tuple[Any, Any]:
-        """Return the controls and their sources."""
+        time: float,
+    ) -> tuple[Any, Any, float]:
+        """Return the controls, their sources and the time."""
         law = np.array((collective, roll, pitch, yaw))
         controls, source = np.empty(CHANNELS), np.empty(CHANNELS, np.int64)
         for channel in range(CHANNELS):
@@ -82,7 +84,7 @@ class ModeSwitch(Block):
             changed = owner != self.owner[channel]
             controls[channel] = _handed(value, smooth, changed, self.last[channel], self.offset[channel])[0]
             source[channel] = owner
-        return controls, source
+        return controls, source, time
 
     def update(
         self,

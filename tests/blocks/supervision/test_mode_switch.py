@@ -111,3 +111,8 @@ def test_a_bare_switch_at_one_metre_would_jump_by_what_the_law_wants() -> None:
     bumpless = switch([4.905, 0.0, 0.0, 0.0], law, series).controls[:, 1]
     assert np.abs(np.diff(bare)).max() == 1.6
     assert np.abs(np.diff(bumpless)).max() == pytest.approx(1.6 * -math.expm1(-0.05 / 0.5))
+
+
+def test_controls_carry_the_time_at_which_they_were_made() -> None:
+    found = switch(np.zeros((STEPS, 4)), np.zeros(4), np.ones((STEPS, 4), bool))
+    assert found.stamp == pytest.approx(found.time)
