@@ -151,6 +151,14 @@ def test_the_better_design_outlasts_it_within_six_decimetres_of_its_target(seed:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", range(1, 4))
+def test_half_the_frames_keep_the_better_design_in_the_air(seed: int) -> None:
+    result = fly("blackout", "fused", seed=seed, settings={"eyes/camera.drop_rate": "0.5"})
+    assert result["excursion.y"].max() <= 0.6
+    assert result["supervision/failsafe.mode"].max() <= 3  # AUTOMATIC and COAST
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(1, 11))
 def test_the_better_design_lands_after_eight_seconds_of_blackout_within_two_metres(seed: int) -> None:
     result = fly("landing", "fused_blackout", seed=seed)

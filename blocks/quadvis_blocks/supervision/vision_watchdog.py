@@ -7,6 +7,7 @@ import math
 from quadvis.block import Block, In, Out, Param, ParameterError, State
 
 FRESH, COAST, LEVEL, LAND = range(4)
+OF_TRUST, OF_FRAME = range(2)
 NONE, NO_FRAMES, TARGET_LOST, REARMING = range(4)
 INSTANT = 1e-9  # s
 
@@ -25,9 +26,11 @@ class VisionWatchdog(Block):
 
     The age counts from the stamp of the frame, not from its arrival. Vision is gone since the last good frame
     of the FRESH state, or since the start; single frames in between do not stop that clock, they only put
-    off the next state for as long as they are fresh. It goes down at most one state a tick, and back to FRESH
-    only after ``frames`` good frames in a row, never stale in between, over at least ``proof``. It starts in
-    COAST: vision has to prove itself first.
+    off the next state for as long as they are fresh. With ``clock: frame``, for an estimator that makes the
+    most of single frames, vision is gone since the last good frame of any state.
+
+    It goes down at most one state a tick, and back to FRESH only after ``frames`` good frames in a row, never
+    stale in between, over at least ``proof``. It starts in COAST: vision has to prove itself first.
 
     Reasons: 0 none, 1 no new frames, 2 frames come but the target is not found, 3 too few good frames yet.
 
@@ -40,6 +43,9 @@ class VisionWatchdog(Block):
     land = Param(5.0, unit="s", above=0.0, tune=True, doc="time without vision to LAND")
     frames = Param(5, type="int64", min=1, tune=True, doc="good frames in a row to be FRESH again")
     proof = Param(0.5, unit="s", min=0.0, tune=True, doc="least time from the first of them to the last")
+    clock = Param(
+        "trust", choices=("trust", "frame"), doc="vision is gone since it was FRESH, or since a frame"
+    )
     stamp = In(unit="s", doc="instant of the newest frame; NaN for none yet")
     valid = In("bool", doc="whether it gave a pose")
     state = Out("int64", doc="0 FRESH, 1 COAST, 2 LEVEL, 3 LAND")
@@ -93,7 +99,7 @@ class VisionWatchdog(Block):
         self.now = _state(self.now, stale, proven, time - self.since, self.level, self.land)
         self.newest, self.good, self.first = newest, good, first
         self.row = 0 if stale else row
-        if self.now == FRESH:
+        if self.now == FRESH or self.clock == OF_FRAME:
             self.since = good
 
 

@@ -84,6 +84,14 @@ def test_single_frames_now_and_then_do_not_keep_a_blind_craft_in_the_air_for_eve
     assert entered(found, LEVEL) < 4.5 and entered(found, LAND) < 7.5
 
 
+def test_they_do_if_the_estimator_makes_the_most_of_them() -> None:
+    frames = steady(0, 3.1) | dict.fromkeys([4.5, 6.0, 7.5], True)
+    found = watch(frames, 13.0, VisionWatchdog(clock="frame"))
+    assert entered(found, COAST, 1.0) == pytest.approx(3.3)
+    assert entered(found, LEVEL) == pytest.approx(9.55)
+    assert entered(found, LAND) == pytest.approx(12.55)
+
+
 def test_before_the_first_frame_nothing_is_trusted() -> None:
     found = watch({}, 6.0)
     assert entered(found, FRESH) == math.inf
