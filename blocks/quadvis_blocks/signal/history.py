@@ -23,8 +23,8 @@ class History(Block):
     instant = In(unit="s", doc="when its value is wanted, such as the stamp of a frame")
     y = Out(unit="a", doc="its value then")
     ok = Out("bool", doc="whether the instant lies between the oldest sample and now")
-    values = State(f"float64[{CAPACITY}]")  # of the ticks before this one; the newest stands at count - 1
-    count = State("int64")
+    values = State(f"float64[{CAPACITY}]")  # of the ticks before this one, the newest first
+    kept = State("int64")
 
     def output(self, u: float, instant: float, time: float) -> tuple[float, bool]:
         """Return the value at the instant."""
@@ -33,19 +33,20 @@ class History(Block):
         age = (time - instant) / self.period
         if age < -1e-6:
             return u, False
-        kept = min(self.count, CAPACITY)
+        kept = self.kept
         if age > kept + 1e-6:
-            return (u if kept == 0 else float(self.values[(self.count - kept) % CAPACITY])), False
+            return (u if kept == 0 else float(self.values[kept - 1])), False
         age = min(max(age, 0.0), float(kept))
         steps = min(int(age), kept - 1)
         if steps < 0:
             return u, True
         share = age - steps
-        later = u if steps == 0 else float(self.values[(self.count - steps) % CAPACITY])
-        earlier = float(self.values[(self.count - steps - 1) % CAPACITY])
+        later = u if steps == 0 else float(self.values[steps - 1])
+        earlier = float(self.values[steps])
         return later + share * (earlier - later), True
 
     def update(self, u: float) -> None:
         """Keep this sample."""
-        self.values[self.count % CAPACITY] = u
-        self.count += 1
+        self.values[1:] = self.values[:-1].copy()
+        self.values[0] = u
+        self.kept = min(self.kept + 1, CAPACITY)
