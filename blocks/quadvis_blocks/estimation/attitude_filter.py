@@ -68,8 +68,8 @@ class AttitudeFilter(Block):
 
     mean = State("float64[4]")  # before the measurements of this tick
     spread = State("float64[4,4]")
-    past = State(f"float64[{CAPACITY}]")  # angles, not wrapped, after the measurements
-    count = State("int64")
+    past = State(f"float64[{CAPACITY}]")  # angles, not wrapped, after the measurements; the newest first
+    kept = State("int64")
     last_stamp = State("float64", math.nan)
 
     def start(self) -> None:
@@ -84,7 +84,7 @@ class AttitudeFilter(Block):
         mean, spread = self.mean.copy(), self.spread.copy()
         new = valid and (math.isnan(stamp) or stamp != self.last_stamp)
         late = 0.0 if math.isnan(stamp) else (time - stamp) / self.period
-        off = _off(angle, late, self.past, self.count, float(mean[0])) if new else math.nan
+        off = _off(angle, late, self.past, self.kept, float(mean[0])) if new else math.nan
         _measure(mean, spread, off, gyro, self.angle_noise, self.rate_noise, self.gate)
         return wrapped(float(mean[0])), float(mean[1]), float(mean[2]), float(mean[3]), spread
 
@@ -95,24 +95,25 @@ class AttitudeFilter(Block):
         mean, spread = self.mean, self.spread
         new = valid and (math.isnan(stamp) or stamp != self.last_stamp)
         late = 0.0 if math.isnan(stamp) else (time - stamp) / self.period
-        off = _off(angle, late, self.past, self.count, float(mean[0])) if new else math.nan
+        off = _off(angle, late, self.past, self.kept, float(mean[0])) if new else math.nan
         _measure(mean, spread, off, gyro, self.angle_noise, self.rate_noise, self.gate)
-        self.past[self.count % CAPACITY] = mean[0]
-        self.count += 1
+        self.past[1:] = self.past[:-1].copy()
+        self.past[0] = mean[0]
+        self.kept = min(self.kept + 1, CAPACITY)
         self.last_stamp = stamp
         _predict(
             mean, spread, torque, self.period, self.torque_noise, self.disturbance_wander, self.bias_wander
         )
 
 
-def _off(angle: float, late: float, past: Any, count: int, now: float) -> float:
+def _off(angle: float, late: float, past: Any, kept: int, now: float) -> float:
     """Return how far a measured angle is from the estimate of `late` ticks ago; NaN if that is not known."""
-    if not math.isfinite(angle) or late < -1e-6 or late > min(count, CAPACITY - 1) + 1e-6:
+    if not math.isfinite(angle) or late < -1e-6 or late > min(kept, CAPACITY - 1) + 1e-6:
         return math.nan
     steps = int(late)
     share = late - steps
-    newer = now if steps == 0 else float(past[(count - steps) % CAPACITY])
-    older = newer if share < 1e-6 else float(past[(count - steps - 1) % CAPACITY])
+    newer = now if steps == 0 else float(past[steps - 1])
+    older = newer if share < 1e-6 else float(past[steps])
     return wrapped(angle - newer - share * (older - newer))
 
 
