@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-CAPACITY = 64  # commands that can be on their way at once
+CAPACITY = 128  # commands: the last that arrived, and those on their way
 INSTANT = 1e-9  # s
 
 
@@ -30,18 +30,31 @@ def wrench(thrust: Any, arm: float, inertia: Any, torque_ratio: float) -> Any:
 
 
 def start(times: Any, commands: Any, now: Any, collective: float) -> None:
-    """Begin with a collective thrust (N), no torque, and nothing on its way: a ring with one command."""
+    """Begin with a collective thrust (N), no torque, and one command, which has arrived."""
     times[0] = -math.inf
     for index in range(4):
         commands[0, index] = now[index] = collective if index == 0 else 0.0
 
 
-def send(times: Any, commands: Any, count: int, time: float, command: Any) -> int:
-    """Put a command that arrives at a time (s) into the ring, unless it is the last one; return the count."""
-    if (commands[(count - 1) % CAPACITY] == command).all():
-        return count
-    times[count % CAPACITY] = time
-    commands[count % CAPACITY] = command
+def send(times: Any, commands: Any, count: int, time: float, delay: float, command: Any) -> int:
+    """Put a command on its way at a time (s), forget what is over, and return how many are kept.
+
+    Those before the last that arrived are over. Every command goes in, also one like the last: what is on
+    its way must not depend on the values.
+    """
+    first = 0
+    while first + 1 < count and times[first + 1] <= time + INSTANT:
+        first += 1
+    if first > 0:
+        count -= first
+        times[:count] = times[first : first + count].copy()
+        commands[:count] = commands[first : first + count].copy()
+    if count == CAPACITY:
+        raise OverflowError(
+            "more than 127 commands are on their way; choose a slower rate or a shorter delay"
+        )
+    times[count] = time + delay
+    commands[count] = command
     return count + 1
 
 
@@ -50,21 +63,21 @@ def follow(
 ) -> None:
     """Carry the wrench `now` (4,) in place from one instant to a later one, and give its mean on the way.
 
-    The ring has the instants at which commands reach the rotors, and the commands.
+    `times` are the instants at which the commands reach the rotors, the first one before `begin`.
     """
     for index in range(4):
         mean[index] = 0.0
     at = begin
     place = count - 1
-    while place > max(count - CAPACITY, 0) and times[place % CAPACITY] > begin + INSTANT:
+    while place > 0 and times[place] > begin + INSTANT:
         place -= 1
     while at < end - INSTANT:
         until = end
-        if place + 1 < count and times[(place + 1) % CAPACITY] < end - INSTANT:
-            until = float(times[(place + 1) % CAPACITY])
+        if place + 1 < count and times[place + 1] < end - INSTANT:
+            until = float(times[place + 1])
         keep, time = math.exp((at - until) / lag), until - at
         for index in range(4):
-            wanted = float(commands[place % CAPACITY, index])
+            wanted = float(commands[place, index])
             off = float(now[index]) - wanted
             mean[index] += wanted * time + off * lag * (1.0 - keep)
             now[index] = wanted + off * keep

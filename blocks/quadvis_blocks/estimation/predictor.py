@@ -24,6 +24,8 @@ class Predictor(Block):
 
     Disturbances stay as they are. Run it at the rate of the control, and let ``thrust`` be what that sends.
 
+    Error: OverflowError if the delay is longer than 127 ticks.
+
     Source: for the delay, Artstein, Linear systems with delayed controls: a reduction (1982).
     """
 
@@ -114,6 +116,6 @@ class Predictor(Block):
     def update(self, thrust: Any, time: float) -> None:
         """Send a command on its way, and follow those that arrive until the next tick."""
         command = wrench(thrust, self.arm, self.inertia, self.torque_ratio)
-        self.count = send(self.times, self.commands, self.count, time + self.delay, command)
+        self.count = send(self.times, self.commands, self.count, time, self.delay, command)
         mean = np.zeros(4)
         follow(self.times, self.commands, self.count, self.now, time, time + self.period, self.lag, mean)

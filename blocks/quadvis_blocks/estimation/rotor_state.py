@@ -17,7 +17,7 @@ class RotorState(Block):
     Exact between ticks, so the block may run faster than the commands come, and a command may arrive between
     two ticks. Commands that came in at most a tick late are what a simulation's ``across: hold`` gives.
 
-    Error: none beyond the model's; at most 63 different commands may be on their way.
+    Error: none beyond the model's; OverflowError if the delay is longer than 127 ticks.
     """
 
     thrust = In("float64[4]", unit="N", doc="thrust commanded of each rotor: front, right, rear, left")
@@ -56,6 +56,6 @@ class RotorState(Block):
     def update(self, thrust: Any, time: float) -> None:
         """Send a command on its way, and follow those that arrive until the next tick."""
         command = wrench(thrust, self.arm, self.inertia, self.torque_ratio)
-        self.count = send(self.times, self.commands, self.count, time + self.delay, command)
+        self.count = send(self.times, self.commands, self.count, time, self.delay, command)
         mean = np.zeros(4)
         follow(self.times, self.commands, self.count, self.now, time, time + self.period, self.lag, mean)
