@@ -5,9 +5,9 @@ Along an axis, with a known acceleration a that is straight between ticks and wh
     p' = v,    v' = a + d + w,    d' = -d / decay + n.
 
 Estimates stand in an array (3, 9), an axis a row: p, v, d, then the covariances pp, pv, pd, vv, vd, dd. The
-axes do not mix. The past is a ring of ticks: instant, acceleration, and the estimates with all frames before
-that instant. Running again from the tick before a frame that comes late, through the frames since, gives to
-the bit what the filter would have given had the frame come in time.
+axes do not mix. The past are the last ticks, the oldest first: instant, acceleration, and the estimates with
+all frames before that instant. Running again from the tick before a frame that comes late, through the frames
+since, gives to the bit what the filter would have given had the frame come in time.
 """
 
 from __future__ import annotations
@@ -103,11 +103,23 @@ def advance(chains: Any, begin: Any, end: Any, until: float, frames: Any, held: 
                 until - at, model)  # fmt: skip
 
 
+def append(ticks: Any, past: Any, count: int, oldest: int, now: Any, chains: Any) -> tuple[int, int]:
+    """Keep a tick (4,) and the estimates there, and return how many are kept and the oldest of use."""
+    if count == TICKS:
+        ticks[:-1] = ticks[1:].copy()
+        past[:-1] = past[1:].copy()
+        count -= 1
+        oldest = max(oldest - 1, 0)
+    ticks[count] = now
+    past[count] = chains
+    return count + 1, oldest
+
+
 def place(ticks: Any, count: int, oldest: int, stamp: float) -> int:
     """Return the number of the last tick that is not after a stamp; -1 if it is not kept any more."""
     number = count - 1
     while number >= oldest:
-        if ticks[number % TICKS, 0] <= stamp:
+        if ticks[number, 0] <= stamp:
             return number
         number -= 1
     return -1
@@ -119,7 +131,7 @@ def filtered(
 ) -> tuple[int, int, int, float]:  # fmt: skip
     """Give the estimates at the tick `now`, before its own frames, with a new frame if that is believed.
 
-    `now` (4,) is number `count`, the ring has those before it, and `frame` has NaN for a stamp if there is
+    `now` (4,) is number `count`, `ticks` has those before it, and `frame` has NaN for a stamp if there is
     none. If `believe`, a frame beyond the gate resets the estimates. Returned are what became of the frame,
     how many are held, the oldest tick of use, and the frame's squared innovation over its variance. Without
     `keep` the past stays as it is.
@@ -132,18 +144,18 @@ def filtered(
             verdict = LATE
         else:
             first, frame[STAMP] = found, stamp
-            chains[:] = past[first % TICKS]
+            chains[:] = past[first]
             again(chains, past, ticks, first, count, now, stamp, frames, held, model, False)
             nis, greatest = innovation(chains, frame, tolerance)
             verdict = TAKEN if greatest <= gate * gate else (RESET if believe else REFUSED)
-    chains[:] = past[first % TICKS]
+    chains[:] = past[first]
     if verdict == RESET:
         held, oldest = 0, first
         begin(chains, frame[VALUE:VARIANCE], sigma, model[3:6])
         if keep:
-            past[first % TICKS] = chains
+            past[first] = chains
     if verdict in (TAKEN, RESET):
-        held = insert(frames, held, frame, float(ticks[oldest % TICKS, 0]))
+        held = insert(frames, held, frame, float(ticks[oldest, 0]))
     again(chains, past, ticks, first, count, now, float(now[0]), frames, held, model, keep)
     return verdict, held, oldest, nis
 
@@ -154,16 +166,16 @@ def again(
 ) -> None:  # fmt: skip
     """Run estimates at tick `first` on to an instant `until`; with `keep`, renew the past on the way.
 
-    `now` (4,) is the tick after the last one in the ring, number `count`.
+    `now` (4,) is the tick after the last one kept, number `count`.
     """
     for number in range(first, count):
-        start = ticks[number % TICKS]
-        end = now if number + 1 == count else ticks[(number + 1) % TICKS]
+        start = ticks[number]
+        end = now if number + 1 == count else ticks[number + 1]
         if start[0] >= until:
             return
         advance(chains, start, end, min(float(end[0]), until), frames, held, model)
         if keep and number + 1 < count:
-            past[(number + 1) % TICKS] = chains
+            past[number + 1] = chains
 
 
 def insert(frames: Any, held: int, frame: Any, horizon: float) -> int:

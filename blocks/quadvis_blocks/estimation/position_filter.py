@@ -20,6 +20,7 @@ from quadvis_blocks.estimation._chain import (
     VALUE,
     VARIANCE,
     WIDTH,
+    append,
     begin,
     filtered,
     latest,
@@ -140,10 +141,9 @@ class PositionFilter(Block):
         self, acceleration: Any, position: Any, stamp: float, valid: bool, measured: Any, time: float
     ) -> None:
         """Keep what came in, and the estimates just before the frames of this instant."""
-        now = _tick(time, acceleration)
+        now, chains = _tick(time, acceleration), self.past[0].copy()
         if self.count > 0:
             frame = _frame(position, stamp, valid, measured, self.noise, self.last_stamp)
-            chains = np.zeros((3, 9))
             verdict, self.held, self.oldest, _ = filtered(
                 chains, self.past, self.ticks, self.count, self.oldest, now, self.frames, self.held, frame,
                 _model(self.acceleration_noise, self.wander, self.decay), self.initial_sigma, self.gate,
@@ -156,10 +156,7 @@ class PositionFilter(Block):
             elif verdict == REFUSED and math.isnan(self.refusing):
                 self.refusing = time
             self.last_stamp = stamp
-            self.past[self.count % TICKS] = chains
-        self.ticks[self.count % TICKS] = now
-        self.count += 1
-        self.oldest = max(self.oldest, self.count - TICKS)
+        self.count, self.oldest = append(self.ticks, self.past, self.count, self.oldest, now, chains)
 
 
 def _tick(time: float, acceleration: Any) -> Any:
