@@ -6,8 +6,9 @@ Along an axis, with a known acceleration a that is straight between ticks and wh
 
 Estimates stand in an array (3, 9), an axis a row: p, v, d, then the covariances pp, pv, pd, vv, vd, dd. The
 axes do not mix. The past are the last ticks, the oldest first: instant, acceleration, and the estimates with
-all frames before that instant. Running again from the tick before a frame that comes late, through the frames
-since, gives to the bit what the filter would have given had the frame come in time.
+all frames before that instant. The tick of now is number TICKS. Frames stand with the newest first. Running
+again from the tick before a frame that comes late, through the frames since, gives to the bit what the filter
+would have given had the frame come in time.
 """
 
 from __future__ import annotations
@@ -90,7 +91,7 @@ def advance(chains: Any, begin: Any, end: Any, until: float, frames: Any, held: 
     """
     at, length = float(begin[0]), float(end[0] - begin[0])
     slope = (end[1:] - begin[1:]) / length if length > 0.0 else 0.0 * begin[1:]
-    for index in range(held):
+    for index in range(held - 1, -1, -1):
         stamp = float(frames[index, STAMP])
         if begin[0] <= stamp < until:
             if stamp > at:
@@ -103,21 +104,18 @@ def advance(chains: Any, begin: Any, end: Any, until: float, frames: Any, held: 
                 until - at, model)  # fmt: skip
 
 
-def append(ticks: Any, past: Any, count: int, oldest: int, now: Any, chains: Any) -> tuple[int, int]:
-    """Keep a tick (4,) and the estimates there, and return how many are kept and the oldest of use."""
-    if count == TICKS:
-        ticks[:-1] = ticks[1:].copy()
-        past[:-1] = past[1:].copy()
-        count -= 1
-        oldest = max(oldest - 1, 0)
-    ticks[count] = now
-    past[count] = chains
-    return count + 1, oldest
+def append(ticks: Any, past: Any, oldest: int, now: Any, chains: Any) -> int:
+    """Keep a tick (4,) and the estimates there in place of the oldest, and return the first of use."""
+    ticks[:-1] = ticks[1:].copy()
+    past[:-1] = past[1:].copy()
+    ticks[TICKS - 1] = now
+    past[TICKS - 1] = chains
+    return max(oldest - 1, 0)
 
 
-def place(ticks: Any, count: int, oldest: int, stamp: float) -> int:
+def place(ticks: Any, oldest: int, stamp: float) -> int:
     """Return the number of the last tick that is not after a stamp; -1 if it is not kept any more."""
-    number = count - 1
+    number = TICKS - 1
     while number >= oldest:
         if ticks[number, 0] <= stamp:
             return number
@@ -126,26 +124,26 @@ def place(ticks: Any, count: int, oldest: int, stamp: float) -> int:
 
 
 def filtered(
-    chains: Any, past: Any, ticks: Any, count: int, oldest: int, now: Any, frames: Any, held: int, frame: Any,
+    chains: Any, past: Any, ticks: Any, oldest: int, now: Any, frames: Any, held: int, frame: Any,
     model: Any, sigma: Any, gate: float, tolerance: float, believe: bool, keep: bool,
 ) -> tuple[int, int, int, float]:  # fmt: skip
     """Give the estimates at the tick `now`, before its own frames, with a new frame if that is believed.
 
-    `now` (4,) is number `count`, `ticks` has those before it, and `frame` has NaN for a stamp if there is
+    `now` (4,) is the tick after those in `ticks`, and `frame` has NaN for a stamp if there is
     none. If `believe`, a frame beyond the gate resets the estimates. Returned are what became of the frame,
     how many are held, the oldest tick of use, and the frame's squared innovation over its variance. Without
     `keep` the past stays as it is.
     """
-    first, verdict, nis = count - 1, NOTHING, math.nan
+    first, verdict, nis = TICKS - 1, NOTHING, math.nan
     if not math.isnan(frame[STAMP]):
         stamp = min(float(frame[STAMP]), float(now[0]))
-        found = place(ticks, count, oldest, stamp)
+        found = place(ticks, oldest, stamp)
         if found < 0 or frame[STAMP] > now[0] + INSTANT:
             verdict = LATE
         else:
             first, frame[STAMP] = found, stamp
             chains[:] = past[first]
-            again(chains, past, ticks, first, count, now, stamp, frames, held, model, False)
+            again(chains, past, ticks, first, now, stamp, frames, held, model, False)
             nis, greatest = innovation(chains, frame, tolerance)
             verdict = TAKEN if greatest <= gate * gate else (RESET if believe else REFUSED)
     chains[:] = past[first]
@@ -156,25 +154,25 @@ def filtered(
             past[first] = chains
     if verdict in (TAKEN, RESET):
         held = insert(frames, held, frame, float(ticks[oldest, 0]))
-    again(chains, past, ticks, first, count, now, float(now[0]), frames, held, model, keep)
+    again(chains, past, ticks, first, now, float(now[0]), frames, held, model, keep)
     return verdict, held, oldest, nis
 
 
 def again(
-    chains: Any, past: Any, ticks: Any, first: int, count: int, now: Any, until: float, frames: Any,
+    chains: Any, past: Any, ticks: Any, first: int, now: Any, until: float, frames: Any,
     held: int, model: Any, keep: bool,
 ) -> None:  # fmt: skip
     """Run estimates at tick `first` on to an instant `until`; with `keep`, renew the past on the way.
 
-    `now` (4,) is the tick after the last one kept, number `count`.
+    `now` (4,) is the tick after the last one kept.
     """
-    for number in range(first, count):
+    for number in range(first, TICKS):
         start = ticks[number]
-        end = now if number + 1 == count else ticks[number + 1]
+        end = now if number + 1 == TICKS else ticks[number + 1]
         if start[0] >= until:
             return
         advance(chains, start, end, min(float(end[0]), until), frames, held, model)
-        if keep and number + 1 < count:
+        if keep and number + 1 < TICKS:
             past[number + 1] = chains
 
 
@@ -183,15 +181,10 @@ def insert(frames: Any, held: int, frame: Any, horizon: float) -> int:
 
     Those before a horizon are dropped, and the oldest if there is no place.
     """
-    dropped = 0
-    while dropped < held and (frames[dropped, STAMP] < horizon or held - dropped >= FRAMES):
-        dropped += 1
-    if dropped > 0:
-        for index in range(dropped, held):
-            frames[index - dropped] = frames[index]
-    held -= dropped
+    while held > 0 and (frames[held - 1, STAMP] < horizon or held >= FRAMES):
+        held -= 1
     index = held
-    while index > 0 and frames[index - 1, STAMP] > frame[STAMP]:
+    while index > 0 and frames[index - 1, STAMP] <= frame[STAMP]:
         frames[index] = frames[index - 1]
         index -= 1
     frames[index] = frame
@@ -212,6 +205,6 @@ def innovation(chains: Any, frame: Any, tolerance: float) -> tuple[float, float]
 
 def latest(chains: Any, frames: Any, held: int, now: float) -> None:
     """Take the frames of this very instant into account."""
-    for index in range(held):
+    for index in range(held - 1, -1, -1):
         if frames[index, STAMP] >= now:
             correct(chains, frames[index])

@@ -98,10 +98,9 @@ class PositionFilter(Block):
         (1.0, 0.5), type="float64[2]", unit="m m/s", above=0.0, doc="deviation of position and velocity then"
     )
 
-    ticks = State(f"float64[{TICKS},4]")  # instant and acceleration
+    ticks = State(f"float64[{TICKS},4]")  # instant and acceleration, the last one last
     past = State(f"float64[{TICKS},3,9]")  # estimates just before the frames of that instant
-    count = State("int64")
-    oldest = State("int64")  # the first tick that frames may go back to
+    oldest = State("int64", TICKS)  # the first tick that frames may go back to; none yet
     frames = State(f"float64[{FRAMES},{WIDTH}]")
     held = State("int64")
     last_stamp = State("float64", math.nan)
@@ -111,7 +110,7 @@ class PositionFilter(Block):
 
     def start(self) -> None:
         """Begin at rest at the initial position."""
-        begin(self.past[0], self.initial, self.initial_sigma, self.wander)
+        begin(self.past[TICKS - 1], self.initial, self.initial_sigma, self.wander)
 
     def output(
         self, acceleration: Any, position: Any, stamp: float, valid: bool, measured: Any, time: float
@@ -119,11 +118,11 @@ class PositionFilter(Block):
         """Return the estimate with what is known now."""
         now = _tick(time, acceleration)
         frame = _frame(position, stamp, valid, measured, self.noise, self.last_stamp)
-        frames, chains = self.frames.copy(), self.past[0].copy()
+        frames, chains = self.frames.copy(), self.past[TICKS - 1].copy()
         newest, refused, nis = self.newest, self.refusals, math.nan
-        if self.count > 0:
+        if self.oldest < TICKS:
             verdict, held, _, nis = filtered(
-                chains, self.past, self.ticks, self.count, self.oldest, now, frames, self.held, frame,
+                chains, self.past, self.ticks, self.oldest, now, frames, self.held, frame,
                 _model(self.acceleration_noise, self.wander, self.decay), self.initial_sigma, self.gate,
                 self.tolerance, time - self.refusing >= self.reset_after, False,
             )  # fmt: skip
@@ -141,11 +140,11 @@ class PositionFilter(Block):
         self, acceleration: Any, position: Any, stamp: float, valid: bool, measured: Any, time: float
     ) -> None:
         """Keep what came in, and the estimates just before the frames of this instant."""
-        now, chains = _tick(time, acceleration), self.past[0].copy()
-        if self.count > 0:
+        now, chains = _tick(time, acceleration), self.past[TICKS - 1].copy()
+        if self.oldest < TICKS:
             frame = _frame(position, stamp, valid, measured, self.noise, self.last_stamp)
             verdict, self.held, self.oldest, _ = filtered(
-                chains, self.past, self.ticks, self.count, self.oldest, now, self.frames, self.held, frame,
+                chains, self.past, self.ticks, self.oldest, now, self.frames, self.held, frame,
                 _model(self.acceleration_noise, self.wander, self.decay), self.initial_sigma, self.gate,
                 self.tolerance, time - self.refusing >= self.reset_after, True,
             )  # fmt: skip
@@ -156,7 +155,7 @@ class PositionFilter(Block):
             elif verdict == REFUSED and math.isnan(self.refusing):
                 self.refusing = time
             self.last_stamp = stamp
-        self.count, self.oldest = append(self.ticks, self.past, self.count, self.oldest, now, chains)
+        self.oldest = append(self.ticks, self.past, self.oldest, now, chains)
 
 
 def _tick(time: float, acceleration: Any) -> Any:
