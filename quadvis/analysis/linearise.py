@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,7 @@ CHECKED = 4  # hyperperiods that the matrix must foretell
 CLOSE = 0.01
 IDLE = 1e-9
 MENTIONED = 8  # blocks in a message
+CHUNK = 32  # slots that are tried together
 
 
 class Unsettled(AnalysisError):
@@ -124,11 +126,11 @@ def _is_continuous(probe: Probe, places: Positions) -> bool:
 def _columns(probe: Probe) -> tuple[Positions, Columns]:
     """Return the slots of the state, and by slot the derivatives of what follows."""
     still = probe.after(probe.positions[:0], 0.0)
-    known: set[int] = set()
     columns: Columns = {}
-    fresh = np.union1d(_changed(probe, probe.shaken(), still[0]), probe.continuous).astype(np.intp)
+    slots, rounds = _reached(probe, still)
+    known = set(slots.tolist())
+    fresh = np.setdiff1d(slots, _forgotten(probe, slots, rounds, still))
     while fresh.size:
-        known.update(fresh.tolist())
         reached: set[int] = set()
         passing = np.isin(fresh, probe.signals)
         for place in [*fresh[~passing].tolist(), *_influential(probe, fresh[passing], still)]:
@@ -140,7 +142,63 @@ def _columns(probe: Probe) -> tuple[Positions, Columns]:
                 columns[place] = _slope(above[0], below[0], step), _slope(above[1], below[1], step)
                 reached.update(changed.tolist())
         fresh = np.array(sorted(reached - known), np.intp)
-    return np.array(sorted(columns), np.intp), columns
+        known |= reached
+    return _heard(np.array(sorted(columns), np.intp), columns), columns
+
+
+def _heard(places: Positions, columns: Columns) -> Positions:
+    """Leave out, from the far end, the slots that matter to no channel and to no other slot left."""
+    a, c = _stacked(columns, places)
+    left = np.arange(places.size)
+    while left.size:
+        matter = (a[np.ix_(left, left)] != 0.0).any(axis=0) | (c[:, left] != 0.0).any(axis=0)
+        if matter.all():
+            break
+        left = left[matter]
+    return places[left]
+
+
+def _reached(probe: Probe, still: tuple[Vector, Vector]) -> tuple[Positions, int]:
+    """Return the slots that a disturbance of some signal comes to, and after how many hyperperiods."""
+    found = np.union1d(_changed(probe, probe.shaken(), still[0]), probe.continuous).astype(np.intp)
+    rounds, known = 1, found[:0]
+    while found.size > known.size:
+        rounds, known = rounds + 1, found
+        found = np.union1d(known, _changed(probe, _nudged(probe, known)[0], still[0])).astype(np.intp)
+    return found, rounds
+
+
+def _nudged(probe: Probe, places: Positions, count: int = 1) -> tuple[Vector, Vector]:
+    """Return what comes of a small random change of all these slots together."""
+    random = np.random.default_rng(2)
+    return probe.after(
+        places, STEP * probe.scale[places] * random.uniform(0.5, 1.0, places.size), count=count
+    )
+
+
+def _forgotten(probe: Probe, places: Positions, rounds: int, still: tuple[Vector, Vector]) -> Positions:
+    """Return slots that only hand on what nothing reads, as the far end of a long shift register does.
+
+    They matter to no channel and to no other slot, and their poles are at zero.
+    """
+    chunks: list[Positions] = []
+    for _, array in groupby(places.tolist(), lambda place: probe.names[place].partition("[")[0]):
+        slots = np.array(list(array), np.intp)
+        chunks += np.split(slots, range(CHUNK, slots.size, CHUNK))
+    results = [_nudged(probe, chunk) for chunk in chunks]
+    left = [
+        (chunk, _changed(probe, memory, still[0]))
+        for chunk, (memory, read) in zip(chunks, results, strict=True)
+        if np.array_equal(read, still[1], equal_nan=True)
+    ]
+    while left:
+        ends = np.concatenate([chunk for chunk, _ in left])
+        inside = [(chunk, changed) for chunk, changed in left if np.isin(changed, ends).all()]
+        if len(inside) == len(left):
+            later = probe.after(places[:0], 0.0, count=rounds)[0]
+            return ends if not _changed(probe, _nudged(probe, ends, rounds)[0], later).size else places[:0]
+        left = inside
+    return places[:0]
 
 
 @np.errstate(invalid="ignore")  # a parameter may be infinite, and a signal missing
@@ -156,12 +214,11 @@ def _changed(probe: Probe, one: Vector, other: Vector) -> Positions:
 
 def _influential(probe: Probe, places: Positions, still: tuple[Vector, Vector]) -> list[int]:
     """Return those of the signals that matter a hyperperiod later, by halves: most are computed anew."""
-    random = np.random.default_rng(2)
     found: list[int] = []
     waiting = [places] if places.size else []
     while waiting:
         group = waiting.pop()
-        memory, read = probe.after(group, STEP * probe.scale[group] * random.uniform(0.5, 1.0, group.size))
+        memory, read = _nudged(probe, group)
         if not _changed(probe, memory, still[0]).size and np.array_equal(read, still[1]):
             continue
         if group.size == 1:
