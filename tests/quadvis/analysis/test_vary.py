@@ -160,3 +160,25 @@ def test_the_hover_tolerates_as_much_misalignment_as_it_does_in_flight() -> None
         times, x = run.times("craft.position"), abs(run["craft.position"][:, 0])
         early, late = x[(times > 30.0) & (times < 60.0)].max(), x[times > 110.0].max()
         assert bool(late < early) is decays
+
+
+QUIET = {
+    "eyes.noise": "0 px", "imu.angle_noise": "0 rad", "imu.drift": "0 rad", "imu.rate_noise": "0 rad/s",
+    "gust.rms": "[0 m/s, 0 m/s, 0 m/s]",
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("delay", "stable"), [("22 ms", True), ("60 ms", True), ("70 ms", False)])
+def test_the_fused_hover_tolerates_as_late_a_radio_as_it_does_in_flight(delay: str, stable: bool) -> None:
+    """Its filters and its predictor go on reckoning with 22 ms; by 15 s the gains are steady."""
+    diagram = bare("hover.yaml", "fused_geometric", **QUIET, **{"radio.delay": delay})
+    analysis = diagram.analyse(at=15.0)
+    assert analysis.stable is stable
+    aside = {"radio.delay": delay, "craft.initial_position": "[1 um, 0 m, 1.5 m]"}
+    run = bare("hover.yaml", "fused_geometric", **QUIET, **aside).run()
+    times, pitch = run.times("craft.attitude"), abs(run["craft.attitude"][:, 1])
+    early, late = (pitch[(times > at) & (times <= at + 5.0)].max() for at in (10.0, 20.0))
+    assert bool(late < early) is stable
+    if not stable:
+        assert math.log(late / early) / 10.0 == approx(analysis.poles[0].real, rel=0.05)
