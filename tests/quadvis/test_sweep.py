@@ -562,12 +562,12 @@ def test_ctrl_c_leaves_what_is_finished_and_resuming_gives_the_bytes_of_one_go(h
     arguments = ("long.yaml", "--over", "seed=0..9", "--workers", "2")
     process = quadvis_sweep(*arguments, "-o", "x.csv", "--logs", "logs")
     workers = wait_for(lambda: children(process))
-    wait_for(lambda: len(list(Path("logs").glob("*"))) >= 4)  # two are finished
+    wait_for(lambda: len(list(Path("logs").glob("*"))) >= 6)  # four are finished, if not yet all told
     os.killpg(process.pid, signal.SIGINT)
     out, told = process.communicate(timeout=60)
     assert (process.returncode, out) == (130, "")
     count = len(rows_of("x.csv"))
-    assert 2 <= count < 10
+    assert 1 <= count < 10
     assert told == f"interrupted\n{count} of 10 runs are finished and in x.csv; --resume does the rest\n"
     assert all(wait_for(lambda pid=pid: gone(pid)) for pid in workers)
     assert [path.name for path in Path().glob(".*")] == []
