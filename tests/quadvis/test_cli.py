@@ -247,7 +247,10 @@ def test_an_interrupted_run_leaves_its_log_and_closes_its_blocks(
 ) -> None:
     own(project, f"os.kill(os.getpid(), {int(number)})")
     process = command("run", "own.yaml")
-    out, err = process.communicate(timeout=60)
+    try:
+        out, err = process.communicate(timeout=60)
+    finally:
+        process.kill()  # one that does not listen would go on for ever, and fill the memory
     assert process.returncode == code
     assert out == ""
     assert "Traceback" not in err
