@@ -20,7 +20,7 @@ from quadvis_blocks.vision._circles import SMALLEST, Ceiling, Disc, Pixels, loca
 from quadvis_blocks.vision._colour_names import cost, named, nearest_name
 from quadvis_blocks.vision._colours import APART, THRESHOLD, Colour, tone
 from quadvis_blocks.vision._detect import usable
-from quadvis_blocks.vision._square import Blob, arrangement_cost, expected_radii
+from quadvis_blocks.vision._square import expected_radii, square_cost
 
 THRESHOLDS = (THRESHOLD, 0.9, 0.55)  # to find circles of unknown colours, one after the other
 WIDTH = 400  # px: about the size to which a picture is reduced for a first look
@@ -145,9 +145,12 @@ def _squares(discs: Sequence[Disc], ratio: float) -> Iterator[tuple[tuple[Disc, 
         for second in seconds:
             for fourth in fourths:
                 corners = (first, second, third, fourth)
-                radii = expected_radii([disc.centre for disc in corners], ratio)
-                misfit = arrangement_cost([Blob(disc.centre, disc.radius, 0.0) for disc in corners], ratio)
-                if radii is None or misfit == math.inf:
+                points = [disc.centre for disc in corners]
+                radii = expected_radii(points, ratio)
+                if radii is None:
+                    continue
+                misfit = square_cost(points, [disc.radius for disc in corners], radii)
+                if misfit == math.inf:
                     continue
                 sizes = [math.log(disc.radius / radius) for disc, radius in zip(corners, radii, strict=True)]
                 if max(sizes) - min(sizes) < SIZES_MAX:
