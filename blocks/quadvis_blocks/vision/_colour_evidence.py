@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from quadvis_blocks.vision._evidence import CalibrationError, check_date
+from quadvis_blocks.vision._evidence import CalibrationError, check_date, known
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -62,13 +62,7 @@ class ColourEvidence:
 
     def facts(self) -> dict[str, Any]:
         """Return what is known as plain data for a file."""
-        plain = {
-            "date": self.date,
-            "rms": self.rms,
-            "errors": None if self.errors is None else self.errors.tolist(),
-            "samples": None if self.samples is None else self.samples.tolist(),
-        }
-        return {key: value for key, value in plain.items() if value is not None}
+        return known(self)
 
     def check(self, prototypes: Floats, distances: Callable[[Floats], Floats]) -> None:
         """Raise `CalibrationError` if this contradicts itself, or prototypes (4, 3).

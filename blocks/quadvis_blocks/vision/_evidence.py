@@ -8,7 +8,7 @@ file, and whoever reads it projects them again.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from datetime import date
 from typing import TYPE_CHECKING, Any
 
@@ -79,13 +79,7 @@ class Evidence:
 
     def facts(self) -> dict[str, Any]:
         """Return what is known as plain data for a file."""
-        plain = {
-            "rms": self.rms,
-            "errors": None if self.errors is None else self.errors.tolist(),
-            "date": self.date,
-            "points": None if self.points is None else self.points.tolist(),
-        }
-        return {key: value for key, value in plain.items() if value is not None}
+        return known(self)
 
     def check(self, project: Callable[[Floats], Floats]) -> None:
         """Raise `CalibrationError` if this contradicts itself, or what `project` makes of points (n, 3)."""
@@ -128,6 +122,16 @@ def _typical(squares: Floats) -> NDArray[np.int64]:
         return np.arange(len(squares))
     order = np.argsort(squares, kind="stable")
     return np.sort(order[((np.arange(MOST_POINTS) + 0.5) * len(squares) / MOST_POINTS).astype(int)])
+
+
+def known(evidence: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass that are known as plain data, in their order."""
+    plain = {field.name: getattr(evidence, field.name) for field in fields(evidence)}
+    return {
+        name: value.tolist() if isinstance(value, np.ndarray) else value
+        for name, value in plain.items()
+        if value is not None
+    }
 
 
 def check_date(text: str) -> None:
