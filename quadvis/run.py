@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import platform
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 from quadvis.engine.engine import Engine
 from quadvis.engine.plan import Bound
 from quadvis.output.log import Channel, Field, LogWriter, Recording
-from quadvis.output.verdict import Outcome
+from quadvis.output.verdict import Outcome, finite
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
@@ -79,7 +78,7 @@ class Result:
             entry.label: {
                 "signal": entry.part.text,
                 "unit": str(entry.part.unit),
-                **{name: _finite(value) for name, value in self.outcome.summary[entry.label].items()},
+                **{name: finite(value) for name, value in self.outcome.summary[entry.label].items()},
             }
             for entry in self.diagram.summary
         }
@@ -93,14 +92,10 @@ class Result:
             "duration_s": self.duration,
             "wall_s": self.wall,
             "cpu_s": self.cpu,
-            "real_time_factor": _finite(self.real_time_factor),
+            "real_time_factor": finite(self.real_time_factor),
             "summary": summary,
             "expect": [verdict.facts() for verdict in self.outcome.verdicts],
         }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def run(diagram: Diagram, *, log: str | Path | None = None, progress: Progress | None = None) -> Result:

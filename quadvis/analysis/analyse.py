@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,6 +17,7 @@ from quadvis.analysis.probe import AnalysisError
 from quadvis.analysis.systems import closed_loop
 from quadvis.analysis.vary import STABLE, Limits
 from quadvis.diagram.analyse import Cut
+from quadvis.output.verdict import finite
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
@@ -60,7 +60,7 @@ class Analysis:
         """Return the analysis as plain data: what `quadvis analyse --json` prints."""
         loops = {
             label: {"signals": list(loop.signals), **{
-                key: _finite(value) for key, value in vars(loop.margins).items()
+                key: finite(value) for key, value in vars(loop.margins).items()
             }}
             for label, loop in self.loops.items()
         }  # fmt: skip
@@ -68,7 +68,7 @@ class Analysis:
             label: {
                 "vary": found.limit.variable.name,
                 "unit": str(found.limit.variable.unit),
-                "stable_to": _finite(found.value),
+                "stable_to": finite(found.value),
                 "reached": found.reached,
                 "reason": found.reason or None,
             }
@@ -85,10 +85,6 @@ class Analysis:
             "cuts": loops,
             "limits": limits,
         }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def analyse(

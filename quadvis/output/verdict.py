@@ -146,7 +146,7 @@ class Verdict:
             "kind": kind,
             "unit": "1" if kind == "count" else str(part.unit),
             "limit": self.expectation.limit,
-            "found": self.found if math.isfinite(self.found) else None,
+            "found": finite(self.found),
             "met": self.met,
         }
 
@@ -172,6 +172,11 @@ class Entry:
         if math.isnan(value):
             return "none"
         return f"{value:g}" if name == "count" else self.part.shows(value)
+
+
+def finite(value: float) -> float | None:
+    """Return a number as JSON can hold it: None if it is infinite or none."""
+    return value if math.isfinite(value) else None
 
 
 def statistic(name: str, values: Samples) -> float:
