@@ -174,8 +174,18 @@ def test_a_variant_takes_the_wires_and_the_rate_of_its_slot(tmp_path: Path) -> N
     assert (slow.kind, slow.task.name) == ("signal.gain", "slow")
 
 
-@pytest.mark.parametrize(("values", "unit"), [("[[1, 1], [1, 0]]", "1"), ("[[1 m, 2 m], [0, 3 m]]", "m")])
-def test_a_plain_zero_has_the_unit_of_the_numbers_beside_it(tmp_path: Path, values: str, unit: str) -> None:
+@pytest.mark.parametrize(
+    ("values", "unit"),
+    [
+        ("[[1, 1], [1, 0]]", "1"),
+        ("[[1 m, 2 m], [0, 3 m]]", "m"),
+        ("[[0, 2 m], [1 m, 3 m]]", "m"),
+        ("[[1 m, 2 s, 0], [2 m, 3 s, 0]]", "m s 1"),
+    ],
+)
+def test_a_plain_zero_has_the_unit_of_the_numbers_beside_it_if_they_agree(
+    tmp_path: Path, values: str, unit: str
+) -> None:
     (tmp_path / "case.yaml").write_text(
         "quadvis: 1\nname: case\nrates: {fast: 10 Hz}\nstop_time: 1 s\nblocks:\n"
         f"  rows: {{block: sources.table, rate: fast, with: {{times: [0 s, 1 s], values: {values}}}}}\n"
