@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from quadvis.block import Block, In, Out, Param, ParameterError
+from quadvis_blocks._craft import GRAVITY, MASS
 from quadvis_blocks.control._saturation import saturated
 
 
@@ -24,8 +25,8 @@ class Altitude(Block):
         (0.0, 0.0), type="float64[2]", unit="N*s/m N/m", min=0.0, tune=True,
         doc="a1, a2 of equation (18); both zero: from the bandwidth",
     )  # fmt: skip
-    mass = Param(0.5, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
-    gravity = Param(9.81, unit="m/s^2", above=0.0, doc="g")
+    mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
+    gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
     force_limit = Param(2.0, unit="N", above=0.0, tune=True, doc="greatest |r1|")
     tilt_floor = Param(0.5, above=0.0, max=1.0, tune=True, doc="least cos(roll) cos(pitch) to divide by")
     height = In(unit="m", doc="height h, up")

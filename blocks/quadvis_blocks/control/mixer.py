@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, In, Out, Param, ParameterError
+from quadvis_blocks._craft import ARM, INERTIA, THRUST_MAX, TORQUE_RATIO
 
 ROUNDING = 1e-12  # N; a demand right at a limit is not called saturated
 
@@ -25,13 +26,13 @@ class Mixer(Block):
     Source: section 3 in words; the numbering and the order of giving way are additions.
     """
 
-    arm = Param(0.24, unit="m", above=0.0, doc="l, from the centre to each rotor; default Draganfly IV")
+    arm = Param(ARM, unit="m", above=0.0, doc="l, from the centre to each rotor; default Draganfly IV")
     inertia = Param(
-        (5e-3, 5e-3, 9e-3), type="float64[3]", unit="kg*m^2", above=0.0, doc="about roll, pitch and yaw axis"
+        INERTIA, type="float64[3]", unit="kg*m^2", above=0.0, doc="about roll, pitch and yaw axis"
     )
-    torque_ratio = Param(0.016, unit="m", above=0.0, doc="c, a rotor's drag torque over its thrust")
+    torque_ratio = Param(TORQUE_RATIO, unit="m", above=0.0, doc="c, a rotor's drag torque over its thrust")
     thrust_min = Param(0.0, unit="N", min=0.0, doc="least thrust of a rotor")
-    thrust_max = Param(2.0, unit="N", above=0.0, doc="greatest thrust of a rotor")
+    thrust_max = Param(THRUST_MAX, unit="N", above=0.0, doc="greatest thrust of a rotor")
     collective = In(unit="N", doc="collective thrust u")
     roll = In(unit="rad/s^2", doc="roll torque divided by inertia")
     pitch = In(unit="rad/s^2", doc="pitch torque divided by inertia")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from quadvis.block import Block, In, Out, Param
+from quadvis_blocks._craft import GRAVITY
 from quadvis_blocks.control._saturation import saturated
 
 ROLL, PITCH = range(2)
@@ -36,7 +37,7 @@ class NestedSaturation(Block):
         (2.0, 0.9, 0.4, 0.19), type="float64[4]", unit="rad", above=0.0, tune=True,
         doc="M1..M4, outermost first: torque / lambda^2, angular rate / lambda, angle, speed * lambda / g",
     )  # fmt: skip
-    gravity = Param(9.81, unit="m/s^2", above=0.0, doc="g")
+    gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
     position = In(unit="m", doc="y for roll, x for pitch")
     velocity = In(unit="m/s", doc="rate of change of the position")
     angle = In(unit="rad", doc="roll or pitch angle")

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from quadvis.block import Block, In, Out, Param
+from quadvis_blocks._craft import GRAVITY, MASS
 from quadvis_blocks.control._saturation import saturated
 
 
@@ -23,8 +24,8 @@ class Trim(Block):
     pitch = Out(unit="rad", doc="pitch angle that balances it")
     force = Out(unit="N", doc="upward force that balances it")
 
-    mass = Param(0.5, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
-    gravity = Param(9.81, unit="m/s^2", above=0.0, doc="g")
+    mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
+    gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
     tilt_limit = Param(0.1, unit="rad", above=0.0, tune=True, doc="greatest angle")
 
     def output(self, acceleration: Any, heading: float) -> tuple[float, float, float]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks._craft import GRAVITY, MASS, MOTOR_LAG
 
 
 class ReckonedHeight(Block):
@@ -25,10 +26,10 @@ class ReckonedHeight(Block):
     trim_bandwidth = Param(
         0.1, unit="rad/s", min=0.0, tune=True, doc="how fast the trim follows; slower than gusts"
     )
-    mass = Param(0.5, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
+    mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
     drag = Param(0.1, unit="N*s/m", min=0.0, tune=True, doc="force per speed through the air")
-    lag = Param(0.08, unit="s", above=0.0, tune=True, doc="time constant of a motor")
-    gravity = Param(9.81, unit="m/s^2", above=0.0, doc="g")
+    lag = Param(MOTOR_LAG, unit="s", above=0.0, tune=True, doc="time constant of a motor")
+    gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
     lowest = Param(-10.0, unit="m", tune=True, doc="where the model stops to sink, when the rotors idle")
     position = In("float64[3]", unit="m", doc="measured position: x, y, h")
     velocity = In("float64[3]", unit="m/s", doc="measured velocity")

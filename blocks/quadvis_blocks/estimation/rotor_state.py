@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks._craft import ARM, GRAVITY, INERTIA, MOTOR_LAG, RADIO_DELAY, TORQUE_RATIO
 from quadvis_blocks.estimation._rotors import CAPACITY, follow, send, start, wrench
 
 
@@ -26,17 +27,17 @@ class RotorState(Block):
         "float64[3]", unit="rad/s^2", doc="about roll, pitch, yaw over inertia: mean until the next tick"
     )
 
-    delay = Param(0.022, unit="s", min=0.0, doc="time that a command takes to the rotors")
-    lag = Param(0.08, unit="s", above=0.0, doc="time constant of a motor")
-    arm = Param(0.24, unit="m", above=0.0, doc="l, from the centre to each rotor; default Draganfly IV")
+    delay = Param(RADIO_DELAY, unit="s", min=0.0, doc="time that a command takes to the rotors")
+    lag = Param(MOTOR_LAG, unit="s", above=0.0, doc="time constant of a motor")
+    arm = Param(ARM, unit="m", above=0.0, doc="l, from the centre to each rotor; default Draganfly IV")
     inertia = Param(
-        (5e-3, 5e-3, 9e-3), type="float64[3]", unit="kg*m^2", above=0.0, doc="about roll, pitch and yaw axis"
+        INERTIA, type="float64[3]", unit="kg*m^2", above=0.0, doc="about roll, pitch and yaw axis"
     )
-    torque_ratio = Param(0.016, unit="m", above=0.0, doc="c, a rotor's drag torque over its thrust")
+    torque_ratio = Param(TORQUE_RATIO, unit="m", above=0.0, doc="c, a rotor's drag torque over its thrust")
     mass = Param(
         0.5, unit="kg", above=0.0, doc="mass of the craft, whose weight the rotors carry at the start"
     )
-    gravity = Param(9.81, unit="m/s^2", above=0.0, doc="g")
+    gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
     times = State(f"float64[{CAPACITY}]", unit="s")  # at which commands arrive
     commands = State(f"float64[{CAPACITY},4]")
     count = State("int64", 1)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, In, Out, Param
+from quadvis_blocks._craft import GRAVITY, MASS
 from quadvis_blocks.estimation._rotors import acceleration
 
 
@@ -26,8 +27,8 @@ class ThrustAcceleration(Block):
     yaw = In(unit="rad", default=0.0, doc="clockwise from above is positive")
     acceleration = Out("float64[3]", unit="m/s^2", doc="along x, y, h")
 
-    mass = Param(0.5, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
-    gravity = Param(9.81, unit="m/s^2", above=0.0, doc="g")
+    mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
+    gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
 
     def output(self, collective: float, roll: float, pitch: float, yaw: float) -> Any:
         """Return the acceleration."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks._craft import GRAVITY
 
 ROLL, PITCH = range(2)
 LINEAR, TANGENT = range(2)
@@ -24,7 +25,7 @@ class Lateral(Block):
     tilt = Param(
         "linear", choices=("linear", "tangent"), doc="acceleration over g as a function of the angle"
     )
-    gravity = Param(9.81, unit="m/s^2", above=0.0, doc="g")
+    gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
     lag = Param(0.0, unit="s", min=0.0, doc="time constant of the motors; 0 for torque at once")
     initial_position = Param(0.0, unit="m", doc="position at the start")
     initial_velocity = Param(0.0, unit="m/s", doc="velocity at the start")

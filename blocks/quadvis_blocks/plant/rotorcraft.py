@@ -9,6 +9,7 @@ import numpy as np
 
 from quadvis.block import Block, In, Out, Param, ParameterError, Random, State
 from quadvis_blocks._angles import wrapped
+from quadvis_blocks._craft import ARM, GRAVITY, INERTIA, MASS, MOTOR_LAG, THRUST_MAX, TORQUE_RATIO
 from quadvis_blocks._random import random_signs
 
 PAPER, RIGID_BODY = range(2)
@@ -38,15 +39,15 @@ class Rotorcraft(Block):
     """
 
     model = Param("paper", choices=("paper", "rigid_body"), doc="equations of motion")
-    mass = Param(0.5, unit="kg", above=0.0, tune=True, doc="mass; default Draganfly IV")
-    arm = Param(0.24, unit="m", above=0.0, doc="l, from the centre to each rotor; default Draganfly IV")
+    mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass; default Draganfly IV")
+    arm = Param(ARM, unit="m", above=0.0, doc="l, from the centre to each rotor; default Draganfly IV")
     inertia = Param(
-        (5e-3, 5e-3, 9e-3), type="float64[3]", unit="kg*m^2", above=0.0, doc="about roll, pitch and yaw axis"
+        INERTIA, type="float64[3]", unit="kg*m^2", above=0.0, doc="about roll, pitch and yaw axis"
     )
-    torque_ratio = Param(0.016, unit="m", above=0.0, doc="c, a rotor's drag torque over its thrust")
-    lag = Param(0.08, unit="s", above=0.0, tune=True, doc="time constant of a motor")
+    torque_ratio = Param(TORQUE_RATIO, unit="m", above=0.0, doc="c, a rotor's drag torque over its thrust")
+    lag = Param(MOTOR_LAG, unit="s", above=0.0, tune=True, doc="time constant of a motor")
     thrust_min = Param(0.0, unit="N", min=0.0, doc="least thrust of a rotor")
-    thrust_max = Param(2.0, unit="N", above=0.0, doc="greatest thrust of a rotor")
+    thrust_max = Param(THRUST_MAX, unit="N", above=0.0, doc="greatest thrust of a rotor")
     drag = Param(0.1, unit="N*s/m", min=0.0, tune=True, doc="force per speed through the air")
     torque_bias = Param(
         (0.0, 0.0, 0.0),
@@ -58,7 +59,7 @@ class Rotorcraft(Block):
     bias_sign = Param(
         "given", choices=("given", "random"), doc="random: each torque bias with a sign drawn at the start"
     )
-    gravity = Param(9.81, unit="m/s^2", above=0.0, doc="g")
+    gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
     initial_position = Param((0.0, 0.0, 0.0), type="float64[3]", unit="m", doc="x, y, h at the start")
     initial_velocity = Param((0.0, 0.0, 0.0), type="float64[3]", unit="m/s", doc="velocity at the start")
     initial_attitude = Param(

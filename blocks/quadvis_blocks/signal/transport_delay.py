@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks._craft import RADIO_DELAY
 
 CAPACITY = 512
 INSTANT = 1e-9  # s; an edge that is due at a tick must not wait for the next one because of rounding
@@ -23,7 +24,7 @@ class TransportDelay(Block):
     """
 
     delay = Param(
-        0.022, unit="s", above=0.0, doc="time that a change takes; default the 22 ms of a radio frame"
+        RADIO_DELAY, unit="s", above=0.0, doc="time that a change takes; default the 22 ms of a radio frame"
     )
     initial = Param(0.0, unit="a", doc="every element of the output until the first input arrives")
     u = In("float64[n]", unit="a", doc="a held signal")

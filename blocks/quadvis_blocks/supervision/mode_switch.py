@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks._craft import GRAVITY, MASS
 
 CHANNELS = 4
 MANUAL, AUTOMATIC, NEUTRAL, IDLE = range(4)
@@ -34,7 +35,9 @@ class ModeSwitch(Block):
     to_manual = Param(
         0.2, unit="s", min=0.0, tune=True, doc="time constant of the transfer to pilot or neutral; 0 jumps"
     )
-    weight = Param(4.905, unit="N", min=0.0, tune=True, doc="collective at neutral: m g; torques are 0")
+    weight = Param(
+        MASS * GRAVITY, unit="N", min=0.0, tune=True, doc="collective at neutral: m g; torques are 0"
+    )
     idle_thrust = Param(0.0, unit="N", min=0.0, tune=True, doc="collective when idle; torques are 0")
     manual = In(
         "float64[4]",

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, In, Out, Param
+from quadvis_blocks._craft import GRAVITY, MASS
 
 ANGLE, DIRECT = range(2)
 
@@ -28,8 +29,8 @@ class StickControl(Block):
     turn = Param(1.0, unit="rad/s", above=0.0, tune=True, doc="yaw rate at full stick, mode angle")
     torque = Param(5.0, unit="rad/s^2", above=0.0, tune=True, doc="torque at full stick, mode direct")
     force = Param(2.0, unit="N", above=0.0, tune=True, doc="force beyond the weight at full stick")
-    mass = Param(0.5, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
-    gravity = Param(9.81, unit="m/s^2", above=0.0, doc="g")
+    mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
+    gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
     tilt_floor = Param(0.5, above=0.0, max=1.0, tune=True, doc="least cos(roll) cos(pitch) to divide by")
     sticks = In("float64[4]", doc="collective, roll, pitch, yaw, each -1 to 1")
     roll = In(unit="rad", doc="roll angle")
