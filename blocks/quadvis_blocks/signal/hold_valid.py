@@ -38,7 +38,7 @@ class HoldValid(Block):
     ) -> tuple[Any, float, bool]:
         """Return the value if it is valid, else the last one that was."""
         made = _instant(stamp, time)
-        if valid and all_finite(value) and not (self.seen and made <= self.measured):
+        if _is_news(value, valid, made, self.seen, self.measured):
             held, measured, seen = 1.0 * value, made, True
         elif self.seen:
             held, measured, seen = 1.0 * self.last, self.measured, True
@@ -50,7 +50,7 @@ class HoldValid(Block):
     def update(self, value: Any, valid: bool, stamp: float, time: float) -> None:
         """Keep the value if it is valid."""
         made = _instant(stamp, time)
-        if valid and all_finite(value) and not (self.seen and made <= self.measured):
+        if _is_news(value, valid, made, self.seen, self.measured):
             self.last = value
             self.measured = made
             self.seen = True
@@ -59,3 +59,8 @@ class HoldValid(Block):
 def _instant(stamp: float, time: float) -> float:
     """Return the stamp, or now if there is none or it is ahead of the time."""
     return time if math.isnan(stamp) else min(stamp, time)
+
+
+def _is_news(value: Any, valid: bool, made: float, seen: bool, measured: float) -> bool:
+    """Return whether a value is good, and made after the one that is held."""
+    return bool(valid and all_finite(value) and not (seen and made <= measured))
