@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram, load
-    from quadvis.output.log import Log, read_log
+    from quadvis.output.log_reader import Log, read_log
     from quadvis.sweeps.sweep import sweep
 
 __version__ = "0.1.0"
@@ -15,8 +15,8 @@ __all__ = ["Diagram", "Log", "load", "read_log", "sweep"]
 _HOMES = {
     "Diagram": "diagram.diagram",
     "load": "diagram.diagram",
-    "Log": "output.log",
-    "read_log": "output.log",
+    "Log": "output.log_reader",
+    "read_log": "output.log_reader",
     "sweep": "sweeps.sweep",
 }
 

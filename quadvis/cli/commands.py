@@ -185,7 +185,7 @@ def draw(options: argparse.Namespace) -> int:
 
 def plot(options: argparse.Namespace) -> int:
     """Draw the figures of a log."""
-    from quadvis.output.log import read_log
+    from quadvis.output.log_reader import read_log
     from quadvis.output.plot import plot_log
 
     for path in plot_log(read_log(options.log), Path(options.output) if options.output else None):

@@ -39,7 +39,7 @@ from quadvis.units import Unit, UnitError, parse_units
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from quadvis.output.log import Log
+    from quadvis.output.log_reader import Log
 
 # Okabe and Ito's colours, which colour-blind readers tell apart.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#222222", "#B8A800")

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from quadvis.cli import main
-from quadvis.output.log import read_log
+from quadvis.output.log_reader import read_log
 
 DIAGRAMS = Path(__file__).parents[2] / "diagrams"
 

@@ -21,7 +21,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from quadvis.errors import QuadvisError, RunError
-from quadvis.output.log import Channel, Field, LogWriter, Recording, message_definition, read_log
+from quadvis.output.log import Channel, Field, LogWriter, Recording, message_definition
+from quadvis.output.log_reader import read_log
 
 PLANT = Channel(
     "/plant", (Field("position", "float64", (3,), "m"), Field("speed", "float64", (), "m/s")), "physics"
@@ -451,7 +452,7 @@ def test_rows_of_a_wrong_size_are_refused(tmp_path: Path) -> None:
 
 def test_importing_the_log_does_not_import_mcap() -> None:
     code = textwrap.dedent("""
-        import sys, quadvis.output.log
+        import sys, quadvis.output.log, quadvis.output.log_reader
         print(*[name for name in ("mcap", "lz4", "zstandard") if name in sys.modules])
     """)
     result = subprocess.run(

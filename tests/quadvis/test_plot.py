@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from quadvis.errors import DiagramError, Faults, QuadvisError
-from quadvis.output.log import Channel, Field, LogWriter, read_log
+from quadvis.output.log import Channel, Field, LogWriter
+from quadvis.output.log_reader import read_log
 from quadvis.output.plot import (
     Figure,
     Panel,

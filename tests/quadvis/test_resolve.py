@@ -11,7 +11,7 @@ import pytest
 from quadvis.diagram.diagram import Diagram, load, load_text
 from quadvis.document import parse_yaml
 from quadvis.errors import DiagramError
-from quadvis.output.log import read_log
+from quadvis.output.log_reader import read_log
 
 DIAGRAMS = Path(__file__).parents[2] / "diagrams"
 

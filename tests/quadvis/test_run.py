@@ -12,7 +12,7 @@ import pytest
 
 from quadvis.diagram.diagram import Diagram, load_text
 from quadvis.errors import RunError
-from quadvis.output.log import read_log
+from quadvis.output.log_reader import read_log
 from quadvis.report import ProgressLine, summary_lines
 
 RAMP = """\
