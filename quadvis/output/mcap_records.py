@@ -1,0 +1,303 @@
+"""The records of an MCAP file that may be cut, damaged, or made to harm: nothing in it is believed unchecked.
+
+A record is a byte (what it is), its length in eight bytes, and its contents; a chunk holds records. Where a
+record is not what its own numbers say, the next one that is gets looked for. Lengths are compared with what
+is there before anything is copied, and what unpacks to much more than a log does is not unpacked.
+
+Format: https://mcap.dev/spec
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+MAGIC = b"\x89MCAP0\r\n"
+HEADER, FOOTER, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX = 0x01, 0x02, 0x04, 0x05, 0x06, 0x07
+ATTACHMENT, METADATA, DATA_END, LAST, PRIVATE = 0x09, 0x0C, 0x0F, 0x0F, 0x80
+HEAD = struct.Struct("<BQ")
+CHUNK_HEAD = struct.Struct("<QQQII")  # first and last time, size unpacked, its CRC, length of the packing
+FREE, RATIO = 4 << 20, 64  # bytes that any file may unpack to, and times its size
+
+# Where a record can be recognised in the middle of anything: chunks, and what begins and ends a log.
+KNOWN = re.compile(
+    rb"\x06.{5}\0{3}.{28}(?:\0{4}|\x03\0{3}lz4|\x04\0{3}zstd)"
+    rb"|\x0c.{5}\0{3}\x07\0{3}(?:quadvis|summary)"
+    rb"|\x09.{5}\0{3}.{16}\x0c\0{3}diagram\.yaml"
+    rb"|\x0f\x04\0{7}.{4}",
+    re.DOTALL,
+)
+
+
+class BrokenError(ValueError):
+    """A record is not what its numbers say."""
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """A file inside the log."""
+
+    name: str
+    data: bytes
+
+
+@dataclass(frozen=True)
+class Metadata:
+    """Names and texts about the run."""
+
+    name: str
+    entries: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What messages of a number are about."""
+
+    number: int
+    topic: str
+    entries: dict[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One row: the channel's number, the time (ns), and the bytes."""
+
+    channel: int
+    time: int
+    data: bytes
+
+
+Record = Attachment | Metadata | Channel | Message
+
+
+class Scan:
+    """Goes through a file once; afterwards ``damaged`` pieces were left out, and ``ended`` tells of its end.
+
+    ``whole`` is true if the part with the rows came to its end.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        """Begin with the contents of a file that starts with `MAGIC`."""
+        self.data = memoryview(data)
+        self.damaged = 0
+        self.ended = self.whole = False
+        self._left = FREE + RATIO * len(data)
+
+    def records(self) -> Iterator[Record]:
+        """Yield what belongs to a log, in the order of the file."""
+        position = len(MAGIC)
+        while not self.ended:
+            try:
+                kind, end = self._frame(position)
+                body = self.data[position + HEAD.size : end]
+                _check(kind, body)
+            except BrokenError:
+                following = self._next(position + 1)
+                if following is None:
+                    yield from self._cut_chunk(position)
+                    return
+                self.damaged += 1
+                position = following
+                continue
+            position = end
+            if kind == FOOTER:
+                self.ended = self._is_end(body, end)
+                return
+            self.whole |= kind == DATA_END
+            yield from self._chunk(body) if kind == CHUNK else _read(kind, body)
+
+    def _frame(self, position: int) -> tuple[int, int]:
+        """Return what stands at a place and where it ends."""
+        if position + HEAD.size > len(self.data):
+            raise BrokenError
+        kind, length = HEAD.unpack_from(self.data, position)
+        end = position + HEAD.size + length
+        if not (1 <= kind <= LAST or kind >= PRIVATE) or end > len(self.data):
+            raise BrokenError
+        return kind, end
+
+    def _next(self, position: int) -> int | None:
+        """Return where the next record stands that can be nothing else."""
+        for found in KNOWN.finditer(self.data, position):
+            try:
+                kind, end = self._frame(found.start())
+                _check(kind, self.data[found.start() + HEAD.size : end])
+            except BrokenError:
+                continue
+            return found.start()
+        return None
+
+    def _is_end(self, footer: memoryview, end: int) -> bool:
+        """Return whether the file ends here, and its index is what was written."""
+        start, _, crc = struct.unpack("<QQI", footer)
+        index = self.data[start : end - 4] if start else b""
+        return bytes(self.data[end : end + len(MAGIC)]) == MAGIC and (not crc or zlib.crc32(index) == crc)
+
+    def _chunk(self, body: memoryview) -> Iterator[Record]:
+        """Yield the records of a chunk, or of a damaged one nothing."""
+        crc = CHUNK_HEAD.unpack_from(body)[3]
+        data = self._unpacked(body, whole=True)
+        if data is None or (crc and zlib.crc32(data) != crc):
+            self.damaged += 1
+            return
+        try:
+            yield from _inside(memoryview(data))
+        except BrokenError:
+            self.damaged += 1
+
+    def _cut_chunk(self, position: int) -> Iterator[Record]:
+        """Yield the records at the beginning of a chunk that the file ends in."""
+        body = self.data[position + HEAD.size :]
+        if self.data[position : position + 1] != bytes([CHUNK]) or len(body) < CHUNK_HEAD.size:
+            return
+        packing = _packing(body)
+        if packing is None or len(body) < CHUNK_HEAD.size + len(packing) + 8:
+            return
+        try:
+            yield from _inside(memoryview(self._unpacked(body, whole=False) or b""))
+        except BrokenError:
+            return  # there the file ends
+
+    def _unpacked(self, body: memoryview, *, whole: bool) -> bytes | memoryview | None:
+        """Return the contents of a chunk, or as much as there is; None if it is damaged or too large."""
+        size, packing = CHUNK_HEAD.unpack_from(body)[2], _packing(body)
+        packed = body[CHUNK_HEAD.size + len(packing or "") + 8 :]
+        if not packing:
+            return packed if not whole or size == len(packed) else None
+        if size > self._left:
+            return None
+        self._left -= size
+        data = _unpack(packing, packed, size)
+        return data if not whole or data is None or len(data) == size else None
+
+
+def _packing(body: memoryview) -> str | None:
+    """Return by what a chunk is packed, "" if by nothing; None for what nobody can unpack."""
+    length = CHUNK_HEAD.unpack_from(body)[4]
+    name = bytes(body[CHUNK_HEAD.size : CHUNK_HEAD.size + min(length, 8)])
+    return name.decode() if name in (b"", b"lz4", b"zstd") and len(name) == length else None
+
+
+def _unpack(packing: str, packed: memoryview, size: int) -> bytes | None:
+    """Return what a chunk unpacks to, but no more than one byte above `size`; None if it is damaged."""
+    try:
+        return (_unpack_lz4 if packing == "lz4" else _unpack_zstd)(bytes(packed), size + 1)
+    except (ImportError, RuntimeError, EOFError, ValueError, MemoryError):
+        return None
+
+
+def _unpack_lz4(packed: bytes, most: int) -> bytes:
+    frame: Any = import_module("lz4.frame")
+    return bytes(frame.LZ4FrameDecompressor().decompress(packed, max_length=most))
+
+
+def _unpack_zstd(packed: bytes, most: int) -> bytes:
+    import zstandard
+
+    # What the format recommends that every decoder can hold, or what a frame of this size may ask for.
+    window = min(max(8 << 20, 1 << most.bit_length()), 1 << 31)
+    parts = []
+    try:
+        with zstandard.ZstdDecompressor(max_window_size=window).stream_reader(packed) as reader:
+            while most > 0 and (part := reader.read(min(most, 1 << 20))):
+                parts.append(part)
+                most -= len(part)
+    except zstandard.ZstdError as error:
+        raise ValueError(str(error)) from error
+    return b"".join(parts)
+
+
+def _check(kind: int, body: memoryview) -> None:
+    """Raise BrokenError if the lengths inside a record are not those of the record."""
+    if kind == CHUNK:
+        packing = _packing(body) if len(body) >= CHUNK_HEAD.size else None
+        start = CHUNK_HEAD.size + len(packing or "")
+        if packing is None or len(body) < start + 8:
+            raise BrokenError
+        if int.from_bytes(body[start : start + 8], "little") != len(body) - start - 8:
+            raise BrokenError
+    elif kind == MESSAGE_INDEX:
+        if len(body) < 6 or int.from_bytes(body[2:6], "little") != len(body) - 6:
+            raise BrokenError
+    elif kind == FOOTER:
+        if len(body) != 20:
+            raise BrokenError
+    elif kind == ATTACHMENT:
+        for _ in _read(kind, body):
+            pass
+        if (crc := int.from_bytes(body[-4:], "little")) and zlib.crc32(body[:-4]) != crc:
+            raise BrokenError
+    else:
+        for _ in _read(kind, body):
+            pass
+
+
+def _inside(data: memoryview) -> Iterator[Record]:
+    """Yield the records of a chunk's contents; BrokenError where one is not whole."""
+    position = 0
+    while position < len(data):
+        if position + HEAD.size > len(data):
+            raise BrokenError
+        kind, length = HEAD.unpack_from(data, position)
+        start = position + HEAD.size
+        position = start + length
+        if position > len(data):
+            raise BrokenError
+        yield from _read(kind, data[start:position])
+
+
+def _read(kind: int, body: memoryview) -> Iterator[Record]:
+    """Yield the record if it is one that a log needs; BrokenError if it contradicts itself."""
+    if kind == MESSAGE:
+        if len(body) < 22:
+            raise BrokenError
+        channel, _, time = struct.unpack_from("<HIQ", body)
+        yield Message(channel, time, bytes(body[22:]))
+    elif kind == CHANNEL:
+        number, _ = struct.unpack("<HH", _slice(body, 0, 4))
+        topic, place = _text(body, 4)
+        _, place = _text(body, place)
+        yield Channel(number, topic, _entries(body, place))
+    elif kind == METADATA:
+        name, place = _text(body, 0)
+        yield Metadata(name, _entries(body, place))
+    elif kind == ATTACHMENT:
+        name, place = _text(body, 16)
+        _, place = _text(body, place)
+        length = int.from_bytes(_slice(body, place, 8), "little")
+        if place + 8 + length + 4 != len(body):
+            raise BrokenError
+        yield Attachment(name, bytes(body[place + 8 : place + 8 + length]))
+
+
+def _slice(body: memoryview, start: int, length: int) -> memoryview:
+    if start + length > len(body):
+        raise BrokenError
+    return body[start : start + length]
+
+
+def _text(body: memoryview, place: int) -> tuple[str, int]:
+    """Return a text with its length before it, and where it ends."""
+    length = int.from_bytes(_slice(body, place, 4), "little")
+    try:
+        return bytes(_slice(body, place + 4, length)).decode(), place + 4 + length
+    except UnicodeDecodeError:
+        raise BrokenError from None
+
+
+def _entries(body: memoryview, place: int) -> dict[str, str]:
+    """Return pairs of texts, which fill the rest of a record."""
+    length = int.from_bytes(_slice(body, place, 4), "little")
+    place += 4
+    if place + length != len(body):
+        raise BrokenError
+    found = {}
+    while place < len(body):
+        key, place = _text(body, place)
+        found[key], place = _text(body, place)
+    return found
