@@ -22,7 +22,7 @@ from quadvis.units import Unit, parse_units
 
 SCALARS = {"float64": float, "int64": int, "bool": bool}
 METHODS = ("start", "output", "update", "deriv")
-RESERVED = {"self", "time", "period", "interface", "numeric", "check", "open", "close", *METHODS}
+RESERVED = {"self", "time", "period", "interface", "numeric", "check", "reads", "open", "close", *METHODS}
 
 Shape = tuple[int, ...]
 Sizes = dict[str, Any]  # symbol -> int; "*" -> Shape
@@ -173,7 +173,8 @@ class Param(Declared):
     """A parameter: typed, with unit and bounds (``min``/``max`` inclusive, ``above``/``below`` exclusive).
 
     Without a default it must be given. ``choices`` makes it a name out of a few; the methods see its index.
-    ``tune=True`` lets it change between ticks of a run. Type ``file`` is a path relative to the diagram.
+    ``tune=True`` lets it change between ticks of a run. Type ``file`` is a path relative to the diagram, of a
+    file or folder that the block reads, or with ``writes=True`` of one that it writes.
     """
 
     def __init__(
@@ -188,8 +189,10 @@ class Param(Declared):
         below: float | None = None,
         choices: tuple[str, ...] = (),
         tune: bool = False,
+        writes: bool = False,
         doc: str = "",
     ) -> None:
+        self.writes = writes
         self.default, self.choices, self.tune = default, choices, tune
         self.min, self.max, self.above, self.below = min, max, above, below
         self.is_file, self.is_text = type == "file", type in ("str", "file")
@@ -335,6 +338,11 @@ class Block:
 
     def check(self) -> None:
         """Refuse parameters that contradict each other or name unreadable files, with ParameterError."""
+
+    def reads(self) -> list[str]:
+        """Return the files that a run reads: those that parameters name, and all files of a folder."""
+        files = (param for param in self.interface.params.values() if param.is_file and not param.writes)
+        return [path for path in (getattr(self, param.name) for param in files) if path]
 
     def open(self) -> None:
         """Acquire what the block needs outside the engine: a file, a port, a device."""

@@ -106,9 +106,8 @@ def run(diagram: Diagram, *, log: str | Path | None = None, progress: Progress |
     signals = Recording(channels)
     wall, cpu = time.perf_counter(), time.process_time()
     with ExitStack() as stack:
-        writer = (
-            stack.enter_context(LogWriter(log, channels, _metadata(diagram))) if log is not None else None
-        )
+        stack.enter_context(diagram.guarded(log))
+        writer = stack.enter_context(LogWriter(log, channels, metadata(diagram))) if log is not None else None
         for index, bound in enumerate(logged):
             _record(engine, index, bound, diagram.decimation(bound.node.path), signals, writer)
         stack.enter_context(engine)
@@ -157,7 +156,8 @@ def _fields(bound: Bound) -> tuple[Field, ...]:
     )
 
 
-def _metadata(diagram: Diagram) -> dict[str, str]:
+def metadata(diagram: Diagram) -> dict[str, str]:
+    """Return what a log says of its run, in words: see ``quadvis.output.log``."""
     from quadvis import __version__
 
     return {

@@ -8,7 +8,9 @@ from pathlib import Path
 
 from quadvis.catalogue import STANDARD, Catalogue
 from quadvis.errors import QuadvisError
+from quadvis.files import Kind, reason, write_output
 
+SKELETON = Kind("the skeleton")
 TAKEN = ("Any", "Block", "In", "Out", "Param", "State")  # what the skeleton imports
 
 BLOCK = '''"""{title}."""
@@ -161,6 +163,6 @@ def _refuse_existing(*paths: Path) -> None:
 def _write(path: Path, text: str) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise QuadvisError(f"cannot write '{path}': {error.strerror}") from error
+        raise QuadvisError(f"cannot write '{path}': {reason(error)}") from error
+    write_output(path, SKELETON, text)

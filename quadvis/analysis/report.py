@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,11 +13,13 @@ from quadvis.analysis.analyse import Analysis
 from quadvis.analysis.margins import Loop
 from quadvis.describe import table
 from quadvis.errors import QuadvisError
+from quadvis.files import PNG, file_name, write_output
 from quadvis.output.plot import COLOURS, STYLE
 from quadvis.units import Unit, format_quantity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 SECOND = Unit.parse("s")
 SHOWN = 8  # poles
@@ -97,12 +98,16 @@ def _degrees(angle: float) -> str:
 
 
 def save_bode_plots(analysis: Analysis, folder: Path) -> list[Path]:
-    """Draw the response of each opened loop as ``NAME-bode-CUT.png``; return where they are."""
+    """Draw the response of each opened loop as ``NAME-bode-CUT.png``; return where they are.
+
+    QuadvisError if one of them would replace what the diagram reads, or is no picture.
+    """
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    name = "-".join(filter(None, (analysis.diagram.name, analysis.diagram.variant)))
+    diagram = analysis.diagram
+    name = file_name(*filter(None, (diagram.name, diagram.variant)))
     paths = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -114,15 +119,20 @@ def save_bode_plots(analysis: Analysis, folder: Path) -> list[Path]:
                 gain, phase = figure.subplots(2, 1, sharex=True)
                 _draw(loop, gain, phase)
                 figure.align_ylabels()
-                paths.append(folder / f"{_file(name)}-bode-{_file(loop.label)}.png")
-                figure.savefig(paths[-1], dpi=120, metadata={"Software": None})
+                paths.append(folder / f"{name}-bode-{file_name(loop.label)}.png")
+                _save(figure, paths[-1], diagram.inputs)
     except OSError as error:
         raise QuadvisError(f"cannot write into '{folder}': {error.strerror or error}") from error
     return paths
 
 
-def _file(text: str) -> str:
-    return re.sub(r"[^A-Za-z0-9_.]+", "-", text).strip("-.").lower() or "loop"
+def _save(figure: Figure, path: Path, inputs: Iterable[Path]) -> None:
+    write_output(
+        path,
+        PNG,
+        lambda file: figure.savefig(file, format="png", dpi=120, metadata={"Software": None}),
+        inputs,
+    )
 
 
 def _draw(loop: Loop, gain: Axes, phase: Axes) -> None:

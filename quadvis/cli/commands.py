@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import argparse
 import gc
-import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from quadvis.errors import QuadvisError, RunError
+from quadvis.files import SVG, Kind, file_name, write_output
 
+if TYPE_CHECKING:
+    from quadvis.diagram.diagram import Diagram
+
+SCHEMA = Kind("the schema", (b"{",), rb'"\$schema"')
 FAILED = 1
 
 
@@ -52,41 +57,43 @@ def sweep(options: argparse.Namespace) -> int:
 
     several = len(options.variant) > 1
     over = [f"variant={','.join(options.variant)}"] * several + options.over
-    table_path = Path(options.output or _runs_folder("table", "-o") / f"{Path(options.file).stem}-sweep.csv")
+    one = None if several else next(iter(options.variant), None)
+    name = f"{_default_name(options, one)}-sweep.csv"
+    table_path = Path(options.output or _runs_folder("table", "-o") / name)
     plot = table_path.parent / f"{table_path.stem}.png" if options.plot is None else Path(options.plot)
-    if options.plot and (plot.suffix != ".png" or not plot.parent.is_dir()):
-        raise QuadvisError(
-            f"cannot write the plot '{plot}': give a name that ends in .png in a folder there is"
-        )
+    if options.plot and plot.suffix != ".png":
+        raise QuadvisError(f"cannot write the plot '{plot}': give a name that ends in .png")
     gc.enable()
     with SweepLine() as progress:
         table = run_sweep(
-            options.file, over, variant=None if several else next(iter(options.variant), None),
+            options.file, over, variant=one,
             settings=options.set, params=options.params, stop_time=options.stop_time, seed=options.seed,
             workers=options.workers, output=table_path, timings=options.timings, resume=options.resume,
-            logs=options.logs, progress=progress,
+            plot=None if options.plot == "" else plot, logs=options.logs, progress=progress,
         )  # fmt: skip
     print("\n".join(sweep_lines(table, _width())))
     print(f"table: {table_path}")
     if options.plot != "":
-        table.plot(plot)
         print(f"plot: {plot}")
     return 0 if table.passed else FAILED
 
 
-def _log_path(given: str | None, diagram: Any) -> Path | None:
+def _log_path(given: str | None, diagram: Diagram) -> Path | None:
     """Return where the log goes: where it is wanted, or in a folder that is made for it."""
     if given is not None:
-        path = Path(given)
-        if given and path.is_dir():
-            raise QuadvisError(f"cannot write the log '{given}': it is a folder")
-        if given and not path.parent.is_dir():
-            raise QuadvisError(f"cannot write the log '{given}': there is no folder '{path.parent}'")
-        return path if given else None
-    sets = (file.name for file in diagram.parameter_files)
-    name = "-".join(filter(None, (diagram.name, diagram.variant, *sets)))
-    file = f"{re.sub(r'[^A-Za-z0-9_.-]+', '-', name).strip('-.') or 'run'}.mcap"
-    return _runs_folder("log", "--log") / file
+        return Path(given) if given else None
+    from quadvis.output.log_place import claim_log
+    from quadvis.run import metadata
+
+    names = diagram.name, diagram.variant, *(file.name for file in diagram.parameter_files)
+    return claim_log(_runs_folder("log", "--log"), "-".join(filter(None, names)), metadata(diagram))
+
+
+def _default_name(options: argparse.Namespace, variant: str | None) -> str:
+    """Return a name for what is made of a diagram: other variants and parameter files have other ones."""
+    stem = Path(options.file).stem
+    name = [file_name(stem) if set(stem) & set("+,") else stem, *([file_name(variant)] if variant else [])]
+    return ",".join(("+".join(name), *(file_name(Path(file).stem) for file in options.params)))
 
 
 def _runs_folder(what: str, option: str) -> Path:
@@ -179,8 +186,8 @@ def analyse(options: argparse.Namespace) -> int:
 def draw(options: argparse.Namespace) -> int:
     """Write a diagram as SVG."""
     diagram = _load(options)
-    text = diagram.draw()
-    return _write(text, options.output or f"{Path(options.file).stem}.svg")
+    output = options.output or f"{_default_name(options, options.variant)}.svg"
+    return _write(diagram.draw(), output, SVG, diagram.inputs)
 
 
 def plot(options: argparse.Namespace) -> int:
@@ -188,7 +195,10 @@ def plot(options: argparse.Namespace) -> int:
     from quadvis.output.log_reader import read_log
     from quadvis.output.plot import plot_log
 
-    for path in plot_log(read_log(options.log), Path(options.output) if options.output else None):
+    log = read_log(options.log)
+    if log.damage:
+        print(log.damage, file=sys.stderr)
+    for path in plot_log(log, Path(options.output) if options.output else None):
         print(path)
     return 0
 
@@ -198,7 +208,8 @@ def schema(options: argparse.Namespace) -> int:
     from quadvis.catalogue import Catalogue
     from quadvis.diagram.schema import diagram_schema
 
-    return _write(_json(diagram_schema(Catalogue(Path())), indent=1) + "\n", options.output or "-")
+    text = _json(diagram_schema(Catalogue(Path())), indent=1) + "\n"
+    return _write(text, options.output or "-", SCHEMA)
 
 
 def new(options: argparse.Namespace) -> int:
@@ -227,13 +238,10 @@ def _width() -> int | None:
     return get_terminal_size().columns if sys.stdout.isatty() else None
 
 
-def _write(text: str, output: str) -> int:
+def _write(text: str, output: str, kind: Kind, inputs: Sequence[Path] = ()) -> int:
     if output == "-":
         sys.stdout.write(text)
         return 0
-    try:
-        Path(output).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise QuadvisError(f"cannot write '{output}': {error.strerror}") from error
+    write_output(output, kind, text, inputs)
     print(output)
     return 0

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from quadvis.block import Block
 from quadvis.catalogue import Catalogue
 from quadvis.diagram.analyse import QuestionReader, Questions
 from quadvis.diagram.build import Builder, Made
@@ -18,6 +19,7 @@ from quadvis.diagram.check import WireCheck, rate_text
 from quadvis.diagram.expand import Expansion, Parts
 from quadvis.diagram.loader import FileSpec, read_file, read_text
 from quadvis.diagram.observe import Observation, read_observation
+from quadvis.diagram.outputs import check_writers
 from quadvis.diagram.settings import Files, Given, ParameterFile, Settings, read_settings, setting_texts
 from quadvis.diagram.slots import Outputs, check_slots, fill_slots
 from quadvis.diagram.times import read_duration
@@ -25,6 +27,7 @@ from quadvis.diagram.wiring import Wiring
 from quadvis.document import Scalar
 from quadvis.engine.graph import Graph, Wire
 from quadvis.errors import DiagramError, Fault, Faults, Place, quoted
+from quadvis.files import reading
 
 if TYPE_CHECKING:
     from quadvis.analysis.analyse import Analysis
@@ -48,6 +51,28 @@ class Diagram:
     variants: tuple[str, ...]
     parameter_files: tuple[ParameterFile, ...] = ()
     settings: tuple[str, ...] = ()  # the parameters that were replaced, block.parameter=value
+    sources: tuple[Path, ...] = ()  # the YAML files of the diagram, its parts and its parameter files
+
+    @cached_property
+    def inputs(self) -> tuple[Path, ...]:
+        """Every file that a run depends on; none of them may be written over."""
+        from quadvis.diagram.outputs import files_read
+
+        return tuple(files_read(self._blocks, self.sources))
+
+    @property
+    def _blocks(self) -> list[Block]:
+        return [node.block for node in self.graph.nodes]
+
+    @contextmanager
+    def guarded(self, log: str | Path | None = None) -> Iterator[None]:
+        """Keep the inputs from what is written meanwhile; QuadvisError if a block writes the log's file."""
+        from quadvis.diagram.outputs import check_log
+
+        if log is not None:
+            check_log(log, self._blocks)
+        with reading(self.inputs):
+            yield
 
     @cached_property
     def resolved(self) -> str:
@@ -162,7 +187,7 @@ def load(
         texts = setting_texts(settings)
         given, files = read_settings(texts, params, faults)
         spec = read_file(Path(path), faults, part=False)
-        diagram = _Assembly(spec, faults).diagram(variant, given, stop_time, seed)
+        diagram = _Assembly(spec, faults, files).diagram(variant, given, stop_time, seed)
         return replace(diagram, parameter_files=files, settings=texts)
 
 
@@ -177,9 +202,9 @@ def check(path: str | Path, settings: Given = (), params: Files = ()) -> Diagram
     """Load a diagram, and with each of its variants in turn; DiagramError tells the faults of all of them."""
     faults = Faults()
     with _told_once(faults):
-        given, _ = read_settings(settings, params, faults)
+        given, files = read_settings(settings, params, faults)
         spec = read_file(Path(path), faults, part=False)
-        assembly = _Assembly(spec, faults)
+        assembly = _Assembly(spec, faults, files)
         diagram = assembly.diagram(settings=given)
         for variant in assembly.spec.variants:
             assembly.diagram(variant)
@@ -203,13 +228,14 @@ def _told_once(faults: Faults) -> Iterator[None]:
 class _Assembly:
     """Puts diagrams together out of what one file says."""
 
-    def __init__(self, spec: FileSpec | None, faults: Faults) -> None:
+    def __init__(self, spec: FileSpec | None, faults: Faults, params: Sequence[ParameterFile] = ()) -> None:
         if spec is None:
             raise DiagramError(faults)
         self.spec, self.faults = spec, faults
         self.catalogue = Catalogue(spec.path.parent)
         self.parts = Parts(faults)
         self.made: Made = {}
+        self._params = [path for file in params for path in (file.path, *file.bases)]
         self._base: Wiring | None = None  # of the diagram without a variant
 
     def diagram(
@@ -242,9 +268,12 @@ class _Assembly:
         seed = spec.seed if seed is None else _seed(seed, faults)
         listing = tuple(draft.path for draft in drafts)
         variants = tuple(spec.variants)
+        sources = (spec.path, *self.parts.files, *self._params)
+        check_writers(drafts, sources, faults)
         return Diagram(
-            spec.name, spec.path, variant, graph, stop, seed, observation, listing, questions, variants
-        )
+            spec.name, spec.path, variant, graph, stop, seed, observation, listing, questions, variants,
+            sources=sources,
+        )  # fmt: skip
 
     def _promised(self, filled: FileSpec) -> Outputs:
         """Return the outputs of what stands in the slots that a variant fills."""

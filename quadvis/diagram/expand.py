@@ -75,6 +75,11 @@ class Parts:
         self.faults = faults
         self._specs: dict[str, FileSpec | None] = {}
 
+    @property
+    def files(self) -> list[Path]:
+        """The files that were read."""
+        return list(map(Path, self._specs))
+
     def read(self, file: Path) -> FileSpec | None:
         """Return what a file says; None if it cannot be used."""
         real = os.path.realpath(file)

@@ -52,12 +52,12 @@ def resolved_text(
 
 
 def _files(graph: Graph) -> list[str]:
-    """Return the paths that parameters name."""
+    """Return the paths that parameters name to be read."""
     return [
         getattr(node.block, param.name)
         for node in graph.nodes
         for param in node.block.interface.params.values()
-        if param.is_file and getattr(node.block, param.name)
+        if param.is_file and not param.writes and getattr(node.block, param.name)
     ]
 
 

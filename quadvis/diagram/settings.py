@@ -45,6 +45,7 @@ class ParameterFile:
 
     name: str
     path: Path
+    bases: tuple[Path, ...] = ()  # the files that it builds on
 
 
 Settings = Mapping[str, Mapping[str, Setting]]  # block path, "" for the diagram -> parameter -> setting
@@ -61,8 +62,9 @@ def read_settings(given: Given, params: Files, faults: Faults) -> tuple[Settings
     found: dict[str, dict[str, Setting]] = {}
     files = []
     for path in map(Path, paths):
-        name = _read_file(path, (), found, faults)
-        files.append(ParameterFile(name or path.stem, path))
+        bases: list[Path] = []
+        name = _read_file(path, (), found, bases, faults)
+        files.append(ParameterFile(name or path.stem, path, tuple(bases)))
     for path_and_name, setting in _command_line(setting_texts(given), faults):
         _put(found, path_and_name, setting)
     return found, tuple(files)
@@ -81,7 +83,11 @@ def _put(found: dict[str, dict[str, Setting]], name: str, setting: Setting) -> N
 
 
 def _read_file(
-    path: Path, users: tuple[str, ...], found: dict[str, dict[str, Setting]], faults: Faults
+    path: Path,
+    users: tuple[str, ...],
+    found: dict[str, dict[str, Setting]],
+    bases: list[Path],
+    faults: Faults,
 ) -> str | None:
     """Add the settings of a file, after those of the file that it builds on; return its name."""
     node = faults.collect(read_yaml, path, faults)
@@ -97,7 +103,8 @@ def _read_file(
         if problem:
             faults.add(root["base"].place, problem, remedy)
         else:
-            _read_file(inner, (*users, os.path.realpath(path)), found, faults)
+            bases.append(inner)
+            _read_file(inner, (*users, os.path.realpath(path)), found, bases, faults)
     settings = faults.collect(root["set"].mapping) if "set" in root else None
     for key, value in settings.pairs() if settings is not None else ():
         with faults.about(f"'{key.value}'"):

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.errors import QuadvisError, RunError, quoted, suggestion
+from quadvis.files import LOG, open_output
 
 SLOT = 8
 SLOT_TYPES = {"float64": "<f8", "int64": "<i8", "bool": "<i8"}
@@ -153,7 +154,7 @@ class LogWriter:
         self._failure = ""
         self._pending = 0
         with self._disk():
-            self._file = self.path.open("wb")
+            self._file = open_output(self.path, LOG)
             # Chunks end where `flush` ends them, never inside `write`.
             self._writer: Any = Writer(self._file, chunk_size=1 << 62, compression=CompressionType.NONE)
             self._begin(dict(metadata))

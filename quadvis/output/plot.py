@@ -24,7 +24,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 
 from quadvis import nodes
 from quadvis.errors import DiagramError, Faults, QuadvisError, quoted, suggestion
+from quadvis.files import PNG, write_output
 from quadvis.units import Unit, UnitError, parse_units
 
 if TYPE_CHECKING:
@@ -146,13 +147,16 @@ def plot_log(log: Log, output: Path | None = None) -> list[Path]:
     figures = read_figures(declared, faults) if declared else []
     faults.check()
     folder = output or log.path.with_name(f"{log.path.stem}-figures")
-    return plot_figures(log, figures or block_figures(log), folder)
+    return plot_figures(log, figures or block_figures(log), folder, [log.path])
 
 
-def plot_figures(recorded: Recorded, figures: Iterable[Figure], folder: Path) -> list[Path]:
+def plot_figures(
+    recorded: Recorded, figures: Iterable[Figure], folder: Path, inputs: Sequence[Path] = ()
+) -> list[Path]:
     """Draw every figure as `<number>-<title>.png` in `folder` and return the files.
 
-    QuadvisError names, before anything is drawn, all signals that are not there or do not fit their panel.
+    QuadvisError names, before anything is drawn, all signals that are not there or do not fit their panel;
+    files that are `inputs`, or no pictures, are not replaced.
     """
     found: list[tuple[Figure, list[list[_Curve]]]] = []
     problems: list[str] = []
@@ -173,7 +177,7 @@ def plot_figures(recorded: Recorded, figures: Iterable[Figure], folder: Path) ->
         folder.mkdir(parents=True, exist_ok=True)
         for number, (figure, curves) in enumerate(found, 1):
             paths.append(folder / f"{number:0{digits}}-{_file_name(figure.title)}.png")
-            _draw(figure, curves, paths[-1])
+            _draw(figure, curves, paths[-1], inputs)
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise QuadvisError(f"cannot write figures to '{folder}': {reason}") from error
@@ -323,7 +327,7 @@ def _file_name(title: str) -> str:
     return re.sub(r"\W+", "-", title.lower()).strip("-")[:60] or "figure"
 
 
-def _draw(figure: Figure, panels: list[list[_Curve]], path: Path) -> None:
+def _draw(figure: Figure, panels: list[list[_Curve]], path: Path, inputs: Sequence[Path]) -> None:
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Sheet
@@ -336,7 +340,7 @@ def _draw(figure: Figure, panels: list[list[_Curve]], path: Path) -> None:
         sheet.suptitle(figure.title)
         for number, (panel, curves) in enumerate(zip(figure.panels, panels, strict=True), 1):
             _draw_panel(sheet.add_subplot(rows, columns, number), figure, panel, curves)
-        sheet.savefig(path, format="png")
+        write_output(path, PNG, lambda file: sheet.savefig(file, format="png"), inputs)
 
 
 def _draw_panel(axes: Axes, figure: Figure, panel: Panel, curves: list[_Curve]) -> None:

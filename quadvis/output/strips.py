@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.errors import QuadvisError
+from quadvis.files import PLOT, write_output
 from quadvis.output.plot import COLOURS, STYLE, WIDTHS
 
 if TYPE_CHECKING:
@@ -63,8 +63,8 @@ class Strips:
     note: str = ""
 
 
-def draw_strips(strips: Strips, path: Path) -> None:
-    """Write a PNG; QuadvisError if it cannot be written."""
+def draw_strips(strips: Strips, path: Path, inputs: Iterable[Path] = ()) -> None:
+    """Write a PNG; QuadvisError if it cannot be written, as where there is something else or an input."""
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Sheet
@@ -84,10 +84,7 @@ def draw_strips(strips: Strips, path: Path) -> None:
             if number > count - columns:
                 axes.set_xlabel(strips.axis)
         _frame(sheet, strips, height)
-        try:
-            sheet.savefig(path, format="png")
-        except OSError as error:
-            raise QuadvisError(f"cannot write the plot '{path}': {error.strerror or error}") from error
+        write_output(path, PLOT, lambda file: sheet.savefig(file, format="png"), inputs)
 
 
 def _frame(sheet: Sheet, strips: Strips, height: float) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from quadvis.sweeps.worker import Quantity
 Rows = list[list[NDArray[np.intp]]]  # by series, then by place
 
 
-def draw(table: Table, path: Path) -> None:
+def draw(table: Table, path: Path, inputs: Iterable[Path] = ()) -> None:
     """Draw the numbers that people look at; QuadvisError if the file cannot be written."""
     others = [axis for axis in table.axes if axis.name != SEED]
     across = max(others, key=lambda axis: len(axis.values), default=None)
@@ -43,6 +43,7 @@ def draw(table: Table, path: Path) -> None:
             note=f"the same in all runs: {', '.join(same)}" if same else "",
         ),
         path,
+        inputs,
     )
 
 

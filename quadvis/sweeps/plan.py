@@ -24,6 +24,7 @@ class Plan:
         self, axes: Sequence[Axis], grid: Sequence[tuple[int, ...]], base: Configuration, seed: int | None
     ) -> None:
         self.axes, self.grid, self.base, self.seed = axes, grid, base, seed
+        self.inputs: set[Path] = set()  # the files that the runs depend on, as far as diagrams were loaded
 
     def configuration(self, point: Sequence[int]) -> Configuration:
         """Return the diagram at a point of the grid."""
@@ -54,7 +55,9 @@ class Plan:
 
     def _load(self, point: Sequence[int]) -> Diagram:
         try:
-            return self.configuration(point).load()
+            diagram = self.configuration(point).load()
+            self.inputs.update(diagram.inputs)
+            return diagram
         except DiagramError as error:
             found = DiagramError(self._placed(fault, point) for fault in error.faults)
             if str(found) == str(error):  # no fault says which value of which axis brought it about

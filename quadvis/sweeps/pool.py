@@ -12,14 +12,17 @@ import os
 import signal
 import sys
 from collections.abc import Generator, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from multiprocessing.process import BaseProcess
+from queue import Empty, SimpleQueue
 from types import ModuleType
 
 from quadvis.errors import RunError
 from quadvis.sweeps.worker import ONE_THREAD, Job, Row, begin, perform
+
+IDLE = 1.0  # s without a row after which the caller has its turn all the same
 
 
 def processors() -> int:
@@ -29,8 +32,8 @@ def processors() -> int:
     return os.cpu_count() or 1
 
 
-def perform_all(jobs: Sequence[Job], workers: int) -> Generator[Row, None, None]:
-    """Yield the rows as they come; closing the iterator ends the workers at once.
+def perform_all(jobs: Sequence[Job], workers: int) -> Generator[Row | None, None, None]:
+    """Yield the rows as they come, and None after a second without one; closing it ends the workers at once.
 
     RunError if a worker is killed.
     """
@@ -46,8 +49,17 @@ def perform_all(jobs: Sequence[Job], workers: int) -> Generator[Row, None, None]
         with _launching():
             futures = [executor.submit(perform, job) for job in jobs]  # this starts the processes
         children = set(multiprocessing.active_children()) - before
-        for future in as_completed(futures):
-            yield future.result()
+        done: SimpleQueue[Future[Row]] = SimpleQueue()
+        for future in futures:
+            future.add_done_callback(done.put)
+        left = len(futures)
+        while left:
+            try:
+                row = done.get(timeout=IDLE).result()
+                left -= 1
+            except Empty:
+                row = None
+            yield row
         finished = True
     except BrokenProcessPool:
         problem = "a worker process was killed, perhaps by the system for lack of memory"

@@ -5,23 +5,25 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 import numpy as np
 
 from quadvis.diagram.settings import Files, Given, value_text
 from quadvis.errors import QuadvisError, quoted
+from quadvis.files import PLOT, Claim, check_output
 from quadvis.sweeps.axes import SEED, VARIANT, Axis, Over, points, read_axes
 from quadvis.sweeps.plan import Plan
 from quadvis.sweeps.pool import perform_all, processors
-from quadvis.sweeps.table import FAILURE, HASH, PASSED, WALL, Table, checked_kind, read_rows
+from quadvis.sweeps.table import FAILURE, HASH, PASSED, WALL, Table, read_rows, table_kind
 from quadvis.sweeps.worker import Configuration, Job, Quantity, Row, diagram_of, quantities
 
-SAVE = 30.0  # s between two writings of what is finished
+SAVE = 1.0  # s between two writings of what is finished
 
 Progress = Callable[[int, int, int], None]  # runs finished, runs in all, runs that did not pass
 
@@ -39,6 +41,7 @@ def sweep(
     output: str | Path | None = None,
     timings: bool = False,
     resume: bool = False,
+    plot: str | Path | None = None,
     logs: str | Path | None = None,
     progress: Progress | None = None,
 ) -> Table:
@@ -51,10 +54,12 @@ def sweep(
 
     ``workers`` processes share the runs (as many as there are processors); the table is the same to the bit
     for any number of them. It is written to ``output`` (.csv or .parquet), and what is finished also when the
-    sweep is interrupted or a worker is killed (RunError). ``resume`` takes what that file has for diagrams
-    of the same hash, and runs the rest. ``logs`` is a folder for a log of every run.
+    sweep is interrupted, a worker is killed (RunError), or this process is: all but the last two seconds.
+    ``resume`` takes what that file has for diagrams of the same hash, and runs the rest. ``plot`` is a
+    picture of the summary (PNG), ``logs`` a folder for a log of every run.
 
-    A run that stops with an error is a row that says so. QuadvisError if a value does not fit the diagram.
+    A run that stops with an error is a row that says so. QuadvisError if a value does not fit the diagram, or
+    if a file cannot be written: where an input is, something else, or what another sweep writes.
     """
     axes, processes = read_axes(over), _workers(workers)
     _refuse_conflicts(axes, variant, settings, seed)
@@ -63,35 +68,52 @@ def sweep(
     plan = Plan(axes, grid, Configuration(*given), seed)
     diagram = plan.check()
     target = Path(output) if output else None
-    if target is not None:
-        checked_kind(target)
+    if plot is not None:
+        check_output(plot, PLOT, plan.inputs)
     found = quantities(diagram)
     jobs = list(plan.jobs(_folder(logs)))
     collection = _Collection(diagram.name, axes, grid, found)
-    if resume and target is not None and target.is_file():
-        jobs = _not_known(jobs, _earlier(target, found), collection)
-    save = _Saving(collection, target, timings)
-    try:
-        with closing(perform_all(jobs, processes)) as rows:
-            for row in rows:
-                collection.add(row)
-                if progress:
-                    progress(len(collection.rows), len(grid), collection.failed)
-                save.now_and_then()
-    except BaseException as error:
-        error.add_note(f"{len(collection.rows)} of {len(grid)} runs are finished{save.words}")
-        raise
-    finally:
-        save.now()
-    return collection.table()
+    with _Saving(collection, target, timings, plan.inputs) as save:
+        if resume and target is not None and target.is_file():
+            jobs = _not_known(jobs, _earlier(target, found), collection)
+        try:
+            with closing(perform_all(jobs, processes)) as rows:
+                for row in rows:
+                    if row is not None:
+                        collection.add(row)
+                        if progress:
+                            progress(len(collection.rows), len(grid), collection.failed)
+                    save.now_and_then()
+        except BaseException as error:
+            error.add_note(f"{len(collection.rows)} of {len(grid)} runs are finished{save.words}")
+            raise
+    table = collection.table()
+    if plot is not None:
+        table.plot(plot, plan.inputs)
+    return table
 
 
 class _Saving:
-    """Writes what is finished to a file, if there is one."""
+    """Writes what is finished to a file, if there is one: as it comes, at last in the order of the grid."""
 
-    def __init__(self, collection: _Collection, path: Path | None, timings: bool) -> None:
+    def __init__(
+        self, collection: _Collection, path: Path | None, timings: bool, inputs: Iterable[Path]
+    ) -> None:
         self.collection, self.path, self.timings = collection, path, timings
+        self.claim = None if path is None else Claim(path, table_kind(path), inputs)
+        self.saved = 0  # rows
         self.last = time.monotonic()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self.claim is not None:
+            with closing(self.claim):
+                if self.collection.rows:
+                    self.claim.write(self._content(self.collection.table()))
 
     @property
     def words(self) -> str:
@@ -99,16 +121,20 @@ class _Saving:
         kept = self.path is not None and self.collection.rows
         return f" and in {self.path}; --resume does the rest" if kept else ""
 
-    def now(self) -> None:
-        """Write all that there is."""
-        if self.path is not None and self.collection.rows:
-            self.collection.table().save(self.path, timings=self.timings)
-        self.last = time.monotonic()
-
     def now_and_then(self) -> None:
-        """Write if the last time is long ago: so much is left of a sweep after `kill -9`."""
-        if time.monotonic() - self.last > SAVE:
-            self.now()
+        """Add what is new if the last time is a while ago: so much is left of a sweep after `kill -9`."""
+        count = len(self.collection.rows)
+        if self.claim is None or count == self.saved or time.monotonic() - self.last < SAVE:
+            return
+        if self.saved and self.claim.path.suffix == ".csv":
+            self.claim.append(self._content(self.collection.table(self.saved), head=False))
+        else:
+            self.claim.write(self._content(self.collection.table()))
+        self.saved, self.last = count, time.monotonic()
+
+    def _content(self, table: Table, head: bool = True) -> bytes:
+        assert self.path is not None
+        return table.content(self.path.suffix, timings=self.timings, head=head)
 
 
 def _texts(settings: Given) -> tuple[str, ...]:
@@ -208,9 +234,9 @@ class _Collection:
         self.rows[row.index] = row
         self.failed += not row.passed
 
-    def table(self) -> Table:
-        """Return the table of the rows that are there."""
-        rows = [self.rows[index] for index in sorted(self.rows)]
+    def table(self, after: int = 0) -> Table:
+        """Return the table of the rows that are there, but for those that came first."""
+        rows = [self.rows[index] for index in sorted(list(self.rows)[after:])]
         indices = np.array([self.grid[row.index] for row in rows], np.int64).reshape(-1, len(self.axes))
         columns = {
             axis.column: axis.cells(indices[:, number].tolist()) for number, axis in enumerate(self.axes)

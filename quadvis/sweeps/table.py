@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import csv
 import math
-import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from io import BytesIO, StringIO
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.errors import QuadvisError
+from quadvis.files import Kind, write_output
 from quadvis.sweeps.axes import SEED, Axis
 from quadvis.sweeps.worker import Quantity
 
 PASSED, FAILURE, HASH, WALL = "passed", "failure", "hash", "wall [s]"
-KINDS = (".csv", ".parquet")
+KINDS = {
+    ".csv": Kind("the table", pattern=rb"(^|,)passed,failure,hash[,\r\n]"),
+    ".parquet": Kind("the table", (b"PAR1",)),
+}
 
 
 class Table(Mapping[str, NDArray[Any]]):
@@ -69,49 +72,34 @@ class Table(Mapping[str, NDArray[Any]]):
             found.setdefault(tuple(point), []).append(row)
         return [(point, np.array(found[point])) for point in sorted(found)]
 
-    def save(self, path: str | Path, *, timings: bool = False) -> None:
+    def save(self, path: str | Path, *, timings: bool = False, inputs: Iterable[Path] = ()) -> None:
         """Write a CSV or Parquet file, by the name's ending; ``timings`` adds the column ``wall [s]``.
 
-        The file is there when it is whole; before, what was there stays. QuadvisError if it cannot be.
+        The file is there when it is whole; before, what was there stays. QuadvisError if it cannot be
+        written, or is one of ``inputs`` or no table.
         """
         path = Path(path)
-        columns = self.columns | ({WALL: self.wall} if timings else {})
-        temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-        try:
-            if checked_kind(path) == ".csv":
-                with temporary.open("w", encoding="utf-8", newline="") as file:
-                    _write_csv(columns, file)
-            else:
-                _write_parquet(columns, temporary)
-            os.replace(temporary, path)
-        except OSError as error:
-            raise QuadvisError(f"cannot write '{path}': {error.strerror or error}") from error
-        finally:
-            with suppress(OSError):
-                temporary.unlink()
+        write_output(path, table_kind(path), self.content(path.suffix, timings=timings), inputs)
 
-    def plot(self, path: str | Path) -> None:
-        """Draw the quantities of the summary over the axes, as PNG."""
+    def content(self, suffix: str, *, timings: bool = False, head: bool = True) -> bytes:
+        """Return the contents of a file whose name ends in ``suffix``, of CSV also without its first line."""
+        columns = self.columns | ({WALL: self.wall} if timings else {})
+        return _csv(columns, head) if suffix == ".csv" else _parquet(columns)
+
+    def plot(self, path: str | Path, inputs: Iterable[Path] = ()) -> None:
+        """Draw the quantities of the summary over the axes, as PNG; QuadvisError as ``save``."""
         from quadvis.sweeps.picture import draw
 
-        draw(self, Path(path))
+        draw(self, Path(path), inputs)
 
 
-def checked_kind(path: Path) -> str:
-    """Return ".csv" or ".parquet"; QuadvisError if a table cannot be written to such a file."""
+def table_kind(path: Path) -> Kind:
+    """Return what such a file holds; QuadvisError if no table can be written to it."""
     if path.suffix not in KINDS:
         raise QuadvisError(f"cannot write the table '{path}': its name must end in .csv or .parquet")
-    if path.is_dir():
-        raise QuadvisError(f"cannot write the table '{path}': it is a folder")
-    if not path.parent.is_dir():
-        raise QuadvisError(f"cannot write the table '{path}': there is no folder '{path.parent}'")
-    if not os.access(path.parent, os.W_OK):
-        raise QuadvisError(
-            f"cannot write the table '{path}': the folder '{path.parent}' cannot be written to"
-        )
     if path.suffix == ".parquet":
         _pyarrow()
-    return path.suffix
+    return KINDS[path.suffix]
 
 
 def _pyarrow() -> Any:
@@ -123,12 +111,15 @@ def _pyarrow() -> Any:
     return pyarrow
 
 
-def _write_csv(columns: Mapping[str, NDArray[Any]], file: TextIO) -> None:
-    """Write rows of which numbers read back to the same bits."""
+def _csv(columns: Mapping[str, NDArray[Any]], head: bool) -> bytes:
+    """Return rows of which numbers read back to the same bits."""
+    file = StringIO(newline="")
     writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(columns)
+    if head:
+        writer.writerow(columns)
     cells = [[_cell(value) for value in column.tolist()] for column in columns.values()]
     writer.writerows(zip(*cells, strict=True))
+    return file.getvalue().encode()
 
 
 def _cell(value: Any) -> str:
@@ -139,10 +130,11 @@ def _cell(value: Any) -> str:
     return str(value)
 
 
-def _write_parquet(columns: Mapping[str, NDArray[Any]], path: Path) -> None:
-    pyarrow = _pyarrow()
+def _parquet(columns: Mapping[str, NDArray[Any]]) -> bytes:
+    pyarrow, file = _pyarrow(), BytesIO()
     arrays = {name: pyarrow.array(column.tolist(), _arrow_type(column)) for name, column in columns.items()}
-    pyarrow.parquet.write_table(pyarrow.table(arrays), path)
+    pyarrow.parquet.write_table(pyarrow.table(arrays), file)
+    return file.getvalue()
 
 
 def _arrow_type(column: NDArray[Any]) -> Any:
@@ -157,7 +149,7 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
     Of a CSV file all cells are texts.
     """
     try:
-        if checked_kind(path) == ".parquet":
+        if path.suffix == ".parquet":
             rows: list[dict[str, Any]] = _pyarrow().parquet.read_table(path).to_pylist()
             return rows
         with path.open(encoding="utf-8", newline="") as file:

@@ -27,7 +27,6 @@ from quadvis.errors import QuadvisError, RunError
 from quadvis.sweeps import sweep as sweeping
 from quadvis.sweeps.axes import points, read_axes
 from quadvis.sweeps.summary import SweepLine, duration_text, sweep_lines
-from quadvis.sweeps.table import Table
 from quadvis.sweeps.worker import Job, Row, perform
 
 ROOT = Path(__file__).parents[2]
@@ -606,12 +605,8 @@ def test_workers_end_with_the_first_process_however_it_ends() -> None:
 def test_what_is_finished_is_written_now_and_then(here: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sweeping, "SAVE", 0.0)
     seen: list[int] = []
-    save = Table.save
-
-    def counted(table: Table, path: str | Path, *, timings: bool = False) -> None:
-        save(table, path, timings=timings)
-        seen.append(len(rows_of(str(path))))
-
-    monkeypatch.setattr(Table, "save", counted)
-    quadvis.sweep("loop.yaml", ["seed=0..2"], output="x.csv")
-    assert seen == [1, 2, 3, 3]
+    quadvis.sweep(
+        "loop.yaml", ["seed=0..3"], output="x.csv", progress=lambda *_: seen.append(len(rows_of("x.csv")))
+    )
+    assert seen == [0, 1, 2, 3]
+    assert [row["seed"] for row in rows_of("x.csv")] == ["0", "1", "2", "3"]

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from quadvis.block import Block, Frame, In, Param, ParameterError, State
-from quadvis.errors import RunError
+from quadvis.errors import QuadvisError, RunError
+from quadvis.files import JPG, PNG, check_output, write_output
+
+KINDS = {".png": PNG, ".jpg": JPG}
+NAMES = r"\d{6,}\.(png|jpg)"  # of the pictures that it writes
 
 
 class FrameWriter(Block, numeric=False):
     """Writes every new frame as a picture into a folder: ``000001.png``, ``000002.png``, ...
 
-    The number is the frame's sequence number, so `vision.image_folder` plays them in order. Pictures of the
-    same name are replaced; frames without pixels are passed over. RunError if one cannot be written.
+    The number is the frame's sequence number, so `vision.image_folder` plays them in order. Pictures of an
+    earlier run with the same name are replaced, but nothing that this run reads, and no file of another kind;
+    frames without pixels are passed over. RunError if one cannot be written.
     """
 
     frame = In("frame", doc="the frames to write")
 
-    folder = Param(type="file", doc="folder, made if it is not there")
+    folder = Param(type="file", writes=True, doc="folder, made if it is not there")
     format = Param("png", choices=("png", "jpg"), doc="png keeps every bit, jpg is some ten times smaller")
     every = Param(1, type="int64", min=1, doc="write one frame out of so many")
 
@@ -30,11 +36,17 @@ class FrameWriter(Block, numeric=False):
             raise ParameterError("folder", f"folder must be a folder, '{self.folder}' is a file")
 
     def open(self) -> None:
-        """Make the folder."""
+        """Make the folder; ParameterError if a file that could be replaced must not be."""
         try:
             Path(self.folder).mkdir(parents=True, exist_ok=True)
+            old = [path for path in Path(self.folder).iterdir() if re.fullmatch(NAMES, path.name)]
         except OSError as error:
             raise RunError(f"cannot make the folder '{self.folder}': {error.strerror}") from error
+        try:
+            for path in old:
+                check_output(path, KINDS[path.suffix])
+        except QuadvisError as error:
+            raise ParameterError("folder", str(error)) from error
 
     def update(self, frame: Frame) -> None:
         """Write a frame that is new."""
@@ -48,11 +60,8 @@ class FrameWriter(Block, numeric=False):
     def _write(self, frame: Frame) -> None:
         import cv2
 
-        path = Path(self.folder) / f"{frame.sequence:06d}.{('png', 'jpg')[self.format]}"
+        path = Path(self.folder) / f"{frame.sequence:06d}{list(KINDS)[self.format]}"
         whole, data = cv2.imencode(path.suffix, frame.pixels)
-        try:
-            if not whole:
-                raise OSError(0, "the picture cannot be coded")
-            path.write_bytes(data.tobytes())
-        except OSError as error:
-            raise RunError(f"cannot write the picture '{path}': {error.strerror}") from error
+        if not whole:
+            raise RunError(f"cannot write the picture '{path}': the picture cannot be coded")
+        write_output(path, KINDS[path.suffix], data.tobytes())

@@ -47,6 +47,10 @@ class ImageFolder(Block, numeric=False):
             problem = f"no picture in '{self.folder}' matches '{self.pattern}'"
             raise ParameterError("pattern", f"{problem}; it needs at least one file of {kinds}")
 
+    def reads(self) -> list[str]:
+        """Return the pictures."""
+        return [str(path) for path in self._find()]
+
     def _find(self) -> list[Path]:
         try:
             found = list(Path(self.folder).glob(self.pattern))

@@ -8,15 +8,17 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, Frame, In, Param, ParameterError, State
-from quadvis.errors import RunError
+from quadvis.errors import QuadvisError, RunError
+from quadvis.files import Kind, check_output, open_output
 from quadvis_blocks.vision._drawing import Picture, is_picture
 
 CODECS = {".mp4": "mp4v", ".avi": "MJPG", ".mkv": "FFV1"}
+HEADS = {".mp4": rb"\A[\s\S]{4}ftyp", ".avi": rb"\ARIFF[\s\S]{4}AVI ", ".mkv": rb"\A\x1aE\xdf\xa3"}
 FINEST = 65535  # MPEG-4 counts time in fractions no finer than this
 
 
 class VideoWriter(Block, numeric=False):
-    """Writes frames into a video file, which is replaced if it is there.
+    """Writes frames into a video file; an earlier video of that name is replaced with the first frame.
 
     The suffix of the file says how: ``.mp4`` is MPEG-4, small and readable everywhere; ``.avi`` is Motion
     JPEG, of which every picture stands alone; ``.mkv`` is FFV1 and keeps every bit.
@@ -26,13 +28,15 @@ class VideoWriter(Block, numeric=False):
     is written once, so that `vision.video_file` plays exactly those.
 
     All pictures of a video have one size, that of the first frame, made even by repeating the last row or
-    column. A frame of another size is fitted into it; one that is not a picture is black. RunError if the
-    file cannot be written.
+    column. A frame of another size is fitted into it; one that is not a picture is black. ParameterError if
+    the file is something else than a video, or is read by this run; RunError if it cannot be written.
     """
 
     frame = In("frame", doc="the frames to write")
 
-    file = Param(type="file", doc="video file: .mp4, .avi or .mkv; its folder is made if it is not there")
+    file = Param(
+        type="file", writes=True, doc="video file: .mp4, .avi or .mkv; its folder is made if it is not there"
+    )
     keep_time = Param(True, type="bool", doc="write a picture at each tick, also without a new frame")
 
     last = State("int64", 0)  # sequence number of the last frame
@@ -40,7 +44,7 @@ class VideoWriter(Block, numeric=False):
 
     def check(self) -> None:
         """Refuse a file that is a folder, and formats that are not known."""
-        if Path(self.file).suffix.lower() not in CODECS:
+        if self._suffix not in CODECS:
             names = ", ".join(CODECS)
             raise ParameterError("file", f"file must end in one of {names}, got '{Path(self.file).name}'")
         if Path(self.file).is_dir():
@@ -49,18 +53,26 @@ class VideoWriter(Block, numeric=False):
     def open(self) -> None:
         """Make the folder; the file is begun with the first frame, which has its size."""
         self._video: Any = None
+        self._held: Any = None  # the file, so that no other run writes it
         self._picture: Picture | None = None
         try:
             Path(self.file).parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise RunError(f"cannot make the folder of '{self.file}': {error.strerror}") from error
+        try:
+            check_output(self.file, self._kind)
+        except QuadvisError as error:
+            raise ParameterError("file", str(error)) from error
 
     def close(self) -> None:
         """Finish the file."""
         video = self.__dict__.get("_video")
         if video is not None:
             video.release()
-        self._video = None
+        held = self.__dict__.get("_held")
+        if held is not None:
+            held.close()
+        self._video = self._held = None
 
     def update(self, frame: Frame) -> None:
         """Write the frame of this tick."""
@@ -76,12 +88,21 @@ class VideoWriter(Block, numeric=False):
                 self._video.write(self._picture)
             self.due += 1
 
+    @property
+    def _suffix(self) -> str:
+        return Path(self.file).suffix.lower()
+
+    @property
+    def _kind(self) -> Kind:
+        return Kind("the video", pattern=HEADS[self._suffix])
+
     def _begin(self, pixels: Picture) -> None:
         import cv2
 
+        self._held = open_output(self.file, self._kind)
         height, width = pixels.shape[:2]
         self._size = (width + width % 2, height + height % 2)
-        codec = cv2.VideoWriter.fourcc(*CODECS[Path(self.file).suffix.lower()])
+        codec = cv2.VideoWriter.fourcc(*CODECS[self._suffix])
         video = cv2.VideoWriter(self.file, cv2.CAP_FFMPEG, codec, frame_rate(self.period), self._size)
         if not video.isOpened():
             size = f"{self._size[0]} x {self._size[1]} px"

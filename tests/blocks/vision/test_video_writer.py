@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from quadvis.block import Frame, ParameterError
 from quadvis.errors import RunError
+from quadvis.files import Kind, open_output, reading
 from quadvis.testing import drive
 from quadvis_blocks.vision.video_file import VideoFile
 from quadvis_blocks.vision.video_writer import CODECS, VideoWriter, frame_rate
@@ -88,6 +89,33 @@ def test_a_file_that_is_there_is_replaced(tmp_path):
     path = tmp_path / "video.avi"
     for count in (9, 3):
         drive(VideoWriter(file=str(path)), frame=frames(count))
+    assert len(read(path)[0]) == 3
+
+
+@pytest.mark.parametrize("suffix", CODECS)
+def test_a_file_of_another_kind_stays_and_so_does_one_that_is_read(tmp_path, suffix):
+    path, other = tmp_path / f"video{suffix}", tmp_path / "other"
+    path.write_text("quadvis: 1\n")
+    with pytest.raises(ParameterError, match=r"cannot write the video .* a file of another kind is there"):
+        drive(VideoWriter(file=str(path)), frame=frames(2))
+    assert path.read_text() == "quadvis: 1\n"
+    path.unlink()
+    drive(VideoWriter(file=str(path)), frame=frames(2))
+    other.symlink_to(path)
+    before = path.read_bytes()
+    with reading([other]), pytest.raises(ParameterError, match=r"it is an input .*other"):
+        drive(VideoWriter(file=str(path)), frame=frames(2))
+    assert path.read_bytes() == before
+
+
+def test_a_video_that_another_run_writes_stays_whole(tmp_path):
+    path = tmp_path / "video.mkv"
+    sent = frames(3)
+    held = open_output(path, Kind("the video"))
+    with pytest.raises(RunError, match="another run is writing it"):
+        drive(VideoWriter(file=str(path)), frame=sent)
+    held.close()
+    drive(VideoWriter(file=str(path)), frame=sent)
     assert len(read(path)[0]) == 3
 
 

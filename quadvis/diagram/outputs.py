@@ -1,0 +1,95 @@
+"""What a diagram reads and what its blocks write: no writer takes what is read, or what another writes."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from quadvis.block import Block
+from quadvis.diagram.flow import Draft
+from quadvis.errors import Faults, Place, QuadvisError, quoted
+from quadvis.files import same_file
+
+
+class Writer(NamedTuple):
+    """A block's parameter that names a file or folder which it writes."""
+
+    block: str
+    parameter: str
+    path: str
+    place: Place
+
+
+def files_read(blocks: Iterable[Block], sources: Iterable[Path]) -> list[Path]:
+    """Return every file that a run depends on: the YAML files, those of parameters, and the blocks' own."""
+    found = dict.fromkeys(sources)
+    for block in blocks:
+        module = getattr(sys.modules.get(type(block).__module__), "__file__", None)
+        found |= dict.fromkeys(map(Path, [*([module] if module else []), *block.reads()]))
+    return list(found)
+
+
+def files_written(blocks: Iterable[Block]) -> list[str]:
+    """Return the files and folders that blocks write."""
+    return [path for block in blocks for _, path in _written(block)]
+
+
+def check_writers(drafts: Sequence[Draft], sources: Iterable[Path], faults: Faults) -> None:
+    """Tell the blocks that would write over what is read, into a folder that is played, or over another."""
+    blocks = {draft.path: draft.block for draft in drafts if isinstance(draft.block, Block)}
+    writers = [
+        Writer(draft.path, name, path, draft.places.get(name, draft.place))
+        for draft in drafts
+        if draft.path in blocks
+        for name, path in _written(blocks[draft.path])
+    ]
+    if not writers:
+        return
+    inputs = files_read(blocks.values(), sources)
+    played = {file_key(path): name for name, block in blocks.items() for path in _folders_read(block)}
+    taken: dict[object, str] = {}
+    for writer in writers:
+        key, what = file_key(writer.path), f"{writer.parameter} {quoted(os.path.basename(writer.path))}"
+        with faults.about(f"block '{writer.block}'"):
+            if key in played:
+                problem = f"{what} is the folder that block '{played[key]}' reads"
+                faults.add(writer.place, problem, "name another one")
+            elif same := same_file(writer.path, inputs):
+                faults.add(
+                    writer.place, f"{what} is an input ('{same}') and would be lost", "name another one"
+                )
+            elif key in taken:
+                faults.add(writer.place, f"{what} is what block '{taken[key]}' writes", "name another one")
+        taken.setdefault(key, writer.block)
+
+
+def check_log(path: str | os.PathLike[str], blocks: Iterable[Block]) -> None:
+    """Refuse, with QuadvisError, a log where a block writes."""
+    if file_key(path) in map(file_key, files_written(blocks)):
+        raise QuadvisError(
+            f"cannot write the log '{path}': a block of the diagram writes that; choose another name"
+        )
+
+
+def file_key(path: str | os.PathLike[str]) -> object:
+    """Return what is equal for two names of one file or folder, also if it is not there yet."""
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError):
+        return os.path.realpath(path)
+    return found.st_dev, found.st_ino
+
+
+def _written(block: Block) -> Iterator[tuple[str, str]]:
+    for name, param in block.interface.params.items():
+        if param.writes and getattr(block, name):
+            yield name, getattr(block, name)
+
+
+def _folders_read(block: Block) -> Iterator[str]:
+    for name, param in block.interface.params.items():
+        if param.is_file and not param.writes and os.path.isdir(getattr(block, name)):
+            yield getattr(block, name)
