@@ -1,6 +1,6 @@
 """Physical units of ports and parameters: reading, comparing, combining and unifying them.
 
-A unit is a product of powers. Its scale to SI is kept exactly, as powers of 2, 3, 5 and pi, beside the powers
+A unit is a product of powers. Its scale to SI is kept exactly, as powers of primes and pi, beside the powers
 of the dimensions m, kg, s, rad, px, A, K and of the unit variables a, b, c; hence nothing is ever rounded.
 Angles have a dimension of their own, so that Hz and rad/s are told apart.
 """
@@ -9,42 +9,30 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property, lru_cache
 
-from quadvis.errors import QuadvisError, quoted, sentence, suggestion
+from quadvis.errors import QuadvisError, quoted, sentence
+from quadvis.unit_names import (
+    BASES,
+    DERIVED,
+    PREFIXED,
+    PREFIXES,
+    PRIMES,
+    SCALES,
+    SPELLINGS,
+    VARIABLES,
+)
+from quadvis.unit_spelling import elsewhere, spellings
 
-VARIABLES = ("a", "b", "c")
-_PRIMES = {"2": 2, "3": 3, "5": 5}
-_SCALES = frozenset((*_PRIMES, "pi"))
 _LARGEST_POWER = 60
 LONGEST = 80
-
-_BASES = ("m", "kg", "s", "rad", "px", "A", "K", *VARIABLES)
-# Every other unit by what it is made of; each line uses only names above it.
-_DERIVED = {
-    "%": "2^-2*5^-2", "Hz": "s^-1", "N": "kg*m/s^2", "J": "N*m", "W": "J/s", "V": "W/A", "ohm": "V/A",
-    "Pa": "N/m^2", "T": "N/A/m", "min": "2^2*3*5*s", "h": "2^2*3*5*min", "deg": "pi*2^-2*3^-2*5^-1*rad",
-    "rev": "2*pi*rad", "rpm": "rev/min",
-}  # fmt: skip
-_PREFIXES = {"n": -9, "u": -6, "m": -3, "c": -2, "h": 2, "k": 3, "M": 6}
-# No gram: people write g for gravity.
-_PREFIXED = "km cm mm um nm ms us ns mrad mA uA mV uV kV mN kN mW kW kHz MHz hPa kPa mT uT"
-_SPELLINGS = str.maketrans(
-    {"·": "*", "⋅": "*", "\u00d7": "*", "²": "^2", "³": "^3", "µ": "u", "μ": "u", "°": "deg"}
-)
-_WORDS = {
-    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "usec": "us", "millisecond": "ms",
-    "milliseconds": "ms", "hr": "h", "hour": "h", "hours": "h", "minute": "min", "minutes": "min",
-    "meter": "m", "meters": "m", "metre": "m", "metres": "m", "hertz": "Hz", "fps": "Hz", "degree": "deg",
-    "degrees": "deg", "radian": "rad", "radians": "rad", "pixel": "px", "pixels": "px", "volt": "V",
-    "volts": "V", "amp": "A", "amps": "A", "ampere": "A", "newton": "N", "newtons": "N", "watt": "W",
-    "watts": "W", "percent": "%", "rps": "rev/s", "mps": "m/s", "kph": "km/h", "kmh": "km/h",
-}  # fmt: skip
+_GENERAL = "use m, s, rad, kg, N, V, Hz, px ..."
 
 _TOKEN = re.compile(r"([A-Za-z%]+)|([0-9]+(?:\.[0-9]+)?)|([*/^()-])")
+_RAISED = re.compile("\N{SUPERSCRIPT MINUS}([¹²³])")
 _AROUND_OPERATOR = re.compile(r"\s*([*/^])\s*")
 
 
@@ -75,9 +63,15 @@ class Unit:
     symbols: tuple[tuple[str, Fraction], ...] = field(default=(), compare=False, repr=False)
 
     @staticmethod
-    def parse(text: str) -> Unit:
-        """Return the unit written as "rad/s^2", "N*m", "1/s", "deg/s", "%", "Hz^0.5", "W/(m*K)" or "1"."""
-        return _parse(text)
+    def parse(text: str, *wanted: Unit) -> Unit:
+        """Return the unit written as "rad/s^2", "N*m", "1/s", "deg/s", "%", "Hz^0.5", "W/(m*K)" or "1".
+
+        UnitError if it is none; what it then suggests has the dimension of a unit that is ``wanted``.
+        """
+        try:
+            return _parse(text)
+        except UnitError as error:
+            raise advised(error, text, wanted) from None
 
     def __str__(self) -> str:
         """Return the unit as it was written, in one spelling; `Unit.parse` reads it back."""
@@ -111,16 +105,16 @@ class Unit:
         """The scale as an exact ratio, and the irrational rest (pi, roots)."""
         ratio, rest = Fraction(1), 1.0
         for symbol, exponent in sorted(self.exponents):  # sets differ in order from one process to the next
-            if symbol in _PRIMES and exponent.denominator == 1:
-                ratio *= Fraction(_PRIMES[symbol]) ** int(exponent)
-            elif symbol in _SCALES:
-                rest *= float(_PRIMES.get(symbol, math.pi)) ** float(exponent)
+            if symbol in PRIMES and exponent.denominator == 1:
+                ratio *= Fraction(PRIMES[symbol]) ** int(exponent)
+            elif symbol in SCALES:
+                rest *= float(PRIMES.get(symbol, math.pi)) ** float(exponent)
         return ratio, rest
 
     @cached_property
     def dimension(self) -> frozenset[tuple[str, Fraction]]:
         """The powers of the dimensions and variables, without the scale."""
-        return frozenset((symbol, exponent) for symbol, exponent in self.exponents if symbol not in _SCALES)
+        return frozenset((symbol, exponent) for symbol, exponent in self.exponents if symbol not in SCALES)
 
     @cached_property
     def variables(self) -> frozenset[str]:
@@ -176,28 +170,33 @@ def unify(pattern: Unit, actual: Unit, bindings: dict[str, Unit]) -> bool:
 def _table() -> dict[str, Unit]:
     """Return every unit by its symbol."""
     one = Fraction(1)
-    table = {name: Unit(frozenset({(name, one)}), ((name, one),)) for name in (*_BASES, *_SCALES)}
-    for name, made_of in _DERIVED.items():
+    table = {name: Unit(frozenset({(name, one)}), ((name, one),)) for name in (*BASES, *SCALES)}
+    for name, made_of in DERIVED.items():
         table[name] = Unit(_Reader(made_of, table).unit().exponents, ((name, one),))
-    for name in _PREFIXED.split():
-        power = Fraction(_PREFIXES[name[0]])
+    for name in sorted(PREFIXED):
+        power = Fraction(PREFIXES[name[0]])
         scaled = _unit((("2", power), ("5", power), *table[name[1:]].exponents), ((name, one),))
         table[name] = scaled
-    for name in _SCALES:
+    for name in SCALES:
         del table[name]
     return table
 
 
+def _plain(text: str) -> str:
+    """Return the text in the one spelling that the reader knows, without blanks around operators."""
+    powers = _RAISED.sub(lambda match: f"^-{'¹²³'.index(match[1]) + 1}", text)
+    return _AROUND_OPERATOR.sub(r"\1", powers.translate(SPELLINGS)).strip()
+
+
 @lru_cache(maxsize=1024)
 def _parse(text: str) -> Unit:
-    plain = _AROUND_OPERATOR.sub(r"\1", text.translate(_SPELLINGS)).strip()
+    plain = _plain(text)
     if not plain:
         raise UnitError("the unit is empty", "write '1' for a number without unit")
     if len(plain) > LONGEST:
         raise UnitError(f"{quoted(text)} is too long for a unit")
     if re.search(r"\s", plain):
-        product = quoted("*".join(plain.split()))
-        raise UnitError(f"{quoted(text)} holds a space", f"write {product} for a product")
+        raise UnitError(f"{quoted(text)} holds a space", "write '*' for a product")
     return _Reader(plain, _table()).unit()
 
 
@@ -285,20 +284,38 @@ class _Reader:
         if token in ("", *"*/^()-"):
             missing = "a unit is missing at its end" if not token else f"'{token}' stands where it cannot"
             return UnitError(f"{quoted(self.text)} is not a unit", missing)
-        if token == "g":
-            return UnitError("'g' is not a unit, since gram and gravity share it", "write 'kg' or 'm/s^2'")
-        if token[0].isdigit() or token.isdigit():
-            before = self.tokens[position - 1] if position else ""
-            power = f"did you mean '{before}^{token}'?" if before in self.table else ""
-            return UnitError(f"{quoted(self.text)} is not a unit", power or f"leave out the number {token}")
-        word = _WORDS.get(token.lower())
-        remedy = f"did you mean '{word}'?" if word else suggestion(token, self.table)
-        return UnitError(f"{quoted(token)} is not a unit", remedy or "use m, s, rad, kg, N, V, Hz, px ...")
+        if token[0].isdigit():
+            return UnitError(f"{quoted(self.text)} is not a unit", f"leave out the number {token}")
+        return UnitError(f"{quoted(token)} is not a unit", _GENERAL)
+
+
+def advised(error: UnitError, text: str, wanted: Sequence[Unit] = ()) -> UnitError:
+    """Return the error with what may have been meant; only a unit of a dimension that is wanted, if known."""
+    plain = _plain(text)
+    name, why, remedy = elsewhere(plain) or ("", "", "")
+    if name:
+        return UnitError(f"{quoted(name)} is not a unit here{why}", remedy)
+    table = _table()
+    likely = [name for name, unit in table.items() if any(map(unit.dimension_equals, wanted))]
+    for near in spellings(plain, table, likely) if len(plain) <= LONGEST else ():
+        try:
+            meant = _parse(near)
+        except UnitError:
+            continue
+        if not wanted or any(map(meant.dimension_equals, wanted)):
+            is_product = near == "*".join(plain.split()) != plain
+            remedy = f"write {quoted(near)} for a product" if is_product else f"did you mean {quoted(near)}?"
+            return UnitError(
+                f"{quoted(text.strip())} {'holds a space' if is_product else 'is not a unit'}", remedy
+            )
+    if not wanted:
+        return error
+    return UnitError(error.problem, f"write it in {' or '.join(map(str, wanted))}")
 
 
 def parse_units(text: str) -> tuple[Unit, ...]:
     """Return the units of a port's elements: one for all of them ("m/s"), or one each ("m m m rad")."""
-    plain = _AROUND_OPERATOR.sub(r"\1", text.translate(_SPELLINGS)).split()
+    plain = _plain(text).split()
     if not plain:
         raise UnitError("the unit is empty", "write '1' for a number without unit")
-    return tuple(map(_parse, plain))
+    return tuple(map(Unit.parse, plain))

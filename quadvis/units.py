@@ -7,7 +7,7 @@ import re
 from fractions import Fraction
 from functools import lru_cache
 
-from quadvis.dimension import LONGEST, Unit, UnitError, parse_units, unify
+from quadvis.dimension import LONGEST, Unit, UnitError, advised, parse_units, unify
 from quadvis.errors import quoted
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
 ]  # fmt: skip
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_OTHER_BASE = re.compile(r"[+-]?0(?:[xX][0-9a-fA-F]|[oO][0-7]|[bB][01])")  # 0x10, but not 0 ohm
 _RATIO = re.compile(r"([0-9]+) */ *([0-9]+)(?![0-9.])")
 
 
@@ -80,7 +81,7 @@ def parse_rational(text: str, unit: Unit | None = None) -> Fraction:
     A `unit` demands its dimension, and that a number which is not 0 has a unit. Units whose scale is
     irrational (deg) are refused.
     """
-    number, written = _parts(text)
+    number, written = _parts(text, unit)
     ratio, rest = written.exact_scale
     if rest != 1.0:
         raise UnitError(f"{quoted(text)} has no exact value", "write it in an SI unit")
@@ -93,8 +94,8 @@ def parse_rational(text: str, unit: Unit | None = None) -> Fraction:
 
 def parse_period(text: str) -> Fraction:
     """Return the exact period in seconds of a rate ("10 Hz") or a period ("50 ms"); it is above zero."""
-    _, unit = _parts(text)
     second, hertz = Unit.parse("s"), Unit.parse("Hz")
+    _, unit = _parts(text, second, hertz)
     rate = unit.dimension_equals(hertz)
     value = parse_rational(text, hertz if rate or not split_quantity(text)[1] else second)
     if value <= 0:
@@ -106,7 +107,7 @@ def read_quantity(text: str, unit: Unit, *, bare: bool = True) -> float:
     """Return a quantity as a number of `unit`; a bare number is one already, unless `bare` is false."""
     if bare and _NUMBER.fullmatch(text):
         return parse_number(text)
-    number, written = _parts(text)
+    number, written = _parts(text, None if unit.variables else unit)
     if not split_quantity(text)[1]:
         require_unit(text, unit)
         return float(number)
@@ -165,18 +166,27 @@ def _likely(value: float, unit: Unit) -> str:
     return small[0] if small and value >= small[1] else str(unit)
 
 
-def _parts(text: str) -> tuple[Fraction, Unit]:
+def _parts(text: str, *wanted: Unit | None) -> tuple[Fraction, Unit]:
+    """Return the number and the unit; advice for a text that is none goes by what is wanted, if known."""
     number, unit = split_quantity(text)
     if not number:
         raise UnitError(f"{quoted(text)} does not begin with a number", "write it as in '50 ms'")
-    if _NUMBER.fullmatch(number) is None or not unit or unit[0] not in "xXoObB_,.:":
-        return _exact(number, text), Unit.parse(unit or "1")
-    raise _not_a_number(text)
+    if _OTHER_BASE.match(text.strip()) or unit[:1] in tuple("_,.:"):
+        raise _not_a_number(text)
+    known = [each for each in wanted if each is not None]
+    written = Unit.parse(unit or "1", *known)
+    if written.variables:
+        raise advised(
+            UnitError(f"{quoted(unit)} is not a unit", "use m, s, rad, kg, N, V, Hz, px ..."), unit, known
+        )
+    return _exact(number, text), written
 
 
 def _require_dimension(text: str, written: Unit, unit: Unit) -> None:
     if written.dimension_equals(unit):
         return
+    if str(written) == "g" and unit == Unit.parse("m/s^2"):
+        raise UnitError(f"{quoted(text)} is in grams, not in {unit}", "write gravity as 9.80665 m/s^2")
     if not unit.dimension:
         raise UnitError(f"{quoted(text)} has a unit where none belongs", "write a number without unit")
     usual = [name for name in _ladder(str(unit)) if Unit.parse(name).scale >= 1e-3]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from decimal import Decimal
 from fractions import Fraction
 
@@ -31,12 +32,20 @@ IN_SI = {
     "km": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0,
     "deg": math.pi / 180, "rev": 2 * math.pi, "rpm": 2 * math.pi / 60, "kHz": 1e3, "mV": 1e-3, "%": 0.01,
     "km/h": 1 / 3.6, "deg/s": math.pi / 180, "mm^2": 1e-6, "1/ms": 1e3, "kW/cm^3": 1e9, "hPa": 100.0,
+    "g": 1e-3, "mg": 1e-6, "l": 1e-3, "ml": 1e-6, "bar": 1e5, "mbar": 100.0, "kPa": 1e3, "ppm": 1e-6,
+    "mA*h": 3.6,
+    "W*h": 3600.0, "uF": 1e-6, "mH": 1e-3, "kohm": 1e3, "MW": 1e6, "l/min": 1e-3 / 60,
+    # Exact by the agreement of 1959, and the nautical mile of 1929.
+    "in": 0.0254, "ft": 0.3048, "mi": 1609.344, "nmi": 1852.0, "mph": 0.44704, "kn": 1852 / 3600,
+    "lb": 0.45359237, "oz": 0.45359237 / 16,
 }  # fmt: skip
 SAME = [
     ("Hz", "1/s"), ("N", "kg*m/s^2"), ("J", "N*m"), ("W", "J/s"), ("W", "V*A"), ("Pa", "N/m^2"),
     ("ohm", "V/A"),
     ("T", "V*s/m^2"), ("m/s^2", "m/s/s"), ("m*s^-2", "m/s^2"), ("W/(m*K)", "W/m/K"), ("min", "1/(1/min)"),
     ("Hz^0.5", "1/s^(1/2)"), ("1", "m/m"), ("m·s", "m*s"), ("m²", "m^2"), ("°/s", "deg/s"), ("µs", "us"),
+    ("C", "A*s"), ("F", "C/V"), ("H", "V*s/A"), ("H", "ohm*s"), ("F", "s/ohm"), ("Wb", "V*s"), ("Ω", "ohm"),
+    ("kΩ", "kohm"), ("m·s⁻²", "m/s^2"), ("l", "dm^3"), ("g", "mg*km/m"),
     ("m / s", "m/s"), ("rev/min", "rpm"), ("mm*km", "m^2"),
 ]  # fmt: skip
 NAMES = "m kg s rad px A K N J W V Hz ms min deg rpm % km mV ohm a b c"
@@ -105,13 +114,13 @@ def test_units_multiply_like_numbers(one, two, three):
     [
         ("sec", "'sec' is not a unit; did you mean 's'?"),
         ("hz", "'hz' is not a unit; did you mean 'Hz'?"),
-        ("Metre/s", "'Metre' is not a unit; did you mean 'm'?"),
+        ("Metre/s", "'Metre/s' is not a unit; did you mean 'm/s'?"),
         ("m2", "'m2' is not a unit; did you mean 'm^2'?"),
         ("N m", "'N m' holds a space; write 'N*m' for a product"),
-        ("g", "'g' is not a unit, since gram and gravity share it; write 'kg' or 'm/s^2'"),
         ("", "the unit is empty; write '1' for a number without unit"),
         ("m/", "'m/' is not a unit; a unit is missing at its end"),
-        ("m**2", "'m**2' is not a unit; '*' stands where it cannot"),
+        ("m**2", "'m**2' is not a unit; did you mean 'm^2'?"),
+        ("m*/s", "'m*/s' is not a unit; '/' stands where it cannot"),
         ("(m", "'(m' lacks a ')'"),
         ("m^", "'m^' has no exponent after '^'; write such as 's^2' or 's^-1'"),
         ("m^99", "a unit has an exponent beyond 60"),
@@ -124,6 +133,123 @@ def test_what_is_no_unit_is_refused_with_advice(text, message):
     with pytest.raises(UnitError) as caught:
         Unit.parse(text)
     assert str(caught.value) == message
+
+
+# What people write, and the unit that is meant.
+MEANT = {
+    "Nm": "N*m", "N.m": "N*m", "N-m": "N*m", "kNm": "kN*m", "Nms": "N*m*s", "Nms/rad": "N*m*s/rad",
+    "Vs": "V*s",
+    "Vs/rad": "V*s/rad", "As": "A*s", "Ah": "A*h", "mAh": "mA*h", "Wh": "W*h", "kWh": "kW*h", "VA": "V*A",
+    "kgm2": "kg*m^2", "kgm^2": "kg*m^2", "kg.m2": "kg*m^2", "1/kgm2": "1/(kg*m^2)", "W/mK": "W/(m*K)",
+    "m2": "m^2", "m/s2": "m/s^2", "rad/s2": "rad/s^2", "s-1": "s^-1", "m s-2": "m*s^-2", "kg m2": "kg*m^2",
+    "m**2": "m^2", "meter": "m", "metres": "m", "Meters": "m", "seconds": "s", "secs": "s", "sec": "s",
+    "milliseconds": "ms", "microseconds": "us", "kilometres": "km", "millimeter": "mm", "minutes": "min",
+    "hours": "h", "degrees": "deg", "degs": "deg", "radians": "rad", "radian/sec": "rad/s",
+    "deg/sec": "deg/s",
+    "hertz": "Hz", "Herz": "Hz", "kilohertz": "kHz", "HZ": "Hz", "mhz": "MHz", "volts": "V",
+    "millivolts": "mV",
+    "amps": "A", "amperes": "A", "milliamps": "mA", "newtons": "N", "Newton": "N", "newton metres": "N*m",
+    "watts": "W", "kilowatts": "kW", "joules": "J", "Joule": "J", "pascal": "Pa", "kilopascals": "kPa",
+    "Ohm": "ohm", "ohms": "ohm", "kOhm": "kohm", "farads": "F", "henry": "H", "henries": "H", "coulombs": "C",
+    "kelvin": "K", "tesla": "T", "grams": "g", "kilograms": "kg", "KG": "kg", "litres": "l", "liter": "l",
+    "percent": "%", "pixels": "px", "feet": "ft", "foot": "ft", "inches": "in", "pounds": "lb", "lbs": "lb",
+    "ounces": "oz", "knots": "kn", "miles": "mi", "kph": "km/h", "kmh": "km/h", "mps": "m/s", "S": "s",
+    "meter per second": "m/s", "revolutions": "rev", "turns/min": "rev/min", "bars": "bar", "RPM": "rpm",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "unit"), MEANT.items())
+def test_the_usual_names_of_a_unit_get_its_right_spelling(text, unit):
+    assert Unit.parse(unit)
+    for wanted in ((), (Unit.parse(unit),)):
+        with pytest.raises(UnitError) as caught:
+            Unit.parse(text, *wanted)
+        assert f"'{unit}'" in caught.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted", "remedy"),
+    [
+        ("Nm", "N*m", "did you mean 'N*m'?"), ("Nm", "nm", "did you mean 'nm'?"),
+        ("rads", "rad", "did you mean 'rad'?"),
+        ("rads", "rad/s", "did you mean 'rad/s'?"), ("MS", "s", "did you mean 'ms'?"),
+        ("hm", "m", "did you mean 'm'?"),
+        ("metres", "s", "write it in s"), ("Nm", "V", "write it in V"),
+        ("m/s2", "rad/s^2", "write it in rad/s^2"),
+        ("xyz", "N*s/m", "write it in N*s/m"), ("volt", "A", "write it in A"), ("Herz", "s", "write it in s"),
+    ],
+)  # fmt: skip
+def test_what_is_suggested_has_the_dimension_that_is_wanted(text, wanted, remedy):
+    with pytest.raises(UnitError) as caught:
+        Unit.parse(text, Unit.parse(wanted))
+    assert caught.value.remedy == remedy
+
+
+@given(st.text("abcABCdBgNmsHF", min_size=1, max_size=4), st.sampled_from(["", "s", "m/s", "A", "N*m"]))
+def test_a_unit_variable_is_never_suggested(text, wanted):
+    try:
+        Unit.parse(text, *([Unit.parse(wanted)] if wanted else []))
+    except UnitError as error:
+        for name in re.findall(r"'([^']*)'", error.remedy):
+            assert not Unit.parse(name).variables
+            assert not wanted or Unit.parse(name).dimension_equals(Unit.parse(wanted))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("3 dB", "'dB' is not a unit here, since it is a logarithm; "
+         "write the ratio, such as 10 for an amplitude of 20 dB"),
+        ("20 degC", "'degC' is not a unit here, since its zero is not 0; "
+         "write 20 degC as 293.15 K, and a difference of 1 degC as 1 K"),
+        ("1 W/degC", "'degC' is not a unit here, since its zero is not 0; "
+         "write 20 degC as 293.15 K, and a difference of 1 degC as 1 K"),
+        ("20 °C", "'degC' is not a unit here, since its zero is not 0; "
+         "write 20 degC as 293.15 K, and a difference of 1 degC as 1 K"),
+        ("2 gauss", "'gauss' is not a unit here; write it in T: 1 gauss is 1e-4 T"),
+        ("3 psi", "'psi' is not a unit here; write it in Pa: 1 psi is 6894.757 Pa"),
+    ],
+)  # fmt: skip
+def test_names_that_cannot_be_units_say_what_to_write(text, message):
+    with pytest.raises(UnitError) as caught:
+        parse_quantity(text)
+    assert str(caught.value) == message
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "unit"),
+    [
+        ("1 ohm", 1.0, "ohm"), ("2 bar", 2e5, "bar"), ("3 oz", 3 * 0.45359237 / 16, "oz"),
+        ("0 ohm", 0.0, "ohm"),
+        ("0ohm", 0.0, "ohm"), ("0bar", 0.0, "bar"), ("0.5 bar", 5e4, "bar"), ("2ohm", 2.0, "ohm"),
+        ("0 oz", 0.0, "oz"), ("10 ohm", 10.0, "ohm"), ("0oz", 0.0, "oz"), ("-0 bar", 0.0, "bar"),
+    ],
+)  # fmt: skip
+def test_units_that_begin_with_a_letter_of_other_bases_are_units(text, value, unit):
+    assert parse_quantity(text) == (pytest.approx(value, rel=1e-15), Unit.parse(unit))
+
+
+@pytest.mark.parametrize(
+    "text", ["0x10", "0X1f m", "0o17", "0b1", "0b101 s", "-0x3", "+0o7", "0B0", "0O1", "0xfa"]
+)
+def test_numbers_of_other_bases_are_refused(text):
+    with pytest.raises(UnitError, match=r"is not a number; write it as in 0\.5, -2 or 1e-3$"):
+        parse_quantity(text)
+
+
+@pytest.mark.parametrize("text", ["1 a", "2 b", "3 c", "4 a/s", "5 m*b"])
+def test_a_unit_variable_is_no_unit_of_a_number(text):
+    for read in (parse_quantity, parse_rational, lambda text: read_quantity(text, Unit.parse("m"))):
+        with pytest.raises(UnitError, match="is not a unit"):
+            read(text)
+
+
+def test_gravity_is_told_from_the_gram():
+    assert read_quantity("50 g", Unit.parse("kg")) == 0.05
+    with pytest.raises(
+        UnitError, match=r"^'2 g' is in grams, not in m/s\^2; write gravity as 9\.80665 m/s\^2$"
+    ):
+        read_quantity("2 g", Unit.parse("m/s^2"))
 
 
 def test_a_port_has_one_unit_or_one_for_each_element():
