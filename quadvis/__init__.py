@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from quadvis.version import __version__
+
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram, load
     from quadvis.output.log_reader import Log, read_log
     from quadvis.sweeps.sweep import sweep
 
-__version__ = "0.1.0"
-__all__ = ["Diagram", "Log", "load", "read_log", "sweep"]
+__all__ = ["Diagram", "Log", "__version__", "load", "read_log", "sweep"]
 
 _HOMES = {
     "Diagram": "diagram.diagram",

@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from quadvis.cli import commands
+from quadvis.version import __version__
 
 JSON_HELP = """\
 --json prints one object: diagram, variant, params, hash, seed, passed, duration_s, wall_s, cpu_s,
@@ -38,6 +39,7 @@ def parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog="quadvis", description="Block diagrams in YAML that fly a four-rotor craft."
     )
+    made.add_argument("--version", action="version", version=f"quadvis {__version__}")
     subparsers = made.add_subparsers(required=True, metavar="COMMAND")
 
     def add(name: str, command: Any, words: str, epilog: str = "") -> argparse.ArgumentParser:
