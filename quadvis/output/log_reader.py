@@ -13,7 +13,7 @@ from quadvis.files import read_input
 from quadvis.output import mcap_records as mcap
 from quadvis.output.log import CDR, DIAGRAM, METADATA, SLOT_TYPES, SUMMARY, Channel, Field, Recording
 
-MOST_SLOTS = 1 << 20  # of one block
+MOST_SLOTS, MOST_AXES = 1 << 20, 32  # of one block, of one output
 LONGEST_DIAGRAM = 1 << 24  # bytes
 FIRST = 1 << 20  # bytes in which the facts of a run stand
 READ = "give a file written by 'quadvis run'"
@@ -83,7 +83,7 @@ class Log(Recording):
             found.append(f"what is left of it {until}")
         digest = hashlib.sha256(self.diagram.encode(errors="replace")).hexdigest()
         if self.metadata.get("hash", digest) != digest:
-            found.append("the diagram in it is not the one that ran: its hash differs")
+            found.append("holds another diagram than the one that ran: its hash differs")
         if found:
             self.damage = f"the log '{self.path}' {'; '.join(found)}"
 
@@ -125,7 +125,8 @@ def _channel(path: str, described: Mapping[str, str]) -> Channel:
         "".join([path, *(text for field in fields for text in (field.name, field.unit))]).encode()
         sizes = [size for field in fields for size in field.shape]
         known = all(type(size) is int and 1 <= size <= MOST_SLOTS for size in sizes)
-        if known and fields and all(field.type in SLOT_TYPES for field in fields):
+        flat = all(len(field.shape) <= MOST_AXES for field in fields)
+        if known and flat and fields and all(field.type in SLOT_TYPES for field in fields):
             channel = Channel(path, fields, described.get("rate", ""))
             if sum(math.prod(field.shape) for field in fields) <= MOST_SLOTS:
                 return channel

@@ -96,6 +96,7 @@ class Scan:
                 kind, end = self._frame(position)
                 body = self.data[position + HEAD.size : end]
                 _check(kind, body)
+                found = list(_inside(self._contents(body)) if kind == CHUNK else _read(kind, body))
             except BrokenError:
                 following = self._next(position + 1)
                 if following is None:
@@ -109,7 +110,7 @@ class Scan:
                 self.ended = self._is_end(body, end)
                 return
             self.whole |= kind == DATA_END
-            yield from self._chunk(body) if kind == CHUNK else _read(kind, body)
+            yield from found
 
     def _frame(self, position: int) -> tuple[int, int]:
         """Return what stands at a place and where it ends."""
@@ -138,42 +139,39 @@ class Scan:
         index = self.data[start : end - 4] if start else b""
         return bytes(self.data[end : end + len(MAGIC)]) == MAGIC and (not crc or zlib.crc32(index) == crc)
 
-    def _chunk(self, body: memoryview) -> Iterator[Record]:
-        """Yield the records of a chunk, or of a damaged one nothing."""
-        crc = CHUNK_HEAD.unpack_from(body)[3]
-        data = self._unpacked(body, whole=True)
-        if data is None or (crc and zlib.crc32(data) != crc):
-            self.damaged += 1
-            return
-        try:
-            yield from _inside(memoryview(data))
-        except BrokenError:
-            self.damaged += 1
+    def _contents(self, body: memoryview) -> memoryview:
+        """Return the records of a chunk; BrokenError if they are not what they were, or too many."""
+        size, crc = CHUNK_HEAD.unpack_from(body)[2:4]
+        data = self._unpacked(body)
+        if data is None or len(data) != size or (crc and zlib.crc32(data) != crc):
+            raise BrokenError
+        return memoryview(data)
 
     def _cut_chunk(self, position: int) -> Iterator[Record]:
         """Yield the records at the beginning of a chunk that the file ends in."""
         body = self.data[position + HEAD.size :]
         if self.data[position : position + 1] != bytes([CHUNK]) or len(body) < CHUNK_HEAD.size:
             return
+        if HEAD.unpack_from(self.data, position)[1] <= len(body):
+            return  # it is all there, but not what it was
         packing = _packing(body)
         if packing is None or len(body) < CHUNK_HEAD.size + len(packing) + 8:
             return
         try:
-            yield from _inside(memoryview(self._unpacked(body, whole=False) or b""))
+            yield from _inside(memoryview(self._unpacked(body) or b""))
         except BrokenError:
             return  # there the file ends
 
-    def _unpacked(self, body: memoryview, *, whole: bool) -> bytes | memoryview | None:
+    def _unpacked(self, body: memoryview) -> bytes | memoryview | None:
         """Return the contents of a chunk, or as much as there is; None if it is damaged or too large."""
         size, packing = CHUNK_HEAD.unpack_from(body)[2], _packing(body)
         packed = body[CHUNK_HEAD.size + len(packing or "") + 8 :]
         if not packing:
-            return packed if not whole or size == len(packed) else None
+            return packed
         if size > self._left:
             return None
         self._left -= size
-        data = _unpack(packing, packed, size)
-        return data if not whole or data is None or len(data) == size else None
+        return _unpack(packing, packed, size)
 
 
 def _packing(body: memoryview) -> str | None:
