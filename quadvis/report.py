@@ -23,9 +23,15 @@ class StatusLine:
 
     def show(self, text: str) -> None:
         """Put a text in place of the one before."""
+        self._put(f"\r\x1b[K{text} ")
+
+    def _put(self, text: str) -> None:
         if self.shown:
-            self.stream.write(f"\r\x1b[K{text} ")
-            self.stream.flush()
+            try:
+                self.stream.write(text)
+                self.stream.flush()
+            except (OSError, ValueError):  # the terminal has gone; what goes on does not end with it
+                self.shown = False
 
     @staticmethod
     def bar(part: float) -> str:
@@ -36,9 +42,7 @@ class StatusLine:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self.shown:
-            self.stream.write("\r\x1b[K")
-            self.stream.flush()
+        self._put("\r\x1b[K")
 
 
 class ProgressLine(StatusLine):

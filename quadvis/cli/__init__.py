@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
 
 from quadvis.cli.options import parser
 from quadvis.errors import QuadvisError
+from quadvis.signals import end_orderly
 
 INTERRUPTED, PIPE_BROKEN = 130, 141
 
@@ -17,8 +16,7 @@ INTERRUPTED, PIPE_BROKEN = 130, 141
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code: 0 ok, 1 a run failed or missed what it should, 2 bad input."""
     options = parser().parse_args(arguments)
-    with suppress(ValueError):  # signals belong to the main thread
-        signal.signal(signal.SIGTERM, _terminate)
+    end_orderly()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")  # a name may hold what the terminal cannot show
@@ -36,8 +34,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # The reader of the pipe has gone; Python would complain about what is still to be written.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return PIPE_BROKEN
-
-
-def _terminate(number: int, _: object) -> None:
-    """Leave through the same door as an error does, so that every block is closed."""
-    raise SystemExit(128 + number)

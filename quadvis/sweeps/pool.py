@@ -9,17 +9,18 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 import sys
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from multiprocessing.process import BaseProcess
 from queue import Empty, SimpleQueue
 from types import ModuleType
 
 from quadvis.errors import RunError
+from quadvis.signals import held_back
 from quadvis.sweeps.worker import ONE_THREAD, Job, Row, begin, perform
 
 IDLE = 1.0  # s without a row after which the caller has its turn all the same
@@ -40,15 +41,15 @@ def perform_all(jobs: Sequence[Job], workers: int) -> Generator[Row | None, None
     if not jobs:
         return
     before = set(multiprocessing.active_children())
+    with held_back():  # Python's own helper shall outlive the terminal as well
+        resource_tracker.ensure_running()
     executor = ProcessPoolExecutor(
         min(workers, len(jobs)), multiprocessing.get_context("spawn"), initializer=begin
     )
-    children: set[BaseProcess] = set()
     finished = False
     try:
         with _launching():
             futures = [executor.submit(perform, job) for job in jobs]  # this starts the processes
-        children = set(multiprocessing.active_children()) - before
         done: SimpleQueue[Future[Row]] = SimpleQueue()
         for future in futures:
             future.add_done_callback(done.put)
@@ -65,6 +66,7 @@ def perform_all(jobs: Sequence[Job], workers: int) -> Generator[Row | None, None
         problem = "a worker process was killed, perhaps by the system for lack of memory"
         raise RunError(f"{problem}; try fewer with --workers") from None
     finally:
+        children: set[BaseProcess] = set(multiprocessing.active_children()) - before
         executor.shutdown(wait=finished, cancel_futures=True)
         for child in children if not finished else ():
             child.kill()
@@ -74,22 +76,18 @@ def perform_all(jobs: Sequence[Job], workers: int) -> Generator[Row | None, None
 
 @contextmanager
 def _launching() -> Iterator[None]:
-    """Let processes begin with one thread for each library, deaf to Ctrl-C, and without the main script.
+    """Let processes begin with one thread for each library, deaf to the terminal, without the main script.
 
     The workers need nothing of the script, which then works without `if __name__ == "__main__":`.
     """
     environment = {name: os.environ.get(name) for name in ONE_THREAD}
     main = sys.modules["__main__"]
-    handler = None
     os.environ.update(ONE_THREAD)
     sys.modules["__main__"] = ModuleType("__main__")
-    with suppress(ValueError):  # signals belong to the main thread
-        handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        yield
+        with held_back():
+            yield
     finally:
-        if handler is not None:
-            signal.signal(signal.SIGINT, handler)
         sys.modules["__main__"] = main
         for name, value in environment.items():
             if value is None:

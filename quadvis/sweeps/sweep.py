@@ -74,7 +74,7 @@ def sweep(
     jobs = list(plan.jobs(_folder(logs)))
     collection = _Collection(diagram.name, axes, grid, found)
     with _Saving(collection, target, timings, plan.inputs) as save:
-        if resume and target is not None and target.is_file():
+        if resume and target is not None and target.stat().st_size:
             jobs = _not_known(jobs, _earlier(target, found), collection)
         try:
             with closing(perform_all(jobs, processes)) as rows:

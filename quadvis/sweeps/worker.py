@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-import signal
 import threading
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from multiprocessing import parent_process
 from typing import TYPE_CHECKING
 
 from quadvis.errors import QuadvisError
 from quadvis.output.verdict import EXPECTATIONS
+from quadvis.signals import leave_to_parent
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
@@ -146,8 +145,7 @@ _loaded: tuple[Configuration, Diagram] | None = None
 
 def begin() -> None:
     """Prepare a worker process."""
-    with suppress(ValueError):
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all; the first process ends the others
+    leave_to_parent()
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

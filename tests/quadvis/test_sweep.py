@@ -24,9 +24,12 @@ from hypothesis import strategies as st
 import quadvis
 from quadvis.cli import main
 from quadvis.errors import QuadvisError, RunError
+from quadvis.files import Claim, Kind
+from quadvis.signals import ENDS
 from quadvis.sweeps import sweep as sweeping
 from quadvis.sweeps.axes import points, read_axes
 from quadvis.sweeps.summary import SweepLine, duration_text, sweep_lines
+from quadvis.sweeps.table import read_rows
 from quadvis.sweeps.worker import Job, Row, perform
 
 ROOT = Path(__file__).parents[2]
@@ -55,11 +58,12 @@ summary:
 
 @pytest.fixture(autouse=True)
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    before = signal.getsignal(signal.SIGTERM)
+    before = {number: signal.getsignal(number) for number in ENDS}
     (tmp_path / "loop.yaml").write_text(LOOP)
     monkeypatch.chdir(tmp_path)
     yield tmp_path
-    signal.signal(signal.SIGTERM, before)
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 @pytest.fixture
@@ -556,18 +560,25 @@ def long_runs(seconds: int) -> None:
 
 
 @linux
-def test_ctrl_c_leaves_what_is_finished_and_resuming_gives_the_bytes_of_one_go(here: list[int]) -> None:
+@pytest.mark.parametrize(
+    ("number", "code", "words"),
+    [(signal.SIGINT, 130, "interrupted\n{} of 10 runs are finished and in x.csv; --resume does the rest\n"),
+     (signal.SIGHUP, 129, ""), (signal.SIGTERM, 143, "")],
+)  # fmt: skip
+def test_what_is_finished_when_a_sweep_is_ended_stays_and_resuming_gives_the_bytes_of_one_go(
+    number: signal.Signals, code: int, words: str, here: list[int]
+) -> None:
     long_runs(150)
     arguments = ("long.yaml", "--over", "seed=0..9", "--workers", "2")
     process = quadvis_sweep(*arguments, "-o", "x.csv", "--logs", "logs")
     workers = wait_for(lambda: children(process))
     wait_for(lambda: len(list(Path("logs").glob("*"))) >= 6)  # four are finished, if not yet all told
-    os.killpg(process.pid, signal.SIGINT)
+    os.killpg(process.pid, number)
     out, told = process.communicate(timeout=60)
-    assert (process.returncode, out) == (130, "")
+    assert (process.returncode, out) == (code, "")
     count = len(rows_of("x.csv"))
     assert 1 <= count < 10
-    assert told == f"interrupted\n{count} of 10 runs are finished and in x.csv; --resume does the rest\n"
+    assert told == words.format(count)
     assert all(wait_for(lambda pid=pid: gone(pid)) for pid in workers)
     assert [path.name for path in Path().glob(".*")] == []
     for name in ("x.csv", "y.csv"):
@@ -610,3 +621,86 @@ def test_what_is_finished_is_written_now_and_then(here: list[int], monkeypatch: 
     )
     assert seen == [0, 1, 2, 3]
     assert [row["seed"] for row in rows_of("x.csv")] == ["0", "1", "2", "3"]
+
+
+HANGS = """\
+import time
+
+from quadvis.block import Block, In, Param
+
+
+class Hang(Block, numeric=False):
+    \"""Lets a run with a large wave never end.\"""
+
+    u = In(unit="a")
+    most = Param(2.0, doc="what is large")
+
+    def update(self, u):
+        \"""Look at the wave.\"""
+        while abs(u) > self.most:
+            time.sleep(0.1)
+"""
+
+
+def hanging_runs() -> tuple[str, ...]:
+    """Return a sweep of which some runs never end."""
+    Path("blocks/own").mkdir(parents=True)
+    Path("blocks/own/hang.py").write_text(HANGS)
+    hang = "  hang: {block: own.hang, rate: fast, in: {u: wave.y}}\nvariants:"
+    Path("hang.yaml").write_text(LOOP.replace("variants:", hang))
+    return ("hang.yaml", "--over", "seed=0..2", "--over", "size=1 m,9 m", "--workers", "2")
+
+
+@linux
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_rows_are_in_the_table_also_if_no_other_run_ends_and_the_sweep_is_killed(
+    kind: str, here: list[int]
+) -> None:
+    if kind == "parquet":
+        pytest.importorskip("pyarrow")
+    arguments = (*hanging_runs(), "--over", "law.factor=1,2", "-o", f"x.{kind}")
+    process = quadvis_sweep(*arguments)
+    name = Path(f"x.{kind}")
+
+    def written() -> list[dict[str, Any]]:
+        return read_rows(name) if name.is_file() and name.stat().st_size else []
+
+    found = wait_for(written)
+    process.kill()
+    process.communicate(timeout=60)
+    assert {row["size [m]"] for row in found} <= {"1.0", 1.0}
+    assert all(row["hash"] for row in found)
+    table = quadvis.sweep("loop.yaml", ["seed=0..1", "size=1 m,9 m"], output=f"y.{kind}", resume=True)
+    assert table.runs == 4
+
+
+def test_two_sweeps_never_write_one_table(here: list[int], capsys: pytest.CaptureFixture[str]) -> None:
+    kind = Kind("the table")
+    quadvis.sweep("loop.yaml", ["seed=0..1"], output="x.csv")
+    before = Path("x.csv").read_bytes()
+    held = Claim("x.csv", kind)
+    assert main(["sweep", "loop.yaml", "--over", "seed=0..4", "-o", "x.csv", "--plot", ""]) == 2
+    assert "another run is writing it" in capsys.readouterr().err
+    assert Path("x.csv").read_bytes() == before
+    held.close()
+
+
+@pytest.mark.parametrize("option", ["-o", "--plot"])
+def test_a_sweep_writes_over_nothing_that_it_reads_and_no_file_of_another_kind(
+    option: str, here: list[int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    suffix = ".png" if option == "--plot" else ".csv"
+    Path("set.yaml").write_text("quadvis: 1\nname: s\nset: {size: 2 m}\n")
+    for source in ("loop.yaml", "set.yaml", "other.txt"):
+        Path("other.txt").write_text("notes")
+        out = Path(f"out{suffix}")
+        out.hardlink_to(source)
+        before = Path(source).read_bytes()
+        options = ["--params", "set.yaml", "--over", "seed=0", option, str(out)]
+        assert main(["sweep", "loop.yaml", *options]) == 2
+        told = capsys.readouterr().err
+        assert told.count("\n") == 1
+        assert ("input" in told) == (source != "other.txt")
+        assert Path(source).read_bytes() == out.read_bytes() == before
+        out.unlink()
+    assert here == []
