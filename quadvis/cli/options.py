@@ -14,7 +14,8 @@ real_time_factor, log;
 summary: {label: {signal, unit, and the statistics by name}};
 expect: [{expectation, signal, kind, unit, limit, found, met}].
 Numbers are in the unit beside them, null where there is none.
-Exit code: 0 all expectations met, 1 one is not or the run stopped, 2 bad input, 130 interrupted."""
+Exit code: 0 all expectations met, 1 one is not or the run stopped, 2 bad input; 130, 129 or 143 interrupted,
+hung up or ended."""
 
 SWEEP_HELP = """\
 With several --over all combinations are run, the last one changing fastest. A name is that of a parameter as
@@ -22,7 +23,8 @@ for --set, or seed, variant, params (files); 'none' stands for no variant and no
 with a step 1..3 step 0.5 rad/s. The table has the axes, the numbers of summary and expectations with their
 units, passed, failure (why a run stopped) and the hash of the diagram; it does not depend on the number of
 processes. Wall times do, so they stand in it only with --timings.
-Exit code: 0 all runs passed, 1 one did not, 2 bad input, 130 interrupted (what is done is in the table)."""
+Exit code: 0 all runs passed, 1 one did not, 2 bad input; 130, 129 or 143 interrupted, hung up or ended
+(what is done is in the table)."""
 
 ANALYSE_HELP = """\
 Noise is taken away, Newton's method finds the steady state near, and the loop is linearised there;
@@ -55,7 +57,9 @@ def parser() -> argparse.ArgumentParser:
     run.add_argument("--stop-time", metavar="T", help="such as '20 s'; replaces the diagram's")
     run.add_argument("--seed", type=int, metavar="N", help="seed of all noise; replaces the diagram's")
     run.add_argument(
-        "--log", metavar="PATH", help="where to write the log; default runs/NAME.mcap, '' for none"
+        "--log",
+        metavar="PATH",
+        help="where to write the log; default runs/NAME-VARIANT-SETS.mcap, '' for none",
     )
     run.add_argument("--json", action="store_true", help="print one JSON object instead of the summary")
     _sweep_options(add("sweep", commands.sweep, "run a diagram at every point of a grid", SWEEP_HELP))
@@ -80,7 +84,12 @@ def parser() -> argparse.ArgumentParser:
     analyse.add_argument("--output", "-o", metavar="FOLDER", help="write Bode plots there, as PNG")
     draw = add("draw", commands.draw, "draw a diagram as SVG")
     _diagram_options(draw)
-    draw.add_argument("--output", "-o", metavar="PATH", help="default NAME.svg; '-' for standard output")
+    draw.add_argument(
+        "--output",
+        "-o",
+        metavar="PATH",
+        help="default NAME.svg, with the variant in it; '-' for standard output",
+    )
     plot = add("plot", commands.plot, "draw the figures that a log's diagram declares, as PNG")
     plot.add_argument("log", metavar="LOG")
     plot.add_argument("--output", "-o", metavar="FOLDER", help="default: beside the log")
@@ -117,7 +126,7 @@ def _sweep_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--stop-time", metavar="T", help="such as '20 s'; replaces the diagram's")
     parser.add_argument("--seed", type=int, metavar="N", help="seed of every run; replaces the diagram's")
     parser.add_argument("--workers", type=int, metavar="N", help="processes; default: one per processor")
-    words = "the table, .csv or .parquet; default runs/NAME-sweep.csv"
+    words = "the table, .csv or .parquet; default runs/NAME-sweep.csv, with variant and sets in its name"
     parser.add_argument("--output", "-o", metavar="TABLE", help=words)
     words = "picture of the summary; default: beside the table, '' for none"
     parser.add_argument("--plot", metavar="PNG", help=words)

@@ -177,6 +177,31 @@ def test_bad_input_ends_with_one_sentence(photographs, arguments, said):
     assert said in refused(*arguments, folder=photographs)
 
 
+@pytest.mark.parametrize("option", ["--output", "--residuals", "--two-planes"])
+@pytest.mark.parametrize("how", ["same", "spelling", "symbolic", "hard", "other kind"])
+def test_nothing_that_is_read_and_no_other_kind_of_file_is_written_over(photographs, tmp_path, option, how):
+    views = []
+    for i in range(4):
+        views.append(tmp_path / f"view{i}.png")
+        views[-1].write_bytes((photographs / f"view{i}.png").read_bytes())
+    out = {"same": views[0], "spelling": tmp_path / ".." / tmp_path.name / "view0.png"}.get(
+        how, tmp_path / "out"
+    )
+    match how:
+        case "symbolic":
+            out.symlink_to(views[0])
+        case "hard":
+            out.hardlink_to(views[0])
+        case "other kind":
+            out.write_text("quadvis: 1\nname: x\n")
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    heights = ("--heights", "0cm,1cm,2cm,3cm") if option == "--two-planes" else ()
+    said = refused(*views, *BOARD, *heights, option, out)
+    assert "cannot write" in said
+    assert ("another kind" in said) == (how == "other kind")
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
 def test_a_file_that_cannot_be_written_is_named(tmp_path):
     points = points_file(tmp_path / "points.csv")
     said = refused("--points", points, "--size", "452x322", "--output", tmp_path / "absent" / "camera.yaml")

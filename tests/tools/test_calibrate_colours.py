@@ -167,7 +167,7 @@ def test_five_frames_of_a_video_are_enough(tmp_path):
 
 
 def test_a_file_that_is_there_is_replaced_as_a_whole(scenes, tmp_path):
-    (tmp_path / "there.yaml").write_text("old")
+    (tmp_path / "there.yaml").write_text("circles: old")
     (tmp_path / "my.yaml").symlink_to("there.yaml")
     assert calibrate(scenes / "clean.png", "-o", "my.yaml", folder=tmp_path).returncode == 0
     assert (tmp_path / "my.yaml").is_symlink()
@@ -213,12 +213,16 @@ def test_a_reader_that_stops_early_sees_no_traceback(scenes, tmp_path):
         (["clean.png", "--radius", "60cm"], "half of the side"),
         (["clean.png", "--radius", "12"], "12"),
         (["clean.png", "--side", "0m"], "above 0"),
-        (["clean.png", "-o", "absent/my.yaml"], "cannot write absent/my.yaml"),
-        (["clean.png", "-o", "a folder"], "not a file"),
+        (["clean.png", "-o", "absent/my.yaml"], "cannot write the colours 'absent/my.yaml'"),
+        (["clean.png", "-o", "a folder"], "it is a folder"),
         (["clean.png", "-o", "."], "not a file"),
-        (["clean.png", "-o", "clean.yaml"], "clean.png is one of the frames"),
+        (["clean.png", "-o", "clean.yaml"], "'clean.png': it is an input and would be lost"),
+        (["clean.png", "-o", "a folder/../clean.png", "--overlay", "x.png"], "would be lost"),
+        (["clean.png", "-o", "my.yaml", "--overlay", "clean.png"], "would be lost"),
+        (["clean.png", "-o", "note.png", "--overlay", "x.png"], "a file of another kind is there"),
+        (["clean.png", "-o", "my.yaml", "--overlay", "note.png"], "a file of another kind is there"),
         (["clean.png", "-o", "my.png"], "both"),
-        (["clean.png", "-o", "my.yaml", "--overlay", "absent/my.png"], "cannot write absent/my.png"),
+        (["clean.png", "--overlay", "absent/my.png"], "cannot write the picture 'absent/my.png'"),
     ],
 )  # fmt: skip
 def test_bad_input_ends_with_one_sentence_and_writes_nothing(scenes, arguments, said):

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from quadvis.document import Node, dump_yaml, read_yaml
 from quadvis.errors import DiagramError, Fault
+from quadvis.files import Kind, write_output
 from quadvis_blocks.vision import _lens
 from quadvis_blocks.vision._evidence import KEYS, CalibrationError, Evidence
 
@@ -23,6 +24,7 @@ _ITERATIONS = 50
 _TOLERANCE = 1e-13  # of a normalised coordinate: far below a millionth of a pixel
 
 NOTHING_KNOWN = Evidence()
+CAMERA = Kind("the camera", pattern=rb"^matrix:")
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +81,7 @@ class CameraCalibration:
             "distortion": self.distortion.tolist(),
         }
         head = "".join(f"# {line}\n" for line in comment.splitlines())
-        Path(path).write_text(head + dump_yaml(data | self.evidence.facts()), encoding="utf-8")
+        write_output(path, CAMERA, head + dump_yaml(data | self.evidence.facts()))
 
     def normalise(self, pixels: ArrayLike) -> Array:
         """Return the undistorted rays (x, y) at depth 1 of pixels (n, 2): K and the lens are taken out.

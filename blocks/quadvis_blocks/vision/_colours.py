@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from quadvis.document import Node, dump_yaml, read_yaml
 from quadvis.errors import DiagramError, Fault, Faults, QuadvisError, sentence
+from quadvis.files import Kind, write_output
 from quadvis_blocks.vision._colour_evidence import KEYS, ColourEvidence
 from quadvis_blocks.vision._evidence import CalibrationError
 
@@ -32,6 +33,7 @@ _RATIO_MAX = 3.0
 APART = 0.3  # least distance of two colours: a step of a third in one channel
 
 NOTHING_KNOWN = ColourEvidence()
+COLOURS = Kind("the colours", pattern=rb"^circles:")
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +100,7 @@ class ColourCalibration:
             lines.append(f"  - {{colour: {json.dumps(name)}, ratio: [{parts}]}}")
         facts = self.evidence.facts()
         text = "\n".join(lines) + "\n" + (dump_yaml(facts) if facts else "")
-        Path(path).write_text(text, encoding="utf-8")
+        write_output(path, COLOURS, text)
 
     @cached_property
     def ratios(self) -> tuple[Colour, ...]:

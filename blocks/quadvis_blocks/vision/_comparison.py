@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from quadvis.errors import QuadvisError
+from quadvis.files import PNG, Kind, reason, write_output
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+FIGURE = Kind("the figure", PNG.heads)
 NAMES = ("x", "y", "z", "phi", "theta", "psi")
 SCALES = np.array([100.0] * 3 + [180 / np.pi] * 3)  # from m and rad to what is shown
 UNITS = ("cm",) * 3 + ("deg",) * 3
@@ -156,9 +158,9 @@ def draw(methods: Sequence[Poses], pictures: Sequence[int], path: Path) -> None:
         sheet.legend(handles, labels, loc="outside upper left", ncols=len(methods), frameon=False)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            sheet.savefig(path, format="png")
         except OSError as error:
-            raise QuadvisError(f"cannot write the figure '{path}': {error.strerror}") from error
+            raise QuadvisError(f"cannot write the figure '{path}': {reason(error)}") from error
+        write_output(path, FIGURE, lambda file: sheet.savefig(file, format="png"))
 
 
 def _draw_values(axes: Axes, methods: Sequence[Poses], pictures: Sequence[int], column: int) -> None:

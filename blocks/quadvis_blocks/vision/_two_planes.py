@@ -26,6 +26,7 @@ import numpy as np
 
 from quadvis.document import dump_yaml, read_yaml
 from quadvis.errors import DiagramError, Fault, QuadvisError
+from quadvis.files import Kind, write_output
 from quadvis.units import Unit, UnitError
 from quadvis_blocks.vision._evidence import KEYS, LEAST_ERROR, MOST_ERROR, CalibrationError, Evidence
 from quadvis_blocks.vision._homogeneous import rq
@@ -50,6 +51,7 @@ _SHAPES = {"H1": (3, 3), "H2": (3, 3), "F": (3,), "V_R": (3,), "V_C": (3,)}
 _NUMBERS = ("z1", "z2", "rho_p", "gamma_p")
 _SIGNIFICANT = 10.0  # F ratio; noise alone gives as much in 7 of 100 000 calibrations with 20 points
 _NOTHING_KNOWN = Evidence()
+TWO_PLANES = Kind("the two planes", pattern=rb"^H1:")
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +146,7 @@ class TwoPlanesCalibration:
         lines += [f"{name}: {float(getattr(self, name))!r}" for name in ("rho_p", "gamma_p")]
         known = self.evidence.facts() | ({} if self.unit is None else {"unit": self.unit})
         text = "\n".join(lines) + "\n" + (dump_yaml(known) if known else "")
-        Path(path).write_text(text, encoding="utf-8")
+        write_output(path, TWO_PLANES, text)
 
     def back_project(self, pixels: ArrayLike) -> tuple[Floats, Floats]:
         """Return the images (n, 3) of pixels (n, 2) on the first and the second plane, eq. (1)."""
