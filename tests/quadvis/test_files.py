@@ -135,3 +135,32 @@ def test_same_file_by_identity(here):
     assert same_file("c", ["none", "b", "a"]) == Path("a")
     assert same_file("b", ["a", "c"]) is None
     assert same_file("none", ["none"]) is None
+
+
+def test_a_kind_may_be_known_by_a_line(here):
+    kind = Kind("the colours", pattern=rb"^circles:")
+    for content, fits in [
+        (b"# made today\ncircles:\n", True), (b"circles: 3", True), (b"", True),
+        (b"quadvis: 1\n", False), (b"x: {circles: 3}", False), (b"# circles:", False),
+    ]:  # fmt: skip
+        Path("there").write_bytes(content)
+        if fits:
+            check_output("there", kind)
+        else:
+            with pytest.raises(QuadvisError, match="a file of another kind"):
+                check_output("there", kind)
+
+
+def test_permissions_stay_and_content_may_be_written_by_a_function(here):
+    Path("out").write_bytes(b"old")
+    os.chmod("out", 0o640)
+    write_output("out", TEXT, lambda file: file.write(b"new"))
+    assert (Path("out").read_bytes(), os.stat("out").st_mode & 0o777) == (b"new", 0o640)
+
+    def fails(file):
+        file.write(b"half")
+        raise ValueError
+
+    with pytest.raises(ValueError):
+        write_output("out", TEXT, fails)
+    assert (Path("out").read_bytes(), os.listdir()) == (b"new", ["out"])
