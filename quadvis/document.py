@@ -9,79 +9,44 @@ from __future__ import annotations
 import os
 import re
 import stat
-from collections.abc import Iterator
 from typing import Any
 
 import yaml
 
-from quadvis.errors import DiagramError, Fault, Faults, Place, QuadvisError, closest, quoted
+from quadvis.composer import FORBIDDEN, LINE_END, MAX_DEPTH, Composer, MisreadError, Position, forbidden
+from quadvis.errors import DiagramError, Fault, Faults, Place, QuadvisError
+from quadvis.missing_file import file_trouble, system_reason
 from quadvis.nodes import Mapping, Node, Scalar, Sequence, measure, plain_value
+from quadvis.number_lists import find_lists, hide_lists
+from quadvis.yaml_faults import STAND_INS, Trouble, explain
 
 __all__ = ["Mapping", "Node", "Scalar", "Sequence", "dump_yaml", "measure", "parse_yaml", "read_yaml"]
 
 MAX_BYTES = 1_000_000
-MAX_NODES = 100_000
-MAX_DEPTH = 50
-MAX_KEY = 200
 
 _Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _Dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
-# Control characters; line breaks that editors do not count; signs that reorder the text that people see.
-_FORBIDDEN = re.compile(
-    "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufeff"
-    "\ufffe\uffff]"
-)
-
 # Directives, of which libyaml compares each with all before it.
 _DIRECTIVE = re.compile("(?:^|[\r\n])%")
 
-# An element of a signal, which ends a text inside {...} and [...].
-_INDEXED = re.compile(r"(?P<name>[^\s{}\[\],:'\"]+)\[[^\[\]{}'\"]*\]")
-
-# PyYAML's words (of libyaml and of its Python parser) and ours; {opened} is the line where the part began.
-_PLAIN_WORDS = (
-    ("mapping values are not allowed", "a ':' stands where none can",
-     "put a text that holds ': ' in quotes, or check the indentation"),
-    ("could not find expected ':'", "a key has no ':' after it", "write 'key: value'"),
-    ("end of stream", "the quotes opened in line {opened} are never closed", "close them"),
-    ("document separator", "the quotes opened in line {opened} are never closed", "close them"),
-    ("document indicator", "the quotes opened in line {opened} are never closed", "close them"),
-    ("',' or '}'", "the map opened in line {opened} lacks a ',' or its '}}' here", "add it"),
-    ("',' or ']'", "the list opened in line {opened} lacks a ',' or its ']' here", "add it"),
-    ("did not find expected key", "this does not belong to the map that began in line {opened}",
-     "check the indentation, and that quotes are closed"),
-    ("did not find expected '-'", "this does not belong to the list that began in line {opened}",
-     "begin it with '- ', or check the indentation"),
-    ("expected <block end>", "this does not belong to what began in line {opened}", "check the indentation"),
-    ("sequence entries", "a '- ' stands where no list can begin", "begin the list on its own line"),
-    ("mapping keys are not allowed", "a '? ' stands where none can", "put the text in quotes"),
-    ("unknown escape character", "the text in double quotes holds an unknown escape after '\\'",
-     "write '\\\\', or use single quotes"),
-    ("cannot start any token", "a text cannot begin with this character", "put the text in quotes"),
-    ("alphabetic or numeric", "a text cannot begin with '*' or '&'", "put the text in quotes"),
-    ("document start", "this does not belong to the document", "check the indentation"),
-    ("document content", "a value is missing", "write one"),
-    ("node content", "a value is missing", "write one"),
-    ("comment or line break", "this does not belong behind '|' or '>'", "begin the text on the next line"),
-    ("chomping or indentation", "this does not belong behind '|' or '>'", "begin the text on the next line"),
-    ("tag", "a tag ('!') is not allowed", "put a text that begins with '!' in quotes"),
-)  # fmt: skip
+# Repairs of a text that was refused; each costs one more reading.
+_MOST_REPAIRS, _MOST_READ = 50, 3 * MAX_BYTES
 
 
 def read_yaml(path: str | os.PathLike[str], faults: Faults | None = None) -> Node:
     """Read a YAML file of at most 1 MB; see `parse_yaml`. Everything that is wrong raises `DiagramError`."""
     name = os.fspath(path)
     try:
-        if not stat.S_ISREG(os.stat(name).st_mode):
-            raise _fault(Place(name), "this is not a file", "name a YAML file")
-        with open(name, "rb") as file:
+        problem, remedy = file_trouble(name)
+        if problem:
+            raise _fault(Place(name), problem, remedy)
+        with open(os.open(name, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise _fault(Place(name), "this is not a file", "name a YAML file")
             data = file.read(MAX_BYTES + 1)
-    except FileNotFoundError:
-        raise _fault(Place(name), "there is no such file", _similar_file(name)) from None
     except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise _fault(Place(name), f"the file cannot be read: {reason}") from None
+        raise _fault(Place(name), f"the file cannot be read: {system_reason(error)}") from None
     if len(data) > MAX_BYTES:
         raise _fault(Place(name, 1, 1), f"the file is larger than {MAX_BYTES // 1000} kB", "split it")
     try:
@@ -102,186 +67,100 @@ def parse_yaml(text: str, name: str = "<text>", faults: Faults | None = None) ->
     text = text.removeprefix("\ufeff")
     if len(text) > MAX_BYTES:
         raise _fault(Place(name, 1, 1), f"the text is larger than {MAX_BYTES // 1000} kB", "split it")
-    bad = _FORBIDDEN.search(text)
+    bad = FORBIDDEN.search(text)
     if bad is not None:
-        raise _fault(_place(text[: bad.start()], name), *_control_character(bad))
+        raise _fault(_place(text[: bad.start()], name), *forbidden(bad))
     directive = _DIRECTIVE.search(text)
     if directive is not None:
         place = _place(text[: directive.end() - 1], name)
         raise _fault(place, "a line that begins with '%' is not allowed", "leave it out")
     found = Faults() if faults is None else faults
-    try:
-        root = _Composer(name, found).compose(yaml.parse(text, Loader=_Loader))
-    except yaml.MarkedYAMLError as error:
-        raise DiagramError([*found, _in_plain_words(error, text, name)]) from None
-    except yaml.YAMLError as error:
-        raise _fault(Place(name, 1, 1), f"this is not YAML: {quoted(error, 200)}") from None
+    kept, root = _read_on(text, name)
+    for fault in kept:
+        found.append(fault)
     if faults is None:
         found.check()
     return root
 
 
-class _Composer:
-    """Builds nodes from events, on a stack of its own."""
+def _read_on(text: str, name: str) -> tuple[Faults, Node]:
+    """Return the root and what was wrong on the way; what stops the parser is repaired where it can be."""
+    kept: list[Fault] = []
+    blanks: list[tuple[int, int]] = []
+    may_repair = not any(stand_in in text for stand_in in STAND_INS.values())
+    read = 0
+    while True:
+        faults = Faults()
+        for fault in kept:
+            faults.append(fault)
+        position = Position(name, list(blanks))
+        try:
+            return faults, _compose(text, position, faults)
+        except yaml.YAMLError as error:
+            trouble = _explained(error, text)
+        line, column = _line_column(text, trouble.at)
+        fault = Fault(Place(*position.of(line, column)), "", trouble.problem, trouble.remedy)
+        read += len(text)
+        done = not may_repair or len(kept) >= _MOST_REPAIRS or read > _MOST_READ or fault in kept
+        if trouble.repaired is None or done:
+            raise DiagramError([*faults, fault])
+        kept.append(fault)
+        text = trouble.repaired
+        if trouble.blank is not None:
+            blanks.append((line, column))
 
-    def __init__(self, name: str, faults: Faults) -> None:
-        self.name, self.faults = name, faults
-        self.stack: list[Sequence | Mapping] = []
-        self.keys: list[Scalar | None] = []  # one per open collection: the key that waits for its value
-        self.root: Node | None = None
-        self.documents = self.nodes = 0
 
-    def compose(self, events: Iterator[Any]) -> Node:
-        """Return the root; raise if there is none."""
-        for event in events:
-            kind = type(event)
-            if kind is yaml.ScalarEvent:
-                self._add(Scalar(event.value, not event.style, *self._position(event)), event)
-            elif kind is yaml.MappingStartEvent:
-                self._open(Mapping({}, {}, *self._position(event)), event)
-            elif kind is yaml.SequenceStartEvent:
-                self._open(Sequence([], *self._position(event)), event)
-            elif kind is yaml.MappingEndEvent or kind is yaml.SequenceEndEvent:
-                self.stack.pop()
-                self.keys.pop()
-            elif kind is yaml.AliasEvent:
-                self._refuse(event, f"the alias {quoted('*' + event.anchor)} is not allowed", "write it out")
-                self._add(Scalar("", True, *self._position(event)), event)
-            elif kind is yaml.DocumentStartEvent:
-                self.documents += 1
-                if self.documents > 1:
-                    raise self._fatal(event, "a second document begins here", "keep one document in a file")
-        if self.root is None or (isinstance(self.root, Scalar) and self.root.plain and not self.root.value):
-            raise DiagramError([*self.faults, Fault(Place(self.name, 1, 1), "", "the file is empty")])
-        return self.root
+def _explained(error: yaml.YAMLError, text: str) -> Trouble:
+    """Take the places of a complaint, none of its words."""
+    starts = [0, *(match.end() for match in LINE_END.finditer(text))]
 
-    def _position(self, event: Any) -> tuple[str, int, int]:
-        mark = event.start_mark
-        return self.name, mark.line + 1, mark.column + 1
+    def offset(mark: Any) -> int | None:
+        if mark is None:
+            return None
+        return min(starts[mark.line] + mark.column, len(text)) if mark.line < len(starts) else len(text)
 
-    def _refuse(self, event: Any, problem: str, remedy: str) -> None:
-        self.faults.add(Place(*self._position(event)), problem, remedy)
+    opened = offset(getattr(error, "context_mark", None))
+    at = offset(getattr(error, "problem_mark", None))
+    return explain(text, (opened or 0) if at is None else at, opened, MAX_DEPTH)
 
-    def _fatal(self, event: Any, problem: str, remedy: str) -> DiagramError:
-        return DiagramError([*self.faults, Fault(Place(*self._position(event)), "", problem, remedy)])
 
-    def _open(self, node: Sequence | Mapping, event: Any) -> None:
-        self._add(node, event)
-        if len(self.stack) >= MAX_DEPTH:
-            raise self._fatal(event, f"this is nested deeper than {MAX_DEPTH} levels", "write it flatter")
-        self.stack.append(node)
-        self.keys.append(None)
-
-    def _add(self, node: Node, event: Any) -> None:
-        """Put a node where it belongs: below the waiting key, at the end of the list, or as a key itself."""
-        self.nodes += 1
-        if self.nodes > MAX_NODES:
-            raise self._fatal(event, f"the file holds more than {MAX_NODES} values", "split it")
-        self._check_properties(event)
-        if not self.stack:
-            self.root = node
-            return
-        parent = self.stack[-1]
-        if isinstance(parent, Sequence):
-            node.key = f"{parent.key}[{len(parent.values)}]"
-            parent.values.append(node)
-            return
-        key = self.keys[-1]
-        if key is None:
-            self.keys[-1] = self._key(parent, node, event)
+def _compose(text: str, position: Position, faults: Faults) -> Node:
+    """Return the root; long lists of numbers are kept from the parser, unless it stumbles over that."""
+    repaired = bool(faults)
+    lists = find_lists(text)
+    if lists:
+        apart = Faults()
+        apart += faults
+        try:
+            composer = Composer(position, apart, text, lists, repaired=repaired)
+            root = composer.compose(yaml.parse(hide_lists(text, lists), Loader=_Loader))
+        except (yaml.YAMLError, MisreadError):
+            pass
         else:
-            if key is not _NO_KEY:
-                node.key = key.value
-                parent.keys[key.value], parent.values[key.value] = key, node
-            self.keys[-1] = None
-
-    def _check_properties(self, event: Any) -> None:
-        escaped = _FORBIDDEN.search(event.value) if getattr(event, "style", "") == '"' else None
-        if escaped is not None:
-            self._refuse(event, *_control_character(escaped))
-        if event.anchor is not None and type(event) is not yaml.AliasEvent:
-            self._refuse(event, f"the anchor {quoted('&' + event.anchor)} is not allowed", "leave it out")
-        if getattr(event, "tag", None) is not None:
-            remedy = "leave it out, or put a text that begins with '!' in quotes"
-            tag = event.tag.replace("tag:yaml.org,2002:", "!!")
-            self._refuse(event, f"the tag {quoted(tag)} is not allowed", remedy)
-
-    def _key(self, parent: Mapping, node: Node, event: Any) -> Scalar:
-        """Return the key to put the next value under, `_NO_KEY` if it is refused."""
-        if type(event) is yaml.AliasEvent:
-            return _NO_KEY
-        problem, remedy = _wrong_key(parent, node)
-        if isinstance(node, Scalar) and not problem:
-            return node
-        self._refuse(event, problem, remedy)
-        return _NO_KEY
+            faults[:] = apart
+            return root
+    return Composer(position, faults, text, repaired=repaired).compose(yaml.parse(text, Loader=_Loader))
 
 
-def _wrong_key(parent: Mapping, node: Node) -> tuple[str, str]:
-    """Return what is wrong with a key, and what would be right; nothing if it will do."""
-    if not isinstance(node, Scalar):
-        return "a key must be a text", "put a text that begins with '{' or '[' in quotes"
-    if not node.value:
-        return "a key is missing before ':'", "write 'key: value'"
-    if len(node.value) > MAX_KEY:
-        return f"the key {quoted(node.value)} is longer than {MAX_KEY} characters", "shorten it"
-    if node.value == "<<" and node.plain:
-        return "the merge key '<<' is not allowed", "write the values out"
-    if node.value in parent.keys:
-        line = parent.keys[node.value].line
-        return f"key {quoted(node.value)} is already in line {line}", "keep one of them"
-    return "", ""
-
-
-_NO_KEY = Scalar("", True, "", 0, 0)
+def _line_column(text: str, at: int) -> tuple[int, int]:
+    """Return line and column of an offset, from 0."""
+    last = None
+    line = 0
+    for match in LINE_END.finditer(text):
+        if match.end() > at:
+            break
+        line, last = line + 1, match.end()
+    return line, at - (last or 0)
 
 
 def _fault(place: Place, problem: str, remedy: str = "") -> DiagramError:
     return DiagramError([Fault(place, "", problem, remedy)])
 
 
-def _control_character(found: re.Match[str]) -> tuple[str, str]:
-    return f"the control character U+{ord(found.group()):04X} is not allowed", "remove it"
-
-
 def _place(before: str, name: str) -> Place:
     """Return the place after a beginning of the text; every kind of line break counts once."""
     lines = re.split("\r\n|\r|\n", before)
     return Place(name, len(lines), len(lines[-1].removeprefix("\ufeff")) + 1)
-
-
-def _similar_file(name: str) -> str:
-    folder, file = os.path.split(name)
-    try:
-        near = closest(file, sorted(os.listdir(folder or "."))[:1000])
-    except (OSError, ValueError):
-        near = None
-    return f"did you mean {quoted(os.path.join(folder, near), 200)}?" if near else ""
-
-
-def _in_plain_words(error: yaml.MarkedYAMLError, text: str, name: str) -> Fault:
-    """Return PyYAML's complaint as one sentence that says what to do."""
-    problem = error.problem or error.context or "no reason given"
-    mark = error.problem_mark or error.context_mark
-    if mark is None:
-        return Fault(Place(name, 1, 1), "", f"this is not YAML: {quoted(problem, 200)}")
-    opened = error.context_mark or mark
-    source = re.split("\r\n|\r|\n", text)
-    ended = not "".join(source[mark.line : mark.line + 1])[mark.column :] and mark.line >= len(source) - 1
-    at = opened if ended else mark
-    place = Place(name, at.line + 1, at.column + 1)
-    indent = source[at.line][: at.column + 1] if at.line < len(source) else ""
-    if "\t" in indent and not indent.strip():
-        return Fault(place, "", "a tab cannot indent a line", "use spaces")
-    line = source[at.line] if at.line < len(source) and "',' or" in problem else ""
-    for indexed in _INDEXED.finditer(line):
-        if indexed.end("name") == at.column:
-            place = Place(name, at.line + 1, indexed.start() + 1)
-            return Fault(place, "", "a text with '[' needs quotes here", f'write "{indexed.group()}"')
-    for words, wrong, right in _PLAIN_WORDS:
-        if words in problem:
-            return Fault(place, "", wrong.format(opened=opened.line + 1), right)
-    return Fault(place, "", f"this is not YAML: {quoted(problem, 200)}")
 
 
 def dump_yaml(data: Any) -> str:

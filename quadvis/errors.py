@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from typing import ClassVar, ParamSpec, TypeVar
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, NamedTuple, ParamSpec, TypeVar
+
+from quadvis.characters import advice
 
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
@@ -21,13 +23,25 @@ class QuadvisError(Exception):
     exit_code: ClassVar[int] = 2
 
 
+class Odd(NamedTuple):
+    """A character that was taken for an ASCII one, and where it stands."""
+
+    line: int
+    column: int
+    character: str
+
+
 @dataclass(frozen=True, order=True, slots=True)
 class Place:
-    """A position in a file; lines and columns count from 1, line 0 means the file as a whole."""
+    """A position in a file; lines and columns count from 1, line 0 means the file as a whole.
+
+    ``odd`` is a character of the text that begins there: should the text turn out to be wrong, that is why.
+    """
 
     file: str
     line: int = 0
     column: int = 0
+    odd: Odd | None = field(default=None, compare=False, repr=False)
 
     def __str__(self) -> str:
         """Return `file:line:column`."""
@@ -48,13 +62,21 @@ class Fault:
         subject = f"{self.subject}: " if self.subject else ""
         return f"{self.place}: {subject}{sentence(self.problem, self.remedy)}"
 
+    def explained(self) -> Fault:
+        """Return the fault at the odd character of the text, if it holds one, with what to write for it."""
+        odd = self.place.odd
+        if odd is None:
+            return self
+        line, column = (odd.line, odd.column) if self.place.line else (0, 0)
+        return Fault(Place(self.place.file, line, column), self.subject, self.problem, advice(odd.character))
+
 
 class DiagramError(QuadvisError):
     """Everything that is wrong with a diagram, one fault a line in the order of the files."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         """Keep the faults, sorted by place and without repetitions."""
-        self.faults: list[Fault] = sorted(set(faults))
+        self.faults: list[Fault] = sorted({fault.explained() for fault in faults})
         super().__init__("\n".join(str(fault) for fault in self.faults))
 
 

@@ -15,7 +15,8 @@ from fractions import Fraction
 from typing import Any, TypeVar
 
 from quadvis import units
-from quadvis.errors import DiagramError, Fault, Faults, Place, closest, quoted, suggestion
+from quadvis.characters import meant, odd_characters, with_article
+from quadvis.errors import DiagramError, Fault, Faults, Odd, Place, closest, quoted, suggestion
 from quadvis.units import Unit, UnitError
 
 ONE = Unit()
@@ -23,6 +24,7 @@ ONE = Unit()
 _Result = TypeVar("_Result")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
 _INTEGER = re.compile(r"[+-]?(0|[1-9][0-9]{0,19})")
+_NO_BLANK = re.compile(r"[A-Za-z_]\w*:(?=[^\s/\\])", re.ASCII)
 _TRUTH = {"true": True, "false": False}
 _TRUTH_ELSEWHERE = {
     **dict.fromkeys(("on", "yes", "y", "1", "true"), "true"),
@@ -139,8 +141,17 @@ class Node:
         """Return the units of elements such as "m m m rad"."""
         return self._read(units.parse_units)
 
+    def check_blanks(self) -> None:
+        """Raise if a quantity holds a blank that is no plain space; other odd signs are no numbers."""
+        text = self._scalar("a text such as '50 ms'")
+        blank = next((char for _, char in odd_characters(text) if meant(char) == " "), None)
+        if blank is not None:
+            label = f"{quoted(self.key)}: " if self.key else ""
+            raise self.fault(f"{label}{quoted(text)} holds {with_article(blank)}", "write a space")
+
     def _read(self, read: Callable[[str], _Result]) -> _Result:
         text = self._scalar("a text such as '50 ms'")
+        self.check_blanks()
         try:
             return read(text)
         except UnitError as error:
@@ -171,7 +182,7 @@ class Node:
         """Return the map of names to values."""
         if isinstance(self, Mapping):
             return self
-        raise self.wrong("a map", "write 'name: value' lines below it")
+        raise self.wrong("a map", _map_remedy(self))
 
     def fields(
         self, required: Collection[str] = (), optional: Collection[str] = (), faults: Faults | None = None
@@ -191,11 +202,25 @@ class Node:
 class Scalar(Node):
     """A text; `plain` says that it stands without quotes."""
 
-    __slots__ = ("plain", "value")
+    __slots__ = ("odd", "plain", "value")
 
-    def __init__(self, value: str, plain: bool, file: str, line: int, column: int, key: str = "") -> None:
+    def __init__(
+        self,
+        value: str,
+        plain: bool,
+        file: str,
+        line: int,
+        column: int,
+        key: str = "",
+        odd: Odd | None = None,
+    ) -> None:
         self.file, self.line, self.column, self.key = file, line, column, key
-        self.value, self.plain = value, plain
+        self.value, self.plain, self.odd = value, plain, odd
+
+    @property
+    def place(self) -> Place:
+        """Where the value begins, and the odd character in it if there is one."""
+        return Place(self.file, self.line, self.column, self.odd)
 
     def to_python(self) -> Any:
         """Return the text, or what it looks like if it stands without quotes."""
@@ -211,11 +236,27 @@ class Scalar(Node):
 class Sequence(Node):
     """A list of nodes."""
 
-    __slots__ = ("values",)
+    __slots__ = ("_values",)
 
     def __init__(self, values: list[Node], file: str, line: int, column: int, key: str = "") -> None:
         self.file, self.line, self.column, self.key = file, line, column, key
-        self.values = values
+        self._values: list[Node] | None = values
+
+    @property
+    def values(self) -> list[Node]:
+        """The nodes of the elements."""
+        if self._values is None:
+            self._values = self._make()
+        return self._values
+
+    def _make(self) -> list[Node]:
+        """Return the nodes of a list that was read as a whole."""
+        raise NotImplementedError
+
+    @property
+    def shape(self) -> tuple[int, ...] | None:
+        """The sizes along the axes, if they are known without a look at the elements."""
+        return None
 
     def to_python(self) -> Any:
         """Return the list of plain values."""
@@ -279,6 +320,12 @@ class Mapping(Node):
         return len(self.values)
 
 
+def _map_remedy(node: Node) -> str:
+    """Return what to write where a text stands in place of a map: "name:value" lacks a blank."""
+    match = _NO_BLANK.match(node.value) if isinstance(node, Scalar) and node.plain else None
+    return f"write a blank behind {quoted(match.group())}" if match else "write 'name: value' lines below it"
+
+
 def plain_value(text: str) -> Any:
     """Return what a text without quotes looks like: None, a truth value, a number, or the text itself."""
     if text in ("", "~", "null"):
@@ -311,6 +358,8 @@ def measure(node: Node) -> tuple[int, ...]:
     """Return the shape of nested lists, () for anything else; all elements of a list must have the same."""
     if not isinstance(node, Sequence):
         return ()
+    if node.shape is not None:
+        return node.shape
     shapes = [measure(child) for child in node.values]
     for child, shape in zip(node.values, shapes, strict=True):
         if shape != shapes[0]:

@@ -14,7 +14,8 @@ from quadvis.diagram.names import absent, remedy_for
 from quadvis.diagram.settings import Settings
 from quadvis.diagram.values import substitute
 from quadvis.document import Node
-from quadvis.errors import DiagramError, Faults, Place, closest, suggestion
+from quadvis.errors import DiagramError, Faults, Place, suggestion
+from quadvis.missing_file import file_trouble
 
 MAX_BLOCKS = 5_000  # parts in parts multiply
 MAX_DEPTH = 30
@@ -211,23 +212,9 @@ class Expansion:
             problem, remedy = f"part '{block.kind}' contains itself", "use another file"
         elif len(files) > MAX_DEPTH:
             problem, remedy = f"parts are nested deeper than {MAX_DEPTH} files", "write them flatter"
-        elif not os.path.isfile(file):
-            others = [
-                name for name in _yaml_files(file.parent) if os.path.realpath(file.parent / name) not in files
-            ]
-            near = closest(file.name, others)
-            problem = f"there is no file '{block.kind}'"
-            remedy = (
-                f"did you mean '{near}'?" if near else "a path is relative to the file in which it stands"
-            )
+        else:
+            problem, remedy = file_trouble(str(file), block.kind, files)
         if problem:
             self.faults.add(block.kind_place, problem, remedy)
             return None
         return self.parts.read(file)
-
-
-def _yaml_files(folder: Path) -> list[str]:
-    try:
-        return sorted(name for name in os.listdir(folder) if name.endswith((".yaml", ".yml")))[:1000]
-    except (OSError, ValueError):
-        return []

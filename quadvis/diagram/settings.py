@@ -23,7 +23,8 @@ from quadvis import document as yaml
 from quadvis.diagram.loader import is_version
 from quadvis.diagram.values import read_constant
 from quadvis.document import Node, parse_yaml, read_yaml
-from quadvis.errors import DiagramError, Faults, Place, closest
+from quadvis.errors import DiagramError, Faults, Place
+from quadvis.missing_file import file_trouble
 
 COMMAND_LINE = "--set"
 PARAMETERS_REQUIRED = ("quadvis", "name", "set")
@@ -131,15 +132,7 @@ def _wrong_base(path: Path, text: str, users: tuple[str, ...]) -> tuple[str, str
         return f"'{text}' builds on itself", "name another file, or leave 'base' out"
     if len(users) > MAX_DEPTH:
         return f"files build on files more than {MAX_DEPTH} deep", "write their values into one"
-    if not path.is_file():
-        try:
-            others = sorted(name for name in os.listdir(path.parent) if name.endswith((".yaml", ".yml")))
-        except OSError:
-            others = []
-        near = closest(path.name, others[:1000])
-        remedy = f"did you mean '{near}'?" if near else "a path is relative to the file in which it stands"
-        return f"there is no file '{text}'", remedy
-    return "", ""
+    return file_trouble(str(path), text, users)
 
 
 def _command_line(texts: Iterable[str], faults: Faults) -> Iterator[tuple[str, Setting]]:

@@ -22,6 +22,8 @@ class Bindings:
 
     def match(self, pattern: tuple[Unit, ...], units: OpenUnits) -> int | None:
         """Bind what the units of the elements say; return the first that does not fit, None if all do."""
+        if len(pattern) == len(self.elements) == 1 and units.count(units[0]) == len(units):
+            units = units[:1]  # what all say alike holds for every element, as the unit of a scalar does
         missing = len(units) - len(self.elements)
         self.elements += [dict(self.elements[0]) for _ in range(missing)]
         for index, unit in enumerate(units):
@@ -98,6 +100,8 @@ class UnitFlow(Flow):
 
     def _units(self, path: str, declared: Declared) -> tuple[Unit, ...]:
         count = self._count(path, declared)
+        if len(declared.units) == len(self.bindings[path].elements) == 1:
+            return (self.bindings[path].unit(declared.units, 0),) * count
         return tuple(self.bindings[path].unit(declared.units, index) for index in range(count))
 
     def _of(self, link: Link) -> tuple[Unit, ...]:

@@ -13,6 +13,7 @@ from quadvis import document as yaml
 from quadvis.block import Param, SignalType
 from quadvis.document import Node, Scalar, measure
 from quadvis.errors import Faults, quoted, suggestion
+from quadvis.number_lists import Numbers
 from quadvis.units import Unit, UnitError, parse_quantity, split_quantity
 
 QUANTITY_KEYS = ("value", "unit")
@@ -33,6 +34,8 @@ def substitute(node: Node, params: Mapping[str, Node | None] | None, faults: Fau
     """Do the same, with every ``$name`` and ``$name[i]`` replaced by the parameter that it names."""
     if isinstance(node, Scalar):
         return _parameter(node, params, faults) if node.value.startswith("$") else node
+    if isinstance(node, Numbers):
+        return node
     if isinstance(node, yaml.Sequence):
         found = [substitute(child, params, faults) for child in node]
         whole = [child for child in found if child is not None]
@@ -77,6 +80,8 @@ def _spread(value: Node, unit: Node | None, key: str) -> Node:
         shape = measure(value)
         if len(units) not in (1, *shape[-1:], math.prod(shape)):
             raise unit.fault(f"there are {len(units)} units for {shape[-1] if shape else 1} values")
+    if isinstance(value, Numbers) and not value.element_units:
+        return value.with_units(units if unit is not None else (), key)
     return _with_units(value, itertools.cycle(units), key)
 
 
@@ -120,6 +125,8 @@ def read_value(signal: SignalType, units: Sequence[Unit], node: Node) -> tuple[A
     if not signal.unify(shape, {}):
         label = quoted(node.key) if node.key else "this"
         raise node.fault(f"{label} takes {shape_text(signal.shape)}, not {shape_text(shape)}")
+    if isinstance(node, Numbers) and _is_read_whole(signal, units, node):
+        return _read_whole(units[0], node)
     faults = Faults()
     leaves = _leaves(node)
     read = [
@@ -131,6 +138,30 @@ def read_value(signal: SignalType, units: Sequence[Unit], node: Node) -> tuple[A
     return _plain(node, iter(value for value, _ in found)), tuple(
         unit for _, unit in found
     ) if is_open else ()
+
+
+def _is_read_whole(signal: SignalType, units: Sequence[Unit], node: Numbers) -> bool:
+    """Say whether no element needs a look of its own: plain numbers where plain numbers belong."""
+    plain = not any(unit.symbols for unit in node.element_units)
+    free = len(units) == 1 and not any(
+        unit.dimension - {(name, 1) for name in unit.variables} for unit in units
+    )
+    return plain and free and signal.scalar == "float64"
+
+
+def _read_whole(declared: Unit, node: Numbers) -> tuple[Any, OpenUnits]:
+    """Read a long list of plain numbers as if element by element."""
+    if not declared.variables:
+        return _floats(node.numbers), ()
+    # All numbers but 0 are alike: what holds for one of them holds for the others.
+    unit = _element("float64", declared, Scalar("1", True, node.file, node.line, node.column, node.key))[1]
+    return _floats(node.numbers), tuple([unit if number else None for number in node.flat()])
+
+
+def _floats(numbers: list[Any]) -> list[Any]:
+    if isinstance(numbers[0], list):
+        return [_floats(each) for each in numbers]
+    return [float(number) for number in numbers]
 
 
 def shape_text(shape: Sequence[int | str]) -> str:
