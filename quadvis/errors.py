@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar, NamedTuple, ParamSpec, TypeVar
 
 from quadvis.characters import advice
+from quadvis.synonyms import synonym
 
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
@@ -34,6 +35,8 @@ class Odd(NamedTuple):
 @dataclass(frozen=True, order=True, slots=True)
 class Place:
     """A position in a file; lines and columns count from 1, line 0 means the file as a whole.
+
+    Of options of one name on a command line, ``column`` is the number, and ``line`` is 0.
 
     ``odd`` is a character of the text that begins there: should the text turn out to be wrong, that is why.
     """
@@ -67,7 +70,7 @@ class Fault:
         odd = self.place.odd
         if odd is None:
             return self
-        line, column = (odd.line, odd.column) if self.place.line else (0, 0)
+        line, column = (odd.line, odd.column) if self.place.line else (0, self.place.column)
         return Fault(Place(self.place.file, line, column), self.subject, self.problem, advice(odd.character))
 
 
@@ -176,18 +179,20 @@ def closest(word: str, candidates: Iterable[str]) -> str | None:
 
     Nearness is the edit distance with swapped neighbours counted as one slip; case and `-` for `_` do not
     count, and a dotted name (`signal.derivative`) is also found by its last part alone. On equal terms the
-    same first letter wins, then the order of the candidates.
+    same first letter wins, then the order of the candidates. Where none is near, a word that other programs
+    use for one of them is taken.
     """
     if not 0 < len(word) <= _LONGEST:
         return None
+    names = list(candidates)
     plain = _plain(word)
     found, least, same = None, _EDIT * _LONGEST, False
-    for candidate in candidates:
+    for candidate in names:
         cost = _cost(plain, _plain(candidate), least)
         first = candidate[:1] == word[:1]
         if cost is not None and (cost < least or (cost == least and first and not same)):
             found, least, same = candidate, cost, first
-    return found
+    return found or synonym(word, names)
 
 
 def _plain(word: str) -> str:

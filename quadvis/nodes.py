@@ -347,8 +347,12 @@ def _check_keys(found: Mapping, required: Collection[str], optional: Collection[
     for key, node in found.keys.items():
         if key not in known:
             free = [name for name in known if name not in found]
-            meant.add(closest(key, free))
-            faults.add(node.place, f"key {quoted(key)} is unknown", suggestion(key, free))
+            near, taken = closest(key, free), closest(key, [name for name in known if name in found])
+            meant.add(near)
+            remedy = suggestion(key, free)
+            if near is None and taken is not None:
+                remedy = f"did you mean {quoted(taken)}, which is in line {found.keys[taken].line}?"
+            faults.add(node.place, f"key {quoted(key)} is unknown", remedy)
     for name in required:
         if name not in found and name not in meant:
             faults.add(found.place, f"key '{name}' is missing", f"add '{name}: ...'")

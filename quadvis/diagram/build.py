@@ -118,7 +118,8 @@ class Builder:
         whole = flat.path not in self.expansion.broken
         for name, node in flat.parameters.items():
             if name not in declared:
-                remedy = remedy_for(name, flat.parameters, declared)
+                is_setting = name not in flat.spec.parameters
+                remedy = remedy_for(name, flat.parameters, declared, replaces=is_setting)
                 self.faults.add(flat.place(name), f"{flat.spec.kind} has no parameter '{name}'", remedy)
                 whole = False
                 continue

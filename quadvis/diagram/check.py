@@ -140,12 +140,14 @@ def crossing_fault(source: Task, target: Task, crossing: str | None) -> tuple[st
     slower = source.period > target.period or target.continuous
     fitting = "hold" if slower and not source.continuous else "sample"
     ratio = source.period / target.period if slower else target.period / source.period
+    # Every period is a whole number of solver steps; where it is not, the step has been reported.
+    divides = ratio.denominator == 1 or source.continuous or target.continuous
     if crossing is None:
-        fitting = fitting if ratio.denominator == 1 else "newest"
+        fitting = fitting if divides else "newest"
         return "the wire does not say how it crosses between rates", f"add 'across: {fitting}'"
     if crossing == TOLD:
         return "", ""
-    if crossing != "newest" and ratio.denominator != 1:
+    if crossing != "newest" and not divides:
         return (
             f"the periods are in the ratio {ratio}, not commensurate for 'across: {crossing}'",
             "write 'across: newest', or choose rates of which one divides the other",

@@ -185,7 +185,7 @@ def load(
     faults = Faults()
     with _told_once(faults):
         texts = setting_texts(settings)
-        given, files = read_settings(texts, params, faults)
+        given, files = read_settings(settings, params, faults)
         spec = read_file(Path(path), faults, part=False)
         diagram = _Assembly(spec, faults, files).diagram(variant, given, stop_time, seed)
         return replace(diagram, parameter_files=files, settings=texts)
@@ -220,7 +220,7 @@ def _told_once(faults: Faults) -> Iterator[None]:
     except DiagramError as error:
         kept: dict[tuple[Place, str, str], Fault] = {}
         for fault in error.faults:
-            subject = "" if fault.place.line else fault.subject
+            subject = "" if fault.place.line or fault.place.column else fault.subject
             kept.setdefault((fault.place, fault.problem, subject), fault)
         raise DiagramError(kept.values()) from None
 
@@ -289,7 +289,7 @@ def _stop_time(spec: FileSpec, given: str | float | None, faults: Faults) -> Fra
         text = given if isinstance(given, str) else f"{float(given)!r} s"
         return faults.collect(read_duration, Scalar(text, False, "--stop-time", 0, 0)) or Fraction(0)
     if spec.stop_time is None:
-        faults.add(spec.place, "key 'stop_time' is missing", "add 'stop_time: 10 s', or give --stop-time")
+        faults.add(spec.top, "key 'stop_time' is missing", "add 'stop_time: 10 s', or give --stop-time")
         return Fraction(0)
     return spec.stop_time
 

@@ -193,7 +193,8 @@ class Expansion:
         for name in values:
             if name not in spec.params:
                 problem = f"part '{block.kind}' has no parameter '{name}'"
-                self.faults.add(places[name], problem, remedy_for(name, values, spec.params))
+                remedy = remedy_for(name, values, spec.params, replaces=name not in block.parameters)
+                self.faults.add(places[name], problem, remedy)
         inputs = block.inputs or {}
         for name, given in inputs.items():
             if name not in spec.inputs:

@@ -66,7 +66,8 @@ class FileSpec:
     """All that one file says. A part has ports; a diagram has rates, a solver and what to make of a run."""
 
     path: Path
-    place: Place
+    place: Place  # of the file as a whole
+    top: Place  # where its keys begin
     name: str = ""
     params: dict[str, Node | None] = field(default_factory=dict)  # None: what is wrong has been told
     blocks: dict[str, BlockSpec] = field(default_factory=dict)
@@ -100,7 +101,7 @@ def _read(path: Path, node: Node | None, faults: Faults, part: bool) -> FileSpec
     root = faults.collect(node.mapping) if node is not None else None
     if root is None or not _is_ours(root, faults, part):
         return None
-    spec = FileSpec(path, Place(str(path)), path.stem)
+    spec = FileSpec(path, Place(str(path)), root.place, path.stem)
     faults.collect(root.fields, REQUIRED_KEYS, PART_KEYS if part else DIAGRAM_KEYS, faults)
     for key in ("name", "doc"):
         text = faults.collect(root[key].text) if key in root else None

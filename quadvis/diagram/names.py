@@ -17,7 +17,16 @@ def absent(wanted: Collection[str], given: Collection[str], known: Collection[st
     return [name for name in missing if name not in meant]
 
 
-def remedy_for(name: str, given: Collection[str], known: Collection[str]) -> str:
-    """Return what was meant by an unknown name, out of those that are still free."""
-    free = [other for other in known if other not in given]
-    return suggestion(name, free or known) if known else "it has none"
+def remedy_for(name: str, given: Collection[str], known: Collection[str], *, replaces: bool = False) -> str:
+    """Return what was meant by an unknown name: one that is free, or the one that was written twice.
+
+    A setting from outside ``replaces`` what is given: for it every name is free.
+    """
+    if not known:
+        return "it has none"
+    free = list(known) if replaces else [other for other in known if other not in given]
+    near = closest(name, free)
+    taken = closest(name, [other for other in known if other not in free])
+    if near is None and taken is not None:
+        return f"did you mean '{taken}', which is given already?"
+    return suggestion(name, free or known)

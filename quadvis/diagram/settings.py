@@ -20,13 +20,15 @@ from pathlib import Path
 from typing import Any
 
 from quadvis import document as yaml
+from quadvis.characters import odd_characters
 from quadvis.diagram.loader import is_version
 from quadvis.diagram.values import read_constant
 from quadvis.document import Node, parse_yaml, read_yaml
-from quadvis.errors import DiagramError, Faults, Place
+from quadvis.errors import DiagramError, Faults, Odd, Place
 from quadvis.missing_file import file_trouble
 
 COMMAND_LINE = "--set"
+ARGUMENT = "settings"  # of the functions for those who work in Python
 PARAMETERS_REQUIRED = ("quadvis", "name", "set")
 PARAMETERS_KEYS = ("doc", "base")
 MAX_DEPTH = 30  # of files that build on files
@@ -66,7 +68,8 @@ def read_settings(given: Given, params: Files, faults: Faults) -> tuple[Settings
         bases: list[Path] = []
         name = _read_file(path, (), found, bases, faults)
         files.append(ParameterFile(name or path.stem, path, tuple(bases)))
-    for path_and_name, setting in _command_line(setting_texts(given), faults):
+    origin = ARGUMENT if isinstance(given, Mapping) else COMMAND_LINE
+    for path_and_name, setting in _from_texts(setting_texts(given), origin, faults):
         _put(found, path_and_name, setting)
     return found, tuple(files)
 
@@ -135,37 +138,51 @@ def _wrong_base(path: Path, text: str, users: tuple[str, ...]) -> tuple[str, str
     return file_trouble(str(path), text, users)
 
 
-def _command_line(texts: Iterable[str], faults: Faults) -> Iterator[tuple[str, Setting]]:
-    """Yield the names and values of ``block.parameter=value``; what is wrong with them is told."""
-    place = Place(COMMAND_LINE)
-    for setting in texts:
-        name, _, text = (part.strip() for part in setting.partition("="))
+def _from_texts(texts: Iterable[str], origin: str, faults: Faults) -> Iterator[tuple[str, Setting]]:
+    """Yield the names and values of ``block.parameter=value``; what is wrong with them is reported."""
+    for number, setting in enumerate(texts, 1):
+        name, _, text = (part.strip(" \r\n") for part in setting.partition("="))
+        place = Place(origin, 0, number, _odd(name))
         parameter = name.rpartition(".")[2]
         with faults.about(f"'{name}'"):
             if not text or not parameter:
                 problem = "there is no value" if parameter else "there is no parameter"
-                remedy = "write block.parameter=value, such as control/roll.bandwidth='2 rad/s'"
+                example = "control/roll.bandwidth", "2 rad/s"
+                remedy = "write block.parameter=value, such as {}='{}'".format(*example)
+                if origin == ARGUMENT:
+                    remedy = "write block.parameter and value, such as {{'{}': '{}'}}".format(*example)
                 faults.add(place, problem, remedy)
                 continue
-            node = faults.collect(_value, text, parameter)
+            node = faults.collect(_value, text, parameter, place)
             yield name, Setting(place, read_constant(node, faults) if node is not None else None)
 
 
-def _value(text: str, parameter: str) -> Node:
-    """Read a value of the command line. A file named there is relative to the working directory."""
+def _odd(name: str) -> Odd | None:
+    return next((Odd(0, 0, char) for _, char in odd_characters(name)), None)
+
+
+def _value(text: str, parameter: str, place: Place) -> Node:
+    """Read a value that stands in no file. A file named there is relative to the working directory."""
     try:
-        node = parse_yaml(text, COMMAND_LINE)
+        node = parse_yaml(text, place.file)
     except DiagramError as error:
-        raise DiagramError(replace(fault, place=Place(COMMAND_LINE)) for fault in error.faults) from None
+        raise DiagramError(replace(fault, place=place) for fault in error.faults) from None
     node.key = parameter
-    _without_place(node)
+    _put_at(node, place.column)
     return node
 
 
-def _without_place(node: Node) -> None:
-    node.line = node.column = 0
-    for child in node if isinstance(node, yaml.Sequence) else ():
-        _without_place(child)
+def _put_at(node: Node, number: int) -> None:
+    """Give a value and all that is in it the place of the setting."""
+    node.line, node.column = 0, number
+    if isinstance(node, yaml.Sequence):
+        children = node.values
+    else:
+        children = list(node.values.values()) if isinstance(node, yaml.Mapping) else []
+    for child in children:
+        _put_at(child, number)
+    for key in node.keys.values() if isinstance(node, yaml.Mapping) else ():
+        _put_at(key, number)
 
 
 def value_text(value: Any) -> str:

@@ -69,17 +69,18 @@ def _values(
         if name not in scope.params:
             where = f"part '{path}'" if path else "the diagram"
             raise node.fault(f"{where} has no parameter '{name}'", suggestion(name, scope.params))
-        return _written(node, name, scope.params[name])
+        return _written(wiring, node, name, scope.params[name])
     paths = {block.path: block for block in graph.nodes}
     if path not in paths:
         raise node.fault(f"there is no block '{path}'", suggestion(path, paths))
     return _given(node, paths[path], name)
 
 
-def _written(node: Node, name: str, value: Node | None) -> tuple[list[Unit], tuple[str, ...]]:
-    if value is None:
-        raise DiagramError(())  # what is wrong with it has been told
-    leaves = list(value) if isinstance(value, Sequence) else [value]
+def _written(wiring: Wiring, node: Node, name: str, value: Node | None) -> tuple[list[Unit], tuple[str, ...]]:
+    leaves = list(value) if isinstance(value, Sequence) else [value] if value is not None else []
+    wrong = {fault.place for fault in wiring.faults}
+    if value is None or any(leaf.place in wrong for leaf in leaves):
+        raise DiagramError(())  # what is wrong with it has been reported
     units, texts = [], []
     for leaf in leaves:
         try:

@@ -70,7 +70,7 @@ class Plan:
         """Return a fault of a value that is swept over with the place where it was given."""
         for axis, index in zip(self.axes, point, strict=True):
             parameter = axis.name.rpartition(".")[2]
-            if fault.place == Place(COMMAND_LINE) and axis.name not in NOT_SET and parameter in str(fault):
+            if fault.place.file == COMMAND_LINE and axis.name not in NOT_SET and parameter in str(fault):
                 return replace(fault, place=Place(f"--over {axis.name}={axis.values[index]}"))
         return fault
 

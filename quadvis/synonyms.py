@@ -1,0 +1,88 @@
+"""Words of other programs for what is called otherwise here: "sample_time" for a rate, "Mux" for a stack.
+
+A word is looked up without case, blanks, `-` and `_`; what it stands for depends on what may stand there.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+
+_MEANT = {
+    # keys of diagrams and parts
+    "quadvis": "version formatversion schemaversion",
+    "name": "title model modelname",
+    "doc": "description comment comments help about note notes summary",
+    "params": "parameters parameter constants variables workspace vars with",
+    "rates": "sampletimes clocks tasks periods frequencies rate",
+    "solver": "integrator solvers",
+    "stop_time": "stoptime duration tstop tend tfinal endtime simulationtime simtime stop end",
+    "seed": "randomseed rngseed",
+    "variants": "configurations configs alternatives variantsubsystems modes",
+    "log": "logging record recording tofile toworkspace datalogging logs",
+    "expect": "expectations asserts assertions assert tests checks requirements criteria",
+    "summary": "statistics stats metrics results",
+    "figures": "plots plot scopes scope figure graphs charts",
+    "analyse": "analyze analysis linearise linearize",
+    "blocks": "components nodes systems subsystems elements",
+    "ports": "interface io terminals",
+    # keys of blocks and wires
+    "block": "type kind class blocktype blockname sourceblock",
+    "part": "subsystem model include import file referencedmodel modelreference system",
+    "rate": "freq frequency sampletime sampleperiod samplingtime samplerate period ts fs dt hz clock task",
+    "with": "params parameters parameter param args arguments settings values set options config",
+    "in": "inputs input inport inports connections connect wires wire lines from signals inp",
+    "out": "outputs output outport outports",
+    "slot": "variant replaceable",
+    "from": "source src signal wire origin",
+    "across": "crossing transition ratetransition via mode sampling",
+    # solver, rates, values
+    "method": "solver type algorithm name",
+    "step": "dt stepsize fixedstep fixedstepsize timestep h ts",
+    "offset": "phase delay start",
+    "unit": "units",
+    "value": "val values number",
+    # expectations, summaries, figures
+    "signal": "name port of output variable",
+    "signals": "signal lines names y",
+    "within": "tolerance tol abs absolute maxabs error band",
+    "below": "max maximum upper less lessthan atmost le lt under",
+    "above": "min minimum lower greater greaterthan atleast ge gt over",
+    "rms": "rmse std",
+    "count": "times number",
+    "after": "start begin since tstart t0",
+    "before": "end until till tend",
+    "of": "target reference setpoint ref around desired",
+    "show": "statistics stats values",
+    "title": "name caption heading",
+    "panels": "axes subplots plots",
+    "every": "decimation decimate downsample",
+    "cuts": "cut openings loops",
+    "limits": "ranges vary",
+    "max": "maximum peak maxabs",
+    "mean": "average avg",
+    "lowest": "min minimum",
+    "highest": "maximum",
+    "final": "last end",
+    # blocks of the library
+    "signal.stack": "mux vectorconcatenate concatenate",
+    "signal.sum": "add subtract adder summer",
+    "signal.saturation": "saturate limiter clip clamp",
+    "signal.unit_delay": "memory onestepdelay",
+    "signal.transport_delay": "deadtime timedelay puredelay",
+    "signal.rate_limiter": "slewrate slewratelimiter",
+    "sources.sine": "sinewave",
+    "sources.pulse": "pulsegenerator squarewave",
+    "sources.noise": "randomnumber whitenoise bandlimitedwhitenoise gaussiannoise",
+    "sources.table": "fromworkspace repeatingsequence waveform",
+}  # fmt: skip
+_STANDS_FOR: dict[str, list[str]] = {}
+for _ours, _theirs in _MEANT.items():
+    for _word in _theirs.split():
+        _STANDS_FOR.setdefault(_word, []).append(_ours)
+
+
+def synonym(word: str, candidates: Collection[str]) -> str | None:
+    """Return the candidate for which other programs use this word, None if there is none."""
+    plain = re.sub(r"[-_ ]", "", word.rpartition(".")[2]).casefold()
+    return next((ours for ours in _STANDS_FOR.get(plain, ()) if ours in candidates), None)
