@@ -43,7 +43,8 @@ def read_parameter_file(name: str, path: str, read: Callable[[str], _Read]) -> _
     try:
         return read(path)
     except QuadvisError as error:
-        raise ParameterError(name, f"{name} is not usable: {error}") from None
+        reasons = "; ".join(str(error).splitlines())
+        raise ParameterError(name, f"{name} is not usable: {reasons}") from None
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from quadvis.characters import NAMELESS, character_name, odd_characters
+from quadvis.characters import NAMELESS, character_name, odd_characters, replacement, with_article
 from quadvis.errors import DiagramError, Fault, Faults, Odd, Place, quoted
 from quadvis.nodes import Mapping, Node, Scalar, Sequence
 from quadvis.number_lists import MARK, NumberList, Numbers, numbers_in
@@ -216,11 +216,18 @@ class Composer:
         match = _NO_BLANK.fullmatch(key.value)
         if match is None:
             return key, node
-        problem = f"a blank is missing behind {quoted(match[1] + ':')}"
-        self.faults.add(key.place, problem, f"write {quoted(f'{match[1]}: {match[2]}')}")
+        value = match[2].lstrip()
         column = key.column + len(match[1]) + 1
+        if value == match[2]:
+            problem = f"a blank is missing behind {quoted(match[1] + ':')}"
+            self.faults.add(Place(*_where(key)), problem, f"write {quoted(f'{match[1]}: {value}')}")
+        else:  # a blank that YAML takes for a letter
+            problem = f"this is {with_article(match[2][0])}"
+            self.faults.add(Place(key.file, key.line, column), problem, replacement(match[2][0]))
+        odd = key.odd if any(odd_characters(value)) else None
+        column += len(match[2]) - len(value)
         return Scalar(match[1], True, key.file, key.line, key.column), Scalar(
-            match[2], True, key.file, key.line, column, odd=key.odd
+            value, True, key.file, key.line, column, odd=odd
         )
 
     def _refuse_doubles(self, parent: Mapping, doubles: list[tuple[Scalar, Node]]) -> None:

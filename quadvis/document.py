@@ -107,7 +107,7 @@ def _read_on(text: str, name: str) -> tuple[Faults, Node]:
         kept.append(fault)
         text = trouble.repaired
         if trouble.blank is not None:
-            blanks.append((line, column))
+            blanks.append(_line_column(text, trouble.blank))
 
 
 def _explained(error: yaml.YAMLError, text: str) -> Trouble:

@@ -11,7 +11,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, NamedTuple, ParamSpec, TypeVar
 
-from quadvis.characters import advice
+from quadvis.characters import advice, character_name
+from quadvis.discretion import is_foreign, without_quotes
 from quadvis.synonyms import synonym
 
 _Arguments = ParamSpec("_Arguments")
@@ -63,7 +64,7 @@ class Fault:
     def __str__(self) -> str:
         """Return `file:line:column: block 'x': what is wrong; what would be right`."""
         subject = f"{self.subject}: " if self.subject else ""
-        return f"{self.place}: {subject}{sentence(self.problem, self.remedy)}"
+        return _on_one_line(f"{self.place}: {subject}{sentence(self.problem, self.remedy)}")
 
     def explained(self) -> Fault:
         """Return the fault at the odd character of the text, if it holds one, with what to write for it."""
@@ -71,7 +72,17 @@ class Fault:
         if odd is None:
             return self
         line, column = (odd.line, odd.column) if self.place.line else (0, self.place.column)
-        return Fault(Place(self.place.file, line, column), self.subject, self.problem, advice(odd.character))
+        named = character_name(odd.character) in self.problem
+        remedy = self.remedy if named else advice(odd.character)
+        return Fault(Place(self.place.file, line, column), self.subject, self.problem, remedy)
+
+    def discreet(self) -> Fault:
+        """Return the fault without a word of its file, if that is one whose contents are none of ours."""
+        file = self.place.file
+        if not self.place.line or not is_foreign(file):
+            return self
+        words = (without_quotes(part, file) for part in (self.subject, self.problem, self.remedy))
+        return Fault(self.place, *words)
 
 
 class DiagramError(QuadvisError):
@@ -79,7 +90,7 @@ class DiagramError(QuadvisError):
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         """Keep the faults, sorted by place and without repetitions."""
-        self.faults: list[Fault] = sorted({fault.explained() for fault in faults})
+        self.faults: list[Fault] = sorted({fault.explained().discreet() for fault in faults})
         super().__init__("\n".join(str(fault) for fault in self.faults))
 
 
@@ -150,6 +161,11 @@ class Faults(list[Fault]):
 def sentence(problem: str, remedy: str = "") -> str:
     """Join what is wrong and what would be right."""
     return f"{problem}; {remedy}" if remedy else problem
+
+
+def _on_one_line(text: str) -> str:
+    """Return a text with everything written out that does not show, or would begin a new line."""
+    return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 def quoted(text: object, limit: int = 40) -> str:

@@ -47,6 +47,8 @@ def _near_file(name: str, shown: str, but: Container[str]) -> str:
         base = name[: len(name) - len(written)] if name.endswith(written) else ""
         there = ", which is there" if os.path.isfile(base + slashed) else ""
         return f"write '/' between folders: {quoted(slashed, 200)}{there}"
+    if not written.isprintable():
+        return "write '/' between folders, since '\\' and a letter are one sign in double quotes"
     folder, file = os.path.split(name)
     stem = os.path.splitext(file)[0]
     try:

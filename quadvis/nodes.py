@@ -15,7 +15,7 @@ from fractions import Fraction
 from typing import Any, TypeVar
 
 from quadvis import units
-from quadvis.characters import meant, odd_characters, with_article
+from quadvis.characters import meant, odd_characters, replacement, with_article
 from quadvis.errors import DiagramError, Fault, Faults, Odd, Place, closest, quoted, suggestion
 from quadvis.units import Unit, UnitError
 
@@ -24,6 +24,7 @@ ONE = Unit()
 _Result = TypeVar("_Result")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
 _INTEGER = re.compile(r"[+-]?(0|[1-9][0-9]{0,19})")
+_DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+(?![0-9.,])")
 _NO_BLANK = re.compile(r"[A-Za-z_]\w*:(?=[^\s/\\])", re.ASCII)
 _TRUTH = {"true": True, "false": False}
 _TRUTH_ELSEWHERE = {
@@ -141,17 +142,21 @@ class Node:
         """Return the units of elements such as "m m m rad"."""
         return self._read(units.parse_units)
 
-    def check_blanks(self) -> None:
-        """Raise if a quantity holds a blank that is no plain space; other odd signs are no numbers."""
+    def check_signs(self) -> None:
+        """Raise if a quantity holds a blank that is no plain space, or a decimal comma."""
         text = self._scalar("a text such as '50 ms'")
+        label = f"{quoted(self.key)}: " if self.key else ""
         blank = next((char for _, char in odd_characters(text) if meant(char) == " "), None)
         if blank is not None:
-            label = f"{quoted(self.key)}: " if self.key else ""
-            raise self.fault(f"{label}{quoted(text)} holds {with_article(blank)}", "write a space")
+            raise self.fault(f"{label}{quoted(text)} holds {with_article(blank)}", replacement(blank))
+        if _DECIMAL_COMMA.match(text):
+            raise self.fault(
+                f"{label}{quoted(text)} is not a number", f"write {quoted(text.replace(',', '.'))}"
+            )
 
     def _read(self, read: Callable[[str], _Result]) -> _Result:
         text = self._scalar("a text such as '50 ms'")
-        self.check_blanks()
+        self.check_signs()
         try:
             return read(text)
         except UnitError as error:

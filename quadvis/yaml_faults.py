@@ -97,10 +97,11 @@ def _odd(scan: Scan, at: int, opened: int | None) -> Trouble | None:
     first = scan.starts[max(above, 0)]
     end = scan.starts[line] + len(scan.line_text(line))
     leads = {number: _lead_end(scan, number) for number in (line, above)}
+    whole = {line} if re.search(r":\s|:$", scan.line_text(max(above, 0))) else {line, above}
     found = [
         (where, char) for where, char in odd_characters(text, first, end)
         if char != "\t" and not scan.is_hidden(where)
-        and (scan.line(where) == line or where < leads.get(scan.line(where), 0))
+        and (scan.line(where) in whole or where < leads.get(scan.line(where), 0))
     ]  # fmt: skip
     if not found:
         return None
@@ -113,7 +114,10 @@ def _odd(scan: Scan, at: int, opened: int | None) -> Trouble | None:
         return Trouble(where, problem, replacement(char) + lines, repaired)
     plain = meant(char)
     repaired = text[:where] + plain + text[where + 1 :] if plain in (" ", "-", ":", ",") else None
-    return Trouble(where, f"this is {with_article(char)}", replacement(char), repaired)
+    blank = None
+    if plain == ":" and text[where + 1 : where + 2].strip():
+        repaired, blank = f"{text[:where]}: {text[where + 1 :]}", where + 1
+    return Trouble(where, f"this is {with_article(char)}", replacement(char), repaired, blank)
 
 
 def _lead_end(scan: Scan, number: int) -> int:

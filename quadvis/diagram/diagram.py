@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -24,6 +25,7 @@ from quadvis.diagram.settings import Files, Given, ParameterFile, Settings, read
 from quadvis.diagram.slots import Outputs, check_slots, fill_slots
 from quadvis.diagram.times import read_duration
 from quadvis.diagram.wiring import Wiring
+from quadvis.discretion import quoting_only
 from quadvis.document import Scalar
 from quadvis.engine.graph import Graph, Wire
 from quadvis.errors import DiagramError, Fault, Faults, Place, quoted
@@ -183,8 +185,8 @@ def load(
     (s, or a text such as "20 s") and ``seed`` replace the diagram's.
     """
     faults = Faults()
-    with _told_once(faults):
-        texts = setting_texts(settings)
+    texts = setting_texts(settings)
+    with quoting_only(_quotable(path, params, texts)), _told_once(faults):
         given, files = read_settings(settings, params, faults)
         spec = read_file(Path(path), faults, part=False)
         diagram = _Assembly(spec, faults, files).diagram(variant, given, stop_time, seed)
@@ -194,14 +196,14 @@ def load(
 def load_text(text: str, folder: str | Path = ".", name: str = "diagram.yaml") -> Diagram:
     """Load a diagram from a text, such as the resolved one in a log, as if it stood in a file of a folder."""
     faults = Faults()
-    with _told_once(faults):
+    with quoting_only([folder]), _told_once(faults):
         return _Assembly(read_text(text, Path(folder) / name, faults), faults).diagram()
 
 
 def check(path: str | Path, settings: Given = (), params: Files = ()) -> Diagram:
     """Load a diagram, and with each of its variants in turn; DiagramError tells the faults of all of them."""
     faults = Faults()
-    with _told_once(faults):
+    with quoting_only(_quotable(path, params, setting_texts(settings))), _told_once(faults):
         given, files = read_settings(settings, params, faults)
         spec = read_file(Path(path), faults, part=False)
         assembly = _Assembly(spec, faults, files)
@@ -209,6 +211,14 @@ def check(path: str | Path, settings: Given = (), params: Files = ()) -> Diagram
         for variant in assembly.spec.variants:
             assembly.diagram(variant)
         return diagram
+
+
+def _quotable(path: str | Path, params: Files, settings: Sequence[str]) -> Iterator[str | Path]:
+    """Yield the files and folders that faults may quote: the diagram's, and what its user named."""
+    for file in (path, *([params] if isinstance(params, str | os.PathLike) else params)):
+        yield Path(file).parent
+        yield Path(os.path.realpath(file)).parent
+    yield from (setting.partition("=")[2].strip() or "." for setting in settings)
 
 
 @contextmanager

@@ -180,6 +180,7 @@ def _element(scalar: str, declared: Unit, node: Node) -> tuple[Any, Unit | None]
         return node.quantity(declared, bare=False), declared
     if not isinstance(node, Scalar) or not node.value:
         raise node.wrong("a number or a quantity")
+    node.check_signs()
     label = f"{quoted(node.key)}: " if node.key else ""
     try:
         value, unit = parse_quantity(node.value)
