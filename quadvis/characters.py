@@ -66,6 +66,18 @@ def odd_characters(text: str, start: int = 0, end: int | None = None) -> Iterato
             yield match.start(), match.group()
 
 
+def cleaned(text: str) -> str:
+    """Return a text with the ASCII that was meant in place of every odd character."""
+    if text.isascii():
+        return text
+    return "".join(char if (plain := meant(char)) is None else plain for char in text).strip()
+
+
+def first_odd(text: str) -> str | None:
+    """Return the first odd character of a text, None if there is none."""
+    return next((char for _, char in odd_characters(text)), None)
+
+
 def character_name(character: str) -> str:
     """Return "no-break space (U+00A0)"."""
     name = "tab" if character == "\t" else unicodedata.name(character, NAMELESS).lower()

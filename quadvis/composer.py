@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from quadvis.characters import NAMELESS, character_name, odd_characters, replacement, with_article
+from quadvis.characters import NAMELESS, character_name, first_odd, odd_characters, replacement, with_article
 from quadvis.errors import DiagramError, Fault, Faults, Odd, Place, quoted
 from quadvis.nodes import Mapping, Node, Scalar, Sequence
 from quadvis.number_lists import MARK, NumberList, Numbers, numbers_in
@@ -26,7 +26,9 @@ FORBIDDEN = re.compile(
     "\ufffe\uffff]"
 )
 LINE_END = re.compile("\r\n|\r|\n")
-_NO_BLANK = re.compile(r"([A-Za-z_]\w*):([^\s/\\].*)", re.ASCII)
+_NO_BLANK = re.compile(r"([A-Za-z_]\w*)([:\u2236\ua789\ufe55\uff1a])([^\s/\\].*| .*)", re.ASCII)
+# In a block, the beginning of a list or map, or a blank that is none, makes the key go on behind its ':'.
+_RUN_ON = re.compile("[A-Za-z_][A-Za-z0-9_]*:(?=[{\\[\u00a0\u1680\u2000-\u200a\u202f\u205f\u3000])")
 _FRACTION = re.compile(r"[0-9]+(?:[eE][+-]?[0-9]+)?(?: *[A-Za-z%/°µ].*)?")
 _WHOLE = re.compile(r"[+-]?[0-9]+")
 _MOST_LINES = 5  # named for a key that is there again and again
@@ -34,6 +36,14 @@ _MOST_LINES = 5  # named for a key that is there again and again
 
 class MisreadError(Exception):
     """A list of numbers was part of a longer text."""
+
+
+class RunOnError(Exception):
+    """A key goes on behind its ':' at this line and column, from 0."""
+
+    def __init__(self, line: int, column: int) -> None:
+        super().__init__(line, column)
+        self.line, self.column = line, column
 
 
 class Position:
@@ -216,17 +226,21 @@ class Composer:
         match = _NO_BLANK.fullmatch(key.value)
         if match is None:
             return key, node
-        value = match[2].lstrip()
-        column = key.column + len(match[1]) + 1
-        if value == match[2]:
-            problem = f"a blank is missing behind {quoted(match[1] + ':')}"
-            self.faults.add(Place(*_where(key)), problem, f"write {quoted(f'{match[1]}: {value}')}")
+        name, colon, rest = match.groups()
+        value = rest.lstrip()
+        column = key.column + len(name)
+        if colon != ":":
+            problem, remedy = f"this is {with_article(colon)}", replacement(colon)
+            self.faults.add(Place(key.file, key.line, column), problem, remedy)
+        elif value == rest:
+            problem = f"a blank is missing behind {quoted(name + ':')}"
+            self.faults.add(Place(*_where(key)), problem, f"write {quoted(f'{name}: {value}')}")
         else:  # a blank that YAML takes for a letter
-            problem = f"this is {with_article(match[2][0])}"
-            self.faults.add(Place(key.file, key.line, column), problem, replacement(match[2][0]))
-        odd = key.odd if any(odd_characters(value)) else None
-        column += len(match[2]) - len(value)
-        return Scalar(match[1], True, key.file, key.line, key.column), Scalar(
+            problem = f"this is {with_article(rest[0])}"
+            self.faults.add(Place(key.file, key.line, column + 1), problem, replacement(rest[0]))
+        odd = key.odd if first_odd(value) else None
+        column += 1 + len(rest) - len(value)
+        return Scalar(name, True, key.file, key.line, key.column), Scalar(
             value, True, key.file, key.line, column, odd=odd
         )
 
@@ -264,10 +278,18 @@ class Composer:
             return _NO_KEY
         problem, remedy = _wrong_key(node)
         if isinstance(node, Scalar) and not problem:
+            if node.plain and ":" in node.value and not self.stack[-1].is_flow:
+                self._check_run_on(node, event)
             return node
         if not self.stack[-1].in_key:
             self._refuse(event, problem, remedy)
         return _NO_KEY
+
+    def _check_run_on(self, key: Scalar, event: Any) -> None:
+        match = _RUN_ON.match(key.value)
+        if match is not None:
+            mark = event.start_mark
+            raise RunOnError(mark.line, mark.column + match.end())
 
 
 def forbidden(found: re.Match[str]) -> tuple[str, str]:

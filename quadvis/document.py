@@ -13,12 +13,21 @@ from typing import Any
 
 import yaml
 
-from quadvis.composer import FORBIDDEN, LINE_END, MAX_DEPTH, Composer, MisreadError, Position, forbidden
+from quadvis.composer import (
+    FORBIDDEN,
+    LINE_END,
+    MAX_DEPTH,
+    Composer,
+    MisreadError,
+    Position,
+    RunOnError,
+    forbidden,
+)
 from quadvis.errors import DiagramError, Fault, Faults, Place, QuadvisError
 from quadvis.missing_file import file_trouble, system_reason
 from quadvis.nodes import Mapping, Node, Scalar, Sequence, measure, plain_value
 from quadvis.number_lists import find_lists, hide_lists
-from quadvis.yaml_faults import STAND_INS, Trouble, explain
+from quadvis.yaml_faults import STAND_INS, Trouble, explain, run_on
 
 __all__ = ["Mapping", "Node", "Scalar", "Sequence", "dump_yaml", "measure", "parse_yaml", "read_yaml"]
 
@@ -98,6 +107,8 @@ def _read_on(text: str, name: str) -> tuple[Faults, Node]:
             return faults, _compose(text, position, faults)
         except yaml.YAMLError as error:
             trouble = _explained(error, text)
+        except RunOnError as error:
+            trouble = run_on(text, _offset(text, error.line, error.column))
         line, column = _line_column(text, trouble.at)
         fault = Fault(Place(*position.of(line, column)), "", trouble.problem, trouble.remedy)
         read += len(text)
@@ -112,16 +123,14 @@ def _read_on(text: str, name: str) -> tuple[Faults, Node]:
 
 def _explained(error: yaml.YAMLError, text: str) -> Trouble:
     """Take the places of a complaint, none of its words."""
-    starts = [0, *(match.end() for match in LINE_END.finditer(text))]
-
-    def offset(mark: Any) -> int | None:
-        if mark is None:
-            return None
-        return min(starts[mark.line] + mark.column, len(text)) if mark.line < len(starts) else len(text)
-
-    opened = offset(getattr(error, "context_mark", None))
-    at = offset(getattr(error, "problem_mark", None))
+    marks = (getattr(error, "context_mark", None), getattr(error, "problem_mark", None))
+    opened, at = (None if mark is None else _offset(text, mark.line, mark.column) for mark in marks)
     return explain(text, (opened or 0) if at is None else at, opened, MAX_DEPTH)
+
+
+def _offset(text: str, line: int, column: int) -> int:
+    starts = [0, *(match.end() for match in LINE_END.finditer(text))]
+    return min(starts[line] + column, len(text)) if line < len(starts) else len(text)
 
 
 def _compose(text: str, position: Position, faults: Faults) -> Node:
@@ -167,8 +176,9 @@ def dump_yaml(data: Any) -> str:
     """Return plain data as YAML that `parse_yaml` reads back to the same."""
     try:
         text = yaml.dump(data, None, _Writer, sort_keys=False, allow_unicode=True, default_flow_style=None)
-    except (yaml.YAMLError, UnicodeError) as error:
-        raise QuadvisError(f"these data cannot be written as YAML: {error}") from None
+    except (yaml.YAMLError, UnicodeError):
+        problem = "these data cannot be written as YAML: they hold more than texts, numbers, lists and maps"
+        raise QuadvisError(problem) from None
     return str(text)
 
 

@@ -15,7 +15,7 @@ from fractions import Fraction
 from typing import Any, TypeVar
 
 from quadvis import units
-from quadvis.characters import meant, odd_characters, replacement, with_article
+from quadvis.characters import first_odd, meant, replacement, with_article
 from quadvis.errors import DiagramError, Fault, Faults, Odd, Place, closest, quoted, suggestion
 from quadvis.units import Unit, UnitError
 
@@ -124,44 +124,40 @@ class Node:
 
     def quantity(self, unit: Unit = ONE, *, bare: bool = True) -> float:
         """Return "50 ms" as a number of `unit`; a bare number is one already, unless `bare` is false."""
-        return self._read(lambda text: units.read_quantity(text, unit, bare=bare))
+        return self.read(lambda text: units.read_quantity(text, unit, bare=bare))
 
     def exact(self, unit: Unit) -> Fraction:
         """Return the exact SI value of a quantity that must have a unit of this dimension."""
-        return self._read(lambda text: units.parse_rational(text, unit))
+        return self.read(lambda text: units.parse_rational(text, unit))
 
     def period(self) -> Fraction:
         """Return the exact period in seconds of "10 Hz", "50 ms" or "1/30 s"."""
-        return self._read(units.parse_period)
+        return self.read(units.parse_period)
 
     def unit(self) -> Unit:
         """Return a unit such as "rad/s^2"."""
-        return self._read(Unit.parse)
+        return self.read(Unit.parse)
 
     def units(self) -> tuple[Unit, ...]:
         """Return the units of elements such as "m m m rad"."""
-        return self._read(units.parse_units)
+        return self.read(units.parse_units)
 
-    def check_signs(self) -> None:
-        """Raise if a quantity holds a blank that is no plain space, or a decimal comma."""
+    def read(self, read: Callable[[str], _Result]) -> _Result:
+        """Return what `read` makes of a quantity; its `UnitError` is raised with the place."""
         text = self._scalar("a text such as '50 ms'")
         label = f"{quoted(self.key)}: " if self.key else ""
-        blank = next((char for _, char in odd_characters(text) if meant(char) == " "), None)
-        if blank is not None:
-            raise self.fault(f"{label}{quoted(text)} holds {with_article(blank)}", replacement(blank))
-        if _DECIMAL_COMMA.match(text):
-            raise self.fault(
-                f"{label}{quoted(text)} is not a number", f"write {quoted(text.replace(',', '.'))}"
-            )
-
-    def _read(self, read: Callable[[str], _Result]) -> _Result:
-        text = self._scalar("a text such as '50 ms'")
-        self.check_signs()
+        odd = first_odd(text)
+        if odd is not None and meant(odd) == " ":  # blanks pass elsewhere
+            raise self.fault(f"{label}{quoted(text)} holds {with_article(odd)}", replacement(odd))
         try:
             return read(text)
         except UnitError as error:
-            label = f"{quoted(self.key)}: " if self.key else ""
-            raise self.fault(label + error.problem, error.remedy) from None
+            problem, remedy = error.problem, error.remedy
+            if odd is not None:
+                problem, remedy = f"{quoted(text)} holds {with_article(odd)}", replacement(odd)
+            elif _DECIMAL_COMMA.match(text):
+                problem, remedy = f"{quoted(text)} is not a number", f"write {quoted(text.replace(',', '.'))}"
+            raise self.fault(label + problem, remedy) from None
 
     def array(self, shape: Items[int | None] | None = None, unit: Unit | Items[Unit] = ONE) -> Any:
         """Return nested lists of floats, each in its unit, all faults of the elements raised together.
@@ -194,11 +190,12 @@ class Node:
     ) -> Mapping:
         """Return a map of which the keys are known: missing and unknown ones are faults.
 
-        With `faults` those of the keys are kept there, and the map is returned with what it has.
+        With `faults` those of the keys are kept there, and the map is returned with what it has; the value
+        of a misspelt key is found under the one that was meant.
         """
         result = self.mapping()
         found = Faults() if faults is None else faults
-        _check_keys(result, required, optional, found)
+        result = _check_keys(result, required, optional, found)
         if faults is None:
             found.check()
         return result
@@ -312,6 +309,12 @@ class Mapping(Node):
         """Return the keys, as nodes with a place, and their values."""
         return list(zip(self.keys.values(), self.values.values(), strict=True))
 
+    def renamed(self, key: str, name: str) -> Mapping:
+        """Return a map in which a value is found under another key; the place of the key stays."""
+        keys = {name if old == key else old: node for old, node in self.keys.items()}
+        values = {name if old == key else old: node for old, node in self.values.items()}
+        return Mapping(keys, values, self.file, self.line, self.column, self.key)
+
     def __contains__(self, key: str) -> bool:
         return key in self.values
 
@@ -345,22 +348,26 @@ def plain_value(text: str) -> Any:
         return text
 
 
-def _check_keys(found: Mapping, required: Collection[str], optional: Collection[str], faults: Faults) -> None:
-    """Keep a fault for each unknown key and for each missing one that no unknown key was meant to be."""
+def _check_keys(
+    found: Mapping, required: Collection[str], optional: Collection[str], faults: Faults
+) -> Mapping:
+    """Keep a fault for each unknown key and each missing one; return the map with misspelt keys as meant."""
     known = list(dict.fromkeys((*required, *optional)))
-    meant = set()
+    free = [name for name in known if name not in found]
+    result = found
     for key, node in found.keys.items():
         if key not in known:
-            free = [name for name in known if name not in found]
-            near, taken = closest(key, free), closest(key, [name for name in known if name in found])
-            meant.add(near)
+            near, taken = closest(key, free), closest(key, [name for name in known if name not in free])
             remedy = suggestion(key, free)
             if near is None and taken is not None:
                 remedy = f"did you mean {quoted(taken)}, which is in line {found.keys[taken].line}?"
             faults.add(node.place, f"key {quoted(key)} is unknown", remedy)
+            if near is not None and near not in result:
+                result = result.renamed(key, near)
     for name in required:
-        if name not in found and name not in meant:
+        if name not in result:
             faults.add(found.place, f"key '{name}' is missing", f"add '{name}: ...'")
+    return result
 
 
 def measure(node: Node) -> tuple[int, ...]:

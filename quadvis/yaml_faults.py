@@ -65,6 +65,16 @@ def explain(text: str, at: int, opened: int | None, limit: int) -> Trouble:
     return _indentation(scan, at, opened)
 
 
+def run_on(text: str, at: int) -> Trouble:
+    """Return what is wrong with a key that goes on behind its ':', since no blank stands there."""
+    char = text[at]
+    if char in "[{":
+        remedy = f"write ': {char}'"
+        return Trouble(at, "a blank is missing behind ':'", remedy, f"{text[:at]} {text[at:]}", at)
+    repaired = f"{text[:at]} {text[at + 1 :]}"
+    return Trouble(at, f"this is {with_article(char)}", replacement(char), repaired)
+
+
 def _replaced(text: str, start: int, end: int) -> str:
     """Return the text with every sign of a stretch hidden from the parser."""
     hidden = "".join(STAND_INS.get(char, char) for char in text[start:end])

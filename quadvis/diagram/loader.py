@@ -7,12 +7,13 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 
+from quadvis.characters import cleaned, first_odd, replacement, with_article
 from quadvis.diagram.reference import Reference, read_reference
 from quadvis.diagram.times import Rate, read_duration, read_rate, read_step
 from quadvis.diagram.values import QUANTITY_KEYS, read_constant
 from quadvis.document import Mapping, Node, Scalar, parse_yaml, read_yaml
 from quadvis.engine.graph import CROSSINGS, SOLVERS, TOLD
-from quadvis.errors import Faults, Place, closest
+from quadvis.errors import Faults, Place, closest, quoted
 
 VERSION = 1
 CONTINUOUS = "continuous"
@@ -102,7 +103,7 @@ def _read(path: Path, node: Node | None, faults: Faults, part: bool) -> FileSpec
     if root is None or not _is_ours(root, faults, part):
         return None
     spec = FileSpec(path, Place(str(path)), root.place, path.stem)
-    faults.collect(root.fields, REQUIRED_KEYS, PART_KEYS if part else DIAGRAM_KEYS, faults)
+    root = root.fields(REQUIRED_KEYS, PART_KEYS if part else DIAGRAM_KEYS, faults)
     for key in ("name", "doc"):
         text = faults.collect(root[key].text) if key in root else None
         spec.name = text if text and key == "name" else spec.name
@@ -159,11 +160,23 @@ def _map(node: Node | None, faults: Faults) -> list[tuple[str, Node]]:
 def _named(root: Mapping, key: str, what: str, faults: Faults) -> list[tuple[str, Node]]:
     """Return the entries of a map from names; keys that are no names are told."""
     node = root.get(key)
-    mapping = faults.collect(node.mapping) if node is not None else None
-    for name in mapping.keys.values() if mapping is not None else ():
-        if NAME.fullmatch(name.value) is None:
-            _refuse_name(name, what, faults)
+    mapping = faults.collect(_with_clean_names, node, faults) if node is not None else None
+    for name, written in mapping.keys.items() if mapping is not None else ():
+        if NAME.fullmatch(name) is None:
+            _refuse_name(written, what, faults)
     return list(mapping.values.items()) if mapping is not None else []
+
+
+def _with_clean_names(node: Node, faults: Faults) -> Mapping:
+    """Return a map of which the keys are names; those with odd characters are refused, and read as meant."""
+    mapping = node.mapping()
+    for key in list(mapping.keys.values()):
+        char, name = first_odd(key.value), cleaned(key.value)
+        if char is not None and PATH.fullmatch(name) and name not in mapping:
+            problem = f"{quoted(key.value)} holds {with_article(char)}"
+            faults.add(key.place, problem, replacement(char))
+            mapping = mapping.renamed(key.value, name)
+    return mapping
 
 
 def _refuse_name(key: Scalar, what: str, faults: Faults) -> None:
@@ -173,21 +186,23 @@ def _refuse_name(key: Scalar, what: str, faults: Faults) -> None:
 
 def _read_blocks(spec: FileSpec, root: Mapping, faults: Faults) -> None:
     node = root.get("blocks")
-    mapping = faults.collect(node.mapping) if node is not None else None
+    mapping = faults.collect(_with_clean_names, node, faults) if node is not None else None
     if mapping is not None and not mapping.values:
         remedy = "add one, such as 'source: {block: sources.sine, rate: fast}'"
         faults.add(mapping.place, "there are no blocks", remedy)
-    for key, value in mapping.pairs() if mapping is not None else []:
-        with faults.about(f"block '{key.value}'"):
-            if key.value == INSIDE:
+    for name, value in mapping.values.items() if mapping is not None else ():
+        assert mapping is not None
+        key = mapping.keys[name]
+        with faults.about(f"block '{name}'"):
+            if name == INSIDE:
                 faults.add(key.place, "no block can be called 'in'", "'in' names the inputs of a part")
-            elif PATH.fullmatch(key.value) is None:
+            elif PATH.fullmatch(name) is None:
                 _refuse_name(key, "block", faults)
-            block = read_block(key.value, key.place, value, faults)
+            block = read_block(name, Place(key.file, key.line, key.column), value, faults)
         if block is None:
-            spec.broken.add(key.value)
+            spec.broken.add(name)
         else:
-            spec.blocks[key.value] = block
+            spec.blocks[name] = block
 
 
 def read_block(name: str, place: Place, node: Node, faults: Faults) -> BlockSpec | None:
@@ -198,8 +213,8 @@ def read_block(name: str, place: Place, node: Node, faults: Faults) -> BlockSpec
     told = {closest(key, BLOCK_KEYS) or "" for key in fields if key not in BLOCK_KEYS}
     kinds = [fields[key] for key in ("block", "part") if key in fields]
     kind = faults.collect(kinds[0].text) if len(kinds) == 1 else None
-    given = faults.collect(fields["with"].mapping) if "with" in fields else None
-    wired = faults.collect(fields["in"].mapping) if "in" in fields else None
+    given = faults.collect(_with_clean_names, fields["with"], faults) if "with" in fields else None
+    wired = faults.collect(_with_clean_names, fields["in"], faults) if "in" in fields else None
     inputs = {port: _read_input(value, faults) for port, value in (wired.values if wired else {}).items()}
     rate = faults.collect(fields["rate"].text) if "rate" in fields else None
     is_slot = faults.collect(fields["slot"].boolean) if "slot" in fields else False
@@ -232,7 +247,7 @@ def _read_input(node: Node, faults: Faults) -> InputSpec:
         faults.add(node.place, "a signal and a value are given at once", "keep 'from' or 'value'")
         return InputSpec(node.place, None)
     if isinstance(node, Mapping) and not is_value:
-        faults.collect(node.fields, WIRE_KEYS[:1], WIRE_KEYS[1:], faults)
+        node = node.fields(WIRE_KEYS[:1], WIRE_KEYS[1:], faults)
         source = read_reference(node["from"], faults) if "from" in node else None
         across = node.get("across")
         crossing = faults.collect(across.choice, CROSSINGS) if across is not None else None

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from quadvis import document as yaml
-from quadvis.characters import odd_characters
+from quadvis.characters import first_odd
 from quadvis.diagram.loader import is_version
 from quadvis.diagram.values import read_constant
 from quadvis.document import Node, parse_yaml, read_yaml
@@ -98,7 +98,7 @@ def _read_file(
     root = faults.collect(node.mapping) if node is not None else None
     if root is None or not is_version(root, faults) or not _is_parameters(root, faults):
         return None
-    faults.collect(root.fields, PARAMETERS_REQUIRED, PARAMETERS_KEYS, faults)
+    root = root.fields(PARAMETERS_REQUIRED, PARAMETERS_KEYS, faults)
     texts = {key: faults.collect(root[key].text) for key in ("name", "doc", "base") if key in root}
     base = texts.get("base")
     if base is not None:
@@ -158,7 +158,8 @@ def _from_texts(texts: Iterable[str], origin: str, faults: Faults) -> Iterator[t
 
 
 def _odd(name: str) -> Odd | None:
-    return next((Odd(0, 0, char) for _, char in odd_characters(name)), None)
+    char = first_odd(name)
+    return Odd(0, 0, char) if char is not None else None
 
 
 def _value(text: str, parameter: str, place: Place) -> Node:

@@ -27,7 +27,7 @@ def read_rate(node: Node) -> Rate:
     if not isinstance(node, Mapping):
         return Rate(read_period(node))
     faults = Faults()
-    faults.collect(node.fields, RATE_KEYS[:1], RATE_KEYS[1:], faults)
+    node = node.fields(RATE_KEYS[:1], RATE_KEYS[1:], faults)
     period = faults.collect(read_period, node["rate"]) if "rate" in node else None
     offset = faults.collect(read_duration, node["offset"]) if "offset" in node else None
     faults.check()

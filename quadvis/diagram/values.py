@@ -14,7 +14,7 @@ from quadvis.block import Param, SignalType
 from quadvis.document import Node, Scalar, measure
 from quadvis.errors import Faults, quoted, suggestion
 from quadvis.number_lists import Numbers
-from quadvis.units import Unit, UnitError, parse_quantity, split_quantity
+from quadvis.units import Unit, parse_quantity, split_quantity
 
 QUANTITY_KEYS = ("value", "unit")
 _PARAMETER = re.compile(r"\$(?P<name>[A-Za-z_]\w*)(?:\[(?P<element>\d{1,6})\])?", re.ASCII)
@@ -45,7 +45,7 @@ def substitute(node: Node, params: Mapping[str, Node | None] | None, faults: Fau
     assert isinstance(node, yaml.Mapping)
     if not any(key in node for key in QUANTITY_KEYS):
         return node  # no value at all: whoever reads it will say so
-    faults.collect(node.fields, QUANTITY_KEYS[:1], QUANTITY_KEYS[1:], faults)
+    node = node.fields(QUANTITY_KEYS[:1], QUANTITY_KEYS[1:], faults)
     value = substitute(node["value"], params, faults) if "value" in node else None
     return None if value is None else faults.collect(_spread, value, node.get("unit"), node.key)
 
@@ -180,13 +180,9 @@ def _element(scalar: str, declared: Unit, node: Node) -> tuple[Any, Unit | None]
         return node.quantity(declared, bare=False), declared
     if not isinstance(node, Scalar) or not node.value:
         raise node.wrong("a number or a quantity")
-    node.check_signs()
-    label = f"{quoted(node.key)}: " if node.key else ""
-    try:
-        value, unit = parse_quantity(node.value)
-    except UnitError as error:
-        raise node.fault(label + error.problem, error.remedy) from None
+    value, unit = node.read(parse_quantity)
     if unit.variables:
+        label = f"{quoted(node.key)}: " if node.key else ""
         raise node.fault(f"{label}{quoted(unit)} is not a unit")
     if split_quantity(node.value)[1]:
         return value, si(unit)

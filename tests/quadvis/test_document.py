@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import re
 import subprocess
 import sys
@@ -267,7 +269,7 @@ def test_files_that_are_none_are_refused(tmp_path):
         ("hovr.yaml", f"hovr.yaml: there is no such file; did you mean '{tmp_path}/hover.yaml'?"),
         ("nowhere/x.yaml", "nowhere/x.yaml: there is no such file"),
         ("", "this is not a file; name a YAML file"),
-        ("hover.yaml/x", "hover.yaml/x: the file cannot be read: Not a directory"),
+        ("hover.yaml/x", f"hover.yaml/x: the file cannot be read: {os.strerror(errno.ENOTDIR)}"),
         ("\0", "the file cannot be read: embedded null byte"),
     ]:
         with pytest.raises(DiagramError) as caught:

@@ -182,14 +182,16 @@ def test_an_array_argument_cannot_be_written_to() -> None:
         return u
 
     call = memory.call(scale, [Slot("float64", (3,), 1)], [Slot("float64", (3,), 4)])
-    with pytest.raises(ValueError, match="read-only"):
+    memory.floats[1:4] = 3.0
+    with pytest.raises(ValueError):
         call()
+    assert (memory.floats[1:4] == 3.0).all()
 
 
 @pytest.mark.parametrize("result", [np.zeros(4), (1.0, 2.0)])
 def test_a_result_of_another_shape_is_an_error(result: object) -> None:
     memory = Memory(8)
-    with pytest.raises(ValueError, match="broadcast"):
+    with pytest.raises(ValueError):
         memory.call(lambda: result, [], [Slot("float64", (3,), 1)])()
 
 
