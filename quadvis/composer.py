@@ -35,7 +35,7 @@ _MOST_LINES = 5  # named for a key that is there again and again
 
 
 class MisreadError(Exception):
-    """A list of numbers was part of a longer text."""
+    """A list of numbers was part of a longer text, or too long."""
 
 
 class RunOnError(Exception):
@@ -127,6 +127,8 @@ class Composer:
                 raise MisreadError
             found, source = self.lists[mark.line, mark.column]
             self.nodes += found.count
+            if self.nodes >= MAX_NODES:
+                raise MisreadError  # read it again, to say at which element it is too much
             return Numbers(found, source, *self._position(event))
         if value.isascii() and "\t" not in value:
             return Scalar(value, plain, *self._position(event))

@@ -51,6 +51,7 @@ def explain(text: str, at: int, opened: int | None, limit: int) -> Trouble:
         _tab,
         _odd,
         _quotes,
+        _unit,
         _brackets,
         _start,
         _block_text,
@@ -88,9 +89,9 @@ def _depth(scan: Scan, at: int, opened: int | None) -> Trouble | None:
 
 
 def _tab(scan: Scan, at: int, opened: int | None) -> Trouble | None:
-    start = scan.starts[scan.line(at)]
-    lead = scan.text[start : at + 1]
-    if "\t" in lead and not lead.strip():
+    start, line = scan.starts[scan.line(at)], scan.line_text(scan.line(at))
+    lead = line[: len(line) - len(line.lstrip(" \t"))]
+    if "\t" in lead:
         return Trouble(start + lead.index("\t"), "a tab cannot indent a line", "use spaces")
     if scan.text[at : at + 1] == "\t":
         repaired = f"{scan.text[:at]} {scan.text[at + 1 :]}"
@@ -305,6 +306,19 @@ def _indent(line: str) -> int:
     return len(line) - len(line.lstrip(" "))
 
 
+def _unit(scan: Scan, at: int, opened: int | None) -> Trouble | None:
+    """Look for a unit behind a list: each number has its own."""
+    text = scan.text
+    last = len(text[:at].rstrip(" \t"))
+    start = next((start for start, end in scan.brackets if end == last and text[start] == "["), None)
+    unit = re.match(r"[^\s,\]}#]*(?: *[*/] *[^\s,\]}#]+)*", text[at : at + 100])
+    if start is None or unit is None or not _is_unit(unit.group()):
+        return None
+    shown = text[start:last] if last - start <= 40 else f"{text[start : start + 20]}...]"
+    remedy = f"write {{value: {shown}, unit: {unit.group()}}}"
+    return Trouble(at, f"the unit '{unit.group()}' stands behind a list", remedy)
+
+
 def _behind(scan: Scan, at: int, opened: int | None) -> Trouble | None:
     """Look for what stands behind a list, a map or a text in quotes that is complete."""
     text = scan.text
@@ -313,12 +327,6 @@ def _behind(scan: Scan, at: int, opened: int | None) -> Trouble | None:
         for start, end in spans:
             if end != last or at >= len(text):
                 continue
-            rest = re.match(r"[^\s,\]}#]*(?: *[*/] *[^\s,\]}#]+)*", text[at:])
-            unit = rest.group() if rest else ""
-            if not kind and text[start] == "[" and _is_unit(unit):
-                shown = text[start:end] if end - start <= 40 else f"{text[start : start + 20]}...]"
-                remedy = f"write {{value: {shown}, unit: {unit}}}"
-                return Trouble(at, f"the unit '{unit}' stands behind a list", remedy)
             if text[at] == ":" or text[at] in "]}":
                 continue
             name = kind or _NAMES[text[start]]
