@@ -13,9 +13,10 @@ from quadvis.diagram.loader import BlockSpec, FileSpec, read_file
 from quadvis.diagram.names import absent, remedy_for
 from quadvis.diagram.settings import Settings
 from quadvis.diagram.values import substitute
-from quadvis.document import Node
-from quadvis.errors import DiagramError, Faults, Place, suggestion
+from quadvis.document import Node, Scalar
+from quadvis.errors import DiagramError, Faults, Place, quoted, suggestion
 from quadvis.missing_file import file_trouble
+from quadvis.units import Unit, UnitError, split_quantity
 
 MAX_BLOCKS = 5_000  # parts in parts multiply
 MAX_DEPTH = 30
@@ -69,6 +70,13 @@ class FlatBlock:
         return self.places[parameter]
 
 
+def _is_unit(text: str) -> bool:
+    try:
+        return bool(Unit.parse(text).dimension) if text else False
+    except UnitError:
+        return False
+
+
 class Parts:
     """The files of parts, each read once; its faults are told then."""
 
@@ -102,7 +110,7 @@ class Expansion:
         self.broken: set[str] = set()  # blocks of which a parameter is wrong
         self._count = 0
         self._used: set[tuple[str, str]] = set()
-        params = {name: self._setting("", name) or node for name, node in spec.params.items()}
+        params = {name: self._chosen("", name, node) for name, node in spec.params.items()}
         self.root = Scope("", spec, params)
         self._expand(self.root, (os.path.realpath(spec.path),))
         self._tell_unused()
@@ -111,6 +119,25 @@ class Expansion:
         self._used.add((path, name))
         setting = self.settings.get(path, {}).get(name)
         return setting.value if setting is not None else None
+
+    def _chosen(self, path: str, name: str, own: Node | None) -> Node | None:
+        """Return the value of a parameter: the setting if there is one; None if it is wrong.
+
+        A setting without a unit for a value with one is refused here, before others are blamed for it.
+        """
+        value = self._setting(path, name)
+        if value is None:
+            return own
+        if not isinstance(value, Scalar) or not isinstance(own, Scalar):
+            return value
+        number, unit = split_quantity(value.value)
+        wanted = split_quantity(own.value)[1]
+        if not number or unit or not number.strip("+-0.") or not _is_unit(wanted):
+            return value
+        remedy = f"did you mean {quoted(f'{number} {wanted}')}?"
+        setting = self.settings[path][name]
+        self.faults.add(setting.place, f"{quoted(name)}: {quoted(number)} has no unit", remedy)
+        return None
 
     def _tell_unused(self) -> None:
         for path, values in self.settings.items():
@@ -162,9 +189,11 @@ class Expansion:
             elif not block.is_part:
                 self.broken.add(path)
         for name in self.settings.get(path, {}):
-            value = self._setting(path, name)
+            value = self._chosen(path, name, values.get(name))
             if value is not None:
                 values[name] = value
+            elif values.pop(name, None) is not None:
+                self.broken.add(path)
         return values
 
     def _places(self, block: BlockSpec, path: str) -> Mapping[str, Place]:
