@@ -127,11 +127,7 @@ def test_a_range_of_a_parameter_is_not_blamed_for_its_value(tmp_path: Path) -> N
     load(path)
     with pytest.raises(DiagramError) as caught:
         load(path, settings=["lag=1"])
-    assert str(
-        caught.value
-    ) == "--set: block 'lag': 'time_constant': '1' has no unit; did you mean '1 s'?".replace(
-        "'time_constant'", "'lag'"
-    )
+    assert str(caught.value) == "--set: 'lag': '1' has no unit; did you mean '1 s'?"
 
 
 @pytest.mark.parametrize("step", ["3 ms", "7 ms", "1/3 s", "0.3 ms", "11 ms"])
