@@ -125,6 +125,11 @@ class Unit:
         """Say whether a quantity in one unit can be converted into the other: m and mm."""
         return self.dimension == other.dimension
 
+    @cached_property
+    def reduced(self) -> Unit:
+        """The same unit in fewer names, where those that came together say it at length: s*N/kg/m is 1/s."""
+        return _reduced(self)
+
     def substitute(self, bindings: Mapping[str, Unit]) -> Unit:
         """Return the unit with the variables replaced that are bound."""
         result = _unit(
@@ -139,6 +144,40 @@ class Unit:
 
 def _unit(exponents: Iterable[tuple[str, Fraction]], symbols: Iterable[tuple[str, Fraction]]) -> Unit:
     return Unit(frozenset(_powers(exponents)), _powers(symbols))
+
+
+# Names that stand for a product of dimensions, the best known first.
+_ORDER = (*VARIABLES, "rad", "px", "kg", "m", "A", "K", "s")
+_SHORT = 3  # factors of a unit that only a single name replaces: N*s/m stays, N/kg/m is 1/s^2
+_NAMED = ("N", "W", "V", "ohm", "Pa", "T", "H", "F", "C")
+
+
+def _reduced(unit: Unit) -> Unit:
+    """Return the shortest product of bases and a power of one name; the unit if it is as short."""
+    if unit.exponents != unit.dimension:
+        return unit
+    choices = [_in_bases(Unit(unit.dimension))]
+    for name in map(Unit.parse, _NAMED):
+        for power in (1, -1, 2, -2):
+            rest = _in_bases(Unit((unit / name**power).dimension))
+            choices.append(name**power * rest)
+    best = min(choices, key=_length)
+    shorter = len(best.symbols) <= 1 if _length(unit) <= _SHORT else True
+    return best if shorter and _length(best) < _length(unit) else _in_order(unit)
+
+
+def _in_bases(unit: Unit) -> Unit:
+    return Unit(unit.exponents, tuple(sorted(unit.exponents, key=lambda item: _ORDER.index(item[0]))))
+
+
+def _in_order(unit: Unit) -> Unit:
+    """Return the unit with its factors in the usual order: m*s, not s*m."""
+    known = all(symbol in _ORDER for symbol, _ in unit.symbols)
+    return _in_bases(unit) if known else unit
+
+
+def _length(unit: Unit) -> Fraction:
+    return sum((abs(exponent) for _, exponent in unit.symbols), Fraction(0))
 
 
 def _power(symbol: str, exponent: Fraction) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -72,7 +72,8 @@ class Flow:
     """Lets what is known flow along the wires until all is known, each block after the blocks that feed it.
 
     ``lost`` are inputs of which nothing is known, since their fault has been told: what depends on them is
-    not looked at. In a ring of blocks nothing comes first; there one block goes ahead with what it has.
+    not looked at. In a ring of blocks nothing comes first; there one block goes ahead with what it has. What
+    is found does not depend on the order of the blocks in the file: where a choice is left the names decide.
     """
 
     def __init__(self, drafts: Mapping[str, Draft], nodes: Mapping[str, Node], links: Sequence[Link],
@@ -80,51 +81,97 @@ class Flow:
         self.drafts, self.nodes, self.faults = drafts, nodes, faults
         self.lost = set(lost)
         self._waiting = {link.key: link for link in links}
+        self._ready: dict[Key, Link] = {}  # those that wait only for the other inputs of their block
         self._settled: set[str] = set()
         self._told: set[Place] = set()
-        self._rank = {path: rank for rank, path in enumerate(drafts)}
         self._into: dict[str, list[Link]] = {path: [] for path in drafts}
         self._from: dict[str, list[Link]] = {path: [] for path in drafts}
-        for link in links:
+        for link in sorted(links, key=self._order):
             self._into[link.draft.path].append(link)
             self._from[link.wire.block].append(link)
 
+    @staticmethod
+    def _order(link: Link) -> tuple[str, int]:
+        """Return what sorts wires by the block and the port that they feed."""
+        return link.draft.path, list(link.draft.block.interface.inputs).index(link.port)
+
     def run(self) -> None:
         """Follow every wire."""
-        for path in self.drafts:
-            if not self._pending(path):
+        for path in sorted(self.drafts):
+            if not self._pending(path) and path not in self._settled:
                 self._settle(path)
         while self._waiting:
-            self._settle(self._first_in_ring())
+            if self._ready:
+                link = min(self._ready.values(), key=self._order)
+                self._take(link)
+                self._spread(link.draft.path)
+                continue
+            path = max(sorted(self._first_ring()), key=self.knowledge)
+            if self.prepare(path):
+                self._spread(path)
+            else:
+                self._settle(path)
 
     def _pending(self, path: str) -> list[Link]:
         return [link for link in self._into[path] if link.key in self._waiting]
 
-    def _first_in_ring(self) -> str:
-        """Walk against the signals until a block comes again; return the one of that ring that knows most."""
-        path = next(iter(self._waiting.values())).wire.block
-        trail: dict[str, None] = {}
-        while path not in trail:
-            trail[path] = None
-            path = self._pending(path)[0].wire.block
-        ring = list(trail)[list(trail).index(path) :]
-        return min(ring, key=lambda member: (-self.knowledge(member), self._rank[member]))
+    def _first_ring(self) -> list[str]:
+        """Return blocks that wait for each other and for no others.
+
+        They are the first strongly connected component that Tarjan's search closes on its way against the
+        signals.
+        """
+        number: dict[str, int] = {}
+        lowest: dict[str, int] = {}
+        trail: list[tuple[str, Iterator[Link]]] = []
+
+        def enter(path: str) -> None:
+            number[path] = lowest[path] = len(number)
+            trail.append((path, iter(self._pending(path))))
+
+        enter(min(link.wire.block for link in self._waiting.values()))
+        while True:
+            path, links = trail[-1]
+            link = next(links, None)
+            if link is not None and link.wire.block not in number:
+                enter(link.wire.block)
+            elif link is not None:
+                lowest[path] = min(lowest[path], number[link.wire.block])
+            elif lowest[path] == number[path]:
+                return [member for member, count in number.items() if count >= number[path]]
+            else:
+                trail.pop()
+                before = trail[-1][0]
+                lowest[before] = min(lowest[before], lowest[path])
 
     def _settle(self, path: str) -> None:
         self._settled.add(path)
         self.settle(path)
+        self._spread(path)
+
+    def _spread(self, path: str) -> None:
+        """Give what is known of a block to those that read it, and so on."""
         changed = [path]
         while changed:
             path = changed.pop()
             for link in self._from[path]:
                 if link.key in self._waiting and (self.knows(link) or path in self._settled):
-                    del self._waiting[link.key]
-                    if not self.knows(link) or not self.take(link):
-                        self.lost.add(link.key)
-                    if link.draft.path not in self._settled and not self._pending(link.draft.path):
-                        self._settled.add(link.draft.path)
-                        self.settle(link.draft.path)
-                    changed.append(link.draft.path)
+                    self._ready[link.key] = link
+                    pending = self._pending(link.draft.path)
+                    if all(each.key in self._ready for each in pending):
+                        # In the order of the ports, so that of two that disagree the second is wrong.
+                        for each in pending:
+                            self._take(each)
+                        if link.draft.path not in self._settled:
+                            self._settled.add(link.draft.path)
+                            self.settle(link.draft.path)
+                        changed.append(link.draft.path)
+
+    def _take(self, link: Link) -> None:
+        del self._waiting[link.key]
+        del self._ready[link.key]
+        if not self.knows(link) or not self.take(link):
+            self.lost.add(link.key)
 
     def fault(self, path: str, place: Place, problem: str, remedy: str = "") -> None:
         """Tell a fault of a block, once for a wire that leads to several blocks of a part."""
@@ -143,6 +190,10 @@ class Flow:
     def settle(self, path: str) -> None:
         """Decide what is still open in a block, since no more will be known."""
         raise NotImplementedError
+
+    def prepare(self, path: str) -> bool:
+        """Let a block in a ring use what is certain, before anything is decided; False if it has no such."""
+        return False
 
     def knowledge(self, path: str) -> int:
         """Return how well a block can go ahead in a ring; higher is better."""

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 
 import numpy as np
 
 from quadvis.block import Declared, Param
-from quadvis.diagram.flow import ONE, Flow, Link
-from quadvis.diagram.values import OpenUnits
+from quadvis.diagram.flow import ONE, Flow, Key, Link
+from quadvis.diagram.values import Bare, OpenUnits
 from quadvis.engine.graph import Constant, selected
+from quadvis.errors import Place
 from quadvis.units import Unit, unify
 
 
@@ -22,6 +23,40 @@ class Bindings:
 
     def match(self, pattern: tuple[Unit, ...], units: OpenUnits) -> int | None:
         """Bind what the units of the elements say; return the first that does not fit, None if all do."""
+        for index, wanted, unit, places in self._pairs(pattern, units):
+            if (
+                isinstance(unit, Unit)
+                and unit != wanted
+                and not all([_unify(wanted, unit, bound) for bound in places])
+            ):
+                return index
+        return None
+
+    def match_bare(self, pattern: tuple[Unit, ...], units: OpenUnits, outputs: Collection[Unit]) -> None:
+        """Let numbers without unit bind what is still open.
+
+        One that stands for an output makes the output a plain number, any other the variable: 3 in "a/s" is
+        3 1/s.
+        """
+        for _, wanted, unit, places in self._pairs(pattern, units):
+            if isinstance(unit, Bare):
+                plain = ONE if wanted in outputs else _plain(wanted)
+                for bound in places:
+                    unify(wanted, plain, bound)
+
+    def refuses(self, pattern: tuple[Unit, ...], units: OpenUnits) -> int | None:
+        """Return the first number without unit that needs one, None if there is none."""
+        for index, wanted, unit, places in self._pairs(pattern, units):
+            if isinstance(unit, Bare):
+                found = {wanted.substitute(bound) for bound in places}
+                if not found <= {ONE, _plain(wanted)} and not any(each.variables for each in found):
+                    return index
+        return None
+
+    def _pairs(
+        self, pattern: tuple[Unit, ...], units: OpenUnits
+    ) -> Iterator[tuple[int, Unit, Unit | Bare | None, list[dict[str, Unit]]]]:
+        """Yield the elements: index, declared unit, given unit, and what the variables stand for there."""
         if len(pattern) == len(self.elements) == 1 and units.count(units[0]) == len(units):
             units = units[:1]  # what all say alike holds for every element, as the unit of a scalar does
         missing = len(units) - len(self.elements)
@@ -29,14 +64,7 @@ class Bindings:
         for index, unit in enumerate(units):
             # The unit of a scalar holds for every element of the block's vectors.
             places = self.elements if len(units) == 1 else self.elements[index : index + 1]
-            wanted = pattern[index % len(pattern)]
-            if (
-                unit is not None
-                and unit != wanted
-                and not all([_unify(wanted, unit, bound) for bound in places])
-            ):
-                return index
-        return None
+            yield index, pattern[index % len(pattern)], unit, places
 
     def unit(self, pattern: tuple[Unit, ...], index: int) -> Unit:
         """Return the unit of an element, with the variables that are bound replaced."""
@@ -63,6 +91,11 @@ class Bindings:
             bound.setdefault(variable, unit)
 
 
+def _plain(unit: Unit) -> Unit:
+    """Return a declared unit with plain numbers in place of its variables: 1/s for "a/s"."""
+    return unit.substitute(dict.fromkeys(unit.variables, ONE)) if unit.variables else unit
+
+
 def _variable(unit: Unit) -> str:
     """Return the variable that the unit is, empty if it is more: a way round slow arithmetic with units."""
     names = [name for name, exponent in unit.exponents if exponent == 1 and name in unit.variables]
@@ -81,17 +114,26 @@ def _unify(wanted: Unit, unit: Unit, bound: dict[str, Unit]) -> bool:
 class UnitFlow(Flow):
     """Units: binds the variables of every block, and fills in the units of every node."""
 
+    changed: Mapping[Key, Unit] = {}  # factors of given values, to try what another unit would do
+
     def run(self) -> None:
-        """Follow every wire, then note the units of all ports and parameters."""
+        """Follow every wire."""
         self.bindings = {path: Bindings() for path in self.drafts}
+        self._prepared: set[str] = set()  # blocks whose given values have been used
+        # Of units that do not fit: what there is over what is wanted, of wires and of given values.
+        self.ratios: dict[Place, Unit] = {}
+        self.given_ratios: dict[Place, Unit] = {}
         super().run()
+
+    def note(self) -> None:
+        """Note the units of all ports and parameters."""
         for path, node in self.nodes.items():
             interface = node.block.interface
             params = interface.params.values() if self.drafts[path].whole else ()
             for declared in (*interface.outputs.values(), *params, *interface.inputs.values()):
                 units = self._units(path, declared)
                 if not any(unit.variables for unit in units):
-                    node.units[declared.name] = units
+                    node.units[declared.name] = tuple(unit.reduced for unit in units)
 
     def _count(self, path: str, declared: Declared) -> int:
         if isinstance(declared, Param):
@@ -125,6 +167,7 @@ class UnitFlow(Flow):
         if wrong is None:
             return True
         wanted = bindings.unit(link.declared.units, wrong)
+        self.ratios[link.connection.place] = units[wrong] / wanted
         element = f"[{wrong}]" if len(units) > 1 else ""
         found = f"'{link.wire.source}' has {words(units[wrong])}"
         problem = f"input '{link.port}{element}' takes {words(wanted)}, {found}"
@@ -136,10 +179,26 @@ class UnitFlow(Flow):
         draft = self.drafts[path]
         interface = draft.block.interface
         for name, units in draft.units.items():
-            yield name, interface.params[name], units
+            yield name, interface.params[name], self._tried(path, name, units)
         for name, connection in draft.connections.items():
             if isinstance(connection.source, Constant) and connection.units and (path, name) not in self.lost:
-                yield name, interface.inputs[name], connection.units
+                yield name, interface.inputs[name], self._tried(path, name, connection.units)
+
+    def _tried(self, path: str, name: str, units: OpenUnits) -> OpenUnits:
+        factor = self.changed.get((path, name))
+        if factor is None:
+            return units
+        return tuple(unit * factor if isinstance(unit, Unit) else unit for unit in units)
+
+    def prepare(self, path: str) -> bool:
+        """Let given values with a unit bind what they can."""
+        fresh = path not in self._prepared and any(
+            isinstance(unit, Unit) for _, _, units in self._given(path) for unit in units
+        )
+        self._prepared.add(path)
+        if fresh:
+            self._match_given(path)
+        return fresh
 
     def settle(self, path: str) -> None:
         """Let given values bind what wires do not; what is still open then counts as plain numbers."""
@@ -148,36 +207,60 @@ class UnitFlow(Flow):
         doubtful = [port for name, port in interface.inputs.items() if (path, name) in self.lost]
         if bindings.open(doubtful) or not self.drafts[path].whole:
             return
+        self._match_bare(path)
         bindings.spread()
         for variable in bindings.open(interface.inputs.values()):
             bindings.bind(variable, ONE)
             self._match_given(path)
+            self._match_bare(path)
         for param in interface.params.values():
             if len(bindings.open([param])) == 1:
                 bindings.match(param.units, (ONE,))
         for variable in bindings.open(interface.outputs.values()):
             bindings.bind(variable, ONE)
+        for name, declared, units in self._given(path):
+            wrong = bindings.refuses(declared.units, units)
+            if wrong is not None:
+                self._tell_given(path, name, declared, wrong, None)
 
     def _match_given(self, path: str) -> None:
         for name, declared, units in self._given(path):
             wrong = self.bindings[path].match(declared.units, units)
             if wrong is not None:
-                self._tell_given(path, name, declared, wrong, units[wrong] or ONE)
+                unit = units[wrong]
+                self._tell_given(path, name, declared, wrong, unit if isinstance(unit, Unit) else None)
 
-    def _tell_given(self, path: str, name: str, declared: Declared, index: int, unit: Unit) -> None:
+    def _match_bare(self, path: str) -> None:
+        """Let numbers without unit bind what is open, first those that stand for a variable itself."""
+        outputs = {unit for port in self.drafts[path].block.interface.outputs.values() for unit in port.units}
+        given = sorted(self._given(path), key=lambda item: (not _variable(item[1].units[0]), item[0]))
+        for _, declared, units in given:
+            self.bindings[path].match_bare(declared.units, units, outputs)
+
+    def _tell_given(self, path: str, name: str, declared: Declared, index: int, unit: Unit | None) -> None:
         draft = self.drafts[path]
         wanted = self.bindings[path].unit(declared.units, index)
         place = draft.connections[name].place if name in draft.connections else draft.places[name]
-        problem = f"'{name}' has {words(unit)}, its unit here is {wanted if wanted.symbols else 'none'}"
-        self.fault(path, place, problem, f"write it in {wanted}" if wanted.symbols else "leave the unit out")
+        if unit is not None:
+            self.given_ratios[place] = unit / wanted
+        fitting = str(wanted.reduced) if wanted.exponents else "none"
+        problem = f"'{name}' has {words(unit or ONE)}, its unit here is {fitting}"
+        remedy = f"write it in {fitting}" if wanted.exponents else "leave the unit out"
+        self.fault(path, place, problem, remedy)
 
     def knowledge(self, path: str) -> int:
-        """Prefer a block whose given values bind something, then one of which nothing can be known."""
-        if any(unit is not None for _, _, units in self._given(path) for unit in units):
+        """Prefer a block whose given values bind something, then one of which nothing can be known.
+
+        Then one with a number without unit, which is taken for a plain one if nothing else is known.
+        """
+        units = {type(unit) for _, _, units in self._given(path) for unit in units}
+        if Unit in units and path not in self._prepared:
+            return 3
+        if any((path, port) in self.lost for port in self.drafts[path].block.interface.inputs):
             return 2
-        return int(any((path, port) in self.lost for port in self.drafts[path].block.interface.inputs))
+        return int(Bare in units)
 
 
 def words(unit: Unit) -> str:
     """Return a unit as a message shows it."""
-    return str(unit) if unit.symbols else "no unit"
+    return str(unit.reduced) if unit.exponents else "no unit"

@@ -19,7 +19,13 @@ from quadvis.units import Unit, parse_quantity, split_quantity
 QUANTITY_KEYS = ("value", "unit")
 _PARAMETER = re.compile(r"\$(?P<name>[A-Za-z_]\w*)(?:\[(?P<element>\d{1,6})\])?", re.ASCII)
 
-OpenUnits = tuple[Unit | None, ...]  # of the elements; None is a 0 without unit, which fits any
+
+class Bare:
+    """In place of a unit: a number other than 0 was written without one."""
+
+
+BARE = Bare()
+OpenUnits = tuple[Unit | Bare | None, ...]  # of the elements; None is a 0 without unit, which fits any
 
 
 def read_constant(node: Node, faults: Faults) -> Node | None:
@@ -171,7 +177,7 @@ def shape_text(shape: Sequence[int | str]) -> str:
     return f"{' x '.join(map(str, shape))} values" if shape else "one value"
 
 
-def _element(scalar: str, declared: Unit, node: Node) -> tuple[Any, Unit | None]:
+def _element(scalar: str, declared: Unit, node: Node) -> tuple[Any, Unit | Bare | None]:
     if scalar == "bool":
         return node.boolean(), None
     if scalar == "int64":
@@ -186,8 +192,7 @@ def _element(scalar: str, declared: Unit, node: Node) -> tuple[Any, Unit | None]
         raise node.fault(f"{label}{quoted(unit)} is not a unit")
     if split_quantity(node.value)[1]:
         return value, si(unit)
-    # Without a unit it is 0, which fits any, or the variables stand for plain numbers: 3 in "a/s" is 3 1/s.
-    return value, declared.substitute(dict.fromkeys(declared.variables, Unit())) if value else None
+    return value, BARE if value else None
 
 
 def si(unit: Unit) -> Unit:

@@ -93,6 +93,30 @@ def test_units_are_shown_as_they_were_written(text, shown):
     assert str(Unit.parse(text)) == shown
 
 
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("s*N/kg/m", "1/s"), ("V*s^2*N/rad/kg/m", "V/rad"), ("N*m*rad/kg/m^2", "rad/s^2"),
+        ("N*m/kg/m^2", "1/s^2"),
+        ("kg*m/s^2", "N"), ("A*V*s/kg/m^2", "1/s^2"), ("N*m*s/rad*A/N/m", "A*s/rad"), ("kg*m^2/s^3/A", "V"),
+        ("V*N/m/N*m", "V"), ("m*kg/s^2*s/m", "kg/s"), ("s*m", "m*s"), ("V/A", "ohm"), ("J/s", "W"),
+        ("s*a", "a*s"), ("m/s*s", "m"),
+        # These are as short as they get, and stay.
+        ("N*m", "N*m"), ("N*s/m", "N*s/m"), ("kg*m^2", "kg*m^2"),
+        ("rad/kg/m^2", "rad/kg/m^2"),
+        ("N*m*s/rad", "N*m*s/rad"), ("m/s^2", "m/s^2"), ("km/h", "km/h"), ("rad/s^2", "rad/s^2"), ("1", "1"),
+    ],
+)  # fmt: skip
+def test_a_unit_that_wires_put_together_is_shown_in_few_names(text, shown):
+    assert str(Unit.parse(text).reduced) == shown
+
+
+@given(units)
+def test_a_reduced_unit_is_the_same(unit):
+    assert unit.reduced == unit
+    assert Unit.parse(str(unit.reduced)) == unit
+
+
 @given(units)
 def test_a_shown_unit_reads_back_the_same(unit):
     assert Unit.parse(str(unit)) == unit
