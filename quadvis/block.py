@@ -22,7 +22,8 @@ from quadvis.units import Unit, parse_units
 
 SCALARS = {"float64": float, "int64": int, "bool": bool}
 METHODS = ("start", "output", "update", "deriv")
-RESERVED = {"self", "time", "period", "interface", "numeric", "check", "reads", "open", "close", *METHODS}
+CHECKS = ("check", "check_period")
+RESERVED = {"self", "time", "period", "interface", "numeric", *CHECKS, "reads", "open", "close", *METHODS}
 
 Shape = tuple[int, ...]
 Sizes = dict[str, Any]  # symbol -> int; "*" -> Shape
@@ -344,6 +345,12 @@ class Block:
         """Return the files that a run reads: those that parameters name, and all files of a folder."""
         files = (param for param in self.interface.params.values() if param.is_file and not param.writes)
         return [path for path in (getattr(self, param.name) for param in files) if path]
+
+    def check_period(self) -> None:
+        """Refuse parameters that do not go with ``self.period`` (s), with ParameterError.
+
+        It is called when a diagram is checked, as soon as the block's rate is known, and again before a run.
+        """
 
     def open(self) -> None:
         """Acquire what the block needs outside the engine: a file, a port, a device."""

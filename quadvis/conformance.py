@@ -23,7 +23,8 @@ from quadvis.engine.compiled import Compiled, Compiler
 from quadvis.engine.engine import Snapshot
 from quadvis.engine.memory import Slot
 from quadvis.engine.plan import TIME, Bound
-from quadvis.rig import PERIOD, STEPS, Rig, Subject, rigs
+from quadvis.errors import QuadvisError
+from quadvis.rig import PERIOD, STEPS, Rig, Subject, extreme_rigs, rigs
 
 __all__ = ["CHECKS", "Subject", "check_block"]
 
@@ -138,6 +139,17 @@ def _bad_values(param: Param) -> Iterator[Any]:
             numbers.append(bound + np.sign(beyond) if whole else float(np.nextafter(bound, beyond)))
     for number in numbers:
         yield np.full(shape, number).tolist()
+
+
+def refuses_before_a_run(subject: Subject) -> None:
+    """Check that ``open`` and ``start`` refuse no parameter: ``quadvis check`` does not call them."""
+    for name, value, rig in extreme_rigs(subject):
+        try:
+            with rig.engine:
+                pass
+        except QuadvisError as error:
+            found = f"{name} = {value!r} stops a run before its first tick ({error})"
+            raise AssertionError(f"{found}; refuse it in check or check_period") from None
 
 
 def starts_the_same(subject: Subject) -> None:
@@ -319,6 +331,7 @@ CHECKS: dict[str, Callable[[Subject], None]] = {
         tested,
         all_declarations_used,
         refuses_bad_parameters,
+        refuses_before_a_run,
         starts_the_same,
         output_changes_nothing,
         inputs_not_asked_for_do_not_matter,

@@ -37,8 +37,14 @@ class Subject:
     test: Any = None
 
     def make(self, **parameters: Any) -> Block:
-        """Return the block with some parameters, the others as given or at their defaults."""
-        return self.block(**{**self.given, **parameters})
+        """Return the block with some parameters, the others as given or at their defaults.
+
+        ParameterError if they do not go with each other or with ``PERIOD``.
+        """
+        block = self.block(**{**self.given, **parameters})
+        block.period = float(PERIOD)
+        block.check_period()
+        return block
 
 
 def alone(
@@ -114,6 +120,38 @@ def rigs(subject: Subject, *, missing: bool = False) -> Iterator[Rig]:
     for shape in ((), (VECTOR,)) if free else ((),):
         for parameters in _parameters(subject, shape):
             yield _rig(subject, subject.make(**parameters), {"*": shape} if free else {}, missing)
+
+
+def extreme_rigs(subject: Subject) -> Iterator[tuple[str, Any, Rig]]:
+    """Yield each parameter with each extreme value that is not refused, and a rig of a block that has it."""
+    params = subject.block.interface.params
+    arrays = {
+        name: param.default
+        for name, param in params.items()
+        if param.signal.shape == ("*",) and name not in subject.given
+    }
+    for name, param in params.items():
+        for value in () if param.is_text or param.choices else _extremes(param):
+            try:
+                block = subject.make(**arrays | {name: value})
+            except ParameterError:
+                continue
+            yield name, value, _rig(subject, block, {"*": ()}, False)
+
+
+def _extremes(param: Param) -> Iterator[Any]:
+    """Yield values at the bounds of a parameter and far beyond what anybody would choose."""
+    bounds = [bound for bound in (param.min, param.max) if bound is not None]
+    bounds += [
+        float(np.nextafter(bound, way))
+        for bound, way in ((param.above, np.inf), (param.below, -np.inf))
+        if bound is not None
+    ]
+    whole = param.signal.scalar == "int64"
+    numbers = [0, 1, -1, 10**6, 2**62] if whole else [0.0, 1e-300, 1e-9, 1.0, -1.0, 1e3, 1e9, -1e9, 1e300]
+    shape = param.signal.resolve({})
+    for number in dict.fromkeys((*bounds, *numbers)):
+        yield np.full(shape, number).tolist()
 
 
 def _rig(subject: Subject, block: Block, sizes: Sizes, missing: bool) -> Rig:

@@ -18,7 +18,8 @@ from quadvis.diagram.wiring import Wiring
 from quadvis.engine.graph import Constant, Task, Wire, common_divisor
 from quadvis.errors import DiagramError, Fault, Faults, QuadvisError, suggestion
 
-Made = dict[tuple[str, type[Block], str], Block]  # by path, class and parameters: variants share most
+# By path, class, parameters and period: variants share most.
+Made = dict[tuple[str, type[Block], str, Fraction | None], Block]
 NO_STEP = Fraction(1, 100)  # stands in for a solver step whose absence has been told
 
 
@@ -52,7 +53,7 @@ class Builder:
             list(self.wiring.inputs(flat))
             return None
         task = self._task(flat, flat.kind)
-        block, units = self._build(flat, flat.kind)
+        block, units = self._build(flat, flat.kind, task)
         connections = dict(self._connections(flat, flat.kind))
         places = {name: flat.place(name) for name in flat.parameters}
         told = "in" in flat.spec.told
@@ -111,7 +112,9 @@ class Builder:
             self.faults.add(place, f"there is no rate '{name}'", remedy or "declare it under 'rates'")
         return self.tasks.get(name)
 
-    def _build(self, flat: FlatBlock, kind: type[Block]) -> tuple[Block | type[Block], dict[str, OpenUnits]]:
+    def _build(
+        self, flat: FlatBlock, kind: type[Block], task: Task | None
+    ) -> tuple[Block | type[Block], dict[str, OpenUnits]]:
         declared = kind.interface.params
         values: dict[str, Any] = {}
         units: dict[str, OpenUnits] = {}
@@ -136,7 +139,8 @@ class Builder:
         for name in absent(required, given, declared) if "with" not in flat.spec.told else ():
             wanted = "a path" if declared[name].is_file else declared[name].wanted()
             self.faults.add(flat.spec.place, f"parameter '{name}' is missing", f"give {wanted} under 'with'")
-        block = self._construct(flat, kind, values) if whole else None
+        period = task.period if task is not None and self.step is not NO_STEP else None
+        block = self._construct(flat, kind, values, period) if whole else None
         return block or kind, units
 
     def _accepts(self, param: Param, value: Any, flat: FlatBlock) -> bool:
@@ -147,12 +151,18 @@ class Builder:
             return False
         return True
 
-    def _construct(self, flat: FlatBlock, kind: type[Block], values: Mapping[str, Any]) -> Block | None:
-        """Make the block, which checks its parameters against each other and reads its files."""
-        key = (flat.path, kind, repr(sorted(values.items())))
+    def _construct(
+        self, flat: FlatBlock, kind: type[Block], values: Mapping[str, Any], period: Fraction | None
+    ) -> Block | None:
+        """Make the block, which checks its parameters against each other, its files and its period."""
+        key = (flat.path, kind, repr(sorted(values.items())), period)
         try:
             if key not in self.made:
-                self.made[key] = kind(**values)
+                block = kind(**values)
+                if period is not None:
+                    block.period = float(period)
+                    block.check_period()
+                self.made[key] = block
             return self.made[key]
         except ParameterError as error:
             node = flat.parameters.get(error.parameter)

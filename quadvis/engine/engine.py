@@ -84,8 +84,11 @@ class Engine:
         """Time of the next tick (s)."""
         return float(self.tick * self.period)
 
+    @np.errstate(all="ignore")  # as in a run
     def __enter__(self) -> Self:
         try:
+            for bound in self.plan.steps:
+                self._guarded(bound, "check_period")
             for bound in self.plan.steps:
                 self._opened.append(bound)
                 self._guarded(bound, "open")

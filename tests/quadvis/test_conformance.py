@@ -108,6 +108,12 @@ FAULTS = [
     ("all_declarations_used", COUNT, f"{COUNT}\n\n    idle = In(default=0.0)", "no method asks for idle"),
     ("refuses_bad_parameters", "    def start", BLIND, "lag = 'no such choice' must be refused"),
     ("refuses_bad_parameters", "    def start", WRONG_WORDS, "say 'blades must be ...', not 'wrong'"),
+    (
+        "refuses_before_a_run",
+        "        self.now = uniform(self.stream)",
+        "        self.now = uniform(self.stream)\n        1 / (self.blades < 9)",
+        "refuse it in check or check_period",
+    ),
     ("starts_the_same", "        self.now = uniform(self.stream)", REMEMBERS, "keep nothing in attributes"),
     (
         "output_changes_nothing",

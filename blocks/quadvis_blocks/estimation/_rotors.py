@@ -40,7 +40,7 @@ def send(times: Any, commands: Any, count: int, time: float, delay: float, comma
     """Put a command on its way at a time (s), forget what is over, and return how many are kept.
 
     Those before the last that arrived are over. Every command goes in, also one like the last: what is on
-    its way must not depend on the values.
+    its way must not depend on the values. `check_delay` has seen to it that there is room.
     """
     first = 0
     while first + 1 < count and times[first + 1] <= time + INSTANT:
@@ -49,10 +49,6 @@ def send(times: Any, commands: Any, count: int, time: float, delay: float, comma
         count -= first
         times[:count] = times[first : first + count].copy()
         commands[:count] = commands[first : first + count].copy()
-    if count == CAPACITY:
-        raise OverflowError(
-            "more than 127 commands are on their way; choose a slower rate or a shorter delay"
-        )
     times[count] = time + delay
     commands[count] = command
     return count + 1

@@ -9,6 +9,7 @@ import numpy as np
 from quadvis.block import Block, In, Out, Param, State
 from quadvis_blocks._angles import wrapped
 from quadvis_blocks._craft import ARM, GRAVITY, INERTIA, MASS, MOTOR_LAG, RADIO_DELAY, TORQUE_RATIO
+from quadvis_blocks._delay import check_delay
 from quadvis_blocks.estimation._rotors import CAPACITY, acceleration, follow, send, start, wrench
 
 STEP = 0.01  # s, at most
@@ -25,7 +26,7 @@ class Predictor(Block):
 
     Disturbances stay as they are. Run it at the rate of the control, and let ``thrust`` be what that sends.
 
-    Error: OverflowError if the delay is longer than 127 ticks.
+    Error: ParameterError if the delay is longer than 127 ticks.
 
     Source: for the delay, Artstein, Linear systems with delayed controls: a reduction (1982).
     """
@@ -66,6 +67,10 @@ class Predictor(Block):
     commands = State(f"float64[{CAPACITY},4]")
     count = State("int64", 1)
     now = State("float64[4]")  # the wrench of the rotors
+
+    def check_period(self) -> None:
+        """Refuse a delay in which more commands come in than there is room for."""
+        check_delay(self.delay, CAPACITY - 1, self.period)
 
     def start(self) -> None:
         """Begin in a trimmed hover."""

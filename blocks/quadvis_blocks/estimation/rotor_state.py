@@ -8,6 +8,7 @@ import numpy as np
 
 from quadvis.block import Block, In, Out, Param, State
 from quadvis_blocks._craft import ARM, GRAVITY, INERTIA, MOTOR_LAG, RADIO_DELAY, TORQUE_RATIO
+from quadvis_blocks._delay import check_delay
 from quadvis_blocks.estimation._rotors import CAPACITY, follow, send, start, wrench
 
 
@@ -18,7 +19,7 @@ class RotorState(Block):
     Exact between ticks, so the block may run faster than the commands come, and a command may arrive between
     two ticks. Commands that came in at most a tick late are what a simulation's ``across: hold`` gives.
 
-    Error: none beyond the model's; OverflowError if the delay is longer than 127 ticks.
+    Error: none beyond the model's; ParameterError if the delay is longer than 127 ticks.
     """
 
     thrust = In("float64[4]", unit="N", doc="thrust commanded of each rotor: front, right, rear, left")
@@ -42,6 +43,10 @@ class RotorState(Block):
     commands = State(f"float64[{CAPACITY},4]")
     count = State("int64", 1)
     now = State("float64[4]")
+
+    def check_period(self) -> None:
+        """Refuse a delay in which more commands come in than there is room for."""
+        check_delay(self.delay, CAPACITY - 1, self.period)
 
     def start(self) -> None:
         """Begin in a trimmed hover."""

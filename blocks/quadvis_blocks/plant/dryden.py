@@ -107,7 +107,7 @@ def _step(share: float) -> tuple[float, float, float, float, float]:
     """
     keep = math.exp(-share)
     left = math.sqrt(-0.5 * math.expm1(-2.0 * share))
-    common = 0.25 * _tail(2, 2.0 * share) / left
+    common = 0.25 * _tail(2, 2.0 * share) / left if left > 0.0 else 0.0
     rest = 0.25 * _tail(3, 2.0 * share) - common * common
     return keep, share * keep, left, common, math.sqrt(max(0.0, rest))
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from quadvis.block import Block, In, Out, Param, State
 from quadvis_blocks._craft import RADIO_DELAY
+from quadvis_blocks._delay import check_delay
 
 CAPACITY = 512
 INSTANT = 1e-9  # s; an edge that is due at a tick must not wait for the next one because of rounding
@@ -20,7 +21,7 @@ class TransportDelay(Block):
     costs the solver an error of up to half that step times the change. At a discrete rate it changes at
     ticks: with the block at the solver's rate and a delay of a whole number of steps, nothing is lost.
 
-    Error: OverflowError if the delay is longer than 511 ticks of the block.
+    Error: ParameterError if the delay is longer than 511 ticks of the block.
     """
 
     delay = Param(
@@ -32,6 +33,10 @@ class TransportDelay(Block):
     since = State(f"float64[{CAPACITY}]", unit="s")
     values = State(f"float64[{CAPACITY},n]")  # the one that arrived last, then those on their way
     waiting = State("int64")
+
+    def check_period(self) -> None:
+        """Refuse a delay in which more values come in than there is room for."""
+        check_delay(self.delay, CAPACITY - 1, self.period)
 
     def start(self) -> None:
         """Forget everything on its way."""
@@ -51,10 +56,6 @@ class TransportDelay(Block):
             self.since[:kept] = self.since[first : first + kept].copy()
             self.values[:kept] = self.values[first : first + kept].copy()
             self.waiting -= first
-        if self.waiting + 1 == CAPACITY:
-            raise OverflowError(
-                "more than 511 values are on their way; give the block a slower rate or a shorter delay"
-            )
         self.waiting += 1
         self.since[self.waiting] = time
         self.values[self.waiting, :] = u

@@ -62,7 +62,7 @@ class DeliveringCamera(Block, numeric=False):
     waiting = State("int64")  # how many of them there are
     shown = State(f"float64[{CONTENT}]")  # the row on the wire; sequence 0 before the first
 
-    def open(self) -> None:
+    def check_period(self) -> None:
         """Refuse a latency that the queue cannot hold; ParameterError."""
         longest = QUEUE * self.every * self.period
         if self.latency + self.jitter > longest * (1 + 1e-9):

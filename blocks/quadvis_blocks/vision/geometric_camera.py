@@ -73,8 +73,7 @@ class GeometricCamera(DeliveringCamera, numeric=False):
         return read_parameter_file("calibration", self.calibration, CameraCalibration.load)
 
     def open(self) -> None:
-        """Read the calibration; ParameterError if the latency is too long for the queue."""
-        super().open()
+        """Read the calibration."""
         self._camera = self._load()
         self._corners = target_corners(self.side)
 

@@ -90,14 +90,17 @@ class RenderedCamera(DeliveringCamera, numeric=False):
     def _load(self) -> CameraCalibration:
         return read_parameter_file("calibration", self.calibration, CameraCalibration.load)
 
-    def open(self) -> None:
-        """Prepare the renderer; ParameterError if the latency or the exposure does not go with the period."""
-        super().open()
+    def check_period(self) -> None:
+        """Refuse a latency or an exposure that does not go with the period; ParameterError."""
+        super().check_period()
         if self.exposure_time > self.period:
             longest = f"at most the period, {self.period:g} s"
             raise ParameterError(
                 "exposure_time", f"exposure_time must be {longest}, got {self.exposure_time:g} s"
             )
+
+    def open(self) -> None:
+        """Prepare the renderer."""
         scene = Scene(
             side=self.side,
             radius=self.radius,

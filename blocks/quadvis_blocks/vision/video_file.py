@@ -34,18 +34,23 @@ class VideoFile(Block, numeric=False):
     stamp = State("float64")  # of the last one
 
     def check(self) -> None:
-        """Refuse a file that is missing."""
+        """Refuse a file that is missing or not a video."""
         if not Path(self.file).is_file():
             raise ParameterError("file", f"file '{self.file}' does not exist; name a video file")
-
-    def open(self) -> None:
-        """Open the file; ParameterError if it is not a video."""
-        self._video = _Video(self.file)
-        self._last = Frame.none()
-        if self._video.frame(0) is None:
+        video = _Video(self.file)
+        try:
+            readable = video.frame(0) is not None
+        finally:
+            video.close()
+        if not readable:
             raise ParameterError(
                 "file", f"file '{self.file}' is not a video that OpenCV can read; convert it, e.g. to mp4"
             )
+
+    def open(self) -> None:
+        """Open the file."""
+        self._video = _Video(self.file)
+        self._last = Frame.none()
 
     def close(self) -> None:
         """Close the file, if it could be opened."""

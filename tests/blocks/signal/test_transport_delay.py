@@ -1,3 +1,5 @@
+import math
+import re
 from fractions import Fraction
 
 import numpy as np
@@ -6,7 +8,6 @@ import pytest
 from quadvis.block import ParameterError
 from quadvis.engine.engine import Engine
 from quadvis.engine.graph import Constant, Graph, Node, Task, Wire
-from quadvis.errors import RunError
 from quadvis.testing import drive
 from quadvis_blocks.signal.integrator import Integrator
 from quadvis_blocks.signal.transport_delay import TransportDelay
@@ -72,9 +73,18 @@ def test_what_waits_does_not_depend_on_the_values() -> None:
     assert np.array_equal(still.state("since"), moving.state("since"))
 
 
-def test_too_many_values_on_their_way_stop_the_run_with_a_reason() -> None:
-    with pytest.raises(RunError, match="slower rate or a shorter delay"):
-        drive(TransportDelay(delay=1.0), u=np.arange(2000.0)[:, None], rate="1 kHz")
+@pytest.mark.parametrize("ticks", [1, 2, 3.5, 510.5, 511])
+def test_a_delay_of_up_to_511_ticks_has_room(ticks: float) -> None:
+    y = drive(TransportDelay(delay=ticks / 1000), u=np.arange(1, 1101.0)[:, None], rate="1 kHz").y[:, 0]
+    late = math.ceil(ticks)
+    assert np.array_equal(y, np.concatenate((np.zeros(late), np.arange(1, 1101 - late))))
+
+
+@pytest.mark.parametrize("delay", [0.5111, 0.512, 1.0, 1e9])
+def test_a_longer_delay_is_refused_before_the_run(delay: float) -> None:
+    problem = rf"delay must be at most 511 ticks of the block, 0\.511 s, got {re.escape(f'{delay:g}')} s"
+    with pytest.raises(ParameterError, match=problem):
+        drive(TransportDelay(delay=delay), u=np.arange(3.0)[:, None], rate="1 kHz")
 
 
 def test_it_breaks_loops() -> None:
