@@ -23,6 +23,7 @@ from quadvis.diagram.observe import Observation, read_observation
 from quadvis.diagram.outputs import check_writers
 from quadvis.diagram.settings import Files, Given, ParameterFile, Settings, read_settings, setting_texts
 from quadvis.diagram.slots import Outputs, check_slots, fill_slots
+from quadvis.diagram.ticks import check_ticks
 from quadvis.diagram.times import read_duration
 from quadvis.diagram.wiring import Wiring
 from quadvis.discretion import quoting_only
@@ -268,6 +269,7 @@ class _Assembly:
         drafts = builder.drafts()
         graph = Graph(spec.name, WireCheck(drafts, faults).run(), spec.solver, builder.step)
         stop = _stop_time(spec, stop_time, faults)
+        check_ticks(spec, graph, stop, faults)
         observation = read_observation(spec.sections, wiring, graph, faults)
         nodes = {node.path: node for node in graph.nodes}
         questions = QuestionReader(wiring, graph, nodes).read(spec.sections.get("analyse"), faults)

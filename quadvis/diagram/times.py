@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 from quadvis.document import Mapping, Node, Scalar
-from quadvis.errors import Faults
+from quadvis.errors import Faults, Place
 from quadvis.units import Unit, format_quantity, split_quantity
 
 SECOND = Unit.parse("s")
@@ -16,23 +16,24 @@ RATE_KEYS = ("rate", "offset")
 
 @dataclass(frozen=True)
 class Rate:
-    """When blocks run: period and offset (s)."""
+    """When blocks run: period and offset (s), and where that is written."""
 
     period: Fraction
     offset: Fraction = Fraction(0)
+    place: Place = field(default=Place(""), compare=False)
 
 
 def read_rate(node: Node) -> Rate:
     """Read ``20 Hz``, ``50 ms`` or ``{rate: 10 Hz, offset: 70 ms}``."""
     if not isinstance(node, Mapping):
-        return Rate(read_period(node))
+        return Rate(read_period(node), place=node.place)
     faults = Faults()
     node = node.fields(RATE_KEYS[:1], RATE_KEYS[1:], faults)
     period = faults.collect(read_period, node["rate"]) if "rate" in node else None
     offset = faults.collect(read_duration, node["offset"]) if "offset" in node else None
     faults.check()
     assert period is not None
-    return Rate(period, offset or Fraction(0))
+    return Rate(period, offset or Fraction(0), node.place)
 
 
 def read_period(node: Node) -> Fraction:

@@ -1,0 +1,71 @@
+"""How many ticks a run has: a run that would never end is a fault of its rates, its step or its stop time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+from quadvis.diagram.check import NO_TASK, rate_text
+from quadvis.diagram.loader import FileSpec
+from quadvis.diagram.times import time_text
+from quadvis.engine.graph import Graph, Task, common_divisor
+from quadvis.errors import Faults, Place
+
+MOST = 10**9  # hours of computing, even without a block
+
+
+def check_ticks(spec: FileSpec, graph: Graph, stop: Fraction, faults: Faults) -> None:
+    """Tell a run of too many ticks, with the rates that make it so."""
+    tasks = [task for task in graph.tasks if task is not NO_TASK]
+    if not tasks or stop / graph.tick < MOST:
+        return
+    run = f"a run of {time_text(stop)}"
+    if graph.step is not None:
+        problem = f"with a step of {time_text(graph.step)} {run} {_count(stop / graph.tick)}"
+        place = spec.step_place or spec.place
+        faults.add(place, problem, "choose a larger step or a shorter stop time", subject="")
+        return
+    guilty = _guilty(tasks, stop)
+    place = max(_place(spec, task) for task in guilty)
+    count = _count(stop / _tick(guilty))
+    if len(guilty) == 1 and not guilty[0].offset:
+        problem = f"at the rate '{guilty[0].name}' ({_rate(guilty[0])}) {run} {count}"
+        faults.add(place, problem, "choose a slower rate or a shorter stop time", subject="")
+        return
+    names = [f"'{task.name}' ({_rate(task)})" for task in guilty]
+    those = (
+        f"the rates {', '.join(names[:-1])} and {names[-1]}"
+        if names[1:]
+        else f"period and offset of {names[0]}"
+    )
+    problem = f"{those} have no common measure longer than {float(_tick(guilty)):.3g} s, so {run} {count}"
+    remedy = "choose periods and offsets that are multiples of a longer time, such as 1 ms"
+    faults.add(place, problem, remedy, subject="")
+
+
+def _count(ticks: Fraction) -> str:
+    return f"has {float(ticks):.3g} ticks, and must have fewer than 1e9"
+
+
+def _guilty(tasks: Sequence[Task], stop: Fraction) -> list[Task]:
+    """Return as few tasks as have too many ticks together."""
+    guilty = list(tasks)
+    for task in reversed(tasks):  # the slowest first: the fastest are to blame
+        others = [other for other in guilty if other is not task]
+        if others and stop / _tick(others) >= MOST:
+            guilty = others
+    return guilty
+
+
+def _tick(tasks: Sequence[Task]) -> Fraction:
+    return common_divisor([time for task in tasks for time in (task.period, task.offset) if time])
+
+
+def _rate(task: Task) -> str:
+    offset = f", offset {time_text(task.offset)}" if task.offset else ""
+    return rate_text(task).removeprefix(f"{task.name}, ") + offset
+
+
+def _place(spec: FileSpec, task: Task) -> Place:
+    rate = spec.rates.get(task.name)
+    return rate.place if rate is not None else spec.place
