@@ -22,7 +22,7 @@ from quadvis.units import Unit, parse_units
 
 SCALARS = {"float64": float, "int64": int, "bool": bool}
 METHODS = ("start", "output", "update", "deriv")
-CHECKS = ("check", "check_period")
+CHECKS = ("check", "check_period", "doubts")
 RESERVED = {"self", "time", "period", "interface", "numeric", *CHECKS, "reads", "open", "close", *METHODS}
 
 Shape = tuple[int, ...]
@@ -351,6 +351,10 @@ class Block:
 
         It is called when a diagram is checked, as soon as the block's rate is known, and again before a run.
         """
+
+    def doubts(self) -> list[ParameterError]:
+        """Return what can be run, but is surely not what was meant at ``self.period`` (s): the warnings."""
+        return []
 
     def open(self) -> None:
         """Acquire what the block needs outside the engine: a file, a port, a device."""

@@ -85,6 +85,16 @@ class Fault:
         return Fault(self.place, *words)
 
 
+@dataclass(frozen=True, order=True, slots=True)
+class Doubt(Fault):
+    """What can be run, and is surely not what was meant."""
+
+    def __str__(self) -> str:
+        """Return `file:line:column: warning: block 'x': what is odd; what would be right`."""
+        subject = f"{self.subject}: " if self.subject else ""
+        return f"{self.place}: warning: {subject}{sentence(self.problem, self.remedy)}"
+
+
 class DiagramError(QuadvisError):
     """Everything that is wrong with a diagram, one fault a line in the order of the files."""
 
@@ -117,9 +127,10 @@ class Faults(list[Fault]):
     LIMIT = 200
 
     def __init__(self) -> None:
-        """Begin with no fault and no subject."""
+        """Begin with no fault, no warning and no subject."""
         super().__init__()
         self.subject = ""
+        self.warnings: list[Doubt] = []
 
     def append(self, fault: Fault) -> None:
         """Keep a fault; raise `DiagramError` with all of them once there are too many to go on."""
@@ -130,6 +141,10 @@ class Faults(list[Fault]):
     def add(self, place: Place, problem: str, remedy: str = "", *, subject: str | None = None) -> None:
         """Keep a fault about the present subject, or about the one given."""
         self.append(Fault(place, self.subject if subject is None else subject, problem, remedy))
+
+    def warn(self, place: Place, problem: str, remedy: str = "", *, subject: str | None = None) -> None:
+        """Keep a warning; it does not keep a diagram from running."""
+        self.warnings.append(Doubt(place, self.subject if subject is None else subject, problem, remedy))
 
     def collect(
         self, read: Callable[_Arguments, _Result], *args: _Arguments.args, **kwargs: _Arguments.kwargs

@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import gc
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from quadvis.errors import QuadvisError, RunError
+from quadvis.errors import Fault, QuadvisError, RunError
 from quadvis.files import SVG, Kind, file_name, write_output
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ def run(options: argparse.Namespace) -> int:
 
     diagram = _load(options, stop_time=options.stop_time, seed=options.seed)
     log = _log_path(options.log, diagram)
+    _print_warnings(diagram, options)
     gc.enable()
     try:
         with ProgressLine(diagram.duration) as progress:
@@ -42,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
             print(f"log up to there: {log}", file=sys.stderr)
         raise
     if options.json:
-        _print_json(result.facts() | {"log": str(log) if log else None})
+        _print_json(result.facts() | {"log": str(log) if log else None, "warnings": _told(diagram.warnings)})
     else:
         print("\n".join(summary_lines(result)))
         if log:
@@ -119,20 +120,31 @@ def check(options: argparse.Namespace) -> int:
     except DiagramError as error:
         if not options.json:
             raise
-        faults = [
-            {"file": fault.place.file, "line": fault.place.line, "column": fault.place.column,
-             "subject": fault.subject, "problem": fault.problem, "remedy": fault.remedy}
-            for fault in error.faults
-        ]  # fmt: skip
-        _print_json({"ok": False, "faults": faults})
+        _print_json({"ok": False, "faults": _told(error.faults), "warnings": []})
         return error.exit_code
+    _print_warnings(diagram, options)
     tasks = ", ".join(task.name for task in diagram.graph.tasks)
     count = len(diagram.graph.nodes)
     if options.json:
-        _print_json({"ok": True, "diagram": diagram.name, "blocks": count, "hash": diagram.hash})
+        found = {"ok": True, "diagram": diagram.name, "blocks": count, "hash": diagram.hash}
+        _print_json(found | {"warnings": _told(diagram.warnings)})
     else:
         print(f"{options.file}: {count} blocks in {tasks}: no fault")
     return 0
+
+
+def _print_warnings(diagram: Any, options: argparse.Namespace) -> None:
+    for warning in diagram.warnings if not options.json else ():
+        print(warning, file=sys.stderr)
+
+
+def _told(faults: Iterable[Fault]) -> list[dict[str, Any]]:
+    """Return faults or warnings as plain data."""
+    return [
+        {"file": fault.place.file, "line": fault.place.line, "column": fault.place.column,
+         "subject": fault.subject, "problem": fault.problem, "remedy": fault.remedy}
+        for fault in faults
+    ]  # fmt: skip
 
 
 def list_blocks(options: argparse.Namespace) -> int:

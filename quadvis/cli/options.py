@@ -12,7 +12,8 @@ JSON_HELP = """\
 --json prints one object: diagram, variant, params, hash, seed, passed, duration_s, wall_s, cpu_s,
 real_time_factor, log;
 summary: {label: {signal, unit, and the statistics by name}};
-expect: [{expectation, signal, kind, unit, limit, found, met}].
+expect: [{expectation, signal, kind, unit, limit, found, met}];
+warnings: [{file, line, column, subject, problem, remedy}], of what can be run and is surely a mistake.
 Numbers are in the unit beside them, null where there is none.
 Exit code: 0 all expectations met, 1 one is not or the run stopped, 2 bad input; 130, 129 or 143 interrupted,
 hung up or ended."""
@@ -65,7 +66,7 @@ def parser() -> argparse.ArgumentParser:
     _sweep_options(add("sweep", commands.sweep, "run a diagram at every point of a grid", SWEEP_HELP))
     check = add("check", commands.check, "check a diagram and tell all its faults")
     _diagram_options(check)
-    check.add_argument("--json", action="store_true", help="print the faults as JSON")
+    check.add_argument("--json", action="store_true", help="print the faults and warnings as JSON")
     blocks = add("list", commands.list_blocks, "list all blocks")
     blocks.add_argument("--json", action="store_true", help="print all declarations as JSON")
     describe = add("describe", commands.describe, "describe a block: ports, parameters, source")

@@ -16,7 +16,7 @@ from quadvis.diagram.times import time_text
 from quadvis.diagram.values import OpenUnits, read_parameter, read_value
 from quadvis.diagram.wiring import Wiring
 from quadvis.engine.graph import Constant, Task, Wire, common_divisor
-from quadvis.errors import DiagramError, Fault, Faults, QuadvisError, suggestion
+from quadvis.errors import DiagramError, Fault, Faults, Place, QuadvisError, suggestion
 
 # By path, class, parameters and period: variants share most.
 Made = dict[tuple[str, type[Block], str, Fraction | None], Block]
@@ -141,6 +141,8 @@ class Builder:
             self.faults.add(flat.spec.place, f"parameter '{name}' is missing", f"give {wanted} under 'with'")
         period = task.period if task is not None and self.step is not NO_STEP else None
         block = self._construct(flat, kind, values, period) if whole else None
+        for doubt in block.doubts() if block is not None and period is not None else ():
+            self.faults.warn(self._place(flat, doubt), str(doubt))
         return block or kind, units
 
     def _accepts(self, param: Param, value: Any, flat: FlatBlock) -> bool:
@@ -165,14 +167,18 @@ class Builder:
                 self.made[key] = block
             return self.made[key]
         except ParameterError as error:
-            node = flat.parameters.get(error.parameter)
-            self.faults.add(node.place if node is not None else flat.spec.place, str(error))
+            self.faults.add(self._place(flat, error), str(error))
         except DiagramError as error:
             for fault in error.faults:
                 self.faults.append(self._from_file(fault, flat, values))
         except QuadvisError as error:
             self.faults.add(flat.spec.place, str(error))
         return None
+
+    @staticmethod
+    def _place(flat: FlatBlock, error: ParameterError) -> Place:
+        node = flat.parameters.get(error.parameter)
+        return node.place if node is not None else flat.spec.place
 
     def _from_file(self, fault: Fault, flat: FlatBlock, values: Mapping[str, Any]) -> Fault:
         """Return a fault of a file that a parameter names; one of the whole file is put where it is named."""

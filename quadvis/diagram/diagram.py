@@ -17,6 +17,7 @@ from quadvis.catalogue import Catalogue
 from quadvis.diagram.analyse import QuestionReader, Questions
 from quadvis.diagram.build import Builder, Made
 from quadvis.diagram.check import WireCheck, rate_text
+from quadvis.diagram.doubts import warn
 from quadvis.diagram.expand import Expansion, Parts
 from quadvis.diagram.loader import FileSpec, read_file, read_text
 from quadvis.diagram.observe import Observation, read_observation
@@ -29,7 +30,7 @@ from quadvis.diagram.wiring import Wiring
 from quadvis.discretion import quoting_only
 from quadvis.document import Scalar
 from quadvis.engine.graph import Graph, Wire
-from quadvis.errors import DiagramError, Fault, Faults, Place, quoted
+from quadvis.errors import DiagramError, Doubt, Fault, Faults, Place, quoted
 from quadvis.files import reading
 
 if TYPE_CHECKING:
@@ -54,6 +55,7 @@ class Diagram:
     variants: tuple[str, ...]
     parameter_files: tuple[ParameterFile, ...] = ()
     settings: tuple[str, ...] = ()  # the parameters that were replaced, block.parameter=value
+    warnings: tuple[Doubt, ...] = ()  # what can be run, and is surely not what was meant
     sources: tuple[Path, ...] = ()  # the YAML files of the diagram, its parts and its parameter files
 
     @cached_property
@@ -191,7 +193,8 @@ def load(
         given, files = read_settings(settings, params, faults)
         spec = read_file(Path(path), faults, part=False)
         diagram = _Assembly(spec, faults, files).diagram(variant, given, stop_time, seed)
-        return replace(diagram, parameter_files=files, settings=texts)
+        found = tuple(sorted(set(faults.warnings)))
+        return replace(diagram, parameter_files=files, settings=texts, warnings=found)
 
 
 def load_text(text: str, folder: str | Path = ".", name: str = "diagram.yaml") -> Diagram:
@@ -211,7 +214,7 @@ def check(path: str | Path, settings: Given = (), params: Files = ()) -> Diagram
         diagram = assembly.diagram(settings=given)
         for variant in assembly.spec.variants:
             assembly.diagram(variant)
-        return diagram
+        return replace(diagram, warnings=tuple(sorted(set(faults.warnings))))
 
 
 def _quotable(path: str | Path, params: Files, settings: Sequence[str]) -> Iterator[str | Path]:
@@ -270,6 +273,7 @@ class _Assembly:
         graph = Graph(spec.name, WireCheck(drafts, faults).run(), spec.solver, builder.step)
         stop = _stop_time(spec, stop_time, faults)
         check_ticks(spec, graph, stop, faults)
+        warn(spec, self.parts, stop, faults)
         observation = read_observation(spec.sections, wiring, graph, faults)
         nodes = {node.path: node for node in graph.nodes}
         questions = QuestionReader(wiring, graph, nodes).read(spec.sections.get("analyse"), faults)

@@ -89,6 +89,10 @@ class Parts:
         """The files that were read."""
         return list(map(Path, self._specs))
 
+    def specs(self) -> list[FileSpec]:
+        """Return what has been read."""
+        return [spec for spec in self._specs.values() if spec is not None]
+
     def read(self, file: Path) -> FileSpec | None:
         """Return what a file says; None if it cannot be used."""
         real = os.path.realpath(file)

@@ -77,6 +77,15 @@ def _parameter(node: Scalar, params: Mapping[str, Node | None] | None, faults: F
     return None
 
 
+def named_parameters(node: Node) -> set[str]:
+    """Return the names that a value takes from ``params``: ``$name`` and ``$name[i]``."""
+    if isinstance(node, Scalar):
+        match = _PARAMETER.fullmatch(node.value)
+        return {match["name"]} if match else set()
+    children = node.values.values() if isinstance(node, yaml.Mapping) else node.items()
+    return {name for child in children for name in named_parameters(child)}
+
+
 def _spread(value: Node, unit: Node | None, key: str) -> Node:
     """Put a unit, or one for each element of the last axis, behind numbers without one; call it ``key``."""
     units = unit.units() if unit is not None else (Unit(),)

@@ -74,8 +74,7 @@ def test_a_step_that_is_too_fine_is_told_at_the_step() -> None:
     (fault,) = faults(diagram({"a": "10 Hz"}, "100 s", step="1 ns"))
     assert fault.place.line == 4
     assert (
-        fault.problem
-        == "with a step of 1e-09 s a run of 100 s has 1e+11 ticks, and must have fewer than 1e9"
+        fault.problem == "with a step of 1e-09 s a run of 100 s has 1e+11 ticks, and must have fewer than 1e9"
     )
 
 

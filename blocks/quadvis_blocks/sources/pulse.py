@@ -29,6 +29,13 @@ class Pulse(Block):
             problem = f"width must be at most the interval, {self.interval:g} s, got {self.width:g} s"
             raise ParameterError("width", problem)
 
+    def doubts(self) -> list[ParameterError]:
+        """Doubt pulses that may fall between two samples of the block."""
+        if not 0.0 < self.width < self.period * (1 - 1e-9):
+            return []
+        problem = f"width is {self.width:g} s, shorter than the period of the block, {self.period:g} s"
+        return [ParameterError("width", f"{problem}; some pulses are missed")]
+
     def output(self, time: float) -> Any:
         """Return the value at this time."""
         elapsed = time - self.begin + INSTANT

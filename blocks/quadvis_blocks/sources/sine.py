@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, Out, Param
+from quadvis.block import Block, Out, Param, ParameterError
 
 
 class Sine(Block):
@@ -16,6 +16,14 @@ class Sine(Block):
     phase = Param(0.0, unit="rad", tune=True, doc="phase at t = 0")
     bias = Param(0.0, unit="a", tune=True, doc="mean value")
     y = Out(unit="a", doc="the wave")
+
+    def doubts(self) -> list[ParameterError]:
+        """Doubt a wave that the block's samples show as a slower one."""
+        highest = 0.5 / self.period
+        if self.frequency <= highest * (1 + 1e-9):
+            return []
+        problem = f"frequency is {self.frequency:g} Hz, above half the rate of the block, {highest:g} Hz"
+        return [ParameterError("frequency", f"{problem}; its samples are those of a slower wave")]
 
     def output(self, time: float) -> Any:
         """Return the value at this time."""
