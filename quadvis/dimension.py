@@ -128,7 +128,7 @@ class Unit:
     @cached_property
     def reduced(self) -> Unit:
         """The same unit in fewer names, where those that came together say it at length: s*N/kg/m is 1/s."""
-        return _reduced(self)
+        return _reduced(self.exponents, self.symbols)
 
     def substitute(self, bindings: Mapping[str, Unit]) -> Unit:
         """Return the unit with the variables replaced that are bound."""
@@ -147,23 +147,27 @@ def _unit(exponents: Iterable[tuple[str, Fraction]], symbols: Iterable[tuple[str
 
 
 # Names that stand for a product of dimensions, the best known first.
-_ORDER = (*VARIABLES, "rad", "px", "kg", "m", "A", "K", "s")
+_ORDER = (*VARIABLES, "kg", "m", "A", "K", "rad", "px", "s")
 _SHORT = 3  # factors of a unit that only a single name replaces: N*s/m stays, N/kg/m is 1/s^2
 _NAMED = ("N", "W", "V", "ohm", "Pa", "T", "H", "F", "C")
 
 
-def _reduced(unit: Unit) -> Unit:
+@lru_cache(maxsize=4096)
+def _reduced(exponents: frozenset[tuple[str, Fraction]], symbols: tuple[tuple[str, Fraction], ...]) -> Unit:
     """Return the shortest product of bases and a power of one name; the unit if it is as short."""
-    if unit.exponents != unit.dimension:
+    unit = Unit(exponents, symbols)
+    if unit.exponents != unit.dimension or len(symbols) < 2:
         return unit
-    choices = [_in_bases(Unit(unit.dimension))]
-    for name in map(Unit.parse, _NAMED):
-        for power in (1, -1, 2, -2):
-            rest = _in_bases(Unit((unit / name**power).dimension))
-            choices.append(name**power * rest)
-    best = min(choices, key=_length)
+    best = min((name * _in_bases(unit / name) for name in _named_powers()), key=_length)
     shorter = len(best.symbols) <= 1 if _length(unit) <= _SHORT else True
     return best if shorter and _length(best) < _length(unit) else _in_order(unit)
+
+
+@lru_cache(maxsize=1)
+def _named_powers() -> tuple[Unit, ...]:
+    """Return the powers of the names, and 1, by which a unit may be divided."""
+    powers = (name**power for name in map(Unit.parse, _NAMED) for power in (1, -1, 2, -2))
+    return (Unit(), *powers)
 
 
 def _in_bases(unit: Unit) -> Unit:
@@ -171,9 +175,9 @@ def _in_bases(unit: Unit) -> Unit:
 
 
 def _in_order(unit: Unit) -> Unit:
-    """Return the unit with its factors in the usual order: m*s, not s*m."""
-    known = all(symbol in _ORDER for symbol, _ in unit.symbols)
-    return _in_bases(unit) if known else unit
+    """Return the unit with its factors in the usual order: m*s, not s*m; names of products come first."""
+    places = {symbol: place for place, symbol in enumerate(_ORDER)}
+    return Unit(unit.exponents, tuple(sorted(unit.symbols, key=lambda item: places.get(item[0], -1))))
 
 
 def _length(unit: Unit) -> Fraction:

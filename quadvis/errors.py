@@ -131,6 +131,7 @@ class Faults(list[Fault]):
         super().__init__()
         self.subject = ""
         self.warnings: list[Doubt] = []
+        self._explained: set[str] = set()
 
     def append(self, fault: Fault) -> None:
         """Keep a fault; raise `DiagramError` with all of them once there are too many to go on."""
@@ -141,6 +142,13 @@ class Faults(list[Fault]):
     def add(self, place: Place, problem: str, remedy: str = "", *, subject: str | None = None) -> None:
         """Keep a fault about the present subject, or about the one given."""
         self.append(Fault(place, self.subject if subject is None else subject, problem, remedy))
+
+    def once(self, rule: str) -> str:
+        """Return a sentence that explains a rule the first time, and nothing after that."""
+        if rule in self._explained:
+            return ""
+        self._explained.add(rule)
+        return rule
 
     def warn(self, place: Place, problem: str, remedy: str = "", *, subject: str | None = None) -> None:
         """Keep a warning; it does not keep a diagram from running."""

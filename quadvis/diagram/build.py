@@ -56,9 +56,10 @@ class Builder:
         block, units = self._build(flat, flat.kind, task)
         connections = dict(self._connections(flat, flat.kind))
         places = {name: flat.place(name) for name in flat.parameters}
+        origins = {name: node.place for name, node in flat.parameters.items()}
         told = "in" in flat.spec.told
         return Draft(
-            flat.path, flat.spec.place, flat.spec.kind, block, task, connections, places, units, told
+            flat.path, flat.spec.place, flat.spec.kind, block, task, connections, places, units, origins, told
         )
 
     def _choose_step(self) -> Fraction | None:

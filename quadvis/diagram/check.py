@@ -12,7 +12,7 @@ from typing import cast
 from quadvis.block import Block
 from quadvis.diagram.flow import Draft, Key, Link, ShapeFlow
 from quadvis.diagram.names import absent, remedy_for
-from quadvis.diagram.unit_flow import UnitFlow
+from quadvis.diagram.unit_repair import follow_units
 from quadvis.diagram.values import shape_text
 from quadvis.engine.graph import TOLD, Constant, Node, Task, Wire, execution_order
 from quadvis.errors import Faults, Place
@@ -56,8 +56,7 @@ class WireCheck:
         shapes = ShapeFlow(self.drafts, self.nodes, self._whole(links), self.lost, self.faults)
         shapes.run()
         self.lost = shapes.lost
-        units = UnitFlow(self.drafts, self.nodes, self._whole(links), self.lost, self.faults)
-        units.run()
+        units = follow_units(self.drafts, self.nodes, self._whole(links), self.lost, self.faults)
         for path, port in units.lost | {link.key for link in links if link.wire.crossing == TOLD}:
             # A loop through a wire that is wrong is no news.
             self.nodes[path].inputs.pop(port, None)

@@ -45,6 +45,7 @@ class Draft:
     connections: dict[str, Connection]
     places: Mapping[str, Place] = field(default_factory=dict)  # of the parameters that are given
     units: Mapping[str, OpenUnits] = field(default_factory=dict)  # of the parameters where they are open
+    origins: Mapping[str, Place] = field(default_factory=dict)  # where their values are written
     told: bool = False  # that its inputs cannot be read
 
     @property
