@@ -4,8 +4,11 @@ import datetime
 import json
 import os
 import re
+import shutil
+import struct
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 
 import cv2
@@ -133,6 +136,62 @@ def test_a_picture_without_the_board_is_left_out_with_a_warning(photographs):
     assert "wall.png" not in done.stdout
 
 
+def ours(done):
+    """Return what we found; OpenCV's threads sum up in any order."""
+    said = json.loads(done.stdout)
+    return [said["cameras"][name] for name in ("equations (7)-(10)", "bundle adjustment")], [
+        (view["name"], view["rms"]) for view in said["views"]
+    ]
+
+
+def turned_on_show(path, orientation=6):
+    """Let a JPEG ask to be turned when it is shown."""
+    asks = b"Exif\0\0MM" + struct.pack(">HIHHHIHHI", 42, 8, 1, 274, 3, 1, orientation, 0, 0)
+    data = path.read_bytes()
+    path.write_bytes(data[:2] + b"\xff\xe1" + struct.pack(">H", 2 + len(asks)) + asks + data[2:])
+
+
+def test_orientation_tags_and_bytes_behind_the_end_change_nothing_but_a_note(photographs, tmp_path):
+    for view in photographs.glob("view*.png"):
+        cv2.imwrite(str(tmp_path / view.with_suffix(".jpg").name), cv2.imread(str(view)))
+    pictures = sorted(tmp_path.glob("*.jpg"))
+    plain = calibrate(*pictures, *BOARD, "--json")
+    turned_on_show(pictures[1])
+    turned_on_show(pictures[3], 3)
+    pictures[2].write_bytes(pictures[2].read_bytes() + bytes(512))
+    changed = calibrate(*pictures, *BOARD, "--json")
+    assert changed.returncode == 0, changed.stderr
+    assert ours(plain) == ours(changed)
+    (note,) = [line for line in changed.stderr.splitlines() if "orientation" in line]
+    assert note.startswith("warning: view1.jpg, view3.jpg ask to be turned")
+    assert "orientation" not in plain.stderr
+
+
+def test_a_picture_that_is_in_the_list_twice_counts_once(photographs, tmp_path):
+    pictures = sorted(photographs.glob("view*.png"))
+    copies = [tmp_path / "copy.png", tmp_path / "saved again.bmp"]
+    shutil.copy(pictures[0], copies[0])
+    cv2.imwrite(str(copies[1]), cv2.imread(str(pictures[2])))
+    once = calibrate(*pictures, *BOARD, "--json")
+    done = calibrate(*pictures, pictures[1], *copies, *BOARD, "--json")
+    assert done.returncode == 0
+    assert ours(done) == ours(once)
+    assert [view["name"] for view in json.loads(done.stdout)["views"]] == [file.name for file in pictures]
+    told = [line for line in done.stderr.splitlines() if "same picture" in line]
+    assert len(told) == 3 and all("counts once" in line for line in told)
+    assert str(copies[0]) in told[1] and str(pictures[0]) in told[1]
+
+
+def test_one_picture_three_times_is_one_view(photographs):
+    said = refused(*[photographs / "view0.png"] * 3, *BOARD)
+    assert "found in 1 of 1 pictures; it takes 3 or more" in said and "same picture" in said
+
+
+def test_one_picture_at_two_heights_is_refused(photographs):
+    said = refused(*["view0.png"] * 2, *BOARD, "--heights", "0cm,1cm", folder=photographs)
+    assert "found in 1 of 1 pictures; it takes 2 or more" in said and "same picture" in said
+
+
 def test_two_pictures_of_the_board_are_too_few(photographs):
     said = refused(photographs / "view0.png", photographs / "view1.png", photographs / "wall.png", *BOARD)
     assert "found in 2 of 3" in said and "3 or more" in said
@@ -144,6 +203,9 @@ def test_two_pictures_of_the_board_are_too_few(photographs):
         ((), "no photographs"),
         (("absent.png", *BOARD), "absent.png"),
         (("note.png", *BOARD), "not a picture"),
+        (("cut.png", *BOARD), "cut.png is damaged, or cut short"),
+        (("/dev/zero", *BOARD), "a device or a pipe"),
+        (("huge.png", *BOARD), "huge.png declares 30000 x 30000 px; at most 64 million"),
         ((".", *BOARD), "cannot read"),
         (("view0.png", "small.png", *BOARD), "one size"),
         (("view0.png",), "--board 9x6"),
@@ -174,6 +236,12 @@ def test_two_pictures_of_the_board_are_too_few(photographs):
 def test_bad_input_ends_with_one_sentence(photographs, arguments, said):
     (photographs / "note.png").write_text("this is not a picture\n")
     points_file(photographs / "points.csv")
+    whole = (photographs / "view0.png").read_bytes()
+    (photographs / "cut.png").write_bytes(whole[:5000] + bytes(5000))
+    head = whole[12:16] + struct.pack(">II", 30_000, 30_000) + whole[24:29]
+    (photographs / "huge.png").write_bytes(
+        whole[:12] + head + struct.pack(">I", zlib.crc32(head)) + whole[33:]
+    )
     assert said in refused(*arguments, folder=photographs)
 
 

@@ -184,6 +184,21 @@ def test_names_that_a_yaml_file_cannot_hold_do_no_harm(scenes, tmp_path):
     ColourCalibration.load(tmp_path / "runs" / "colours.yaml")
 
 
+def test_orientation_tags_and_bytes_behind_the_end_are_ignored(tmp_path):
+    plain, changed = tmp_path / "plain", tmp_path / "changed"
+    for folder in (plain, changed):
+        folder.mkdir()
+        shutil.copy(FRAMES[0], folder / "frame.jpg")
+    data = (changed / "frame.jpg").read_bytes()
+    asks = b"Exif\0\0MM\0*\0\0\0\x08\0\1\1\x12\0\3\0\0\0\1\0\6\0\0\0\0\0\0"
+    turned = data[:2] + b"\xff\xe1" + (2 + len(asks)).to_bytes(2, "big") + asks + data[2:]
+    (changed / "frame.jpg").write_bytes(turned + bytes(512))
+    done = {folder: calibrate("frame.jpg", folder=folder) for folder in (plain, changed)}
+    assert done[plain].stdout == done[changed].stdout and not done[plain].stderr
+    assert "frame.jpg asks to be turned" in done[changed].stderr
+    assert len({(folder / "runs" / "colours.yaml").read_text() for folder in done}) == 1
+
+
 def test_a_reader_that_stops_early_sees_no_traceback(scenes, tmp_path):
     reading, writing = os.pipe()
     os.close(reading)
@@ -203,8 +218,8 @@ def test_a_reader_that_stops_early_sees_no_traceback(scenes, tmp_path):
         (["grey.png"], "grey.png: the picture has no colours"),
         (["absent.png"], "cannot read absent.png"),
         (["a folder"], "cannot read a folder"),
-        (["note.png"], "not a whole picture"),
-        (["cut.png"], "not a whole picture"),
+        (["note.png"], "note.png is not a picture"),
+        (["cut.png"], "cut.png is cut short"),
         (["note.mp4"], "not a video"),
         (["note.mp4", "clean.png"], "give it alone"),
         (["clean.png", "--order", "red,blue,green"], "four different colours"),

@@ -170,6 +170,45 @@ def test_bad_input_ends_with_one_sentence(tmp_path, arguments, said):
     assert said in refused(*arguments, folder=tmp_path)
 
 
+def test_pictures_of_another_size_than_the_calibration_are_refused_by_their_headers(tmp_path):
+    (tmp_path / "pictures").mkdir()
+    cv2.imwrite(str(tmp_path / "pictures" / "1.png"), np.zeros((480, 640, 3), np.uint8))
+    said = refused("--folder", "pictures", folder=tmp_path)
+    assert "1.png is 640x480 but" in said and "camera.yaml is for 452x322 px" in said
+
+
+def test_the_calibration_of_the_pictures_is_the_detectors_too(tmp_path):
+    (tmp_path / "pictures").mkdir()
+    for number in (1, 2, 3):
+        picture = cv2.imread(str(PICTURES / f"{number:06d}.jpg"))
+        wide = cv2.copyMakeBorder(picture, 0, 0, 0, 48, cv2.BORDER_REPLICATE)
+        cv2.imwrite(str(tmp_path / "pictures" / f"{number}.png"), wide)
+    camera = (ROOT / "diagrams" / "calib" / "camera.yaml").read_text()
+    (tmp_path / "wide.yaml").write_text(camera.replace("[452, 322]", "[500, 322]"))
+    _, methods = found("--folder", "pictures", "--calibration", "wide.yaml", folder=tmp_path)
+    assert all(np.isfinite(values).all() for values in methods.values())
+
+
+def test_orientation_tags_are_ignored_and_what_cannot_be_read_is_told(tmp_path):
+    shutil.copytree(PICTURES, tmp_path / "pictures")
+    first, second = (tmp_path / "pictures" / f"{number:06d}.jpg" for number in (1, 2))
+    data = first.read_bytes()
+    asks = b"Exif\0\0MM\0*\0\0\0\x08\0\1\1\x12\0\3\0\0\0\1\0\6\0\0\0\0\0\0"
+    first.write_bytes(
+        data[:2] + b"\xff\xe1" + (2 + len(asks)).to_bytes(2, "big") + asks + data[2:] + bytes(99)
+    )
+    second.write_bytes(second.read_bytes()[:3000])
+    _, plain = found(folder=tmp_path)
+    done = compare("--folder", "pictures", "--json", folder=tmp_path)
+    assert done.returncode == 0
+    assert "000002.jpg is cut short" in done.stderr and "000001.jpg asks to be turned" in done.stderr
+    for name, values in json.loads(done.stdout)["poses"].items():
+        seen = np.array(values, dtype=float)
+        assert np.isnan(seen[1]).all()
+        assert np.array_equal(seen[0], plain[name][0])  # after a gap circles are searched for, not followed
+        assert np.isfinite(seen[2:]).all()
+
+
 def test_the_program_can_be_started_by_its_name():
     assert os.access(ROOT / "tools" / "compare_poses", os.X_OK)
     assert (ROOT / "tools" / "compare_poses").read_text().startswith("#!/usr/bin/env python3\n")

@@ -12,6 +12,7 @@ OpenCV finds the corners, and its calibrateCamera stands beside the result for c
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,7 @@ from quadvis_blocks.vision._bundle import LENS, Bundle, adjust
 from quadvis_blocks.vision._calibration import CameraCalibration
 from quadvis_blocks.vision._evidence import CalibrationError, Evidence
 from quadvis_blocks.vision._homogeneous import HomogeneousCalibration, calibrate
+from quadvis_blocks.vision._pictures import CodedPicture, read_coded, turned_note
 from quadvis_blocks.vision._residuals import rms
 
 if TYPE_CHECKING:
@@ -80,7 +82,8 @@ class Views:
     """The m pictures out of several that show the board.
 
     `names` and `corners` (n, 2) of each; `size`, the width and height of all pictures; `missed`, the paths of
-    those without the board; `crowded`, the names of those with crowded corners; `picture`, the last, in grey.
+    those without the board; `crowded`, the names of those with crowded corners; `notes`, what to say of the
+    files, such as that one is there twice; `picture`, the last, in grey.
     """
 
     names: list[str]
@@ -88,6 +91,7 @@ class Views:
     size: tuple[int, int]
     missed: list[str]
     crowded: list[str]
+    notes: list[str]
     picture: Picture
 
 
@@ -122,23 +126,6 @@ class ChessboardCalibration:
         return rms(self.predicted - self.measured)
 
 
-def read_picture(path: str | Path) -> Picture:
-    """Return a photograph in grey, (height, width); `QuadvisError` if it is none."""
-    import cv2
-
-    try:
-        raw = Path(path).read_bytes()
-    except OSError as error:
-        raise QuadvisError(f"cannot read {path}: {error.strerror}; give the path of a photograph") from None
-    try:
-        picture: Any = cv2.imdecode(np.frombuffer(raw, dtype=np.uint8), cv2.IMREAD_GRAYSCALE)
-    except cv2.error:  # no bytes, or more pixels than OpenCV allows
-        picture = None
-    if picture is None:
-        raise QuadvisError(f"{path} is not a picture; give a PNG, JPEG or other format that OpenCV reads")
-    return np.asarray(picture, dtype=np.uint8)
-
-
 def find_corners(picture: Picture, board: Board, window: int | None = USUAL_WINDOW) -> Corners | None:
     """Return the inner corners of the board to a fraction of a pixel, or None if not all of it is in view.
 
@@ -164,32 +151,46 @@ def read_views(
 ) -> Views:
     """Return the corners of the board in photographs; those that do not show it are left out.
 
+    A picture that is there twice counts once, whatever its files are called: it is known by its pixels.
+
     `QuadvisError` if fewer than `least` show it, if one is no picture, or if they differ in size.
     """
-    pictures = [read_picture(path) for path in paths]
-    for path, picture in zip(paths, pictures, strict=True):
-        if picture.shape != pictures[0].shape:
-            sizes = [f"{shape[1]}x{shape[0]}" for shape in (picture.shape, pictures[0].shape)]
+    read: list[CodedPicture] = []
+    first: dict[bytes, str] = {}  # by what the pixels hash to
+    again: list[str] = []
+    found: list[tuple[str, Corners | None]] = []
+    for path in paths:
+        read.append(replace(coded := read_coded(path), data=b""))
+        if coded.size != read[0].size:
+            sizes = [f"{width}x{height}" for width, height in (coded.size, read[0].size)]
             raise QuadvisError(
                 f"{path} is {sizes[0]} but {paths[0]} is {sizes[1]}; one camera gives one size"
             )
-    found = [
-        (path, find_corners(picture, board, window)) for path, picture in zip(paths, pictures, strict=True)
-    ]
+        picture = coded.decode(grey=True)
+        same = first.setdefault(sha256(picture.tobytes()).digest(), path)
+        if len(first) == len(found):
+            again.append(f"{path} is the same picture as {same} and counts once")
+            continue
+        found.append((path, find_corners(picture, board, window)))
     seen = [(Path(path).name, corners) for path, corners in found if corners is not None]
     if len(seen) < least:
         wanted = f"a board of {board.columns}x{board.rows} inner corners"
         raise QuadvisError(
-            f"{wanted} was found in {len(seen)} of {len(paths)} pictures; it takes {least} or more"
+            "; ".join(
+                [
+                    f"{wanted} was found in {len(seen)} of {len(found)} pictures; it takes {least} or more",
+                    *again,
+                ]
+            )
         )
-    height, width = pictures[0].shape
     return Views(
         names=[name for name, _ in seen],
         corners=[corners.pixels for _, corners in seen],
-        size=(width, height),
+        size=read[0].size,
         missed=[path for path, corners in found if corners is None],
         crowded=[name for name, corners in seen if corners.crowded],
-        picture=pictures[-1],
+        notes=[*again, *turned_note(read)],
+        picture=picture,
     )
 
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.block import Block, Frame, Out, Param, ParameterError, State
-
-SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png")
+from quadvis.errors import QuadvisError
+from quadvis_blocks.vision._pictures import SUFFIXES, read_coded
 
 
 class ImageFolder(Block, numeric=False):
@@ -19,9 +18,9 @@ class ImageFolder(Block, numeric=False):
 
     Each picture is stamped with the time of its tick. After the last one it stays on the wire with its stamp
     and sequence number, and `finished` is true; with `loop` the first one follows, and the sequence numbers
-    go on. A picture that cannot be read, or is cut short, becomes a frame without pixels (0, 0, 3), with
-    stamp and number like any other. The orientation that a file may ask for is ignored: a calibration is
-    about pixels as the sensor gave them.
+    go on. A picture that cannot be read, is cut short, or declares more than 64 million pixels becomes a
+    frame without pixels (0, 0, 3), with stamp and number like any other. The orientation that a file may ask
+    for is ignored: a calibration is about pixels as the sensor gave them.
 
     Source: section 6.1, the comparison of pose estimates on a recorded sequence.
     """
@@ -42,16 +41,17 @@ class ImageFolder(Block, numeric=False):
             raise ParameterError(
                 "folder", f"folder '{self.folder}' does not exist; name a folder with pictures"
             )
-        if not self._find():
+        if not self.pictures():
             kinds = ", ".join(suffix[1:] for suffix in SUFFIXES)
             problem = f"no picture in '{self.folder}' matches '{self.pattern}'"
             raise ParameterError("pattern", f"{problem}; it needs at least one file of {kinds}")
 
     def reads(self) -> list[str]:
         """Return the pictures."""
-        return [str(path) for path in self._find()]
+        return [str(path) for path in self.pictures()]
 
-    def _find(self) -> list[Path]:
+    def pictures(self) -> list[Path]:
+        """Return the files in the order in which they are played."""
         try:
             found = list(Path(self.folder).glob(self.pattern))
         except (ValueError, NotImplementedError):
@@ -61,7 +61,7 @@ class ImageFolder(Block, numeric=False):
 
     def open(self) -> None:
         """List the pictures."""
-        self._paths = self._find()
+        self._paths = self.pictures()
         self._last = Frame.none()
 
     def output(self, time: float) -> tuple[Frame, bool]:
@@ -69,7 +69,7 @@ class ImageFolder(Block, numeric=False):
         finished = not self.loop and self.played >= len(self._paths)
         sequence, stamp = (self.played, self.stamp) if finished else (self.played + 1, time)
         if (self._last.sequence, self._last.stamp) != (sequence, stamp):
-            pixels = read_picture(self._paths[(sequence - 1) % len(self._paths)])
+            pixels = read_frame(self._paths[(sequence - 1) % len(self._paths)])
             self._last = Frame(pixels, stamp, sequence)
         return self._last, finished
 
@@ -86,25 +86,9 @@ def natural_order(path: Path) -> tuple[list[tuple[int, int | str]], str]:
     return [(0, int(part)) if part.isdigit() else (1, part) for part in parts if part], path.name
 
 
-def read_picture(path: Path) -> NDArray[np.uint8]:
-    """Return the picture (height, width, 3) BGR, or one without pixels (0, 0, 3) if the file is not whole."""
-    import cv2
-
-    picture: Any = None
+def read_frame(path: Path) -> NDArray[np.uint8]:
+    """Return the picture (height, width, 3) BGR, or one without pixels (0, 0, 3) if it cannot be used."""
     try:
-        data = path.read_bytes()
-        if data and not _is_cut(data):
-            flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-            picture = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
-    except (OSError, cv2.error):
-        pass
-    return Frame.none().pixels if picture is None else np.asarray(picture, dtype=np.uint8)
-
-
-def _is_cut(data: bytes) -> bool:
-    """Return whether a file ends too early; the decoders would fill up the rest with grey."""
-    if data[:2] == b"\xff\xd8":  # JPEG: an end-of-image marker after the last start of scan
-        return data.rfind(b"\xff\xd9") < data.rfind(b"\xff\xda")
-    if data[:4] == b"\x89PNG":
-        return b"IEND" not in data[-64:]
-    return data[:2] == b"BM" and len(data) < int.from_bytes(data[2:6], "little")
+        return read_coded(path).decode()
+    except QuadvisError:
+        return Frame.none().pixels

@@ -9,6 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.block import Block, Frame, Out, Param, ParameterError, State
+from quadvis.errors import QuadvisError
+from quadvis_blocks.vision._drawing import is_picture
+from quadvis_blocks.vision._pictures import not_a_video, open_video
 
 
 class VideoFile(Block, numeric=False):
@@ -36,16 +39,15 @@ class VideoFile(Block, numeric=False):
     def check(self) -> None:
         """Refuse a file that is missing or not a video."""
         if not Path(self.file).is_file():
-            raise ParameterError("file", f"file '{self.file}' does not exist; name a video file")
+            state = "is not a file" if Path(self.file).exists() else "does not exist"
+            raise ParameterError("file", f"file '{self.file}' {state}; name a video file")
         video = _Video(self.file)
         try:
-            readable = video.frame(0) is not None
+            video.begin()
+        except QuadvisError as error:
+            raise ParameterError("file", f"file {error}") from None
         finally:
             video.close()
-        if not readable:
-            raise ParameterError(
-                "file", f"file '{self.file}' is not a video that OpenCV can read; convert it, e.g. to mp4"
-            )
 
     def open(self) -> None:
         """Open the file."""
@@ -86,6 +88,11 @@ class _Video:
         self._length: int | None = None  # known once the end was met
         self._kept: dict[int, NDArray[np.uint8]] = {}  # the last two frames: the end needs one of them again
 
+    def begin(self) -> None:
+        """Open the file and read its first frame; QuadvisError if it is not a video."""
+        if self.frame(0) is None:
+            raise not_a_video(self._path)
+
     def frame(self, number: int, loop: bool = False) -> NDArray[np.uint8] | None:
         """Return frame `number` from 0 (height, width, 3) BGR, or None behind the end; `loop` goes round."""
         if self._length is None and number not in self._kept:
@@ -109,15 +116,12 @@ class _Video:
             self._length = self._next
             return
         self._kept = {key: kept for key, kept in self._kept.items() if key == number - 1}
-        self._kept[number] = np.asarray(picture, dtype=np.uint8)
+        self._kept[number] = np.asarray(picture) if is_picture(picture) else Frame.none().pixels
         self._next = number + 1
 
     def _open(self) -> None:
-        import cv2
-
         self.close()
-        self._capture = cv2.VideoCapture(self._path)
-        self._capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
+        self._capture = open_video(self._path)
         self._next = 0
 
     def close(self) -> None:

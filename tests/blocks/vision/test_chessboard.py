@@ -13,6 +13,7 @@ from quadvis_blocks.vision import _lens, _opencv
 from quadvis_blocks.vision._bundle import adjust
 from quadvis_blocks.vision._calibration import CameraCalibration
 from quadvis_blocks.vision._homogeneous import calibrate
+from quadvis_blocks.vision._pictures import read_coded
 from quadvis_blocks.vision._residuals import draw_residuals
 
 BOARD = chessboard.Board(9, 6, 0.025)
@@ -169,9 +170,9 @@ def test_a_file_that_is_no_picture_is_named(tmp_path):
     for content in (b"", b"not a picture"):
         file.write_bytes(content)
         with pytest.raises(QuadvisError, match=r"note\.jpg is not a picture"):
-            chessboard.read_picture(file)
+            read_coded(file)
     with pytest.raises(QuadvisError, match=r"absent\.jpg"):
-        chessboard.read_picture(tmp_path / "absent.jpg")
+        read_coded(tmp_path / "absent.jpg")
 
 
 def test_points_in_space_go_through_opencv_too():
@@ -229,7 +230,7 @@ needs_photographs = pytest.mark.skipif(
 def photographed(side, window):
     files = sorted(PHOTOGRAPHS.glob(f"{side}??.jpg"))
     assert len(files) == 13
-    found = [chessboard.find_corners(chessboard.read_picture(file), BOARD, window) for file in files]
+    found = [chessboard.find_corners(read_coded(file).decode(grey=True), BOARD, window) for file in files]
     assert all(corners is not None for corners in found)
     return [corners.pixels for corners in found]
 
