@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +51,7 @@ def width_of(text: str) -> float:
     return float(cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 1.0, 1)[0][0])
 
 
-def is_picture(pixels: object) -> bool:
+def is_picture(pixels: object) -> TypeGuard[Picture]:
     """Return whether this is uint8 (height, width, 3) with at least one pixel."""
     if not isinstance(pixels, np.ndarray) or pixels.dtype != np.uint8 or pixels.ndim != 3:
         return False

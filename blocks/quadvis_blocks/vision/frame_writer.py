@@ -5,9 +5,12 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
+
 from quadvis.block import Block, Frame, In, Param, ParameterError, State
 from quadvis.errors import QuadvisError, RunError
 from quadvis.files import JPG, PNG, check_output, write_output
+from quadvis_blocks.vision._drawing import is_picture
 
 KINDS = {".png": PNG, ".jpg": JPG}
 NAMES = r"\d{6,}\.(png|jpg)"  # of the pictures that it writes
@@ -18,7 +21,8 @@ class FrameWriter(Block, numeric=False):
 
     The number is the frame's sequence number, so `vision.image_folder` plays them in order. Pictures of an
     earlier run with the same name are replaced, but nothing that this run reads, and no file of another kind;
-    frames without pixels are passed over. RunError if one cannot be written.
+    frames that are no pictures (uint8, three channels, with pixels) are passed over. RunError if one cannot
+    be written.
     """
 
     frame = In("frame", doc="the frames to write")
@@ -54,14 +58,17 @@ class FrameWriter(Block, numeric=False):
             return
         self.written = frame.sequence
         self.seen += 1
-        if (self.seen - 1) % self.every == 0 and frame.pixels.size:
+        if (self.seen - 1) % self.every == 0 and is_picture(frame.pixels):
             self._write(frame)
 
     def _write(self, frame: Frame) -> None:
         import cv2
 
         path = Path(self.folder) / f"{frame.sequence:06d}{list(KINDS)[self.format]}"
-        whole, data = cv2.imencode(path.suffix, frame.pixels)
+        try:
+            whole, data = cv2.imencode(path.suffix, np.ascontiguousarray(frame.pixels))
+        except cv2.error:
+            whole = False
         if not whole:
             raise RunError(f"cannot write the picture '{path}': the picture cannot be coded")
         write_output(path, KINDS[path.suffix], data.tobytes())

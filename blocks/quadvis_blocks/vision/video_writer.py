@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from quadvis_blocks.vision._drawing import Picture, is_picture
 CODECS = {".mp4": "mp4v", ".avi": "MJPG", ".mkv": "FFV1"}
 HEADS = {".mp4": rb"\A[\s\S]{4}ftyp", ".avi": rb"\ARIFF[\s\S]{4}AVI ", ".mkv": rb"\A\x1aE\xdf\xa3"}
 FINEST = 65535  # MPEG-4 counts time in fractions no finer than this
+SMALLEST = 16  # px: Motion JPEG of pictures with a smaller side overruns its memory and ends the process
 
 
 class VideoWriter(Block, numeric=False):
@@ -28,8 +29,9 @@ class VideoWriter(Block, numeric=False):
     is written once, so that `vision.video_file` plays exactly those.
 
     All pictures of a video have one size, that of the first frame, made even by repeating the last row or
-    column. A frame of another size is fitted into it; one that is not a picture is black. ParameterError if
-    the file is something else than a video, or is read by this run; RunError if it cannot be written.
+    column. A frame of another size is fitted into it; one that is not a picture, or has a side below 16 px,
+    is black. ParameterError if the file is something else than a video, or is read by this run; RunError if
+    it cannot be written.
     """
 
     frame = In("frame", doc="the frames to write")
@@ -79,7 +81,7 @@ class VideoWriter(Block, numeric=False):
         new = frame.sequence not in (0, self.last)
         if new:
             self.last = frame.sequence
-            if self._video is None and is_picture(frame.pixels):
+            if self._video is None and is_shown(frame.pixels):
                 self._begin(frame.pixels)
             if self._video is not None:
                 self._picture = fitted(frame.pixels, self._size)
@@ -113,6 +115,11 @@ class VideoWriter(Block, numeric=False):
             video.write(black)
 
 
+def is_shown(pixels: object) -> TypeGuard[Picture]:
+    """Return whether this is a picture that is large enough for a video."""
+    return is_picture(pixels) and min(pixels.shape[:2]) >= SMALLEST
+
+
 def frame_rate(period: float) -> float:
     """Return frames/s for a period in s, rounded until an MPEG-4 file can say it."""
     rates = (round(1 / period, digits) for digits in (3, 2, 1))
@@ -126,7 +133,7 @@ def fitted(pixels: object, size: tuple[int, int]) -> Picture:
 
     wide, high = size
     picture = np.zeros((high, wide, 3), np.uint8)
-    if not is_picture(pixels):
+    if not is_shown(pixels):
         return picture
     source = np.ascontiguousarray(pixels)
     height, width = source.shape[:2]
