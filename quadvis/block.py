@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -18,12 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.errors import QuadvisError, sentence, suggestion
+from quadvis.inputs import file_digest
 from quadvis.units import Unit, parse_units
 
 SCALARS = {"float64": float, "int64": int, "bool": bool}
 METHODS = ("start", "output", "update", "deriv")
 CHECKS = ("check", "check_period", "doubts")
-RESERVED = {"self", "time", "period", "interface", "numeric", *CHECKS, "reads", "open", "close", *METHODS}
+FILES = ("reads", "read_file", "verify_files")
+RESERVED = {"self", "time", "period", "interface", "numeric", *CHECKS, *FILES, "open", "close", *METHODS}
 
 Shape = tuple[int, ...]
 Sizes = dict[str, Any]  # symbol -> int; "*" -> Shape
@@ -37,15 +40,6 @@ class ParameterError(QuadvisError):
     def __init__(self, parameter: str, message: str) -> None:
         super().__init__(message)
         self.parameter = parameter
-
-
-def read_parameter_file(name: str, path: str, read: Callable[[str], _Read]) -> _Read:
-    """Return ``read(path)`` of a parameter's file; ParameterError tells what is wrong with the file."""
-    try:
-        return read(path)
-    except QuadvisError as error:
-        reasons = "; ".join(str(error).splitlines())
-        raise ParameterError(name, f"{name} is not usable: {reasons}") from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,7 +330,14 @@ class Block:
             if value is None:
                 raise ParameterError(name, f"parameter '{name}' is missing; give {param.wanted()}")
             self.__dict__[name] = param.accept(value)
+        self._kept: dict[str, Any] = {}  # what was made of files, by parameter
         self.check()
+        self._digests = {
+            param.name: file_digest(getattr(self, param.name))
+            for param in declared.values()
+            if param.is_file and not param.writes and param.name not in self._kept
+            if os.path.isfile(getattr(self, param.name))
+        }
 
     def check(self) -> None:
         """Refuse parameters that contradict each other or name unreadable files, with ParameterError."""
@@ -355,6 +356,31 @@ class Block:
     def doubts(self) -> list[ParameterError]:
         """Return what can be run, but is surely not what was meant at ``self.period`` (s): the warnings."""
         return []
+
+    def read_file(self, name: str, read: Callable[[str], _Read]) -> _Read:
+        """Return ``read(path)`` of the file that a parameter names; ParameterError tells what is wrong in it.
+
+        It is read at the first call and kept, so that what ``check`` has seen is what ``open`` gets, whatever
+        happens to the file meanwhile. Do not change what this returns.
+        """
+        if name not in self._kept:
+            try:
+                self._kept[name] = read(getattr(self, name))
+            except ParameterError:
+                raise
+            except QuadvisError as error:
+                reasons = "; ".join(str(error).splitlines())
+                raise ParameterError(name, f"{name} is not usable: {reasons}") from None
+        found: _Read = self._kept[name]
+        return found
+
+    def verify_files(self) -> None:
+        """Refuse a file that was not kept and is not what it was when the block was made; before ``open``."""
+        for name, digest in self._digests.items():
+            path = getattr(self, name)
+            if not os.path.isfile(path) or file_digest(path) != digest:
+                problem = f"file '{path}' is not what it was when the diagram was loaded"
+                raise ParameterError(name, sentence(problem, "load it again"))
 
     def open(self) -> None:
         """Acquire what the block needs outside the engine: a file, a port, a device."""

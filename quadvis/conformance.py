@@ -100,6 +100,8 @@ def _names(code: types.CodeType) -> Iterator[str]:
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
             yield from _names(constant)
+        elif isinstance(constant, str) and "read_file" in code.co_names:  # read_file("calibration", ...)
+            yield constant
 
 
 def refuses_bad_parameters(subject: Subject) -> None:

@@ -24,6 +24,7 @@ from quadvis.composer import (
     forbidden,
 )
 from quadvis.errors import DiagramError, Fault, Faults, Place, QuadvisError
+from quadvis.inputs import note_input
 from quadvis.missing_file import file_trouble, system_reason
 from quadvis.nodes import Mapping, Node, Scalar, Sequence, measure, plain_value
 from quadvis.number_lists import find_lists, hide_lists
@@ -58,6 +59,7 @@ def read_yaml(path: str | os.PathLike[str], faults: Faults | None = None) -> Nod
         raise _fault(Place(name), f"the file cannot be read: {system_reason(error)}") from None
     if len(data) > MAX_BYTES:
         raise _fault(Place(name, 1, 1), f"the file is larger than {MAX_BYTES // 1000} kB", "split it")
+    note_input(name, data)
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:

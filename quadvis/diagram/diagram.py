@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
@@ -32,6 +32,7 @@ from quadvis.document import Scalar
 from quadvis.engine.graph import Graph, Wire
 from quadvis.errors import DiagramError, Doubt, Fault, Faults, Place, quoted
 from quadvis.files import reading
+from quadvis.inputs import noted_inputs
 
 if TYPE_CHECKING:
     from quadvis.analysis.analyse import Analysis
@@ -57,6 +58,7 @@ class Diagram:
     settings: tuple[str, ...] = ()  # the parameters that were replaced, block.parameter=value
     warnings: tuple[Doubt, ...] = ()  # what can be run, and is surely not what was meant
     sources: tuple[Path, ...] = ()  # the YAML files of the diagram, its parts and its parameter files
+    files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of every file that was read, by path
 
     @cached_property
     def inputs(self) -> tuple[Path, ...]:
@@ -84,7 +86,9 @@ class Diagram:
         """The diagram written out: parts expanded, variant and settings applied, every parameter given."""
         from quadvis.diagram.resolve import resolved_text
 
-        return resolved_text(self.graph, self.stop_time, self.seed, self.observation, self.path.parent)
+        return resolved_text(
+            self.graph, self.stop_time, self.seed, self.observation, self.path.parent, self.files
+        )
 
     @property
     def hash(self) -> str:
@@ -189,32 +193,34 @@ def load(
     """
     faults = Faults()
     texts = setting_texts(settings)
-    with quoting_only(_quotable(path, params, texts)), _told_once(faults):
+    with quoting_only(_quotable(path, params, texts)), _told_once(faults) as digests:
         given, files = read_settings(settings, params, faults)
         spec = read_file(Path(path), faults, part=False)
         diagram = _Assembly(spec, faults, files).diagram(variant, given, stop_time, seed)
         found = tuple(sorted(set(faults.warnings)))
-        return replace(diagram, parameter_files=files, settings=texts, warnings=found)
+        return replace(diagram, parameter_files=files, settings=texts, warnings=found, files=digests)
 
 
 def load_text(text: str, folder: str | Path = ".", name: str = "diagram.yaml") -> Diagram:
     """Load a diagram from a text, such as the resolved one in a log, as if it stood in a file of a folder."""
     faults = Faults()
-    with quoting_only([folder]), _told_once(faults):
-        return _Assembly(read_text(text, Path(folder) / name, faults), faults).diagram()
+    with quoting_only([folder]), _told_once(faults) as digests:
+        diagram = _Assembly(read_text(text, Path(folder) / name, faults), faults).diagram()
+        return replace(diagram, files=digests)
 
 
 def check(path: str | Path, settings: Given = (), params: Files = ()) -> Diagram:
     """Load a diagram, and with each of its variants in turn; DiagramError tells the faults of all of them."""
     faults = Faults()
-    with quoting_only(_quotable(path, params, setting_texts(settings))), _told_once(faults):
+    quotable = _quotable(path, params, setting_texts(settings))
+    with quoting_only(quotable), _told_once(faults) as digests:
         given, files = read_settings(settings, params, faults)
         spec = read_file(Path(path), faults, part=False)
         assembly = _Assembly(spec, faults, files)
         diagram = assembly.diagram(settings=given)
         for variant in assembly.spec.variants:
             assembly.diagram(variant)
-        return replace(diagram, warnings=tuple(sorted(set(faults.warnings))))
+        return replace(diagram, warnings=tuple(sorted(set(faults.warnings))), files=digests)
 
 
 def _quotable(path: str | Path, params: Files, settings: Sequence[str]) -> Iterator[str | Path]:
@@ -226,10 +232,14 @@ def _quotable(path: str | Path, params: Files, settings: Sequence[str]) -> Itera
 
 
 @contextmanager
-def _told_once(faults: Faults) -> Iterator[None]:
-    """Raise what was found. One cause may be met from several blocks: its place and problem are the same."""
+def _told_once(faults: Faults) -> Iterator[Mapping[str, str]]:
+    """Raise what was found, and give the SHA-256 of every file that is read meanwhile, by path.
+
+    One cause may be met from several blocks: its place and problem are the same.
+    """
     try:
-        yield
+        with noted_inputs() as digests:
+            yield digests
         faults.check()
     except DiagramError as error:
         kept: dict[tuple[Place, str, str], Fault] = {}

@@ -6,8 +6,8 @@ parameter names is held by the SHA-256 of its contents.
 
 from __future__ import annotations
 
-import hashlib
 import os
+from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -20,15 +20,22 @@ from quadvis.diagram.observe import Observation
 from quadvis.diagram.reference import wire_text
 from quadvis.document import dump_yaml
 from quadvis.engine.graph import Graph, Node, Wire
-from quadvis.errors import Faults, QuadvisError
+from quadvis.errors import Faults
+from quadvis.inputs import file_digest
 
 
 def resolved_text(
-    graph: Graph, stop_time: Fraction, seed: int, observation: Observation, folder: Path
+    graph: Graph,
+    stop_time: Fraction,
+    seed: int,
+    observation: Observation,
+    folder: Path,
+    digests: Mapping[str, str],
 ) -> str:
     """Return the diagram with parts expanded, variant and settings applied and every parameter written out.
 
-    It loads in ``folder``, and gives the same run to the bit. QuadvisError if a file cannot be read.
+    It loads in ``folder``, and gives the same run to the bit. ``digests`` has the SHA-256 of the files that
+    were read, by path.
     """
     rates = {
         task.name: {"rate": f"{task.period} s", "offset": f"{task.offset} s"}
@@ -43,7 +50,7 @@ def resolved_text(
     if graph.step is not None:
         data["solver"] = {"method": graph.solver, "step": f"{graph.step} s"}
     data |= {"stop_time": f"{stop_time} s", "seed": seed}
-    files = {path: file_digest(path) for path in _files(graph) if os.path.isfile(path)}
+    files = {path: digests[path] for path in _files(graph) if path in digests}
     if files:
         data["files"] = {_relative(path, folder): digest for path, digest in sorted(files.items())}
     data["blocks"] = {node.path: _block(node, folder) for node in graph.nodes}
@@ -57,17 +64,8 @@ def _files(graph: Graph) -> list[str]:
         getattr(node.block, param.name)
         for node in graph.nodes
         for param in node.block.interface.params.values()
-        if param.is_file and not param.writes and getattr(node.block, param.name)
+        if param.is_file and not param.writes
     ]
-
-
-def file_digest(path: str | Path) -> str:
-    """Return the SHA-256 of a file's contents."""
-    try:
-        with open(path, "rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise QuadvisError(f"cannot read '{path}': {error.strerror}") from error
 
 
 def check_files(spec: FileSpec, faults: Faults) -> None:

@@ -88,6 +88,7 @@ class Engine:
     def __enter__(self) -> Self:
         try:
             for bound in self.plan.steps:
+                self._guarded(bound, "verify_files")
                 self._guarded(bound, "check_period")
             for bound in self.plan.steps:
                 self._opened.append(bound)

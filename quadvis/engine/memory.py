@@ -165,6 +165,7 @@ class Memory:
                 view = self.view(Slot(item.scalar, item.shape, position + item.offset))
                 bound.__dict__[_array_key(item.name)] = view
         bound.period = period
+        bound.__dict__.update(_kept=block._kept, _digests=block._digests)
         for name, param in block.interface.params.items():
             value = getattr(block, name)
             if param.is_text:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.settings import COMMAND_LINE
-from quadvis.errors import DiagramError, Fault, Place
+from quadvis.errors import DiagramError, Fault, Place, QuadvisError
 from quadvis.sweeps.axes import NONE, PARAMS, SEED, VARIANT, Axis
 from quadvis.sweeps.worker import Configuration, Job
 
@@ -25,6 +25,7 @@ class Plan:
     ) -> None:
         self.axes, self.grid, self.base, self.seed = axes, grid, base, seed
         self.inputs: set[Path] = set()  # the files that the runs depend on, as far as diagrams were loaded
+        self.files: dict[str, str] = {}  # SHA-256 of what the diagrams were read from, by path
 
     def configuration(self, point: Sequence[int]) -> Configuration:
         """Return the diagram at a point of the grid."""
@@ -57,6 +58,9 @@ class Plan:
         try:
             diagram = self.configuration(point).load()
             self.inputs.update(diagram.inputs)
+            for path, digest in diagram.files.items():
+                if self.files.setdefault(path, digest) != digest:
+                    raise QuadvisError(f"'{path}' was changed while it was being read; sweep again")
             return diagram
         except DiagramError as error:
             found = DiagramError(self._placed(fault, point) for fault in error.faults)
@@ -81,7 +85,7 @@ class Plan:
             seeds = next((axis.values for axis in self.axes if axis.name == SEED), ())
             seed = int(seeds[chosen[SEED]]) if seeds else self.seed
             log = str(folder / f"{self._log_name(row, point)}.mcap") if folder else None
-            yield Job(row, self.configuration(point), seed, log)
+            yield Job(row, self.configuration(point), seed, log, self.files)
 
     def _log_name(self, row: int, point: Sequence[int]) -> str:
         """Return the number of the row and the values of the axes, fit for the name of a file."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import threading
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from multiprocessing import parent_process
 from typing import TYPE_CHECKING
 
@@ -57,12 +58,16 @@ class Configuration:
 
 @dataclass(frozen=True)
 class Job:
-    """One run: ``index`` is its row in the table, ``seed`` None stands for the diagram's."""
+    """One run: ``index`` is its row in the table, ``seed`` None stands for the diagram's.
+
+    ``files`` has the SHA-256 of the files that the sweep began with, by path.
+    """
 
     index: int
     configuration: Configuration
     seed: int | None = None
     log: str | None = None
+    files: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -174,9 +179,16 @@ def perform(job: Job) -> Row:
 
 
 def diagram_of(job: Job) -> Diagram:
-    """Return the diagram of a run; it is read once for runs of one configuration that follow each other."""
+    """Return the diagram of a run; it is read once for runs of one configuration that follow each other.
+
+    QuadvisError if a file is not what it was when the sweep began: one table is about one diagram.
+    """
     global _loaded
     if _loaded is None or _loaded[0] != job.configuration:
-        _loaded = job.configuration, job.configuration.load()
+        loaded = job.configuration.load()
+        for path, digest in loaded.files.items():
+            if job.files.get(path, digest) != digest:
+                raise QuadvisError(f"'{path}' is not what it was when the sweep began; sweep again")
+        _loaded = job.configuration, loaded
     diagram = _loaded[1]
     return diagram if job.seed is None else replace(diagram, seed=job.seed)

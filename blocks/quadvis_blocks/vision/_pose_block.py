@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.block import Block, In, Out, Param, read_parameter_file
+from quadvis.block import Block, In, Out, Param
 from quadvis_blocks.vision._calibration import CameraCalibration
 from quadvis_blocks.vision._lens import by_point
 from quadvis_blocks.vision._pose import Pose, camera_points, seen_centres
 from quadvis_blocks.vision._projection import CAMERA_FROM_BODY, SIDE, attitude_of, target_corners
 from quadvis_blocks.vision._refine import View, pose_of, refine, unknowns_of
 from quadvis_blocks.vision._two_planes import TwoPlanesCalibration
+
+if TYPE_CHECKING:
+    _Base = Block
+else:  # no block by itself: it has outputs, but not what makes them
+    _Base = object
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool]
@@ -70,7 +75,7 @@ def _alike(matrix: Array, points: Array) -> Array:
     return np.broadcast_to(matrix, (len(points), 2, 2))
 
 
-class PoseFromCircles:
+class PoseFromCircles(_Base):
     """Ports and parameters of a block that finds the craft from the circles of the target."""
 
     centres = In("float64[4,2]", unit="px", doc="u, v of circles 1 to 4; a row with NaN is missing")
@@ -97,8 +102,8 @@ class PoseFromCircles:
 
     def _load(self) -> PinholeRays | TwoPlanesRays:
         if self.rays == TWO_PLANES:
-            return read_parameter_file("calibration", self.calibration, TwoPlanesRays)
-        return read_parameter_file("calibration", self.calibration, PinholeRays)
+            return self.read_file("calibration", TwoPlanesRays)
+        return self.read_file("calibration", PinholeRays)
 
     def open(self) -> None:
         """Read the calibration."""

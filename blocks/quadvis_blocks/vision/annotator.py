@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, Frame, In, Out, Param, read_parameter_file
+from quadvis.block import Block, Frame, In, Out, Param
 from quadvis_blocks.vision._calibration import CameraCalibration
 from quadvis_blocks.vision._overlay import Finding, Overlay
 from quadvis_blocks.vision._projection import RADIUS, SIDE
@@ -48,7 +48,7 @@ class Annotator(Block, numeric=False):
         self._load()
 
     def _load(self) -> CameraCalibration:
-        return read_parameter_file("calibration", self.calibration, CameraCalibration.load)
+        return self.read_file("calibration", CameraCalibration.load)
 
     def open(self) -> None:
         """Read the calibration."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, Frame, In, Out, Param, ParameterError, State, read_parameter_file
+from quadvis.block import Block, Frame, In, Out, Param, ParameterError, State
 from quadvis_blocks.vision._calibration import CameraCalibration
 from quadvis_blocks.vision._circles import Target
 from quadvis_blocks.vision._colours import ColourCalibration
@@ -86,13 +86,13 @@ class CircleDetector(Block, numeric=False):
             )
 
     def _load(self) -> ColourCalibration:
-        return read_parameter_file("colours", self.colours, ColourCalibration.load)
+        return self.read_file("colours", ColourCalibration.load)
 
     def _size(self) -> tuple[int, int] | None:
         """Return the width and height that pictures must have, None for any."""
         if not self.calibration:
             return None
-        return read_parameter_file("calibration", self.calibration, CameraCalibration.load).size
+        return self.read_file("calibration", CameraCalibration.load).size
 
     def open(self) -> None:
         """Read the files."""

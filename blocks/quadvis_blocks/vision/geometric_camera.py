@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import In, Out, Param, Random, State, read_parameter_file
+from quadvis.block import In, Out, Param, Random, State
 from quadvis_blocks._random import fill_normal
 from quadvis_blocks.vision._calibration import CameraCalibration
 from quadvis_blocks.vision._delivery import CONTENT, QUEUE, SEQUENCE, STAMP, DeliveringCamera, Row
@@ -70,7 +70,7 @@ class GeometricCamera(DeliveringCamera, numeric=False):
         self._load()
 
     def _load(self) -> CameraCalibration:
-        return read_parameter_file("calibration", self.calibration, CameraCalibration.load)
+        return self.read_file("calibration", CameraCalibration.load)
 
     def open(self) -> None:
         """Read the calibration."""

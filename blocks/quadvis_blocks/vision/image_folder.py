@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +12,10 @@ from numpy.typing import NDArray
 
 from quadvis.block import Block, Frame, Out, Param, ParameterError, State
 from quadvis.errors import QuadvisError
+from quadvis.inputs import note_digest
 from quadvis_blocks.vision._pictures import SUFFIXES, read_coded
+
+FileState = tuple[int, int]
 
 
 class ImageFolder(Block, numeric=False):
@@ -19,7 +24,8 @@ class ImageFolder(Block, numeric=False):
     Each picture is stamped with the time of its tick. After the last one it stays on the wire with its stamp
     and sequence number, and `finished` is true; with `loop` the first one follows, and the sequence numbers
     go on. A picture that cannot be read, is cut short, or declares more than 64 million pixels becomes a
-    frame without pixels (0, 0, 3), with stamp and number like any other. The orientation that a file may ask
+    frame without pixels (0, 0, 3), with stamp and number like any other; so does one that was changed since
+    the run began, and a folder that was changed before it is refused. The orientation that a file may ask
     for is ignored: a calibration is about pixels as the sensor gave them.
 
     Source: section 6.1, the comparison of pose estimates on a recorded sequence.
@@ -41,7 +47,7 @@ class ImageFolder(Block, numeric=False):
             raise ParameterError(
                 "folder", f"folder '{self.folder}' does not exist; name a folder with pictures"
             )
-        if not self.pictures():
+        if not self.read_file("folder", self._listed):
             kinds = ", ".join(suffix[1:] for suffix in SUFFIXES)
             problem = f"no picture in '{self.folder}' matches '{self.pattern}'"
             raise ParameterError("pattern", f"{problem}; it needs at least one file of {kinds}")
@@ -52,6 +58,15 @@ class ImageFolder(Block, numeric=False):
 
     def pictures(self) -> list[Path]:
         """Return the files in the order in which they are played."""
+        return list(self.read_file("folder", self._listed))
+
+    def _listed(self, folder: str) -> dict[Path, FileState]:
+        """Return the files in the order in which they are played, and by what a change of them is known."""
+        found = {path: state for path in self._find() if (state := state_of(path)) is not None}
+        note_digest(os.path.join(folder, ""), sha256(repr(sorted(found.items())).encode()).hexdigest())
+        return found
+
+    def _find(self) -> list[Path]:
         try:
             found = list(Path(self.folder).glob(self.pattern))
         except (ValueError, NotImplementedError):
@@ -60,8 +75,15 @@ class ImageFolder(Block, numeric=False):
         return sorted((p for p in found if p.suffix.lower() in SUFFIXES and p.is_file()), key=natural_order)
 
     def open(self) -> None:
-        """List the pictures."""
-        self._paths = self.pictures()
+        """Refuse a folder that is not what it was when the diagram was checked."""
+        self._states = self.read_file("folder", self._listed)
+        now = {path: state_of(path) for path in self._find()}
+        for path in [*self._states, *now]:
+            if self._states.get(path) != now.get(path):
+                change = "new" if path not in self._states else "changed" if path in now else "gone"
+                problem = f"folder '{self.folder}' is not what it was when the diagram was loaded"
+                raise ParameterError("folder", f"{problem}: '{path.name}' is {change}; load it again")
+        self._paths = list(self._states)
         self._last = Frame.none()
 
     def output(self, time: float) -> tuple[Frame, bool]:
@@ -69,15 +91,28 @@ class ImageFolder(Block, numeric=False):
         finished = not self.loop and self.played >= len(self._paths)
         sequence, stamp = (self.played, self.stamp) if finished else (self.played + 1, time)
         if (self._last.sequence, self._last.stamp) != (sequence, stamp):
-            pixels = read_frame(self._paths[(sequence - 1) % len(self._paths)])
+            pixels = self._read(self._paths[(sequence - 1) % len(self._paths)])
             self._last = Frame(pixels, stamp, sequence)
         return self._last, finished
+
+    def _read(self, path: Path) -> NDArray[np.uint8]:
+        """Return a picture, or one without pixels if it cannot be used or is not what it was."""
+        return read_frame(path) if state_of(path) == self._states[path] else Frame.none().pixels
 
     def update(self, time: float) -> None:
         """Count the picture that was on the wire."""
         if self.loop or self.played < len(self._paths):
             self.played += 1
             self.stamp = time
+
+
+def state_of(path: Path) -> FileState | None:
+    """Return by what a change of a file is known: length in bytes and time of the last change (ns)."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_size, found.st_mtime_ns
 
 
 def natural_order(path: Path) -> tuple[list[tuple[int, int | str]], str]:

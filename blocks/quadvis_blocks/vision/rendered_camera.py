@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Frame, In, Out, Param, ParameterError, Random, State, read_parameter_file
+from quadvis.block import Frame, In, Out, Param, ParameterError, Random, State
 from quadvis_blocks._random import uniform
 from quadvis_blocks.vision._calibration import CameraCalibration
 from quadvis_blocks.vision._delivery import CONTENT, QUEUE, SEQUENCE, STAMP, DeliveringCamera, Row
@@ -88,7 +88,7 @@ class RenderedCamera(DeliveringCamera, numeric=False):
             )
 
     def _load(self) -> CameraCalibration:
-        return read_parameter_file("calibration", self.calibration, CameraCalibration.load)
+        return self.read_file("calibration", CameraCalibration.load)
 
     def check_period(self) -> None:
         """Refuse a latency or an exposure that does not go with the period; ParameterError."""
