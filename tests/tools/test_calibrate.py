@@ -182,6 +182,62 @@ def test_a_picture_that_is_in_the_list_twice_counts_once(photographs, tmp_path):
     assert str(copies[0]) in told[1] and str(pictures[0]) in told[1]
 
 
+@pytest.fixture(scope="module")
+def one_angle(tmp_path_factory):
+    """Pictures of a board that is always tilted the same way, by K."""
+    folder = tmp_path_factory.mktemp("one angle")
+    for number, turn in enumerate((0.0, 0.02, -0.02, 0.04)):
+        cv2.imwrite(str(folder / f"{number}.png"), board(0.02 * number, 0.35, turn, 0.3))
+    return sorted(folder.glob("*.png"))
+
+
+def test_views_from_one_angle_are_told_beside_the_camera_and_in_its_file(one_angle, tmp_path):
+    output = tmp_path / "camera.yaml"
+    done = calibrate(*one_angle, *BOARD, "--window", "auto", "--output", output)
+    assert done.returncode == 0, done.stderr
+    (said,) = [line for line in done.stderr.splitlines() if "undetermined" in line]
+    assert said.startswith(
+        "warning: these views leave the camera undetermined: errors of 0.25 px in them change fx"
+    )
+    assert said.endswith("tilt the board more ways, by 20 deg and more")
+    assert f"# {said}\n" in output.read_text()
+    assert "# standard deviation: " in output.read_text()
+    CameraCalibration.load(output)
+    as_json = json.loads(calibrate(*one_angle, *BOARD, "--window", "auto", "--json").stdout)
+    assert said.removeprefix("warning: ") in as_json["warnings"]
+
+
+def test_standard_deviations_stand_beside_the_values(photographs, tmp_path):
+    pictures = sorted(photographs.glob("view*.png"))
+    output = tmp_path / "camera.yaml"
+    done = calibrate(*pictures, *BOARD, "--window", "auto", "--output", output)
+    rows = [line.split() for line in done.stdout.splitlines() if line.startswith("standard deviation")]
+    assert len(rows) == 2 and rows[0][4] == "-"  # the skew is held
+    told = json.loads(calibrate(*pictures, *BOARD, "--window", "auto", "--json").stdout)[
+        "standard deviations"
+    ]
+    assert [float(rows[0][index]) for index in (2, 3, 5, 6)] == pytest.approx(
+        [told[name] for name in ("fx", "fy", "cx", "cy")], abs=6e-4
+    )
+    for name, text in zip(("k1", "k2", "p1", "p2", "k3"), rows[1][2:], strict=True):
+        assert text == "-" if name not in told else float(text) == pytest.approx(told[name], abs=6e-6)
+    assert 0 < told["fx"] < 2 and "undetermined" not in done.stderr
+    head = output.read_text().partition("size:")[0]
+    assert "# standard deviation: " in head and "warning" not in head
+
+
+def test_points_at_almost_one_depth_are_told_and_others_have_deviations(tmp_path):
+    done = calibrate("--points", points_file(tmp_path / "points.csv"), "--json")
+    assert list(json.loads(done.stdout)["standard deviations"]) == ["fx", "fy", "cx", "cy", "skew"]
+    assert not done.stderr
+    near = points_file(tmp_path / "near.csv", heights=(0.0, 0.1))
+    done = calibrate("--points", near, "--two-planes", tmp_path / "planes.yaml")
+    assert done.returncode == 0
+    assert "these points leave the camera undetermined" in done.stderr
+    assert "more depths" in done.stderr
+    assert "# warning: these points leave the camera undetermined" in (tmp_path / "planes.yaml").read_text()
+
+
 def test_one_picture_three_times_is_one_view(photographs):
     said = refused(*[photographs / "view0.png"] * 3, *BOARD)
     assert "found in 1 of 1 pictures; it takes 3 or more" in said and "same picture" in said
@@ -319,13 +375,13 @@ def test_the_residuals_of_both_calibrations_are_drawn_over_the_picture(tmp_path)
         assert drawn[20, left + 100].mean() < drawn[20, left + 800].mean() - 20
 
 
-def board(height, tilt=0.0, turn=0.0):
+def board(height, tilt=0.0, turn=0.0, lean=0.0):
     """Return a noisy picture by K of a 7x5 board with 25 mm squares, `height` m nearer than 0.42 m."""
     checks = np.pad(np.indices((6, 8)).sum(axis=0) % 2, 1, constant_values=1)
     texture = (40 + 180 * np.kron(checks, np.ones((40, 40)))).astype(np.uint8)
     onto_board = np.array([[1, 0, 0.5 - 200], [0, 1, 0.5 - 160], [0, 0, 1600]])
     onto_samples = np.array([[4, 0, 1.5], [0, 4, 1.5], [0, 0, 1]])
-    r = cv2.Rodrigues(np.array([tilt, 0, 0.0]))[0] @ cv2.Rodrigues(np.array([0, 0, turn]))[0]
+    r = cv2.Rodrigues(np.array([tilt, lean, 0.0]))[0] @ cv2.Rodrigues(np.array([0, 0, turn]))[0]
     shift = np.array([0, 0, 0.42]) - r[:, 2] * height
     h = onto_samples @ K @ np.column_stack([r[:, :2], shift]) @ onto_board
     fine = cv2.warpPerspective(texture, h, (4 * 452, 4 * 322), borderValue=220)

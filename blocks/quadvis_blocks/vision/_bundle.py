@@ -83,12 +83,12 @@ def adjust(
     if len(pixels) < 3:
         raise QuadvisError(f"{len(pixels)} views of the board do not determine a camera; give at least 3")
     bundle = _start(points, pixels, size)
-    free = np.array([True] * 4 + [skew] + [name in lens for name in LENS])
-    residuals, jacobians = _linearise(bundle, points, pixels)
+    free = free_parameters(skew=skew, lens=lens)
+    residuals, jacobians = linearise(bundle, points, pixels)
     damping, error = 1e-3, float(np.sum(residuals**2))
     for _ in range(_STEPS):
         trial = _step(bundle, residuals, jacobians, damping, free)
-        trial_residuals, trial_jacobians = _linearise(trial, points, pixels)
+        trial_residuals, trial_jacobians = linearise(trial, points, pixels)
         trial_error = float(np.sum(trial_residuals**2))
         if trial_error < error:
             settled = error - trial_error <= _SETTLED * error
@@ -101,6 +101,45 @@ def adjust(
             if damping > _STIFFEST:
                 break
     return bundle
+
+
+def free_parameters(*, skew: bool, lens: Collection[str]) -> NDArray[np.bool_]:
+    """Return which of the ten parameters of a camera are found, (10,), in the order of `Bundle.camera`."""
+    return np.array([True] * 4 + [skew] + [name in lens for name in LENS])
+
+
+def linearise(bundle: Bundle, board: Floats, views: Floats) -> tuple[Floats, Floats]:
+    """Return residuals (m, n, 2), predicted minus measured, and their derivatives (m, n, 2, 16).
+
+    See `derivatives` for the columns.
+    """
+    placed = bundle.place(board)
+    turned = placed - bundle.translations[:, None]
+    predicted, jacobian = derivatives(placed, turned, bundle.matrix, bundle.distortion)
+    return predicted - views, jacobian
+
+
+def derivatives(placed: Floats, turned: Floats, matrix: Floats, lens: Floats) -> tuple[Floats, Floats]:
+    """Return the pixels (m, n, 2) of points (m, n, 3) in camera axes, and their derivatives (m, n, 2, 16).
+
+    The first ten columns belong to the camera, in the order of `Bundle.camera`, then three to a small turn
+    about camera axes, which moves the points by its cross product with `turned`, and three to a shift.
+    """
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        depth = placed[..., 2]
+        normalised = placed[..., :2] / depth[..., None]
+        bent, slopes = _lens.linearise(normalised, lens)
+        focal = matrix[:2, :2]
+        jacobian = np.zeros((*placed.shape[:2], 2, 16))
+        jacobian[..., 0, 0], jacobian[..., 0, 4] = bent[..., 0], bent[..., 1]
+        jacobian[..., 1, 1] = bent[..., 1]
+        jacobian[..., 0, 2] = jacobian[..., 1, 3] = 1
+        jacobian[..., 5:10] = focal @ _lens.by_lens(normalised)
+        by_point = focal @ slopes @ _by_depth(normalised, depth)
+        # d(w x p)/dw = -[p]x, written out as a cross product of each row with p.
+        jacobian[..., 10:13] = np.cross(turned[..., None, :], by_point)
+        jacobian[..., 13:] = by_point
+        return np.asarray(bent @ focal.T + matrix[:2, 2]), jacobian
 
 
 def _start(board: Floats, views: Floats, size: tuple[int, int]) -> Bundle:
@@ -130,10 +169,15 @@ def _focal_lengths(maps: Floats, centre: Floats) -> tuple[float, float]:
         sides += [-a[2] * b[2] * scale, -(a[2] ** 2 - b[2] ** 2) * scale]
     inverse, _, rank, _ = np.linalg.lstsq(np.array(rows), np.array(sides), rcond=1e-10)
     if rank < 2 or not (inverse > 0).all():
-        raise QuadvisError(
-            "the views do not determine the focal length; show the board tilted in several directions"
-        )
+        raise undetermined()
     return float(inverse[0] ** -0.5), float(inverse[1] ** -0.5)
+
+
+def undetermined() -> QuadvisError:
+    """Return the sentence about views from which no camera follows."""
+    return QuadvisError(
+        "the views do not determine the focal length; show the board tilted in several directions"
+    )
 
 
 def _pose(a: Floats) -> tuple[Floats, Floats]:
@@ -144,32 +188,6 @@ def _pose(a: Floats) -> tuple[Floats, Floats]:
     if translation[2] < 0:
         first, second, translation = -first, -second, -translation
     return np.column_stack([first, second, np.cross(first, second)]), translation
-
-
-def _linearise(bundle: Bundle, board: Floats, views: Floats) -> tuple[Floats, Floats]:
-    """Return residuals (m, n, 2), predicted minus measured, and their derivatives (m, n, 2, 16).
-
-    The first ten columns belong to the camera, then three to a small turn about camera axes and three to t.
-    """
-    placed = bundle.place(board)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        depth = placed[..., 2]
-        normalised = placed[..., :2] / depth[..., None]
-        lens = bundle.distortion
-        bent, slopes = _lens.linearise(normalised, lens)
-        focal = bundle.matrix[:2, :2]
-        residuals = bent @ focal.T + bundle.matrix[:2, 2] - views
-        jacobian = np.zeros((*views.shape, 16))
-        jacobian[..., 0, 0], jacobian[..., 0, 4] = bent[..., 0], bent[..., 1]
-        jacobian[..., 1, 1] = bent[..., 1]
-        jacobian[..., 0, 2] = jacobian[..., 1, 3] = 1
-        jacobian[..., 5:10] = focal @ _lens.by_lens(normalised)
-        by_point = focal @ slopes @ _by_depth(normalised, depth)
-        turned = placed - bundle.translations[:, None]
-        # d(w x p)/dw = -[p]x, written out as a cross product of each row with p.
-        jacobian[..., 10:13] = np.cross(turned[..., None, :], by_point)
-        jacobian[..., 13:] = by_point
-    return residuals, jacobian
 
 
 def _by_depth(normalised: Floats, depth: Floats) -> Floats:

@@ -19,8 +19,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from quadvis.errors import QuadvisError
-from quadvis_blocks.vision._bundle import LENS, Bundle, adjust
+from quadvis_blocks.vision._bundle import LENS, Bundle, adjust, free_parameters, undetermined
 from quadvis_blocks.vision._calibration import CameraCalibration
+from quadvis_blocks.vision._deviations import Deviations, bundle_deviations
 from quadvis_blocks.vision._evidence import CalibrationError, Evidence
 from quadvis_blocks.vision._homogeneous import HomogeneousCalibration, calibrate
 from quadvis_blocks.vision._pictures import CodedPicture, read_coded, turned_note
@@ -104,7 +105,7 @@ class ChessboardCalibration:
     lens, as the file holds it. `measured` corners are (m, n, 2) in pixels, `predicted` ones follow from
     `camera` and `homogeneous`. `bundle_rms` is what the bundle itself leaves, in pixels. `omitted` names
     terms of the lens that are held at zero: corners that do not go out far enough let the lens fold what lies
-    beyond them.
+    beyond them. `deviations` are those of the bundle, whose K that of (7)-(10) repeats.
     """
 
     homogeneous: HomogeneousCalibration
@@ -113,6 +114,7 @@ class ChessboardCalibration:
     camera: CameraCalibration
     measured: Floats
     predicted: Floats
+    deviations: Deviations
     omitted: tuple[str, ...] = ()
 
     @property
@@ -215,7 +217,11 @@ def calibrate_views(
     points = seen.reshape(*measured.shape[:2], 3)
     camera = replace(camera, evidence=Evidence.of([*points], [*measured], [*predicted]))
     bundle_rms = float(rms(bent.project(placed) - pixels))
-    return ChessboardCalibration(homogeneous, bundle, bundle_rms, camera, measured, predicted, omitted)
+    free = free_parameters(skew=skew, lens=[name for name in LENS if name not in omitted])
+    deviations = bundle_deviations(bundle, board.points, measured, free)
+    return ChessboardCalibration(
+        homogeneous, bundle, bundle_rms, camera, measured, predicted, deviations, omitted
+    )
 
 
 def at_heights(
@@ -267,8 +273,8 @@ def _adjusted(
         try:
             return bundle, CameraCalibration(size, bundle.matrix, bundle.distortion), omitted
         except CalibrationError as error:
-            if error.field != "distortion":
-                raise
+            if error.field != "distortion":  # such as a focal length below 0
+                raise undetermined() from None
     raise QuadvisError(
         "no lens fits the corners without folding the picture; are they from one camera and one board?"
     )

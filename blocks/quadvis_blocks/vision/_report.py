@@ -14,22 +14,37 @@ if TYPE_CHECKING:
 
 _WIDTH = 22  # of the first column
 _INTRINSICS = ("fx", "fy", "skew", "cx", "cy")
+_DEVIATION = "standard deviation"
 _LENS = ("k1", "k2", "p1", "p2", "k3")
 
 
 @dataclass
 class Report:
-    """Cameras (name, K, rms px), lenses by name, and views (name, rms px, OpenCV's rms px if it has one)."""
+    """Cameras (name, K, rms px), lenses by name, and views (name, rms px, OpenCV's rms px if it has one).
+
+    `deviations` are the standard deviations of what was found, by its name: fx, k1 and so on. `cautions` are
+    those warnings that a user of the calibration must know, too.
+    """
 
     cameras: list[tuple[str, Floats, float]] = field(default_factory=list)
     lenses: dict[str, Floats] = field(default_factory=dict)
     views: list[tuple[str, float, float | None]] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    deviations: dict[str, float] = field(default_factory=dict)
+    cautions: list[str] = field(default_factory=list)
 
     def header(self) -> str:
         """Return the comment of a camera file."""
         found = [f"{name}: {' '.join(f'{number:.3f}' for number in _five(k))}" for name, k, _ in self.cameras]
-        return "\n".join([f"By tools/calibrate; {' '.join(_INTRINSICS)} (px):", *found])
+        known = [self.deviations.get(name) for name in _INTRINSICS]
+        numbers = " ".join("-" if value is None else f"{value:.3f}" for value in known)
+        spread = [f"{_DEVIATION}: {numbers}"] if self.deviations else []
+        first = f"By tools/calibrate; {' '.join(_INTRINSICS)} (px):"
+        return "\n".join([first, *found, *spread, *self.cautioned()])
+
+    def cautioned(self) -> list[str]:
+        """Return the cautions as lines of a comment."""
+        return [f"warning: {caution}" for caution in self.cautions]
 
     def text(self) -> str:
         """Return the tables."""
@@ -37,10 +52,12 @@ class Report:
         for name, k, rms in self.cameras:
             numbers = "".join(f"{number:10.3f}" for number in _five(k))
             lines.append(f"{name:<{_WIDTH}}{numbers}{rms:10.4f}")
+        lines += self._spread(_INTRINSICS, 3)
         if self.lenses:
             lines += ["", _heads("", _LENS)]
             for name, lens in self.lenses.items():
                 lines.append(f"{name:<{_WIDTH}}{''.join(f'{number:10.5f}' for number in lens)}")
+            lines += self._spread(_LENS, 5)
         if self.views:
             width = max(_WIDTH, 1 + max(len(name) for name, _, _ in self.views))
             compared = any(theirs is not None for _, _, theirs in self.views)
@@ -48,6 +65,14 @@ class Report:
             for name, ours, theirs in self.views:
                 lines.append(f"{name:<{width}}{ours:10.4f}{'' if theirs is None else f'{theirs:10.4f}'}")
         return "\n".join(lines)
+
+    def _spread(self, names: tuple[str, ...], digits: int) -> list[str]:
+        """Return the row of the standard deviations, if there is one; a dash for what was held."""
+        if not self.deviations:
+            return []
+        known = [self.deviations.get(name) for name in names]
+        numbers = ["-" if value is None else f"{value:.{digits}f}" for value in known]
+        return [f"{_DEVIATION:<{_WIDTH}}{''.join(f'{number:>10}' for number in numbers)}"]
 
     def json(self) -> str:
         """Return everything; lengths in pixels."""
@@ -58,8 +83,9 @@ class Report:
         everything: dict[str, Any] = {
             "cameras": {name: {"K": k.tolist(), "rms": rms} for name, k, rms in self.cameras},
             "distortion": {name: lens.tolist() for name, lens in self.lenses.items()},
+            "standard deviations": self.deviations,
             "views": views,
-            "warnings": self.warnings,
+            "warnings": [*self.warnings, *self.cautions],
         }
         return json.dumps(everything, indent=2)
 
