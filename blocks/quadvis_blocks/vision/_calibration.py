@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from quadvis.document import Node, dump_yaml, read_yaml
+from quadvis.document import Node, dump_yaml
 from quadvis.errors import DiagramError, Fault
 from quadvis.files import Kind, write_output
 from quadvis_blocks.vision import _lens
+from quadvis_blocks.vision._calibration_file import read_fields
 from quadvis_blocks.vision._evidence import KEYS, CalibrationError, Evidence
 
 Array = NDArray[np.float64]
@@ -61,7 +62,7 @@ class CameraCalibration:
         optionally, `rms` (px), `errors: [px of each view]`, `date` and `points: [[x, y, z, u, v], ...]` in
         camera axes, which the camera must meet as well as `rms` says.
         """
-        fields = read_yaml(path).fields(("size", "matrix", "distortion"), KEYS)
+        fields = read_fields(path, "a camera calibration", ("size", "matrix", "distortion"), KEYS)
         try:
             return cls(
                 size=_size(fields["size"]),

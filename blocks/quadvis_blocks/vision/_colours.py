@@ -16,9 +16,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.document import Node, dump_yaml, read_yaml
+from quadvis.document import Node, dump_yaml
 from quadvis.errors import DiagramError, Fault, Faults, QuadvisError, sentence
 from quadvis.files import Kind, write_output
+from quadvis_blocks.vision._calibration_file import read_fields
 from quadvis_blocks.vision._colour_evidence import KEYS, ColourEvidence
 from quadvis_blocks.vision._evidence import CalibrationError
 
@@ -72,7 +73,7 @@ class ColourCalibration:
         picture]` and `samples: [four ratios of each picture]`, which must agree with each other and with the
         ratios.
         """
-        fields = read_yaml(str(path)).fields(("threshold", "circles"), KEYS)
+        fields = read_fields(path, "a file of colours", ("threshold", "circles"), KEYS)
         circles = fields["circles"].items()
         if len(circles) != 4:
             raise fields["circles"].wrong("a list of 4 circles", found=f"a list of {len(circles)}")

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from quadvis.errors import QuadvisError, quoted
+from quadvis.inputs import read_input
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -160,12 +161,10 @@ def read_correspondences(path: str | Path) -> tuple[Floats, Floats]:
     line.
     """
     try:
-        lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is not text"
-        raise QuadvisError(
-            f"cannot read {path}: {reason}; give a CSV file with {','.join(_COLUMNS)}"
-        ) from None
+        lines = read_input(path).decode("utf-8-sig").splitlines()
+    except (QuadvisError, UnicodeDecodeError) as error:
+        problem = error if isinstance(error, QuadvisError) else f"cannot read {path}: it is not text"
+        raise QuadvisError(f"{problem}; give a CSV file with {','.join(_COLUMNS)}") from None
     table = csv.DictReader(lines, skipinitialspace=True)
     names = {_ALSO.get(name.strip(), name.strip()): name for name in table.fieldnames or ()}
     missing = [name for name in _COLUMNS if name not in names]

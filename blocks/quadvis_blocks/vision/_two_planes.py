@@ -24,10 +24,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from quadvis.document import dump_yaml, read_yaml
+from quadvis.document import dump_yaml
 from quadvis.errors import DiagramError, Fault, QuadvisError
 from quadvis.files import Kind, write_output
 from quadvis.units import Unit, UnitError
+from quadvis_blocks.vision._calibration_file import read_fields
 from quadvis_blocks.vision._evidence import KEYS, LEAST_ERROR, MOST_ERROR, CalibrationError, Evidence
 from quadvis_blocks.vision._homogeneous import rq
 from quadvis_blocks.vision._plane_maps import (
@@ -124,7 +125,7 @@ class TwoPlanesCalibration:
         (rows x, y, z, rho, gamma), which the camera must meet as well as rms says.
         """
         required = ("convention", "projective", *_NUMBERS, *_SHAPES)
-        fields = read_yaml(str(path)).fields(required, (*KEYS, "unit"))
+        fields = read_fields(path, "a two-planes calibration", required, (*KEYS, "unit"))
         fields["convention"].choice(("row",))
         values: dict[str, Any] = {name: fields[name].number() for name in _NUMBERS}
         values |= {name: fields[name].array(shape) for name, shape in _SHAPES.items()}
