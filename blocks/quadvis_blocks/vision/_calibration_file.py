@@ -15,16 +15,14 @@ from quadvis.errors import DiagramError, Fault, Place, QuadvisError
 from quadvis.inputs import read_input
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
+    from collections.abc import Collection
 
-    from quadvis.document import Node
+    from quadvis.document import Mapping
 
 ENOUGH = 2  # of the keys at the beginning of lines: so many make a calibration file of it
 
 
-def read_fields(
-    path: str | Path, kind: str, required: Collection[str], optional: Collection[str]
-) -> Mapping[str, Node]:
+def read_fields(path: str | Path, kind: str, required: Collection[str], optional: Collection[str]) -> Mapping:
     """Return the nodes of a file's keys; `DiagramError` as `quadvis.document.read_yaml` and `Node.fields`.
 
     `kind` is what the file should be, such as "a camera calibration". One that does not look like it is

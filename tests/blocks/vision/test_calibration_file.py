@@ -89,7 +89,11 @@ blocks:
     rate: vision
     with: {colours: ../secret, calibration: ../secret}
     in: {frame: recording.frame}
-  pose: {block: vision.pose_imu, rate: vision, with: {calibration: ../secret}, in: {centres: detector.centres}}
+  pose:
+    block: vision.pose_imu
+    rate: vision
+    with: {calibration: ../secret}
+    in: {centres: detector.centres}
 """
 
 
