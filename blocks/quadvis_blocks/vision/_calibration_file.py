@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from quadvis.document import Mapping
 
-ENOUGH = 2  # of the keys at the beginning of lines: so many make a calibration file of it
-
 
 def read_fields(path: str | Path, kind: str, required: Collection[str], optional: Collection[str]) -> Mapping:
     """Return the nodes of a file's keys; `DiagramError` as `quadvis.document.read_yaml` and `Node.fields`.
@@ -39,10 +37,9 @@ def read_fields(path: str | Path, kind: str, required: Collection[str], optional
 
 
 def _looks_right(path: str | Path, keys: Collection[str]) -> bool:
-    """Return whether enough of the keys are there, however wrong the rest may be."""
+    """Return whether a line begins with one of the keys, however wrong the rest may be."""
     try:
         data = read_input(path, MAX_BYTES)
     except QuadvisError:
         return False
-    found = [key for key in keys if re.search(rf"^[\"']?{key}[\"']?\s*:".encode(), data, re.MULTILINE)]
-    return len(found) >= ENOUGH
+    return re.search(rf"^[\"']?(?:{'|'.join(keys)})[\"']?\s*:".encode(), data, re.MULTILINE) is not None

@@ -23,8 +23,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
 OTHERS = {
     "accounts": "root:SECRET:0:0:SECRET:/root:/bin/sh\nSECRET:x:1:1::/:\n",
     "map": "user: SECRET\npassword: SECRET\n",
-    "map with one key": "size: SECRET\nSECRET: 1\n",
-    "map with another key": "threshold: SECRET\nSECRET: 1\n",
+    "map with other keys": "resize: SECRET\nsizes: SECRET\na size: SECRET\nSECRET: 1\n",
     "nested": "a:\n  size: 1\n  matrix: 2\n  distortion: 3\n  SECRET: 4\n",
     "JSON": '{"password": "SECRET", "SECRET": [1, 2, "SECRET"]}',
     "list": "- SECRET\n- SECRET\n",
