@@ -16,7 +16,7 @@ from quadvis.block import Block, Frame, Out, Param, ParameterError
 from quadvis.diagram.diagram import Diagram, load_text
 from quadvis.errors import QuadvisError
 from quadvis.inputs import file_digest, note_digest, note_input, noted_inputs, open_input, read_input
-from quadvis.output.log import read_log
+from quadvis.output.log_reader import read_log
 from quadvis.sweeps import sweep as sweeping
 from quadvis.sweeps import worker
 from quadvis.sweeps.worker import Job, Row
