@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from types import TracebackType
 from typing import Self, TextIO
@@ -12,11 +13,15 @@ from quadvis.run import Result
 
 
 class StatusLine:
-    """One line on standard error that is rewritten while something goes on; nothing where no one watches."""
+    """One line on standard error that is rewritten while something goes on; nothing where no one watches.
+
+    A terminal that takes nothing, or has gone, holds up nobody: the line is not shown then.
+    """
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self.stream = stream or sys.stderr
         self.shown = self.stream.isatty()
+        self._terminal = _open_terminal(self.stream) if self.shown else None
 
     def __enter__(self) -> Self:
         return self
@@ -26,12 +31,18 @@ class StatusLine:
         self._put(f"\r\x1b[K{text} ")
 
     def _put(self, text: str) -> None:
-        if self.shown:
-            try:
+        if not self.shown:
+            return
+        try:
+            if self._terminal is None:
                 self.stream.write(text)
                 self.stream.flush()
-            except (OSError, ValueError):  # the terminal has gone; what goes on does not end with it
-                self.shown = False
+            else:
+                os.write(self._terminal, text.encode(errors="replace"))
+        except BlockingIOError:
+            pass  # there is no room now; the next text may find some
+        except (OSError, ValueError):  # the terminal has gone; what goes on does not end with it
+            self.shown = False
 
     @staticmethod
     def bar(part: float) -> str:
@@ -43,6 +54,18 @@ class StatusLine:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._put("\r\x1b[K")
+        if self._terminal is not None:
+            os.close(self._terminal)
+            self._terminal = None
+            self.shown = False
+
+
+def _open_terminal(stream: TextIO) -> int | None:
+    """Open the terminal behind a stream anew, to be written without waiting; None where that cannot be."""
+    try:
+        return os.open(os.ttyname(stream.fileno()), os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
+    except (OSError, ValueError, AttributeError):
+        return None
 
 
 class ProgressLine(StatusLine):
@@ -80,7 +103,7 @@ def _entry_row(entry: Entry, outcome: Outcome) -> tuple[str, ...]:
     values = outcome.summary[entry.label]
     shown = ", ".join(f"{name} {entry.shows(name, value)}" for name, value in values.items())
     of = f"of {entry.part.shows(entry.part.of)}" if entry.part.of else ""
-    return entry.label, shown, ", ".join(filter(None, (of, entry.part.stretch)))
+    return entry.label, shown, ", ".join(filter(None, (of, str(entry.part.stretch), entry.part.stretch.cut)))
 
 
 def _verdict_row(verdict: Verdict) -> tuple[str, ...]:

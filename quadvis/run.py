@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import platform
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,12 +18,16 @@ from numpy.typing import NDArray
 
 from quadvis.engine.engine import Engine
 from quadvis.engine.plan import Bound
-from quadvis.output.log import Channel, Field, LogWriter, Recording
+from quadvis.output.kept import ALL, RowJudge, RunSignals
+from quadvis.output.log import PORTS, LogWriter
+from quadvis.output.recording import Channel, Field, Recording
+from quadvis.output.stretch import NANOSECONDS
 from quadvis.output.verdict import Outcome, finite
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
 
+Taker = Callable[[int, bytes], object]  # of a stamp (ns) and a row
 Progress = Callable[[float, float], None]  # simulated time reached, wall time spent (s)
 SLICE = 0.2  # s of wall time between two calls of the progress, and the longest wait for Ctrl-C
 
@@ -30,7 +36,8 @@ SLICE = 0.2  # s of wall time between two calls of the progress, and the longest
 class Result:
     """What a run gave: ``result["plant.position"]`` is an array with a leading time axis.
 
-    ``duration`` is the simulated time (s), ``wall`` the time that took, ``cpu`` the processor time.
+    ``duration`` is the simulated time (s), ``wall`` the time that took, ``cpu`` the processor time. ``lost``
+    says what the log lacks because the disk refused it; empty if there is no log or nothing is missing.
     """
 
     diagram: Diagram
@@ -39,12 +46,23 @@ class Result:
     duration: float
     wall: float
     cpu: float
+    lost: str = ""
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.signals[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.signals.names)
+        return iter(self.signals)
+
+    def __len__(self) -> int:
+        return len(self.signals)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.signals
+
+    def __repr__(self) -> str:
+        passed = "passed" if self.passed else "failed"
+        return f"<Result of {self.diagram.name}: {self.duration:g} s, {len(self)} signals, {passed}>"
 
     def times(self, name: str) -> NDArray[np.float64]:
         """Return the times of a signal's rows (s)."""
@@ -71,7 +89,8 @@ class Result:
         ``diagram``, ``variant`` (or None), ``params`` (the parameter files), ``hash``, ``seed``: what was
         run. ``passed``: whether all expectations are met. ``duration_s`` simulated, in ``wall_s`` of wall
         time and ``cpu_s`` of processor time; ``real_time_factor``. ``summary``: by label ``{signal, unit,
-        rms, max, ...}``. ``expect``: list of ``{expectation, signal, kind, unit, limit, found, met}``.
+        rms, max, ...}``, ``final`` of several elements as a list. ``expect``: list of ``{expectation,
+        signal, kind, unit, limit, found, met, lack}``, where ``lack`` says why the run cannot be judged.
         Numbers are in the unit beside them, None where there is none.
         """
         summary = {
@@ -98,25 +117,59 @@ class Result:
         }
 
 
-def run(diagram: Diagram, *, log: str | Path | None = None, progress: Progress | None = None) -> Result:
-    """Run a diagram to its stop time; RunError if a block fails, with the log readable up to there."""
+def run(
+    diagram: Diagram,
+    *,
+    log: str | Path | None = None,
+    progress: Progress | None = None,
+    keep: Sequence[str] | None = None,
+) -> Result:
+    """Run a diagram to its stop time; RunError if a block fails, with the log readable up to there.
+
+    ``keep`` are the signals whose rows stay in memory, as patterns such as "craft.*"; None is all of them if
+    no log is written, and none if one is: then the result reads what is asked for back from the log. What
+    the diagram expects, and its summary, needs no rows. A log that the disk refuses does not stop the run.
+    """
     engine = Engine(diagram.graph, diagram.seed)
     logged = [bound for bound in engine.plan.steps if diagram.logs(bound.node.path) and _fields(bound)]
     channels = [Channel(f"/{bound.node.path}", _fields(bound), bound.node.task.name) for bound in logged]
-    signals = Recording(channels)
+    patterns = ((ALL,) if log is None else ()) if keep is None else tuple(keep)
+    signals = RunSignals(channels, diagram.ports, patterns)
+    judging = diagram.judging()
     wall, cpu = time.perf_counter(), time.process_time()
     with ExitStack() as stack:
         stack.enter_context(diagram.guarded(log))
         writer = stack.enter_context(LogWriter(log, channels, metadata(diagram))) if log is not None else None
+        judges = []
         for index, bound in enumerate(logged):
-            _record(engine, index, bound, diagram.decimation(bound.node.path), signals, writer)
+            judge = RowJudge(channels[index], judging)
+            takers = _takers(index, signals, writer, judge)
+            if takers:
+                _observe(engine, bound, diagram.decimation(bound.node.path), takers)
+                judges.append(judge)
         stack.enter_context(engine)
         _advance(engine, diagram.ticks, progress)
-        outcome = diagram.judge(signals)
+        for judge in judges:
+            judge.flush()
+        outcome = judging.outcome()
         if writer:
             writer.close(_closing(outcome))
+            signals.written(writer.path, writer.loss)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    return Result(diagram, signals, outcome, diagram.duration, wall, cpu)
+    lost = writer.loss if writer else ""
+    return Result(diagram, signals, outcome, diagram.duration, wall, cpu, lost)
+
+
+def _takers(index: int, signals: RunSignals, writer: LogWriter | None, judge: RowJudge) -> list[Taker]:
+    """Return who wants the rows of a block, as functions of the stamp (ns) and the row."""
+    takers: list[Taker] = []
+    if index in signals.kept:
+        takers.append(partial(signals.append, index))
+    if writer:
+        takers.append(partial(writer.write, index))
+    if judge.names:
+        takers.append(judge)
+    return takers
 
 
 def _advance(engine: Engine, ticks: int, progress: Progress | None) -> None:
@@ -132,18 +185,15 @@ def _advance(engine: Engine, ticks: int, progress: Progress | None) -> None:
             progress(engine.time, time.perf_counter() - began)
 
 
-def _record(
-    engine: Engine, index: int, bound: Bound, every: int, signals: Recording, writer: LogWriter | None
-) -> None:
+def _observe(engine: Engine, bound: Bound, every: int, takers: Sequence[Taker]) -> None:
     raw, row = engine.plan.memory.raw, bound.row
-    numerator, denominator = (engine.period * 1_000_000_000).as_integer_ratio()
+    numerator, denominator = (engine.period * NANOSECONDS).as_integer_ratio()
 
     def observe(tick: int) -> None:
         data = bytes(raw[row])
-        nanoseconds = tick * numerator // denominator
-        signals.append(index, nanoseconds, data)
-        if writer:
-            writer.write(index, nanoseconds, data)
+        stamp = tick * numerator // denominator
+        for take in takers:
+            take(stamp, data)
 
     engine.observe(bound.node.task.name, observe, every)
 
@@ -169,6 +219,7 @@ def metadata(diagram: Diagram) -> dict[str, str]:
         "hash": diagram.hash,
         "start": datetime.now(UTC).isoformat(timespec="seconds"),
         "python": platform.python_version(),
+        PORTS: json.dumps(dict(diagram.ports)),
         "diagram": diagram.resolved,
     }
 

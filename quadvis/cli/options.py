@@ -10,13 +10,13 @@ from quadvis.version import __version__
 
 JSON_HELP = """\
 --json prints one object: diagram, variant, params, hash, seed, passed, duration_s, wall_s, cpu_s,
-real_time_factor, log;
-summary: {label: {signal, unit, and the statistics by name}};
-expect: [{expectation, signal, kind, unit, limit, found, met}];
+real_time_factor, log, lost (what the log lacks, and why);
+summary: {label: {signal, unit, and the statistics by name, final of a vector as a list}};
+expect: [{expectation, signal, kind, unit, limit, found, met, lack (why the run cannot be judged)}];
 warnings: [{file, line, column, subject, problem, remedy}], of what can be run and is surely a mistake.
 Numbers are in the unit beside them, null where there is none.
-Exit code: 0 all expectations met, 1 one is not or the run stopped, 2 bad input; 130, 129 or 143 interrupted,
-hung up or ended."""
+Exit code: 0 all expectations met, 1 one is not, the run stopped or its log lacks something, 2 bad input; 130,
+129 or 143 interrupted, hung up or ended."""
 
 SWEEP_HELP = """\
 With several --over all combinations are run, the last one changing fastest. A name is that of a parameter as

@@ -11,12 +11,13 @@ import numpy as np
 
 from quadvis import document as yaml
 from quadvis.diagram.flow import misfit
-from quadvis.diagram.reference import read_reference, wire_text
+from quadvis.diagram.reference import read_reference
 from quadvis.diagram.times import read_duration
 from quadvis.diagram.variable import Variable, find_variable
 from quadvis.diagram.wiring import Wiring
 from quadvis.document import Node, Scalar
 from quadvis.engine.graph import Graph, Wire
+from quadvis.engine.names import wire_text
 from quadvis.errors import Faults
 from quadvis.units import Unit, split_quantity
 

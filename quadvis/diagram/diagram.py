@@ -30,13 +30,14 @@ from quadvis.diagram.wiring import Wiring
 from quadvis.discretion import quoting_only
 from quadvis.document import Scalar
 from quadvis.engine.graph import Graph, Wire
+from quadvis.engine.names import wire_text
 from quadvis.errors import DiagramError, Doubt, Fault, Faults, Place, quoted
 from quadvis.files import reading
 from quadvis.inputs import noted_inputs
 
 if TYPE_CHECKING:
     from quadvis.analysis.analyse import Analysis
-    from quadvis.output.verdict import Entry, Outcome, Signals
+    from quadvis.output.verdict import Entry, Judging, Outcome, Signals
     from quadvis.run import Progress, Result
 
 
@@ -57,6 +58,7 @@ class Diagram:
     parameter_files: tuple[ParameterFile, ...] = ()
     settings: tuple[str, ...] = ()  # the parameters that were replaced, block.parameter=value
     warnings: tuple[Doubt, ...] = ()  # what can be run, and is surely not what was meant
+    ports: Mapping[str, str] = field(default_factory=dict)  # of parts: the signals of blocks that they are
     sources: tuple[Path, ...] = ()  # the YAML files of the diagram, its parts and its parameter files
     files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of every file that was read, by path
 
@@ -120,15 +122,25 @@ class Diagram:
         """Every how many rows of a block are logged."""
         return self.observation.every.get(self.graph[path].task.name, 1)
 
+    def judging(self) -> Judging:
+        """Return what judges a run while it goes on."""
+        return self.observation.judging()
+
     def judge(self, signals: Signals) -> Outcome:
-        """Return the summary and the verdicts of a run."""
+        """Return the summary and the verdicts of a recorded run; it may have ended early."""
         return self.observation.judge(signals)
 
-    def run(self, *, log: str | Path | None = None, progress: Progress | None = None) -> Result:
+    def run(
+        self,
+        *,
+        log: str | Path | None = None,
+        progress: Progress | None = None,
+        keep: Sequence[str] | None = None,
+    ) -> Result:
         """Run to the stop time; see ``quadvis.run.run``."""
         from quadvis.run import run
 
-        return run(self, log=log, progress=progress)
+        return run(self, log=log, progress=progress, keep=keep)
 
     def analyse(
         self,
@@ -149,7 +161,6 @@ class Diagram:
 
     def draw(self) -> str:
         """Return a picture of the diagram as SVG."""
-        from quadvis.diagram.reference import wire_text
         from quadvis.diagram.resolve import constant_text
         from quadvis.output.draw import DrawnBlock, DrawnWire, draw
 
@@ -284,7 +295,8 @@ class _Assembly:
         stop = _stop_time(spec, stop_time, faults)
         check_ticks(spec, graph, stop, faults)
         warn(spec, self.parts, stop, faults)
-        observation = read_observation(spec.sections, wiring, graph, faults)
+        shortened = spec.stop_time is not None and stop < spec.stop_time
+        observation = read_observation(spec.sections, wiring, graph, stop, shortened, faults)
         nodes = {node.path: node for node in graph.nodes}
         questions = QuestionReader(wiring, graph, nodes).read(spec.sections.get("analyse"), faults)
         if spec.files:
@@ -296,9 +308,10 @@ class _Assembly:
         variants = tuple(spec.variants)
         sources = (spec.path, *self.parts.files, *self._params)
         check_writers(drafts, sources, faults)
+        ports = {name: wire_text(source) for name, source in wiring.ports()}
         return Diagram(
             spec.name, spec.path, variant, graph, stop, seed, observation, listing, questions, variants,
-            sources=sources,
+            ports=MappingProxyType(ports), sources=sources,
         )  # fmt: skip
 
     def _promised(self, filled: FileSpec) -> Outputs:

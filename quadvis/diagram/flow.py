@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from quadvis.block import Block, In
-from quadvis.diagram.reference import index_text
 from quadvis.diagram.values import OpenUnits, shape_text
 from quadvis.engine.graph import Constant, Node, Task, Wire, selected
+from quadvis.engine.names import index_text
 from quadvis.errors import Faults, Place
 from quadvis.units import Unit
 

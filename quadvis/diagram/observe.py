@@ -6,19 +6,24 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
+from fractions import Fraction
 from typing import Any
 
 from quadvis import document as yaml
 from quadvis.diagram.flow import misfit
-from quadvis.diagram.reference import read_reference, wire_text
+from quadvis.diagram.reference import read_reference
 from quadvis.diagram.times import read_duration
 from quadvis.diagram.unit_flow import words
 from quadvis.diagram.wiring import Wiring
 from quadvis.document import Node, Scalar
 from quadvis.engine.graph import Graph, Wire, selected
+from quadvis.engine.graph import Node as Block
+from quadvis.engine.names import wire_text
 from quadvis.errors import Faults, Place, suggestion
 from quadvis.output.plot import read_figures
-from quadvis.output.verdict import EXPECTATIONS, STATISTICS, Entry, Expectation, Outcome, Part, Signals
+from quadvis.output.statistics import COUNT, STATISTICS
+from quadvis.output.stretch import Sampling, Stretch
+from quadvis.output.verdict import EXPECTATIONS, Entry, Expectation, Judging, Outcome, Part, Signals
 from quadvis.units import Unit, split_quantity
 
 ONE = Unit()
@@ -41,17 +46,30 @@ class Observation:
         default_factory=dict
     )  # expect, summary, figures as data, with full names
 
+    def judging(self) -> Judging:
+        """Return what judges a run while it goes on."""
+        return Judging(self.summary, self.expectations)
+
     def judge(self, signals: Signals) -> Outcome:
-        """Return the summary and the verdicts of a run."""
-        summary = {entry.label: entry.compute(signals) for entry in self.summary}
-        return Outcome(summary, tuple(expectation.judge(signals) for expectation in self.expectations))
+        """Return the summary and the verdicts of a recorded run."""
+        judging = self.judging()
+        judging.read(signals)
+        return judging.outcome()
 
 
 def read_observation(
-    sections: Mapping[str, Node], wiring: Wiring, graph: Graph, faults: Faults
+    sections: Mapping[str, Node],
+    wiring: Wiring,
+    graph: Graph,
+    stop: Fraction,
+    shortened: bool,
+    faults: Faults,
 ) -> Observation:
-    """Read the sections against the blocks that there are; faults are collected."""
-    reader = _Reader(wiring, graph, faults)
+    """Read the sections against the blocks that there are; faults are collected.
+
+    The run ends at ``stop`` (s); ``shortened`` says that the diagram by itself ends later.
+    """
+    reader = _Reader(wiring, graph, stop, shortened, faults)
     with faults.about("log"):
         reader.log(sections.get("log"))
     with faults.about("expect"):
@@ -71,8 +89,8 @@ def read_observation(
 
 
 class _Reader:
-    def __init__(self, wiring: Wiring, graph: Graph, faults: Faults) -> None:
-        self.wiring, self.faults = wiring, faults
+    def __init__(self, wiring: Wiring, graph: Graph, stop: Fraction, shortened: bool, faults: Faults) -> None:
+        self.wiring, self.stop, self.shortened, self.faults = wiring, stop, shortened, faults
         self.nodes = {node.path: node for node in graph.nodes}
         self.result = Observation()
         self.names: dict[Place, str] = {}  # the full name of each signal, by where it is written
@@ -161,7 +179,15 @@ class _Reader:
             return None
         self.names[node.place] = text = wire_text(source)
         unit = units.pop()
-        return Part(source.source, source.index, text, unit, DEGREE if str(unit) == "rad" else unit), scalar
+        shown = DEGREE if str(unit) == "rad" else unit
+        stretch = Stretch(self._sampling(found))
+        return Part(source.source, source.index, text, unit, shown, 0.0, stretch, shape), scalar
+
+    def _sampling(self, node: Block) -> Sampling:
+        """Return when a block's outputs are recorded."""
+        task = node.task
+        every = self.result.every.get(task.name, 1)
+        return Sampling(task.offset, task.period * every, self.stop, self.shortened)
 
     def _part(self, fields: yaml.Mapping) -> tuple[Part, str] | None:
         """Return the part that an expectation or a line of the summary is about."""
@@ -173,8 +199,8 @@ class _Reader:
         if found is None:
             return None
         of = self.faults.collect(fields["of"].quantity, found[0].unit, bare=False) if "of" in fields else None
-        end = math.inf if before is None else float(before)
-        return replace(found[0], of=of or 0.0, after=float(after or 0), before=end), found[1]
+        stretch = replace(found[0].stretch, after=after or Fraction(0), before=before)
+        return replace(found[0], of=of or 0.0, stretch=stretch), found[1]
 
     def expectation(self, node: Node) -> None:
         """Read ``{signal: plant.position[0], after: 20 s, within: 0.15 m}``."""
@@ -189,11 +215,12 @@ class _Reader:
             )
         for kind in kinds if found is not None else []:
             assert found is not None
-            unit = ONE if kind == "count" else found[0].unit
+            is_count = EXPECTATIONS[kind].statistic == COUNT
+            unit = ONE if is_count else found[0].unit
             limit = self.faults.collect(fields[kind].quantity, unit, bare=False)
             if limit is not None:
                 shown = _written(fields[kind]) or found[0].shown
-                part = found[0] if kind == "count" else replace(found[0], shown=shown)
+                part = found[0] if is_count else replace(found[0], shown=shown)
                 self.result.expectations.append(Expectation(part, kind, limit))
 
     def entry(self, label: str, node: Node) -> None:
@@ -213,7 +240,7 @@ class _Reader:
         if unit is not None and not unit.dimension_equals(part.unit):
             problem = f"'{part.text}' has {words(part.unit)}, which is not shown in {words(unit)}"
             self.faults.add(fields["unit"].place, problem, "write a unit of the same kind")
-        default = ("rms", "max") if scalar == "float64" else ("count",)
+        default = ("rms", "max") if scalar == "float64" else (COUNT,)
         shown = tuple(name for name in show if name is not None) or default
         self.result.summary.append(Entry(label, replace(part, shown=unit or part.shown), shown))
 

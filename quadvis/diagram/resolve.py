@@ -17,9 +17,9 @@ import numpy as np
 from quadvis.block import Param
 from quadvis.diagram.loader import CONTINUOUS, VERSION, FileSpec
 from quadvis.diagram.observe import Observation
-from quadvis.diagram.reference import wire_text
 from quadvis.document import dump_yaml
 from quadvis.engine.graph import Graph, Node, Wire
+from quadvis.engine.names import wire_text
 from quadvis.errors import Faults
 from quadvis.inputs import file_digest
 

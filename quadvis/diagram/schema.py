@@ -32,7 +32,8 @@ from quadvis.diagram.times import RATE_KEYS
 from quadvis.diagram.values import QUANTITY_KEYS
 from quadvis.engine.graph import CROSSINGS, SOLVERS
 from quadvis.output.plot import FIGURE_KEYS, PANEL_KEYS, TRACE_KEYS
-from quadvis.output.verdict import EXPECTATIONS, STATISTICS
+from quadvis.output.statistics import STATISTICS
+from quadvis.output.verdict import EXPECTATIONS
 
 Schema = dict[str, Any]
 

@@ -46,6 +46,16 @@ class Wiring:
                 self._export(child, port)
             self.check_ports(child)
 
+    def ports(self, scope: Scope | None = None) -> Iterator[tuple[str, Wire]]:
+        """Yield what goes out of every part, by its full name such as "control/heading.right"."""
+        scope = scope or self.expansion.root
+        for child in scope.children.values():
+            for port in child.spec.outputs:
+                source = self._export(child, port).source
+                if isinstance(source, Wire):
+                    yield f"{child.prefix.removesuffix('/')}.{port}", source
+            yield from self.ports(child)
+
     def inputs(self, block: FlatBlock) -> Iterator[tuple[str, Source]]:
         """Yield what each input of a block is given."""
         for port, given in (block.spec.inputs or {}).items():

@@ -12,155 +12,64 @@ record `quadvis`), and ends with its outcome (record `summary`) and the indexes.
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.errors import QuadvisError, RunError, quoted, suggestion
+from quadvis.errors import RunError
 from quadvis.files import LOG, open_output
+from quadvis.output.recording import Buffer, Channel
+from quadvis.output.sink import Sink
 
-SLOT = 8
-SLOT_TYPES = {"float64": "<f8", "int64": "<i8", "bool": "<i8"}
 CDR = b"\x00\x01\x00\x00"  # plain CDR, little endian
 FLUSH = 0.05  # s between handing rows to the operating system
 CHUNK = 1 << 16  # bytes after which that happens earlier
+PATIENCE = 2.0  # s that a run waits for a slow disk in all, before rows are left out
 FORMAT = "1"
 DIAGRAM, METADATA, SUMMARY = "diagram.yaml", "quadvis", "summary"
-
-Buffer = bytes | bytearray | memoryview
-
-
-@dataclass(frozen=True)
-class Field:
-    """One output port in a log: its type ("float64", "int64" or "bool"), shape and unit."""
-
-    name: str
-    type: str = "float64"
-    shape: tuple[int, ...] = ()
-    unit: str = "1"
-
-    @property
-    def size(self) -> int:
-        """How many slots it takes: one for every element."""
-        return math.prod(self.shape)
-
-
-@dataclass(frozen=True)
-class Channel:
-    """One logged block: its path ("/vision/detector"), outputs in the order of memory, and rate."""
-
-    path: str
-    fields: tuple[Field, ...]
-    rate: str = ""
-
-    @property
-    def size(self) -> int:
-        """Bytes in a row."""
-        return SLOT * sum(field.size for field in self.fields)
-
-    def signal(self, field: Field) -> str:
-        """Return a field's name among all signals, such as "vision/detector.centres"."""
-        return f"{self.path.strip('/')}.{field.name}"
-
-
-class Recording:
-    """Signals in memory: `recording["plant.position"]` is an array with a leading time axis."""
-
-    def __init__(self, channels: Iterable[Channel] = ()) -> None:
-        """Begin without rows."""
-        self.channels: list[Channel] = []
-        self._times: list[list[int]] = []
-        self._rows: list[list[bytes]] = []
-        self._arrays: dict[int, tuple[NDArray[np.float64], NDArray[np.int64]]] = {}
-        self._signals: dict[str, tuple[int, int, Field]] = {}
-        for channel in channels:
-            self.add(channel)
-
-    def add(self, channel: Channel) -> None:
-        """Make room for the rows of one more block."""
-        index, start = len(self.channels), 0
-        self.channels.append(channel)
-        self._times.append([])
-        self._rows.append([])
-        for field in channel.fields:
-            self._signals[channel.signal(field)] = (index, start, field)
-            start += field.size
-
-    def append(self, channel: int, time: int, row: bytes) -> None:
-        """Keep one row: the outputs of `channels[channel]` at `time` (ns) as in memory."""
-        self._times[channel].append(time)
-        self._rows[channel].append(row)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """All signals, block by block."""
-        return tuple(self._signals)
-
-    @property
-    def units(self) -> dict[str, str]:
-        """The unit of every signal."""
-        return {name: field.unit for name, (_, _, field) in self._signals.items()}
-
-    def times(self, name: str) -> NDArray[np.float64]:
-        """Return the times (s) of a signal's N rows."""
-        return self._decoded(self._find(name)[0])[0]
-
-    def __getitem__(self, name: str) -> NDArray[Any]:
-        """Return a signal of N rows, shape (N, *shape of the port): float64, int64 or bool."""
-        channel, start, field = self._find(name)
-        values = self._decoded(channel)[1][:, start : start + field.size].view(SLOT_TYPES[field.type])
-        return (values != 0 if field.type == "bool" else values).reshape(-1, *field.shape)
-
-    def _decoded(self, channel: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Return the times (s) and the slots of a channel, decoded once until rows are added."""
-        count = len(self._rows[channel])
-        if channel not in self._arrays or len(self._arrays[channel][0]) != count:
-            slots = np.frombuffer(b"".join(self._rows[channel]), np.dtype("<i8"))
-            times = np.array(self._times[channel], np.float64) / 1e9
-            self._arrays[channel] = times, slots.reshape(count, self.channels[channel].size // SLOT)
-        return self._arrays[channel]
-
-    def _find(self, name: str) -> tuple[int, int, Field]:
-        if name not in self._signals:
-            some = f"there are {', '.join(self.names[:8])}, ..." if self._signals else "nothing was recorded"
-            remedy = suggestion(name, self.names) or some
-            raise QuadvisError(f"there is no signal {quoted(name)}; {remedy}")
-        return self._signals[name]
+PORTS = "ports"  # of the facts of a run: what the ports of parts are, as JSON
 
 
 class LogWriter:
     """Writes the rows of a run so that what is older than `FLUSH` outlives the process.
 
-    Rows are handed on when a later row is due, so where rows are rare let an idle loop call `flush`. When the
-    disk refuses, that call and every later one raises `RunError`; what is in the file stays readable.
+    Rows are handed on when a later row is due, so where rows are rare let an idle loop call `flush`. A run
+    outlives its log: when the disk refuses, or is too slow for longer than `PATIENCE`, rows are left out,
+    `loss` says how many, and what is in the file stays readable.
     """
 
     def __init__(self, path: str | Path, channels: Sequence[Channel], metadata: Mapping[str, str]) -> None:
-        """Begin a file, replacing what was there; `metadata["diagram"]` is the resolved diagram's text."""
+        """Begin a file, replacing what was there; `metadata["diagram"]` is the resolved diagram's text.
+
+        RunError if not even this can be written.
+        """
         from mcap.writer import CompressionType, Writer
 
         definitions = [message_definition(channel) for channel in channels]
         self.path = Path(path)
         self._sizes = [len(CDR) + channel.size for channel in channels]
-        self._failure = ""
-        self._pending = 0
-        with self._disk():
-            self._file = open_output(self.path, LOG)
-            # Chunks end where `flush` ends them, never inside `write`.
-            self._writer: Any = Writer(self._file, chunk_size=1 << 62, compression=CompressionType.NONE)
-            self._begin(dict(metadata))
-            names = _message_names(channel.path for channel in channels)
-            self._ids = list(map(self._register, channels, names, definitions))
-            self.flush()
+        self._closed = False
+        self._patience = PATIENCE
+        self._pending = self._rows = self._first = 0
+        self._sink = Sink(open_output(self.path, LOG))
+        # Chunks end where `flush` ends them, never inside `write`.
+        self._writer: Any = Writer(
+            cast(Any, self._sink), chunk_size=1 << 62, compression=CompressionType.NONE
+        )
+        setattr(self._writer, "_Writer__chunk_indices", _ChunkIndexes())  # noqa: B010, a private name
+        self._begin(dict(metadata))
+        names = _message_names(channel.path for channel in channels)
+        self._ids = list(map(self._register, channels, names, definitions))
+        self.flush()
+        self._sink.drain()
+        if self._sink.failure:
+            raise RunError(self._refusal)
 
     def _begin(self, metadata: dict[str, str]) -> None:
         self._writer.start(profile="ros2", library=f"quadvis {metadata.get('quadvis', '')}".strip())
@@ -178,12 +87,21 @@ class LogWriter:
         data = CDR + row
         if len(data) != self._sizes[channel]:
             raise ValueError(f"a row of channel {channel} has {self._sizes[channel] - len(CDR)} bytes")
-        if self._failure:
-            raise RunError(self._failure)
+        if self._sink.full and not self._has_room():
+            self._sink.lose(1, time)
+            return
         self._writer.add_message(self._ids[channel], time, data, time)
+        self._first = time if not self._rows else self._first
+        self._rows += 1
         self._pending += len(data)
         if self._pending >= CHUNK or monotonic() >= self._due:
             self.flush()
+
+    def _has_room(self) -> bool:
+        """Return whether one more row can be taken; wait for that as long as there is patience left."""
+        if not self._sink.failure and self._patience > 0:
+            self._patience -= self._sink.wait_for_room(self._patience)
+        return not self._sink.full
 
     def write_rows(self, channel: int, times: Sequence[int] | NDArray[np.int64], rows: Buffer) -> None:
         """Write rows that lie one after another in `rows`; `times` (ns) has one entry for each."""
@@ -195,21 +113,43 @@ class LogWriter:
             self.write(channel, time, view[i * size : (i + 1) * size])
 
     def flush(self) -> None:
-        """Hand everything to the operating system, so that it survives the end of this process."""
-        with self._disk():
-            self._writer.flush()
+        """Hand everything on, so that it survives the end of this process a moment later."""
+        self._writer.flush()
+        self._sink.hand_on(self._rows, self._first)
         self._due = monotonic() + FLUSH
-        self._pending = 0
+        self._pending = self._rows = 0
 
     def close(self, summary: Mapping[str, str] | None = None) -> None:
-        """End the file with the outcome of the run; a second call does nothing."""
-        if self._file.closed and not self._failure:
+        """End the file with the outcome of the run, and with what it lacks; a second call does nothing."""
+        if self._closed:
             return
-        with self._disk():
-            self._writer.flush()
-            self._writer.add_metadata(SUMMARY, dict(summary or {}))
-            self._writer.finish()
-            self._file.close()
+        self._closed = True
+        self.flush()
+        self._sink.drain()
+        lost = {"lost": self.loss} if self.loss else {}
+        self._writer.add_metadata(SUMMARY, {**(summary or {}), **lost})
+        self._writer.finish()
+        self._sink.hand_on()
+        self._sink.close()
+
+    @property
+    def loss(self) -> str:
+        """What is not in the log, and why, as a sentence; empty if all is. It is known after `close`."""
+        sink = self._sink
+        if sink.failure:
+            return f"{self._refusal}; {self._missing}"
+        return f"the disk is too slow for the log '{self.path}'; {self._missing}" if sink.lost else ""
+
+    @property
+    def _refusal(self) -> str:
+        return f"cannot write the log '{self.path}': {self._sink.failure}"
+
+    @property
+    def _missing(self) -> str:
+        count, first = self._sink.lost, self._sink.lost_from
+        if first is None:
+            return "it lacks its end"
+        return f"it lacks {count} row{'s' * (count != 1)}, the first of t = {first / 1e9:.9g} s"
 
     def __enter__(self) -> Self:
         """Return the writer itself."""
@@ -218,23 +158,42 @@ class LogWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close the file, unless the disk has refused it already; the summary names what stopped the run."""
-        if not self._failure:
-            self.close({"stopped": str(error) or type(error).__name__} if error else None)
+        """Close the file; the summary names what stopped the run, and that says what the file lacks."""
+        self.close({"stopped": str(error) or type(error).__name__} if error else None)
+        if error and self.loss:
+            error.add_note(self.loss)
 
-    @contextmanager
-    def _disk(self) -> Iterator[None]:
-        """Turn a refusal of the disk into a sentence and give the file up: half a record may be its end."""
-        if self._failure:
-            raise RunError(self._failure)
-        try:
-            yield
-        except OSError as error:
-            self._failure = f"cannot write the log '{self.path}': {_reason(error)}"
-            if hasattr(self, "_file"):
-                with suppress(OSError):  # the same refusal, of what is still buffered
-                    self._file.close()
-            raise RunError(self._failure) from error
+
+class _ChunkIndexes:
+    """The indexes of chunks for the end of a file, packed: there are twenty for every second of a run."""
+
+    def __init__(self) -> None:
+        self._packed = bytearray()
+
+    def append(self, index: Any) -> None:
+        """Keep one more index, as it will be written."""
+        from mcap.data_stream import RecordBuilder
+
+        builder: Any = RecordBuilder()
+        index.write(builder)
+        self._packed += builder.end()
+
+    def __iter__(self) -> Iterator[_ChunkIndexes]:
+        if self._packed:
+            yield self
+
+    def write(self, builder: Any) -> None:
+        """Write all of them."""
+        builder.write(bytes(self._packed))
+
+
+def ports_of(metadata: Mapping[str, str]) -> dict[str, str]:
+    """Return what the ports of the diagram's parts are, by the facts of a run; none if they are damaged."""
+    try:
+        found = json.loads(metadata.get(PORTS, "{}"))
+    except ValueError:
+        return {}
+    return {str(port): str(source) for port, source in found.items()} if isinstance(found, dict) else {}
 
 
 def message_definition(channel: Channel) -> str:
@@ -273,10 +232,3 @@ def _unique(names: Iterable[str], joint: str) -> list[str]:
         numbered = (f"{name}{joint}{i}" if i > 1 else name for i in range(1, len(found) + 2))
         found.append(next(candidate for candidate in numbered if candidate not in found))
     return found
-
-
-def _reason(error: OSError) -> str:
-    """Return why the system refused."""
-    if isinstance(error, FileNotFoundError):
-        return "there is no such file or folder"
-    return (error.strerror or str(error)).lower()

@@ -11,7 +11,8 @@ from pathlib import Path
 from quadvis.errors import QuadvisError, quoted
 from quadvis.files import read_input
 from quadvis.output import mcap_records as mcap
-from quadvis.output.log import CDR, DIAGRAM, METADATA, SLOT_TYPES, SUMMARY, Channel, Field, Recording
+from quadvis.output.log import CDR, DIAGRAM, METADATA, SUMMARY, ports_of
+from quadvis.output.recording import SLOT_TYPES, Channel, Field, Recording
 
 MOST_SLOTS, MOST_AXES = 1 << 20, 32  # of one block, of one output
 LONGEST_DIAGRAM = 1 << 24  # bytes
@@ -62,6 +63,7 @@ class Log(Recording):
                 self.diagram = record.data[:LONGEST_DIAGRAM].decode(errors="replace")
         elif record.name == METADATA:
             self.metadata = record.entries
+            self.ports = ports_of(record.entries)
         elif record.name == SUMMARY:
             self.summary = record.entries
 

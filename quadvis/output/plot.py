@@ -33,8 +33,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis import nodes
+from quadvis.engine.names import read_name
 from quadvis.errors import DiagramError, Faults, QuadvisError, quoted, suggestion
 from quadvis.files import PNG, write_output
+from quadvis.output.stretch import NANOSECONDS, stamp
 from quadvis.units import Unit, UnitError, parse_units
 
 if TYPE_CHECKING:
@@ -78,9 +80,6 @@ STRETCH_KEYS = ("from", "to")
 PANEL_KEYS = ("signals", "title", "unit", "reference")
 TRACE_KEYS = ("signal", "label")
 FIGURE_KEYS = ("title", *STRETCH_KEYS, "panels", "signals", "unit", "reference")
-
-_SELECTOR = r"(?:\d{1,9}|\d{0,9}:\d{0,9})"
-_SIGNAL = re.compile(rf"([^\[\]\s.]+\.[^\[\]\s.]+)(?:\[({_SELECTOR}(?:,{_SELECTOR})*)\])?")
 
 
 class Recorded(Protocol):
@@ -223,8 +222,10 @@ def _read_figure(node: nodes.Node, faults: Faults) -> Figure:
 
 
 def _read_seconds(node: nodes.Node | None, absent: float, faults: Faults) -> float:
-    value = faults.collect(node.quantity, Unit.parse("s"), bare=False) if node else None
-    return absent if value is None else value
+    """Return a time as the rows of a log have it: rounded down to a nanosecond, so that its own row is in."""
+    if node is None or faults.collect(node.quantity, Unit.parse("s"), bare=False) is None:
+        return absent
+    return stamp(node.exact(Unit.parse("s"))) / NANOSECONDS
 
 
 def _some(node: nodes.Node) -> list[nodes.Node]:
@@ -269,18 +270,11 @@ def _read_trace(node: nodes.Node) -> Trace:
 
 def split_signal(text: str) -> tuple[str, tuple[int | slice, ...]]:
     """Split "plant.position[0:2]" into the signal's name and an index as numpy takes it."""
-    match = _SIGNAL.fullmatch(text)
-    if match is None:
+    named = read_name(text)
+    if named is None:
         remedy = "write 'block.port', 'block.port[0]' or 'block.port[0:2]'"
         raise QuadvisError(f"{quoted(text)} is not a signal; {remedy}")
-    return match[1], tuple(_selector(part) for part in match[2].split(",")) if match[2] else ()
-
-
-def _selector(text: str) -> int | slice:
-    if ":" not in text:
-        return int(text)
-    first, last = (int(end) if end else None for end in text.split(":"))
-    return slice(first, last)
+    return named.source, named.index
 
 
 def _curves(recorded: Recorded, figure: Figure, panel: Panel) -> list[_Curve]:

@@ -10,14 +10,12 @@ from multiprocessing import parent_process
 from typing import TYPE_CHECKING
 
 from quadvis.errors import QuadvisError
-from quadvis.output.verdict import EXPECTATIONS
+from quadvis.output.statistics import COUNT, FINAL
 from quadvis.signals import leave_to_parent
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
     from quadvis.output.verdict import Outcome, Part
-
-COUNT = "count"  # the statistic that has no unit
 
 # Where runs share the processors, threads inside a run only take turns.
 ONE_THREAD = dict.fromkeys(
@@ -90,7 +88,10 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Row:
-    """What one run gave; no numbers if it stopped with an error."""
+    """What one run gave; no numbers if it stopped with an error.
+
+    ``failure`` says why it stopped, or what its log lacks: then it should be run again.
+    """
 
     index: int
     hash: str = ""
@@ -102,14 +103,15 @@ class Row:
 
 
 def quantities(diagram: Diagram) -> list[Quantity]:
-    """Return what the runs of a diagram give, in the order of `numbers`."""
+    """Return what the runs of a diagram give, in the order of `numbers`; of vectors one for each element."""
     found = [
-        Quantity(f"{entry.label}.{name}", _unit(entry.part, name), _limit(diagram, entry.part, name))
+        Quantity(f"{entry.label}.{name}{element}", _unit(entry.part, name), _limit(diagram, entry.part, name))
         for entry in diagram.summary
         for name in entry.show
+        for element in (entry.part.elements if name == FINAL else ("",))
     ]
     for expectation in diagram.observation.expectations:
-        part, name = expectation.part, EXPECTATIONS[expectation.kind].statistic
+        part, name = expectation.part, expectation.statistic
         limit = expectation.limit * _scale(part, name)
         found.append(Quantity(str(expectation), _unit(part, name), limit, summary=False))
     return found
@@ -117,14 +119,14 @@ def quantities(diagram: Diagram) -> list[Quantity]:
 
 def numbers(diagram: Diagram, outcome: Outcome) -> list[float]:
     """Return what a run gave, in the units in which people read it."""
-    found = [
-        outcome.summary[entry.label][name] * _scale(entry.part, name)
-        for entry in diagram.summary
-        for name in entry.show
-    ]
+    found = []
+    for entry in diagram.summary:
+        for name in entry.show:
+            value = outcome.summary[entry.label][name]
+            values = value if isinstance(value, tuple) else (value,)
+            found += [each * _scale(entry.part, name) for each in values]
     for verdict in outcome.verdicts:
-        name = EXPECTATIONS[verdict.expectation.kind].statistic
-        found.append(verdict.found * _scale(verdict.expectation.part, name))
+        found.append(verdict.found * _scale(verdict.expectation.part, verdict.expectation.statistic))
     return found
 
 
@@ -140,7 +142,7 @@ def _limit(diagram: Diagram, part: Part, statistic: str) -> float | None:
     """Return what is expected of a number of the summary, if an expectation is about the same."""
     for expectation in diagram.observation.expectations:
         same = replace(expectation.part, shown=part.shown, text=part.text) == part
-        if same and EXPECTATIONS[expectation.kind].statistic == statistic:
+        if same and expectation.statistic == statistic:
             return expectation.limit * _scale(part, statistic)
     return None
 
@@ -170,12 +172,13 @@ def perform(job: Job) -> Row:
     try:
         diagram = diagram_of(job)
         digest = diagram.hash
-        result = run(diagram, log=job.log)
+        result = run(diagram, log=job.log, keep=())
     except QuadvisError as error:
         return Row(job.index, digest, failure=" | ".join(str(error).splitlines()))
     units = tuple(quantity.unit for quantity in quantities(diagram))
     found = tuple(numbers(diagram, result.outcome))
-    return Row(job.index, digest, units, found, result.passed, wall=result.wall)
+    passed = result.passed and not result.lost
+    return Row(job.index, digest, units, found, passed, result.lost, wall=result.wall)
 
 
 def diagram_of(job: Job) -> Diagram:

@@ -19,8 +19,9 @@ from hypothesis import strategies as st
 
 from quadvis.cli import main
 from quadvis.errors import QuadvisError
-from quadvis.output.log import Channel, Field, LogWriter
+from quadvis.output.log import LogWriter
 from quadvis.output.log_reader import Log, log_facts, read_log
+from quadvis.output.recording import Channel, Field
 
 DIAGRAM = "quadvis: 1\nname: x\nfigures:\n- {title: one, signals: [c.y]}\n"
 FACTS = {"diagram": DIAGRAM, "name": "x", "hash": hashlib.sha256(DIAGRAM.encode()).hexdigest()}

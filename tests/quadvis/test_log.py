@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 import resource
@@ -10,6 +11,7 @@ import struct
 import subprocess
 import sys
 import textwrap
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -21,8 +23,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from quadvis.errors import QuadvisError, RunError
-from quadvis.output.log import Channel, Field, LogWriter, Recording, message_definition
+from quadvis.output.log import LogWriter, message_definition
 from quadvis.output.log_reader import read_log
+from quadvis.output.recording import Channel, Field, Recording
 
 PLANT = Channel(
     "/plant", (Field("position", "float64", (3,), "m"), Field("speed", "float64", (), "m/s")), "physics"
@@ -310,33 +313,148 @@ def test_rows_wait_no_longer_than_the_next_flush(tmp_path: Path) -> None:
     log = LogWriter(tmp_path / "idle.mcap", [PLANT], METADATA)
     log.write(0, 0, slots(1.0, 2.0, 3.0, 4.0))
     log.flush()
+    log._sink.drain()  # the thread that writes needs a moment
     assert read_log(tmp_path / "idle.mcap")["plant.position"].tolist() == [[1, 2, 3]]
     log.close()
 
 
-def test_a_disk_that_fills_up_stops_the_log_and_leaves_it_readable(tmp_path: Path) -> None:
+def test_a_disk_that_fills_up_leaves_a_readable_log_and_a_sentence(tmp_path: Path) -> None:
     path = tmp_path / "full.mcap"
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     log = LogWriter(path, [PLANT], METADATA)
     previous = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, limits[1]))
     try:
-        with pytest.raises(RunError, match=r"cannot write the log .*full\.mcap"):
-            for i in range(10_000):
-                log.write(0, i, slots(float(i), 0.0, 0.0, 0.0))
-                if i % 100 == 99:
-                    log.flush()
+        for i in range(10_000):
+            log.write(0, i, slots(float(i), 0.0, 0.0, 0.0))
+            if i % 100 == 99:
+                log.flush()
+        log.close({"passed": "true"})
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
         signal.signal(signal.SIGXFSZ, previous)
-    with pytest.raises(RunError, match="cannot write the log"):
-        log.write(0, 0, slots(0.0, 0.0, 0.0, 0.0))
-    with pytest.raises(RunError, match="cannot write the log"):
-        log.close()
     kept = read_log(path)
     assert not kept.complete
-    assert len(kept["plant.position"]) >= 300
-    assert kept["plant.position"][:, 0].tolist() == list(range(len(kept["plant.position"])))
+    count = len(kept["plant.position"])
+    assert count >= 300
+    assert kept["plant.position"][:, 0].tolist() == list(range(count))
+    first = f"{count / 1e9:.9g}"
+    assert log.loss.startswith(f"cannot write the log '{path}': ")
+    assert log.loss.endswith(f"; it lacks {10_000 - count} rows, the first of t = {first} s")
+
+
+def test_a_log_without_its_end_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    log = LogWriter(tmp_path / "end.mcap", [PLANT], METADATA)
+    log.write(0, 0, slots(1.0, 2.0, 3.0, 4.0))
+    log.flush()
+    log._sink.drain()
+    refuse(monkeypatch)
+    log.close()
+    assert log.loss.endswith("end.mcap': no space left on device; it lacks its end")
+    assert len(read_log(tmp_path / "end.mcap")["plant.speed"]) == 1
+
+
+def refuse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the disk be full from now on."""
+
+    def write(descriptor: int, data: Any) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("quadvis.output.sink.os.write", write)
+
+
+def hold(monkeypatch: pytest.MonkeyPatch) -> threading.Event:
+    """Let the disk take nothing until the event is set."""
+    ready, write = threading.Event(), os.write
+
+    def wait(descriptor: int, data: Any) -> int:
+        ready.wait()
+        return write(descriptor, data)
+
+    monkeypatch.setattr("quadvis.output.sink.os.write", wait)
+    return ready
+
+
+def test_a_disk_that_hangs_for_a_while_costs_rows_but_stops_nobody(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("quadvis.output.sink.ROOM", 50_000)
+    monkeypatch.setattr("quadvis.output.log.PATIENCE", 0.1)
+    log = LogWriter(tmp_path / "slow.mcap", [PLANT], METADATA)
+    ready = hold(monkeypatch)
+    for i in range(10_000):  # 10,000 rows of 36 bytes and more
+        log.write(0, i, slots(float(i), 0.0, 0.0, 0.0))
+    ready.set()
+    log._sink.drain()
+    for i in range(10_000, 10_100):
+        log.write(0, i, slots(float(i), 0.0, 0.0, 0.0))
+    log.close({"passed": "true"})
+    kept = read_log(tmp_path / "slow.mcap")
+    rows = kept["plant.position"][:, 0].tolist()
+    gap = next(i for i, row in enumerate(rows) if row != i)
+    assert kept.complete
+    assert rows == [*range(gap), *range(10_000, 10_100)]
+    assert 500 < gap < 5_000
+    sentence = f"; it lacks {10_000 - gap} rows, the first of t = {gap / 1e9:.9g} s"
+    assert log.loss == f"the disk is too slow for the log '{tmp_path / 'slow.mcap'}'{sentence}"
+    assert kept.summary == {"passed": "true", "lost": log.loss}
+
+
+def test_a_disk_that_is_slow_for_a_moment_costs_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("quadvis.output.sink.ROOM", 50_000)
+    monkeypatch.setattr("quadvis.output.log.PATIENCE", 60.0)
+    log = LogWriter(tmp_path / "slow.mcap", [PLANT], METADATA)
+    ready = hold(monkeypatch)
+    threading.Timer(0.1, ready.set).start()
+    for i in range(10_000):
+        log.write(0, i, slots(float(i), 0.0, 0.0, 0.0))
+    log.close()
+    assert log.loss == ""
+    assert len(read_log(tmp_path / "slow.mcap")["plant.speed"]) == 10_000
+
+
+def test_a_disk_that_hangs_for_good_is_given_up_at_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("quadvis.output.sink.HUNG", 0.1)
+    log = LogWriter(tmp_path / "hung.mcap", [PLANT], METADATA)
+    ready = hold(monkeypatch)
+    for i in range(100):
+        log.write(0, i, slots(float(i), 0.0, 0.0, 0.0))
+    log.close()
+    assert "the disk takes nothing any more; it lacks 100 rows, the first of t = 0 s" in log.loss
+    ready.set()
+
+
+def test_what_the_disk_refused_is_a_note_on_what_stopped_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with (
+        pytest.raises(RunError, match="the output became nan") as found,
+        LogWriter(tmp_path / "run.mcap", [PLANT], METADATA) as log,
+    ):
+        refuse(monkeypatch)
+        log.write(0, 0, slots(1.0, 2.0, 3.0, 4.0))
+        raise RunError("the output became nan")
+    assert found.value.__notes__ == [log.loss]
+
+
+def test_the_indexes_of_chunks_lead_to_every_row(tmp_path: Path) -> None:
+    from mcap.reader import make_reader
+
+    path = tmp_path / "chunks.mcap"
+    with LogWriter(path, [PLANT, DETECTOR], METADATA) as log:
+        for i in range(50):
+            log.write(0, i, slots(float(i), 0.0, 0.0, 0.0))
+            log.flush()
+    with path.open("rb") as file:
+        reader = make_reader(file)
+        summary = reader.get_summary()
+        assert summary is not None
+        assert len(summary.chunk_indexes) == summary.statistics.chunk_count == 50
+        assert [message.log_time for _, _, message in reader.iter_messages()] == [*range(50)]
 
 
 def test_a_path_that_cannot_be_written_is_a_sentence(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from quadvis.errors import DiagramError, Faults, QuadvisError
-from quadvis.output.log import Channel, Field, LogWriter
+from quadvis.output.log import LogWriter
 from quadvis.output.log_reader import read_log
 from quadvis.output.plot import (
     Figure,
@@ -29,6 +29,7 @@ from quadvis.output.plot import (
     read_figures,
     split_signal,
 )
+from quadvis.output.recording import Channel, Field
 
 Sheets = list[Any]
 

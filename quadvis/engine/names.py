@@ -1,0 +1,47 @@
+"""Names of signals as texts: ``pose.position``, ``eyes/camera.centres[2,1]``, ``a.y[:2]``."""
+
+from __future__ import annotations
+
+import re
+
+from quadvis.engine.graph import Index, Wire
+
+_NAME = re.compile(r"(?P<block>[A-Za-z_][\w/]*)\.(?P<port>[A-Za-z_]\w*)(?:\[(?P<index>[^\]]*)\])?", re.ASCII)
+_BOUNDS = re.compile(r"\s*(?P<first>\d{1,6})?\s*(?P<slice>:\s*(?P<last>\d{1,6})?\s*)?", re.ASCII)
+
+
+def read_name(text: str) -> Wire | None:
+    """Return what a name names, as the source of a wire; None if it is no name of a signal."""
+    match = _NAME.fullmatch(text)
+    index = read_index(match["index"]) if match and match["index"] is not None else ()
+    if match is None or index is None:
+        return None
+    return Wire(match["block"], match["port"], index)
+
+
+def read_index(text: str) -> Index | None:
+    """Read ``0``, ``2,1``, ``0:2``, ``1:`` or ``:``; None if it is no index."""
+    parts: list[int | slice] = []
+    for part in text.split(","):
+        bounds = _BOUNDS.fullmatch(part)
+        if bounds is None or (bounds["slice"] is None and bounds["first"] is None):
+            return None
+        first, last = (int(bounds[name]) if bounds[name] else None for name in ("first", "last"))
+        parts.append(int(bounds["first"]) if bounds["slice"] is None else slice(first, last))
+    return tuple(parts)
+
+
+def index_text(index: Index) -> str:
+    """Return an index as a diagram writes it."""
+    parts = [_slice_text(part) if isinstance(part, slice) else str(part) for part in index]
+    return f"[{','.join(parts)}]" if parts else ""
+
+
+def _slice_text(part: slice) -> str:
+    first, last = ("" if bound is None else str(bound) for bound in (part.start, part.stop))
+    return f"{first}:{last}"
+
+
+def wire_text(wire: Wire) -> str:
+    """Return where a wire comes from, as a diagram writes it."""
+    return wire.source + index_text(wire.index)
