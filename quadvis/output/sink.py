@@ -28,8 +28,8 @@ class Batch:
 class Sink:
     """Takes what a file is made of, as a binary stream; `hand_on` gives it to the thread as one batch.
 
-    When the disk refuses, `failure` says why, and nothing is written any more: what is in the file then ends
-    in the midst of a batch at worst. `lost` counts the rows that are not in it, from `lost_from` (ns) on.
+    When the disk refuses, `failure` says why, and nothing is written any more: the file ends with the last
+    whole batch. `lost` counts the rows that are not in it, from `lost_from` (ns) on.
     """
 
     def __init__(self, file: BinaryIO) -> None:
@@ -41,7 +41,7 @@ class Sink:
         self._parts: list[bytes] = []
         self._taken = 0
         self._queue: deque[Batch] = deque()
-        self._waiting = self._written = 0
+        self._waiting = self._written = self._whole = 0  # bytes; the last are those of whole batches
         self._ending = False
         self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._work, name="log", daemon=True)
@@ -117,9 +117,13 @@ class Sink:
             try:
                 self._put(batch.data)
             except OSError as error:
+                # A part of a batch is of no use, and would make the count of what is lost wrong.
+                with suppress(OSError):
+                    os.ftruncate(self._file.fileno(), self._whole)
                 with self._changed:
                     self._give_up(reason(error))
                 break
+            self._whole += len(batch.data)
             with self._changed:
                 if self.failure:
                     break
