@@ -704,3 +704,37 @@ def test_a_sweep_writes_over_nothing_that_it_reads_and_no_file_of_another_kind(
         assert Path(source).read_bytes() == out.read_bytes() == before
         out.unlink()
     assert here == []
+
+
+def test_the_final_value_of_a_vector_has_a_column_for_each_element(here: list[int]) -> None:
+    text = LOOP.replace("summary:\n", (
+        "summary:\n  all: {signal: both.y, show: [rms, final], unit: cm}\n"
+        '  last: {signal: "both.y[1:3]", show: [final]}\n  one: {signal: "both.y[1]", show: [final]}\n'
+    ))  # fmt: skip
+    both = "  both: {block: signal.stack, rate: fast, in: {a: wave.y, b: law.y, c: noise.y}}\n"
+    Path("loop.yaml").write_text(text.replace("variants:\n", f"{both}variants:\n"))
+    over = {"size": ["1 m", "2 m"], "seed": range(2)}
+    table = quadvis.sweep("loop.yaml", over, output="x.csv")
+    finals = [name for name in table if ".final" in name and name[:3] in ("all", "las", "one")]
+    assert finals == [
+        "all.final[0] [cm]", "all.final[1] [cm]", "all.final[2] [cm]",
+        "last.final[1] [m]", "last.final[2] [m]", "one.final [m]",
+    ]  # fmt: skip
+    for row, (size, seed) in enumerate((size, seed) for size in ("1 m", "2 m") for seed in range(2)):
+        last = quadvis.load("loop.yaml", settings={"size": size}, seed=seed).run()["both.y"][-1]
+        found = [table[name][row] for name in finals]
+        assert found == pytest.approx([*(last * 100), *last[1:], last[1]])
+    lines = "\n".join(sweep_lines(table))
+    assert "all.final[2] [cm]" in lines
+    here.clear()
+    again = quadvis.sweep("loop.yaml", over, output="x.csv", resume=True)
+    assert here == []
+    assert all(np.array_equal(again[name], table[name]) for name in finals)
+    table.plot("x.png")
+    assert Path("x.png").stat().st_size > 0
+
+
+def test_a_run_that_has_not_all_of_a_window_is_a_row_that_does_not_pass(here: list[int]) -> None:
+    Path("loop.yaml").write_text(LOOP.replace("within: 150 cm", "before: 0.9 s, within: 10 m"))
+    assert quadvis.sweep("loop.yaml", {"seed": range(2)}).passed
+    assert not quadvis.sweep("loop.yaml", {"seed": range(2)}, stop_time="0.5 s")["passed"].any()
