@@ -30,6 +30,7 @@ from quadvis.output.sink import Sink
 CDR = b"\x00\x01\x00\x00"  # plain CDR, little endian
 FLUSH = 0.05  # s between handing rows to the operating system
 CHUNK = 1 << 16  # bytes after which that happens earlier
+AROUND = 47  # bytes that the format puts around a row and into its index
 PATIENCE = 2.0  # s that a run waits for a slow disk in all, before rows are left out
 FORMAT = "1"
 DIAGRAM, METADATA, SUMMARY = "diagram.yaml", "quadvis", "summary"
@@ -93,7 +94,7 @@ class LogWriter:
         self._writer.add_message(self._ids[channel], time, data, time)
         self._first = time if not self._rows else self._first
         self._rows += 1
-        self._pending += len(data)
+        self._pending += len(data) + AROUND
         if self._pending >= CHUNK or monotonic() >= self._due:
             self.flush()
 

@@ -254,7 +254,8 @@ def test_a_damaged_file_gives_a_log_or_a_sentence(
 
 KILLED = """
 import struct, sys, time
-from quadvis.output.log import Channel, Field, LogWriter
+from quadvis.output.log import LogWriter
+from quadvis.output.recording import Channel, Field
 clock = Channel("/clock", (Field("elapsed"), Field("row", "int64")))
 log = LogWriter(sys.argv[1], [clock], {"diagram": "name: killed"})
 start = time.monotonic()

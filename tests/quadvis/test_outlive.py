@@ -15,7 +15,7 @@ import pytest
 import quadvis
 from quadvis.cli import main
 from quadvis.errors import QuadvisError
-from quadvis.output.log import read_log
+from quadvis.output.log_reader import read_log
 
 FLIGHT = """\
 quadvis: 1
@@ -113,7 +113,7 @@ def test_a_full_disk_before_the_start_stops_the_run(
 def test_a_limit_of_the_system_on_files_is_no_other_case(folder: Path) -> None:
     code = (
         "import resource, sys; from quadvis.cli import main;"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, -1)); sys.exit(main(sys.argv[1:]))"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (150_000, -1)); sys.exit(main(sys.argv[1:]))"
     )
     done = subprocess.run(
         [sys.executable, "-c", code, "run", "flight.yaml", "--log", "run.mcap"],

@@ -13,7 +13,7 @@ import pytest
 
 from quadvis.diagram.diagram import Diagram, load, load_text
 from quadvis.errors import QuadvisError
-from quadvis.output.log import read_log
+from quadvis.output.log_reader import read_log
 
 INNER = """\
 quadvis: 1

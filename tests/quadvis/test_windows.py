@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from quadvis.diagram.diagram import Diagram, load, load_text
-from quadvis.output.log import read_log
+from quadvis.output.log_reader import read_log
 from quadvis.output.plot import read_figures
 from quadvis.output.verdict import Outcome
 from quadvis.report import summary_lines
