@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 NANOSECONDS = 10**9
@@ -30,7 +30,7 @@ class Sampling:
     offset: Fraction = Fraction(0)
     spacing: Fraction = Fraction(1)
     end: Fraction = Fraction(0)
-    shortened: bool = False
+    shortened: bool = field(default=False, compare=False)  # it changes words, no verdict
 
     def time(self, row: int) -> Fraction:
         """Return the time of a row (s); they are counted from 0."""
