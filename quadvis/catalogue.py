@@ -3,7 +3,8 @@
 ``signal.derivative`` is class ``Derivative`` in module ``quadvis_blocks.signal.derivative``. ``acme:slope``
 is block ``slope`` of the library that another distribution registered as ``acme`` in the entry point group
 ``quadvis.libraries``. A folder ``blocks`` beside a diagram adds the user's own: ``blocks/wind/fan.py`` is
-``wind.fan``.
+``wind.fan``. Those are Python code that comes with the diagram, so whoever loads it may be told of it first,
+or refuse it: see `OwnBlocks`.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import os
 import pkgutil
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 
@@ -23,6 +24,11 @@ from quadvis.errors import QuadvisError, sentence, suggestion
 
 STANDARD = "quadvis_blocks"
 GROUP = "quadvis.libraries"
+
+OwnBlocks = bool | Callable[[Path], None]
+"""Whether the code in the folder ``blocks`` beside a diagram may be run; a function is called with that
+folder before any of it is run."""
+
 NAME = re.compile(r"(?:(?P<library>[a-z]\w*):)?(?P<path>[a-z]\w*(?:\.[a-z]\w*)*)")
 
 
@@ -35,12 +41,13 @@ class CatalogueError(QuadvisError):
 
 
 class Catalogue:
-    """Finds blocks by name; ``folder`` is where the diagram lies."""
+    """Finds blocks by name; ``folder`` is where the diagram lies, whose own blocks may be refused."""
 
-    def __init__(self, folder: Path | None = None) -> None:
+    def __init__(self, folder: Path | None = None, own_blocks: OwnBlocks = True) -> None:
         own = None if folder is None else folder / "blocks"
         # In quadvis's own repository the folder of that name is the standard library's.
         self.own = None if own is None or (own / STANDARD).is_dir() else own
+        self.own_blocks = own_blocks
         self._found: dict[str, type[Block]] = {}
 
     def find(self, name: str) -> type[Block]:
@@ -61,16 +68,27 @@ class Catalogue:
         if own and standard:
             raise CatalogueError(f"'{name}' is in the standard library and in {own}", "rename the file")
         if own:
+            self._permit(own, name)
             return _block_class(_load_file(own, name), name)
         if not standard:
             remedy = suggestion(name, self.names()) or "quadvis list shows all"
             raise CatalogueError(f"there is no block '{name}'", remedy)
         return _block_class(_import(f"{STANDARD}.{match['path']}", name), name)
 
+    def load_all(self) -> tuple[dict[str, type[Block]], list[str]]:
+        """Return the classes of all blocks by name, and a sentence for each that cannot be loaded."""
+        found, failures = {}, []
+        for name in self.names():
+            try:
+                found[name] = self.find(name)
+            except CatalogueError as error:
+                failures.append(str(error))
+        return found, failures
+
     def names(self) -> list[str]:
         """Return the names of all blocks: the standard library's, the user's own, other libraries'."""
         found = sorted(_walk(STANDARD))
-        if self.own is not None and self.own.is_dir():
+        if self.own is not None and self.own_blocks and self.own.is_dir():
             files = sorted(self.own.rglob("*.py"))
             paths = [file.relative_to(self.own).with_suffix("").parts for file in files]
             public = [parts for parts in paths if not any(part.startswith(("_", ".")) for part in parts)]
@@ -78,6 +96,16 @@ class Catalogue:
         for library, package in _libraries().items():
             found += [f"{library}:{path}" for path in sorted(_walk(package))]
         return found
+
+    def _permit(self, file: Path, name: str) -> None:
+        """Refuse to run the code of an own block, or say that it will be run."""
+        if not self.own_blocks:
+            problem = (
+                f"block '{name}' is code of this diagram's own, in {str(file)!r}, and such code is refused"
+            )
+            raise CatalogueError(problem, "read it, and leave out --no-own-blocks if you trust it")
+        if callable(self.own_blocks) and self.own is not None:
+            self.own_blocks(self.own)
 
     def _own_file(self, path: str) -> Path | None:
         file = self.own.joinpath(*path.split(".")).with_suffix(".py") if self.own else None

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, Declared, In, Out, Param, State
-from quadvis.catalogue import Catalogue, CatalogueError
+from quadvis.catalogue import Catalogue
 
 LEAST = 20  # columns left for the words about a port, however narrow the terminal
 WIDEST = 30  # columns for a default value
@@ -25,13 +25,8 @@ def first_line(block: type[Block]) -> str:
 
 def catalogue_lines(catalogue: Catalogue, width: int | None = None) -> tuple[list[str], list[str]]:
     """Return one line per block, and one per block that cannot be loaded: those are told, never skipped."""
-    rows, failures = [], []
-    for name in catalogue.names():
-        try:
-            rows.append((name, first_line(catalogue.find(name))))
-        except CatalogueError as error:
-            failures.append(str(error))
-    return table(rows, width), failures
+    blocks, failures = catalogue.load_all()
+    return table([(name, first_line(block)) for name, block in blocks.items()], width), failures
 
 
 def description(name: str, block: type[Block], width: int | None = None) -> str:

@@ -13,6 +13,7 @@ from quadvis.errors import Fault, QuadvisError, RunError
 from quadvis.files import SVG, Kind, file_name, write_output
 
 if TYPE_CHECKING:
+    from quadvis.catalogue import Catalogue, OwnBlocks
     from quadvis.diagram.diagram import Diagram
 
 SCHEMA = Kind("the schema", (b"{",), rb'"\$schema"')
@@ -23,7 +24,21 @@ def _load(options: argparse.Namespace, **more: Any) -> Any:
     from quadvis.diagram.diagram import load
 
     given = {"variant": options.variant, "settings": options.set, "params": options.params}
-    return load(options.file, **given, **more)
+    return load(options.file, **given, **more, own_blocks=_own_blocks(options))
+
+
+def _own_blocks(options: argparse.Namespace) -> OwnBlocks:
+    """Return what is to be done about the blocks beside a diagram: refuse them, or say once that they run."""
+    if options.no_own_blocks:
+        return False
+    said = set()
+
+    def say(folder: Path) -> None:
+        if folder not in said:
+            print(f"own blocks from {str(folder)!r}", file=sys.stderr, flush=True)
+        said.add(folder)
+
+    return say
 
 
 def run(options: argparse.Namespace) -> int:
@@ -73,7 +88,8 @@ def sweep(options: argparse.Namespace) -> int:
             options.file, over, variant=one,
             settings=options.set, params=options.params, stop_time=options.stop_time, seed=options.seed,
             workers=options.workers, output=table_path, timings=options.timings, resume=options.resume,
-            plot=None if options.plot == "" else plot, logs=options.logs, progress=progress,
+            plot=None if options.plot == "" else plot, logs=options.logs, own_blocks=_own_blocks(options),
+            progress=progress,
         )  # fmt: skip
     print("\n".join(sweep_lines(table, _width())))
     print(f"table: {table_path}")
@@ -118,7 +134,9 @@ def check(options: argparse.Namespace) -> int:
 
     try:
         diagram = (
-            _load(options) if options.variant else check_diagram(options.file, options.set, options.params)
+            _load(options)
+            if options.variant
+            else check_diagram(options.file, options.set, options.params, _own_blocks(options))
         )
     except DiagramError as error:
         if not options.json:
@@ -152,15 +170,27 @@ def _told(faults: Iterable[Fault]) -> list[dict[str, Any]]:
 
 def list_blocks(options: argparse.Namespace) -> int:
     """Print all blocks; 2 if a library cannot be loaded."""
-    from quadvis.catalogue import Catalogue
     from quadvis.describe import catalogue_lines, facts
 
-    catalogue = Catalogue(Path())
+    catalogue = _catalogue(options)
     if options.json:
-        _print_json([facts(name, catalogue.find(name)) for name in catalogue.names()])
-        return 0
-    lines, failures = catalogue_lines(catalogue, _width())
-    print("\n".join(lines))
+        blocks, failures = catalogue.load_all()
+        _print_json([facts(name, block) for name, block in blocks.items()])
+    else:
+        lines, failures = catalogue_lines(catalogue, _width())
+        print("\n".join(lines))
+    return _all_loaded(failures)
+
+
+def _catalogue(options: argparse.Namespace) -> Catalogue:
+    """Return the blocks that a diagram in the working directory could use."""
+    from quadvis.catalogue import Catalogue
+
+    return Catalogue(Path(), _own_blocks(options))
+
+
+def _all_loaded(failures: list[str]) -> int:
+    """Say after the rest which blocks could not be loaded."""
     if failures:
         raise QuadvisError("\n".join(failures))
     return 0
@@ -168,10 +198,9 @@ def list_blocks(options: argparse.Namespace) -> int:
 
 def describe(options: argparse.Namespace) -> int:
     """Print what a block declares."""
-    from quadvis.catalogue import Catalogue
     from quadvis.describe import description, facts
 
-    block = Catalogue(Path()).find(options.block)
+    block = _catalogue(options).find(options.block)
     if options.json:
         _print_json(facts(options.block, block))
     else:
@@ -219,12 +248,12 @@ def plot(options: argparse.Namespace) -> int:
 
 
 def schema(options: argparse.Namespace) -> int:
-    """Write the JSON schema of diagrams."""
-    from quadvis.catalogue import Catalogue
+    """Write the JSON schema of diagrams; 2 if a block cannot be loaded, which is left out."""
     from quadvis.diagram.schema import diagram_schema
 
-    text = _json(diagram_schema(Catalogue(Path())), indent=1) + "\n"
-    return _write(text, options.output or "-", SCHEMA)
+    blocks, failures = _catalogue(options).load_all()
+    _write(_json(diagram_schema(blocks), indent=1) + "\n", options.output or "-", SCHEMA)
+    return _all_loaded(failures)
 
 
 def new(options: argparse.Namespace) -> int:

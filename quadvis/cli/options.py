@@ -69,9 +69,11 @@ def parser() -> argparse.ArgumentParser:
     check.add_argument("--json", action="store_true", help="print the faults and warnings as JSON")
     blocks = add("list", commands.list_blocks, "list all blocks")
     blocks.add_argument("--json", action="store_true", help="print all declarations as JSON")
+    _own_block_option(blocks)
     describe = add("describe", commands.describe, "describe a block: ports, parameters, source")
     describe.add_argument("block", metavar="BLOCK", help="such as signal.derivative")
     describe.add_argument("--json", action="store_true", help="print its declarations as JSON")
+    _own_block_option(describe)
     analyse = add(
         "analyse", commands.analyse, "linearise the closed loop: poles, margins, limits", ANALYSE_HELP
     )
@@ -96,10 +98,16 @@ def parser() -> argparse.ArgumentParser:
     plot.add_argument("--output", "-o", metavar="FOLDER", help="default: beside the log")
     schema = add("schema", commands.schema, "print the JSON schema of diagrams, for editors")
     schema.add_argument("--output", "-o", metavar="PATH", help="default: standard output")
+    _own_block_option(schema)
     new = add("new", commands.new, "write the skeleton of a block or of a diagram")
     new.add_argument("kind", choices=("block", "diagram"))
     new.add_argument("name", metavar="NAME", help="a block as group.block, a diagram as FILE.yaml")
     return made
+
+
+def _own_block_option(parser: argparse.ArgumentParser) -> None:
+    words = "refuse the code in the folder blocks beside the diagram, which is run otherwise"
+    parser.add_argument("--no-own-blocks", action="store_true", help=words)
 
 
 def _diagram_options(parser: argparse.ArgumentParser) -> None:
@@ -113,6 +121,7 @@ def _setting_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--params", action="append", default=[], metavar="FILE", help=words)
     words = "replace a parameter, such as control/roll.bandwidth='2 rad/s'; repeat it for more"
     parser.add_argument("--set", action="append", default=[], metavar="BLOCK.PARAM=VALUE", help=words)
+    _own_block_option(parser)
 
 
 def _sweep_options(parser: argparse.ArgumentParser) -> None:

@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from quadvis.block import Block
-from quadvis.catalogue import Catalogue
+from quadvis.catalogue import Catalogue, OwnBlocks
 from quadvis.diagram.analyse import QuestionReader, Questions
 from quadvis.diagram.build import Builder, Made
 from quadvis.diagram.check import WireCheck, rate_text
@@ -61,6 +61,7 @@ class Diagram:
     ports: Mapping[str, str] = field(default_factory=dict)  # of parts: the signals of blocks that they are
     sources: tuple[Path, ...] = ()  # the YAML files of the diagram, its parts and its parameter files
     files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of every file that was read, by path
+    own_blocks: bool = True  # whether code beside the diagram may be run
 
     @cached_property
     def inputs(self) -> tuple[Path, ...]:
@@ -157,7 +158,10 @@ class Diagram:
     def varied(self, setting: str) -> Diagram:
         """Return the diagram, loaded again with one more parameter replaced: ``block.parameter=value``."""
         params, settings = [file.path for file in self.parameter_files], (*self.settings, setting)
-        return load(self.path, variant=self.variant, settings=settings, params=params, seed=self.seed)
+        return load(
+            self.path, variant=self.variant, settings=settings, params=params, seed=self.seed,
+            own_blocks=self.own_blocks,
+        )  # fmt: skip
 
     def draw(self) -> str:
         """Return a picture of the diagram as SVG."""
@@ -194,6 +198,7 @@ def load(
     params: Files = (),
     stop_time: str | float | None = None,
     seed: int | None = None,
+    own_blocks: OwnBlocks = True,
 ) -> Diagram:
     """Load and check a diagram; DiagramError tells all its faults at once.
 
@@ -201,33 +206,44 @@ def load(
     ``control/roll.bandwidth=2.5 rad/s``; a name without a dot is a parameter of the diagram. ``params`` are
     parameter files, which hold such settings; they apply in their order, before ``settings``. ``stop_time``
     (s, or a text such as "20 s") and ``seed`` replace the diagram's.
+
+    Loading runs the Python code of the blocks in the folder ``blocks`` beside the diagram.
+    ``own_blocks=False`` refuses those; a function is called with that folder before the first of them is run.
     """
     faults = Faults()
     texts = setting_texts(settings)
     with quoting_only(_quotable(path, params, texts)), _told_once(faults) as digests:
         given, files = read_settings(settings, params, faults)
         spec = read_file(Path(path), faults, part=False)
-        diagram = _Assembly(spec, faults, files).diagram(variant, given, stop_time, seed)
+        diagram = _Assembly(spec, faults, files, own_blocks).diagram(variant, given, stop_time, seed)
         found = tuple(sorted(set(faults.warnings)))
-        return replace(diagram, parameter_files=files, settings=texts, warnings=found, files=digests)
+        return replace(
+            diagram, parameter_files=files, settings=texts, warnings=found, files=digests,
+            own_blocks=bool(own_blocks),
+        )  # fmt: skip
 
 
-def load_text(text: str, folder: str | Path = ".", name: str = "diagram.yaml") -> Diagram:
+def load_text(
+    text: str, folder: str | Path = ".", name: str = "diagram.yaml", own_blocks: OwnBlocks = True
+) -> Diagram:
     """Load a diagram from a text, such as the resolved one in a log, as if it stood in a file of a folder."""
     faults = Faults()
     with quoting_only([folder]), _told_once(faults) as digests:
-        diagram = _Assembly(read_text(text, Path(folder) / name, faults), faults).diagram()
+        spec = read_text(text, Path(folder) / name, faults)
+        diagram = _Assembly(spec, faults, own_blocks=own_blocks).diagram()
         return replace(diagram, files=digests)
 
 
-def check(path: str | Path, settings: Given = (), params: Files = ()) -> Diagram:
+def check(
+    path: str | Path, settings: Given = (), params: Files = (), own_blocks: OwnBlocks = True
+) -> Diagram:
     """Load a diagram, and with each of its variants in turn; DiagramError tells the faults of all of them."""
     faults = Faults()
     quotable = _quotable(path, params, setting_texts(settings))
     with quoting_only(quotable), _told_once(faults) as digests:
         given, files = read_settings(settings, params, faults)
         spec = read_file(Path(path), faults, part=False)
-        assembly = _Assembly(spec, faults, files)
+        assembly = _Assembly(spec, faults, files, own_blocks)
         diagram = assembly.diagram(settings=given)
         for variant in assembly.spec.variants:
             assembly.diagram(variant)
@@ -263,11 +279,17 @@ def _told_once(faults: Faults) -> Iterator[Mapping[str, str]]:
 class _Assembly:
     """Puts diagrams together out of what one file says."""
 
-    def __init__(self, spec: FileSpec | None, faults: Faults, params: Sequence[ParameterFile] = ()) -> None:
+    def __init__(
+        self,
+        spec: FileSpec | None,
+        faults: Faults,
+        params: Sequence[ParameterFile] = (),
+        own_blocks: OwnBlocks = True,
+    ) -> None:
         if spec is None:
             raise DiagramError(faults)
         self.spec, self.faults = spec, faults
-        self.catalogue = Catalogue(spec.path.parent)
+        self.catalogue = Catalogue(spec.path.parent, own_blocks)
         self.parts = Parts(faults)
         self.made: Made = {}
         self._params = [path for file in params for path in (file.path, *file.bases)]

@@ -11,7 +11,6 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from quadvis.block import Block, Declared, Param
-from quadvis.catalogue import Catalogue
 from quadvis.describe import default_text, first_line
 from quadvis.diagram.analyse import ANALYSE_KEYS, LIMIT_KEYS
 from quadvis.diagram.loader import (
@@ -49,9 +48,8 @@ LIBRARY_BLOCK: Schema = {
 }
 
 
-def diagram_schema(catalogue: Catalogue) -> Schema:
-    """Return the schema of all files, with the ports and parameters of the catalogue's blocks."""
-    blocks = {name: catalogue.find(name) for name in catalogue.names()}
+def diagram_schema(blocks: Mapping[str, type[Block]]) -> Schema:
+    """Return the schema of all files, with the ports and parameters of the blocks, given by name."""
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "quadvis diagram",

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from quadvis.catalogue import OwnBlocks
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.settings import COMMAND_LINE
 from quadvis.errors import DiagramError, Fault, Place, QuadvisError
@@ -21,11 +22,17 @@ class Plan:
     """The runs of a sweep as jobs for the workers."""
 
     def __init__(
-        self, axes: Sequence[Axis], grid: Sequence[tuple[int, ...]], base: Configuration, seed: int | None
+        self,
+        axes: Sequence[Axis],
+        grid: Sequence[tuple[int, ...]],
+        base: Configuration,
+        seed: int | None,
+        own_blocks: OwnBlocks,
     ) -> None:
         self.axes, self.grid, self.base, self.seed = axes, grid, base, seed
         self.inputs: set[Path] = set()  # the files that the runs depend on, as far as diagrams were loaded
         self.files: dict[str, str] = {}  # SHA-256 of what the diagrams were read from, by path
+        self.own_blocks = own_blocks
 
     def configuration(self, point: Sequence[int]) -> Configuration:
         """Return the diagram at a point of the grid."""
@@ -39,6 +46,7 @@ class Plan:
             base.settings + own,
             base.params if file == NONE else (*base.params, file),
             base.stop_time,
+            base.own_blocks,
         )
 
     def check(self) -> Diagram:
@@ -56,7 +64,7 @@ class Plan:
 
     def _load(self, point: Sequence[int]) -> Diagram:
         try:
-            diagram = self.configuration(point).load()
+            diagram = self.configuration(point).load(self.own_blocks)
             self.inputs.update(diagram.inputs)
             for path, digest in diagram.files.items():
                 if self.files.setdefault(path, digest) != digest:

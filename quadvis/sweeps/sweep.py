@@ -14,6 +14,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from quadvis.catalogue import OwnBlocks
 from quadvis.diagram.settings import Files, Given, value_text
 from quadvis.errors import QuadvisError, quoted
 from quadvis.files import PLOT, Claim, check_output
@@ -43,6 +44,7 @@ def sweep(
     resume: bool = False,
     plot: str | Path | None = None,
     logs: str | Path | None = None,
+    own_blocks: OwnBlocks = True,
     progress: Progress | None = None,
 ) -> Table:
     """Run a diagram at every point of a grid, and return what the runs gave as a table.
@@ -63,9 +65,9 @@ def sweep(
     """
     axes, processes = read_axes(over), _workers(workers)
     _refuse_conflicts(axes, variant, settings, seed)
-    given = (str(path), variant, _texts(settings), _paths(params), stop_time)
+    given = (str(path), variant, _texts(settings), _paths(params), stop_time, bool(own_blocks))
     grid = points(axes)
-    plan = Plan(axes, grid, Configuration(*given), seed)
+    plan = Plan(axes, grid, Configuration(*given), seed, own_blocks)
     diagram = plan.check()
     target = Path(output) if output else None
     if plot is not None:

@@ -14,6 +14,7 @@ from quadvis.output.statistics import COUNT, FINAL
 from quadvis.signals import leave_to_parent
 
 if TYPE_CHECKING:
+    from quadvis.catalogue import OwnBlocks
     from quadvis.diagram.diagram import Diagram
     from quadvis.output.verdict import Outcome, Part
 
@@ -40,9 +41,10 @@ class Configuration:
     settings: tuple[str, ...] = ()
     params: tuple[str, ...] = ()
     stop_time: str | float | None = None
+    own_blocks: bool = True
 
-    def load(self) -> Diagram:
-        """Return the diagram; DiagramError tells its faults."""
+    def load(self, own_blocks: OwnBlocks = True) -> Diagram:
+        """Return the diagram; DiagramError tells its faults. ``own_blocks`` may be told what is run."""
         from quadvis.diagram.diagram import load
 
         return load(
@@ -51,6 +53,7 @@ class Configuration:
             settings=self.settings,
             params=self.params,
             stop_time=self.stop_time,
+            own_blocks=self.own_blocks and own_blocks,
         )
 
 

@@ -137,7 +137,7 @@ def test_check_and_draw_take_them_too(capsys: pytest.CaptureFixture[str]) -> Non
 
 
 def test_the_schema_takes_parameter_files_and_refuses_what_is_wrong_in_form() -> None:
-    validator = Draft202012Validator(diagram_schema(Catalogue()))
+    validator = Draft202012Validator(diagram_schema(Catalogue().load_all()[0]))
     for text in FILES.values():
         assert validator.is_valid(yaml.safe_load(text))
     right = yaml.safe_load(FILES[S1])

@@ -16,7 +16,7 @@ from quadvis.diagram.schema import diagram_schema
 from .corpus import all_cases
 
 DIAGRAMS = Path(__file__).parents[2] / "diagrams"
-SCHEMA = diagram_schema(Catalogue())
+SCHEMA = diagram_schema(Catalogue().load_all()[0])
 VALIDATOR = Draft202012Validator(SCHEMA)
 
 

@@ -1,0 +1,167 @@
+"""The code in the folder `blocks` beside a diagram: it is said before it runs, and can be refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import quadvis
+from quadvis.cli import main
+from quadvis.diagram.diagram import check, load_text
+from quadvis.errors import DiagramError
+
+MARK = "import pathlib\npathlib.Path('ran').touch()\n"
+FAN = '''"""A fan."""
+from quadvis.block import Block, Out
+
+class Fan(Block):
+    """Turns."""
+    y = Out(doc="speed")
+    def output(self):
+        return 1.0
+'''
+LOOP = """\
+quadvis: 1
+name: loop
+rates: {fast: 10 Hz}
+stop_time: 0.2 s
+seed: 1
+blocks:
+  fan: {block: wind.fan, rate: fast}
+  again: {block: wind.fan, rate: fast}
+  gain: {block: signal.gain, rate: fast, in: {u: fan.y}}
+"""
+COMMANDS = [
+    ("run", "mine/loop.yaml", "--log", ""),
+    ("check", "mine/loop.yaml"),
+    ("check", "mine/loop.yaml", "--json"),
+    ("check", "mine/loop.yaml", "--variant", "half"),
+    ("draw", "mine/loop.yaml", "-o", "-"),
+    ("analyse", "mine/loop.yaml"),
+    ("sweep", "mine/loop.yaml", "--over", "seed=0..1", "--workers", "2", "--plot", "", "-o", "table.csv"),
+]
+LIBRARY = [
+    ("list",),
+    ("list", "--json"),
+    ("describe", "wind.fan"),
+    ("describe", "wind.fan", "--json"),
+    ("schema",),
+]
+Captured = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(autouse=True)
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of someone else's: what its block does when it is loaded leaves a file behind."""
+    block = tmp_path / "mine" / "blocks" / "wind" / "fan.py"
+    block.parent.mkdir(parents=True)
+    block.write_text(FAN + MARK)
+    variant = "variants: {half: {slots: {gain: {block: signal.gain, with: {factor: 0.5}}}}}\n"
+    text = LOOP.replace("gain: {block", "gain: {slot: true, block") + variant
+    (tmp_path / "mine" / "loop.yaml").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+def test_a_command_says_once_that_it_runs_the_blocks_beside_a_diagram(
+    command: tuple[str, ...], capsys: Captured
+) -> None:
+    main(command)
+    assert capsys.readouterr().err.count("own blocks from 'mine/blocks'\n") == 1
+    assert Path("ran").exists()
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+def test_a_command_refuses_them_where_it_is_asked_to(command: tuple[str, ...], capsys: Captured) -> None:
+    assert main([*command, "--no-own-blocks"]) == 2
+    told = "".join(capsys.readouterr())
+    assert "block 'wind.fan' is code of this diagram's own, in 'mine/blocks/wind/fan.py'" in told
+    assert "own blocks from" not in told
+    assert not Path("ran").exists()
+
+
+@pytest.mark.parametrize("command", LIBRARY, ids=" ".join)
+def test_what_shows_the_library_says_it_too_and_can_refuse(
+    command: tuple[str, ...], capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir("mine")
+    code = main([*command, "--no-own-blocks"])
+    shown = capsys.readouterr()
+    assert code == (2 if command[0] == "describe" else 0)
+    assert "Turns." not in shown.out and "own blocks from" not in shown.err and not Path("ran").exists()
+    assert main(command) == 0
+    shown = capsys.readouterr()
+    assert shown.err == "own blocks from 'blocks'\n"
+    assert "Turns." in shown.out and Path("ran").exists()
+
+
+@pytest.mark.parametrize("command", [("check", "mine/plain.yaml"), ("list",)], ids=" ".join)
+def test_nothing_is_said_where_no_own_block_is_run(command: tuple[str, ...], capsys: Captured) -> None:
+    Path("mine/plain.yaml").write_text(LOOP.replace("wind.fan", "sources.constant, with: {value: 1}"))
+    assert main(command) == 0
+    assert capsys.readouterr().err == ""
+    assert not Path("ran").exists()
+
+
+def test_it_is_said_before_the_code_runs_even_if_that_fails(capsys: Captured) -> None:
+    Path("mine/blocks/wind/fan.py").write_text("import sys\nprint('running', file=sys.stderr)\n1 / 0\n")
+    assert main(["check", "mine/loop.yaml"]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("own blocks from 'mine/blocks'\nrunning\n")
+    assert "ZeroDivisionError" in told
+
+
+def test_the_place_is_shown_without_control_characters(capsys: Captured) -> None:
+    Path("mine").rename("mi\x1b[2Jne")
+    assert main(["check", "mi\x1b[2Jne/loop.yaml"]) == 0
+    assert capsys.readouterr().err == "own blocks from 'mi\\x1b[2Jne/blocks'\n"
+
+
+def test_from_python_they_are_refused_or_reported_by_a_parameter() -> None:
+    for refused in (
+        lambda: quadvis.load("mine/loop.yaml", own_blocks=False),
+        lambda: check("mine/loop.yaml", own_blocks=False),
+        lambda: load_text(LOOP, "mine", own_blocks=False),
+        lambda: quadvis.sweep("mine/loop.yaml", {"seed": range(2)}, own_blocks=False, workers=1),
+    ):
+        with pytest.raises(DiagramError, match=r"code of this diagram's own.*and such code is refused"):
+            refused()
+    assert not Path("ran").exists()
+    folders: list[Path] = []
+    diagram = quadvis.load("mine/loop.yaml", own_blocks=folders.append)
+    assert set(folders) == {Path("mine/blocks")}
+    assert diagram.own_blocks
+
+
+def test_a_diagram_without_own_blocks_loads_where_they_are_refused() -> None:
+    Path("mine/plain.yaml").write_text(LOOP.replace("wind.fan", "sources.constant, with: {value: 1}"))
+    diagram = quadvis.load("mine/plain.yaml", own_blocks=False)
+    assert not diagram.varied("gain.factor=2").own_blocks
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("1 / 0\n", "ZeroDivisionError"),
+        ("def fan(:\n", "SyntaxError"),
+        ("import no_such_module_anywhere\n", "ModuleNotFoundError"),
+        ("", "must define one block"),
+        (FAN.replace("def output(self)", "def output(self, u)"), "Fan.output asks for 'u'"),
+    ],
+)
+@pytest.mark.parametrize("command", [("list",), ("list", "--json"), ("schema",)], ids=" ".join)
+def test_a_broken_block_is_reported_and_the_rest_is_shown(
+    command: tuple[str, ...], text: str, reason: str, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir("mine")
+    Path("blocks/wind/fan.py").write_text(text)
+    Path("blocks/wind/good.py").write_text(FAN.replace("Fan", "Good"))
+    assert main(command) == 2
+    shown = capsys.readouterr()
+    assert "'wind.fan'" in shown.err and reason in shown.err
+    assert "wind.good" in shown.out and "signal.gain" in shown.out and "wind.fan" not in shown.out
+    if command != ("list",):
+        json.loads(shown.out)
