@@ -95,7 +95,11 @@ class Diagram:
 
     @property
     def hash(self) -> str:
-        """SHA-256 of the resolved diagram: two runs with one hash and one seed are the same to the bit."""
+        """SHA-256 of the resolved diagram: two runs with one hash and one seed are the same to the bit.
+
+        On one kind of processor, with one set of versions: BLAS, OpenCV and the C library choose their code
+        by the processor, and may round the last digit otherwise.
+        """
         from hashlib import sha256
 
         return sha256(self.resolved.encode()).hexdigest()

@@ -33,6 +33,19 @@ blocks:
   again: {block: wind.fan, rate: fast}
   gain: {block: signal.gain, rate: fast, in: {u: fan.y}}
 """
+WRITES = """\
+quadvis: 1
+name: writes
+rates: {{slow: 10 Hz}}
+stop_time: 0.1 s
+blocks:
+  eye:
+    block: vision.rendered_camera
+    rate: slow
+    with: {{calibration: {calibration}}}
+    in: {{position: {{value: [0, 0, 1.5], unit: m}}, attitude: {{value: [0, 0, 0], unit: rad}}}}
+  writer: {{block: vision.frame_writer, rate: slow, with: {{folder: {folder}}}, in: {{frame: eye.frame}}}}
+"""
 COMMANDS = [
     ("run", "mine/loop.yaml", "--log", ""),
     ("check", "mine/loop.yaml"),
@@ -165,3 +178,17 @@ def test_a_broken_block_is_reported_and_the_rest_is_shown(
     assert "wind.good" in shown.out and "signal.gain" in shown.out and "wind.fan" not in shown.out
     if command != ("list",):
         json.loads(shown.out)
+
+
+@pytest.mark.parametrize("folder", ["../out", "{there}/out"])
+@pytest.mark.parametrize("command", ["check", "draw", "run"])
+def test_only_a_run_writes_where_the_writers_of_a_foreign_diagram_say(
+    command: str, folder: str, project: Path
+) -> None:
+    calibration = Path(__file__).parents[2] / "diagrams" / "calib" / "camera.yaml"
+    Path("mine/writes.yaml").write_text(
+        WRITES.format(calibration=calibration, folder=folder.format(there=project))
+    )
+    more = {"check": (), "draw": ("-o", "drawn.svg"), "run": ("--log", "")}[command]
+    assert main([command, "mine/writes.yaml", *more]) == 0
+    assert (project / "out").exists() == (command == "run")

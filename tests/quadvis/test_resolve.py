@@ -107,8 +107,9 @@ def test_a_calibration_file_is_part_of_the_hash(tmp_path: Path) -> None:
 def test_a_folder_that_a_run_writes_is_no_part_of_the_hash(tmp_path: Path) -> None:
     path = copied(tmp_path / "copy").with_name("record.yaml")
     before = load(path).hash
-    (path.parent / "recordings" / "hand_held").mkdir(parents=True)
-    (path.parent / "recordings" / "hand_held" / "000001.jpg").write_bytes(b"picture")
+    written = path.parent.parent / "runs" / "hand_held"
+    written.mkdir(parents=True)
+    (written / "000001.jpg").write_bytes(b"picture")
     assert load(path).hash == before
 
 
