@@ -12,7 +12,6 @@ import subprocess
 import sys
 import textwrap
 import threading
-import time
 from pathlib import Path
 from typing import Any
 
@@ -278,10 +277,9 @@ def test_a_killed_run_keeps_all_but_the_last_tenth_of_a_second(tmp_path: Path) -
         [sys.executable, "-c", KILLED, str(path)], stdout=subprocess.PIPE, text=True, env=environment()
     )
     assert child.stdout is not None
-    child.stdout.readline()
-    time.sleep(0.7)
+    lines = [child.stdout.readline() for _ in range(400)]  # one in a millisecond at most
     child.send_signal(signal.SIGKILL)
-    written = [float(line) for line in child.stdout.read().split("\n")[:-1]]
+    written = [float(line) for line in [*lines, *child.stdout.read().split("\n")[:-1]]]
     child.wait()
     child.stdout.close()
     log = read_log(path)

@@ -605,9 +605,10 @@ def test_a_worker_that_is_killed_is_told_in_one_sentence() -> None:
 @linux
 def test_workers_end_with_the_first_process_however_it_ends() -> None:
     long_runs(100_000)
-    process = quadvis_sweep("long.yaml", "--over", "seed=0..9", "--workers", "2", "-o", "x.csv")
+    arguments = ("--over", "seed=0..9", "--workers", "2", "-o", "x.csv", "--logs", "logs")
+    process = quadvis_sweep("long.yaml", *arguments)
     workers = wait_for(lambda: len(children(process)) == 2 and children(process))
-    time.sleep(1.0)  # they have begun
+    wait_for(lambda: len(list(Path("logs").glob("*"))) == 2)  # both have begun
     process.kill()
     process.communicate(timeout=60)
     assert all(wait_for(lambda pid=pid: gone(pid)) for pid in workers)

@@ -18,12 +18,16 @@ import pytest
 from quadvis_blocks.vision._calibration import CameraCalibration
 from quadvis_blocks.vision._two_planes import TwoPlanesCalibration
 
+from .script import run_script
+
 ROOT = Path(__file__).parents[2]
 PHOTOGRAPHS = ROOT.parent / "shared" / "data" / "chessboard"
 K = np.array([[430.0, 0, 226], [0, 438, 161], [0, 0, 1]])
 
 
 def calibrate(*arguments, options=(), folder=None, stdout=subprocess.PIPE):
+    if not options and stdout == subprocess.PIPE:
+        return run_script(ROOT / "tools" / "calibrate", *arguments, folder=folder)
     paths = [str(ROOT), str(ROOT / "blocks"), *filter(None, [os.environ.get("PYTHONPATH")])]
     return subprocess.run(
         [sys.executable, *options, str(ROOT / "tools" / "calibrate"), *map(str, arguments)],

@@ -16,6 +16,8 @@ import pytest
 from quadvis_blocks.vision._colours import ColourCalibration
 from quadvis_blocks.vision._scenes import CONDITIONS, shoot
 
+from .script import run_script
+
 ROOT = Path(__file__).parents[2]
 DIAGRAM = ROOT / "diagrams" / "recorded.yaml"
 FRAMES = [
@@ -24,7 +26,11 @@ FRAMES = [
 VIDEO = ROOT / "diagrams" / "recordings" / "hand_held.mp4"
 
 
-def run(*arguments, folder, options=(), stdout=subprocess.PIPE):
+def run(program, *arguments, folder, options=(), stdout=subprocess.PIPE):
+    video = any(str(argument).endswith(".mp4") for argument in arguments)  # whose reader prints by itself
+    if isinstance(program, Path) and not options and not video and stdout == subprocess.PIPE:
+        return run_script(program, *arguments, folder=folder)
+    arguments = (program, *arguments)
     paths = [str(ROOT), str(ROOT / "blocks"), *filter(None, [os.environ.get("PYTHONPATH")])]
     return subprocess.run(
         [sys.executable, *options, *map(str, arguments)],

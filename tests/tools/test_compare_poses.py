@@ -11,6 +11,8 @@ import cv2
 import numpy as np
 import pytest
 
+from .script import run_script
+
 ROOT = Path(__file__).parents[2]
 PICTURES = ROOT / "diagrams" / "recordings" / "hand_held"
 VIDEO = ROOT / "diagrams" / "recordings" / "hand_held.mp4"
@@ -18,6 +20,8 @@ ANGLES = slice(3, 6)
 
 
 def run(tool, *arguments, folder, options=()):
+    if not options:
+        return run_script(ROOT / "tools" / tool, *arguments, folder=folder)
     paths = [*filter(None, [os.environ.get("PYTHONPATH")]), str(ROOT), str(ROOT / "blocks")]
     return subprocess.run(
         [sys.executable, *options, str(ROOT / "tools" / tool), *map(str, arguments)],

@@ -1,34 +1,26 @@
 """tools/constraints: the file of tried versions pins all that pyproject.toml asks for, and nothing else."""
 
-import subprocess
 import sys
 import tomllib
-from importlib.machinery import SourceFileLoader
-from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 
 import pytest
 from packaging.version import Version
+
+from .script import loaded, run_script
 
 ROOT = Path(__file__).parents[2]
 TOOL = ROOT / "tools" / "constraints"
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
 
 
-def loaded():
-    loader = SourceFileLoader("constraints", str(TOOL))
-    module = module_from_spec(spec_from_loader("constraints", loader))
-    loader.exec_module(module)
-    return module
-
-
-constraints = loaded()
+constraints = loaded(TOOL)
 STATED = constraints.read((ROOT / "tools" / "constraints.txt").read_text("utf-8"))
 
 
 @pytest.mark.skipif(sys.version_info[:2] != (3, 11), reason="the versions were tried with Python 3.11")
 def test_the_file_is_what_the_tool_would_write_here() -> None:
-    found = subprocess.run([sys.executable, TOOL, "--check"], capture_output=True, text=True, check=False)
+    found = run_script(TOOL, "--check")
     assert (found.returncode, found.stderr) == (0, "")
 
 
