@@ -25,10 +25,11 @@ from quadvis.block import Block, In, Out, Param, State
 class {name}(Block):
     """First-order lag of a signal: what the block does, in one sentence.
 
-    ``y[k] = y[k-1] + share * (u[k] - y[k-1])``, from zero. Say here where it comes from and how far it holds.
+    ``y[k] = y[k-1] + share * (u[k] - y[k-1])``, from zero. Say here where it comes from
+    and how far it holds.
     """
 
-    share = Param(0.5, above=0.0, max=1.0, tune=True, doc="how much of the way to go at each tick")
+    share = Param(0.5, above=0.0, max=1.0, tune=True, doc="part of the way per tick")
     u = In(unit="a", doc="the signal")
     y = Out(unit="a", doc="the lagged signal")
     last = State()
@@ -42,9 +43,10 @@ class {name}(Block):
         self.last += self.share * (u - self.last)
 '''
 
-TEST = '''"""{path}"""
+TEST = '''"""Tests of the block {path}."""
 
 {head}
+
 def test_a_step_is_followed_by_a_geometric_row() -> None:
     y = drive({name}(share=0.5), u=[1.0] * 5, rate="10 Hz").y
     assert y == pytest.approx([0.5, 0.75, 0.875, 0.9375, 0.96875])
@@ -58,14 +60,17 @@ def test_a_share_above_one_is_refused() -> None:
 OWN_HEAD = """from pathlib import Path
 
 import pytest
-
 from quadvis.block import ParameterError
 from quadvis.catalogue import Catalogue
+from quadvis.conformance import check_block
 from quadvis.testing import drive
 
-{name} = Catalogue(Path(__file__).parents[{up}]).find("{path}")
+BLOCKS = Catalogue(Path(__file__).parents[{up}])
+{name} = BLOCKS.find("{path}")
 
 
+def test_it_does_what_every_block_must_do() -> None:
+    check_block({name}, test=Path(__file__))
 """
 
 STANDARD_HEAD = """import pytest
@@ -73,8 +78,6 @@ STANDARD_HEAD = """import pytest
 from quadvis.block import ParameterError
 from quadvis.testing import drive
 from {module} import {name}
-
-
 """
 
 DIAGRAM = """# A signal through a lag: change it into your own.

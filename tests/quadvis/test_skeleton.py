@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -34,7 +35,37 @@ def test_a_new_block_is_found_by_a_diagram_beside_it_and_passes_its_test(
     assert result.units["lag.y"] == "m"
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     done = subprocess.run([sys.executable, "-m", "pytest", "-q"], capture_output=True, text=True)
-    assert (done.returncode, "2 passed" in done.stdout) == (0, True), done.stdout
+    assert (done.returncode, "3 passed" in done.stdout) == (0, True), done.stdout
+
+
+@pytest.mark.parametrize("name", ["fan", "signal.my_filter", "control.position_integrator"])
+@pytest.mark.parametrize("ours", [False, True], ids=["own", "standard"])
+def test_what_is_written_is_as_ruff_wants_it(name: str, ours: bool, project: Path) -> None:
+    ruff = [sys.executable, "-m", "ruff"]
+    if ours:
+        (project / "blocks" / "quadvis_blocks").mkdir(parents=True)
+        (project / "quadvis").mkdir()
+        for module in ("quadvis/block", "quadvis/testing", "blocks/quadvis_blocks/__init__"):
+            (project / f"{module}.py").touch()  # so that ruff knows them as this project's
+        shutil.copy(Path(__file__).parents[2] / "pyproject.toml", project)
+    paths = [str(path) for path in new_block(name)]
+    options = [] if ours else ["--select", "E,F,I,B,UP,SIM,RUF"]
+    for command in (["format", "--diff"], ["check", "--no-cache", *options]):
+        done = subprocess.run([*ruff, *command, *paths], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_test_of_a_new_block_finds_a_breach_of_the_contract(
+    project: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    block, test = new_block("signal.my_filter")
+    text = block.read_text()
+    block.write_text(
+        text.replace("        return self.last", "        self.last += 0.001 * u\n        return self.last")
+    )
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    done = subprocess.run([sys.executable, "-m", "pytest", "-q", str(test)], capture_output=True, text=True)
+    assert (done.returncode, "test_it_does_what_every_block_must_do" in done.stdout) == (1, True), done.stdout
 
 
 def test_a_new_block_of_the_standard_library_goes_there(project: Path) -> None:
