@@ -1,5 +1,6 @@
 """Flights of references that move, and with a failsafe: a blackout, landings, take-overs, a hanging IMU."""
 
+import functools
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,15 @@ LSB = np.array([4.0, 100.0, 100.0, 10.0]) / 1000
 
 
 def fly(name: str, variant: str | None = None, seed: int = 1, **more: Any) -> Any:
+    return whole_flight(name, variant, seed) if not more else flown(name, variant, seed, **more)
+
+
+@functools.lru_cache(maxsize=4)  # some flights are looked at by several tests
+def whole_flight(name: str, variant: str | None, seed: int) -> Any:
+    return flown(name, variant, seed)
+
+
+def flown(name: str, variant: str | None, seed: int, **more: Any) -> Any:
     return quadvis.load(DIAGRAMS / f"{name}.yaml", variant=variant, seed=seed, **more).run()
 
 

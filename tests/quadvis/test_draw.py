@@ -386,8 +386,11 @@ def test_long_constants_are_shortened_and_kept_whole_in_the_tooltip() -> None:
 names = st.text("abcxyz_", min_size=1, max_size=9)
 
 
+Drawn = tuple[list[DrawnBlock], list[DrawnWire]]
+
+
 @st.composite
-def diagrams(draws: st.DrawFn) -> tuple[list[DrawnBlock], list[DrawnWire]]:
+def diagrams(draws: st.DrawFn) -> Drawn:
     paths = draws(
         st.lists(
             st.tuples(st.sampled_from(["", "p/", "p/q/", "r/"]), names), min_size=1, max_size=7, unique=True
@@ -409,9 +412,20 @@ def diagrams(draws: st.DrawFn) -> tuple[list[DrawnBlock], list[DrawnWire]]:
     return blocks, wires
 
 
-@settings(max_examples=20, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=5, suppress_health_check=list(HealthCheck))
 @given(diagrams())
-def test_any_diagram_is_well_drawn(diagram: tuple[list[DrawnBlock], list[DrawnWire]]) -> None:
+def test_any_diagram_is_well_drawn(diagram: Drawn) -> None:
+    assert_drawn_well(diagram)
+
+
+@pytest.mark.slow
+@settings(max_examples=40, suppress_health_check=list(HealthCheck))
+@given(diagrams())
+def test_many_more_diagrams_are_well_drawn(diagram: Drawn) -> None:
+    assert_drawn_well(diagram)
+
+
+def assert_drawn_well(diagram: Drawn) -> None:
     blocks, wires = diagram
     picture = read(draw("any", blocks, wires, {}, TASKS))
     assert_well_drawn(picture, blocks, wires)

@@ -38,6 +38,7 @@ def test_white_noise_has_its_deviation_on_each_channel_and_no_memory() -> None:
     assert abs(np.corrcoef(errors[1:, 0], errors[:-1, 0])[0, 1]) < 4 / 100
 
 
+@pytest.mark.slow
 def test_the_drift_has_its_deviation_and_correlation_time() -> None:
     result = measure(steps=100000, angle_noise=0.0, drift_time=2.0)
     drift = result.roll - 0.1
@@ -58,6 +59,7 @@ def test_the_drift_is_there_from_the_first_sample() -> None:
     assert np.std(first) == pytest.approx(1.0, rel=4 / math.sqrt(600))
 
 
+@pytest.mark.slow
 def test_the_rates_drift_apart_from_each_other_and_from_the_angles() -> None:
     quiet = QUIET | {"drift": 0.1, "drift_time": 2.0}
     result = measure(steps=100000, **quiet, rate_drift=0.02)
