@@ -127,7 +127,7 @@ def test_some_block_of_every_group_is_compiled_in_the_first_stage() -> None:
     }  # fmt: skip
 
 
-@pytest.mark.parametrize(("name", "check"), conformance())
+@pytest.mark.parametrize(("name", "check"), list(conformance()))
 def test_every_block_conforms(name: str, check: str, subject: Subject) -> None:
     CHECKS[check](subject)
 
