@@ -7,6 +7,7 @@ import re
 import shlex
 import shutil
 import subprocess
+import tomllib
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -231,6 +232,18 @@ def test_a_command_ends_as_its_readme_says(
 
 def _contents(folder: Path) -> dict[Path, bytes]:
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_the_licences_that_the_package_names_go_with_it() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["license"] == "BSD-3-Clause AND EPL-2.0"
+    texts = [(ROOT / file).read_text(encoding="utf-8") for file in project["license-files"]]
+    assert [text.partition("\n")[0].strip("# ") for text in texts] == [
+        "BSD 3-Clause License",
+        "Eclipse Public License - v 2.0",
+    ]
+    carried = {path.parent for path in (ROOT / "quadvis").rglob("*LICEN*")}
+    assert carried == {(ROOT / file).parent for file in project["license-files"]} - {ROOT}
 
 
 def test_nothing_that_is_made_by_running_is_tracked() -> None:
