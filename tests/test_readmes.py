@@ -46,7 +46,7 @@ class Command:
         return parser().parse_args(self.words)
 
 
-def told_commands(text: str) -> list[Command]:
+def stated_commands(text: str) -> list[Command]:
     """Return the command lines of a README that can be typed as they stand.
 
     In tables "`... --variant x`" stands for the command beside the diagram above with these words added, and
@@ -84,14 +84,16 @@ def _is_template(words: tuple[str, ...]) -> bool:
     return any(re.search(r"\b[A-Z]{3,}\b|[\[<|]|^\.\.\.$", word) for word in words)
 
 
-TOLD = list({str(command): command for text in TEXTS.values() for command in told_commands(text)}.values())
+STATED = list(
+    {str(command): command for text in TEXTS.values() for command in stated_commands(text)}.values()
+)
 WITH_DIAGRAM = [
-    command for command in TOLD if command.words[0] in ("run", "check", "analyse", "draw", "sweep")
+    command for command in STATED if command.words[0] in ("run", "check", "analyse", "draw", "sweep")
 ]
 
 
 def test_the_commands_of_the_readmes_are_found() -> None:
-    typed = {str(command) for command in TOLD}
+    typed = {str(command) for command in STATED}
     assert {
         "run diagrams/hover.yaml",
         "run diagrams/hover.yaml --set 'bandwidth=1 rad/s'",
@@ -102,7 +104,7 @@ def test_the_commands_of_the_readmes_are_found() -> None:
     assert len(WITH_DIAGRAM) >= 30
 
 
-@pytest.mark.parametrize("command", TOLD, ids=str)
+@pytest.mark.parametrize("command", STATED, ids=str)
 def test_a_command_of_a_readme_can_be_read(command: Command) -> None:
     assert command.options.command
 
@@ -131,14 +133,14 @@ def test_every_diagram_stands_in_the_table() -> None:
 
 def test_every_variant_of_every_diagram_stands_in_the_table() -> None:
     text = TEXTS["diagrams/README.md"].partition("## The format")[0]
-    told = {(Path(command.options.file).name, str(command.options.variant)) for command in WITH_DIAGRAM}
-    told |= {(name, "rendered") for name in re.findall(r"\w+\.yaml", text) if "any of the five" in text}
+    stated = {(Path(command.options.file).name, str(command.options.variant)) for command in WITH_DIAGRAM}
+    stated |= {(name, "rendered") for name in re.findall(r"\w+\.yaml", text) if "any of the five" in text}
     paths = sorted((ROOT / "diagrams").glob("*.yaml"))
     assert [
         (path.name, variant)
         for path in paths
         for variant in load(path).variants
-        if (path.name, variant) not in told
+        if (path.name, variant) not in stated
     ] == []
 
 
@@ -168,32 +170,32 @@ def test_the_table_of_commands_has_every_command_and_no_other() -> None:
     assert SIGNATURES.keys() == COMMANDS.keys()
 
 
-def told_options(name: str) -> set[str]:
+def stated_options(name: str) -> set[str]:
     return set(re.findall(r"(?<![\w-])--?[a-z][a-z-]*", " ".join(SIGNATURES[name])))
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_row_of_the_table_of_commands_has_no_option_that_does_not_exist(name: str) -> None:
-    assert told_options(name) <= set(COMMANDS[name]._option_string_actions)
+    assert stated_options(name) <= set(COMMANDS[name]._option_string_actions)
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_option_stands_in_the_row_of_its_command_or_in_that_of_run(name: str) -> None:
-    told = told_options(name) | told_options("run")
+    stated = stated_options(name) | stated_options("run")
     actions = [action.option_strings for action in COMMANDS[name]._actions]
-    assert [flags for flags in actions if flags and "--help" not in flags and not told & set(flags)] == []
+    assert [flags for flags in actions if flags and "--help" not in flags and not stated & set(flags)] == []
 
 
 def test_every_key_of_a_diagram_is_documented_and_no_other() -> None:
     rows = table(TEXTS["diagrams/README.md"], "The format")
-    told = {key for row in rows for key in re.findall(r"`(\w+)`", row[0])}
-    assert told == {*REQUIRED_KEYS, *DIAGRAM_KEYS}
+    stated = {key for row in rows for key in re.findall(r"`(\w+)`", row[0])}
+    assert stated == {*REQUIRED_KEYS, *DIAGRAM_KEYS}
 
 
 def test_every_tool_is_in_the_readme_and_no_other() -> None:
-    told = set(re.findall(r"`tools/(\w+)", TEXTS["README.md"]))
+    stated = set(re.findall(r"`tools/(\w+)", TEXTS["README.md"]))
     files = {path.name for path in (ROOT / "tools").iterdir() if path.is_file() and not path.suffix}
-    assert told == files
+    assert stated == files
 
 
 @pytest.mark.parametrize("name", ROOMS)
@@ -211,7 +213,7 @@ def test_the_times_of_the_readme_say_on_what_they_were_taken() -> None:
     assert all(word in before for word in ("one core of", "GHz", "Python 3.11", "numpy", "OpenCV"))
 
 
-RUNS = [command for command in TOLD if command.words[0] in ("run", "analyse")]
+RUNS = [command for command in STATED if command.words[0] in ("run", "analyse")]
 
 
 @pytest.mark.slow

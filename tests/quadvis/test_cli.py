@@ -388,8 +388,8 @@ def test_help_tells_every_command_and_what_it_does(capsys: Captured) -> None:
     (commands,) = [action for action in parser()._actions if isinstance(action, argparse._SubParsersAction)]
     assert len(commands.choices) >= 10
     assert done("--help") == 0
-    told = dict(re.findall(r"^    (\w+) +(\S.*)$", capsys.readouterr().out, re.MULTILINE))
-    assert told.keys() == commands.choices.keys()
+    shown = dict(re.findall(r"^    (\w+) +(\S.*)$", capsys.readouterr().out, re.MULTILINE))
+    assert shown.keys() == commands.choices.keys()
 
 
 @pytest.mark.parametrize("name", [name for action in parser()._actions for name in action.choices or ()])
