@@ -1,14 +1,25 @@
 """Start of the command line."""
 
-import gc
-import os
+# Ctrl-C may come while the modules below are still being imported.
+try:
+    import gc
+    import os
 
-# Nothing of what is made to start a command is garbage; looking for some takes a twentieth of the start.
-gc.disable()
-# One BLAS thread: matrices are small here, and starting a pool of threads costs more than importing numpy.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Nothing of what is made to start a command is garbage; looking for it takes a twentieth of the start.
+    gc.disable()
+    # One BLAS thread: matrices are small here, and a pool of threads costs more than importing numpy.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from quadvis.cli import main  # noqa: E402
+    from quadvis.shell import listen
+
+    listen()
+
+    from quadvis.cli import main
+except KeyboardInterrupt:
+    import os
+
+    os.write(2, b"interrupted\n")
+    os._exit(130)
 
 if __name__ == "__main__":
     raise SystemExit(main())

@@ -68,6 +68,10 @@ class Result:
         """Return the times of a signal's rows (s)."""
         return self.signals.times(name)
 
+    def rate(self, name: str) -> str:
+        """Return the name of the rate at which a signal's block works."""
+        return self.signals.rate(name)
+
     @property
     def units(self) -> Mapping[str, str]:
         """The unit of every signal."""

@@ -11,10 +11,11 @@ import numpy as np
 
 from quadvis.analysis.analyse import Analysis
 from quadvis.analysis.margins import Loop
+from quadvis.canvas import blank_sheet
 from quadvis.describe import table
 from quadvis.errors import QuadvisError
 from quadvis.files import PNG, file_name, write_output
-from quadvis.output.plot import COLOURS, STYLE
+from quadvis.output.style import COLOURS, STYLE
 from quadvis.units import Unit, format_quantity
 
 if TYPE_CHECKING:
@@ -102,19 +103,13 @@ def save_bode_plots(analysis: Analysis, folder: Path) -> list[Path]:
 
     QuadvisError if one of them would replace what the diagram reads, or is no picture.
     """
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     diagram = analysis.diagram
     name = file_name(*filter(None, (diagram.name, diagram.variant)))
     paths = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for loop in analysis.loops.values():
-            with rc_context(dict(STYLE)):
-                figure = Figure(figsize=(8.0, 6.0), layout="constrained")
-                FigureCanvasAgg(figure)
+            with blank_sheet(8.0, 6.0, STYLE, layout="constrained") as figure:
                 figure.suptitle(f"Loop opened at {loop.label}")
                 gain, phase = figure.subplots(2, 1, sharex=True)
                 _draw(loop, gain, phase)

@@ -10,22 +10,22 @@
               - plant.position[0]          # a signal, an element [2,1], or elements [0:2]
               - {signal: "vision/pose.position[0]", label: camera}
             unit: cm                       # of the axis; the first signal's own if absent
-            reference: 0                   # dashed line from which the RMS in the legend counts
+            reference: 0                   # dashed line; the legend has the RMS of the distance from it
       - title: Yaw angle                   # a figure of one panel may have the panel's keys
         signals: plant.attitude[2]
         unit: deg
 
 A reference is in the unit of the axis, or brings its own ("4 cm"). In YAML's flow style a signal with an
-index needs quotes. Only a title and signals are required.
+index needs quotes. Only a title and signals are required. Sampled signals are drawn as stairs, since they
+stand still between their ticks; those of the continuous rate as lines.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -33,49 +33,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis import nodes
+from quadvis.canvas import blank_sheet
 from quadvis.engine.names import read_name
 from quadvis.errors import DiagramError, Faults, QuadvisError, quoted, suggestion
 from quadvis.files import PNG, write_output
+from quadvis.output.panel import Curve, draw_panel, legend_of
 from quadvis.output.stretch import NANOSECONDS, stamp
+from quadvis.output.style import STYLE, WIDTHS, fitted, measure
 from quadvis.units import Unit, UnitError, parse_units
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from quadvis.output.log_reader import Log
 
-# Okabe and Ito's colours, which colour-blind readers tell apart.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#222222", "#B8A800")
-STYLE: Mapping[Any, Any] = {
-    "axes.edgecolor": "#666666",
-    "axes.grid": True,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.titlesize": 11,
-    "axes.xmargin": 0.0,
-    "axes.ymargin": 0.08,
-    "figure.titlesize": 13,
-    "figure.titleweight": "bold",
-    "font.size": 10,
-    "grid.color": "#DDDDDD",
-    "grid.linewidth": 0.6,
-    "legend.borderaxespad": 0.0,
-    "legend.borderpad": 0.2,
-    "legend.fontsize": 9,
-    "legend.frameon": False,
-    "legend.handlelength": 1.4,
-    "legend.title_fontsize": 11,
-    "lines.linewidth": 1.0,
-    "text.parse_math": False,
-    "xtick.color": "#444444",
-    "ytick.color": "#444444",
-}
-WIDTHS = (8.0, 10.0, 13.0)  # inches, by the number of columns
 HEIGHT = 3.6  # inches of a row
-LEGEND_ROWS = 4
-MOST_CURVES = 12  # that a legend can name
-FEW_SAMPLES = 40  # that deserve a mark each
+TITLE = 0.5  # inches for the title of a picture, and for each line more half of it
+SIDE = 0.5  # inches that a title leaves free
 
+CONTINUOUS = "continuous"  # the rate of what the solver integrates; all others are sampled
 STRETCH_KEYS = ("from", "to")
 PANEL_KEYS = ("signals", "title", "unit", "reference")
 TRACE_KEYS = ("signal", "label")
@@ -94,6 +68,9 @@ class Recorded(Protocol):
 
     def times(self, name: str) -> NDArray[np.float64]:
         """Return the times (s) of its rows."""
+
+    def rate(self, name: str) -> str:
+        """Return the name of the rate at which its block works; "" if that is not known."""
 
 
 @dataclass(frozen=True)
@@ -124,15 +101,6 @@ class Figure:
     stop: float = math.inf
 
 
-@dataclass(frozen=True)
-class _Curve:
-    label: str
-    unit: Unit
-    times: NDArray[np.float64]
-    values: NDArray[np.float64]
-    steps: bool
-
-
 def plot_log(log: Log, output: Path | None = None) -> list[Path]:
     """Draw what the log's diagram asks for; return the PNG files, in `output` or in a folder beside the log.
 
@@ -157,7 +125,7 @@ def plot_figures(
     QuadvisError names, before anything is drawn, all signals that are not there or do not fit their panel;
     files that are `inputs`, or no pictures, are not replaced.
     """
-    found: list[tuple[Figure, list[list[_Curve]]]] = []
+    found: list[tuple[Figure, list[list[Curve]]]] = []
     problems: list[str] = []
     for figure in figures:
         found.append((figure, []))
@@ -277,7 +245,7 @@ def split_signal(text: str) -> tuple[str, tuple[int | slice, ...]]:
     return named.source, named.index
 
 
-def _curves(recorded: Recorded, figure: Figure, panel: Panel) -> list[_Curve]:
+def _curves(recorded: Recorded, figure: Figure, panel: Panel) -> list[Curve]:
     """Return a panel's curves over the figure's stretch of the run, in the unit that the panel shows."""
     found = [curve for trace in panel.traces for curve in _elements(recorded, trace)]
     if not found:
@@ -288,12 +256,15 @@ def _curves(recorded: Recorded, figure: Figure, panel: Panel) -> list[_Curve]:
         if not curve.unit.dimension_equals(shown):
             raise QuadvisError(f"{quoted(curve.label)} is in {curve.unit}, which cannot be shown in {shown}")
         part = (curve.times >= figure.start) & (curve.times <= figure.stop)
-        values = curve.values[part] * (curve.unit.scale / shown.scale)
-        curves.append(_Curve(curve.label, shown, curve.times[part], values, curve.steps))
+        values = curve.values * (curve.unit.scale / shown.scale)
+        earlier = values[curve.times < figure.start]
+        before = float(earlier[-1]) if earlier.size else math.nan
+        times = curve.times[part]
+        curves.append(replace(curve, unit=shown, times=times, values=values[part], before=before))
     return curves
 
 
-def _elements(recorded: Recorded, trace: Trace) -> Iterator[_Curve]:
+def _elements(recorded: Recorded, trace: Trace) -> Iterator[Curve]:
     """Return one curve for every element that a trace selects."""
     name, index = split_signal(trace.signal)
     if name not in recorded.units:
@@ -309,70 +280,33 @@ def _elements(recorded: Recorded, trace: Trace) -> Iterator[_Curve]:
         extent = f"the shape {list(shape)}" if shape else "one element and takes no index"
         raise QuadvisError(f"{quoted(trace.signal)} does not exist; {quoted(name)} has {extent}")
     elements = rows.reshape(len(rows), size)
+    held = rows.dtype.kind != "f" or recorded.rate(name) not in ("", CONTINUOUS)
     for element in chosen:
         label = trace.label or name
         if shape and (len(chosen) > 1 or not trace.label):
             label += f"[{','.join(map(str, np.unravel_index(element, shape)))}]"
         values = elements[:, element].astype(np.float64)
-        yield _Curve(label, units[element % len(units)], times, values, rows.dtype.kind != "f")
+        yield Curve(label, units[element % len(units)], times, values, held, rows.dtype.kind != "f")
 
 
 def _file_name(title: str) -> str:
     return re.sub(r"\W+", "-", title.lower()).strip("-")[:60] or "figure"
 
 
-def _draw(figure: Figure, panels: list[list[_Curve]], path: Path, inputs: Sequence[Path]) -> None:
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure as Sheet
-
+def _draw(figure: Figure, panels: list[list[Curve]], path: Path, inputs: Sequence[Path]) -> None:
     columns = min(len(WIDTHS), len(panels))
-    rows = math.ceil(len(panels) / columns)
-    with mpl.rc_context({**STYLE}):
-        sheet = Sheet(figsize=(WIDTHS[columns - 1], 0.5 + HEIGHT * rows), dpi=120, layout="constrained")
-        FigureCanvasAgg(sheet)
-        sheet.suptitle(figure.title)
-        for number, (panel, curves) in enumerate(zip(figure.panels, panels, strict=True), 1):
-            _draw_panel(sheet.add_subplot(rows, columns, number), figure, panel, curves)
+    width = WIDTHS[columns - 1]
+    pairs = list(zip(figure.panels, panels, strict=True))
+    legends = [legend_of(panel.title, curves, panel.reference, width / columns) for panel, curves in pairs]
+    title = fitted(figure.title, width - SIDE, measure(STYLE["figure.titlesize"], bold=True), lines=3)
+    # A row is as high as its highest legend asks for, so that the axes keep their height.
+    rows = [legends[start : start + columns] for start in range(0, len(legends), columns)]
+    heights = [HEIGHT + max(legend.height for legend in row) for row in rows]
+    height = TITLE * (1.0 + 0.5 * title.count("\n")) + sum(heights)
+    with blank_sheet(width, height, STYLE, layout="constrained") as sheet:
+        sheet.suptitle(title)
+        grid = sheet.add_gridspec(len(rows), columns, height_ratios=heights)
+        for number, ((panel, curves), legend) in enumerate(zip(pairs, legends, strict=True)):
+            axes = sheet.add_subplot(grid[divmod(number, columns)])
+            draw_panel(axes, curves, panel.reference, (figure.start, figure.stop), legend)
         write_output(path, PNG, lambda file: sheet.savefig(file, format="png"), inputs)
-
-
-def _draw_panel(axes: Axes, figure: Figure, panel: Panel, curves: list[_Curve]) -> None:
-    from matplotlib.ticker import MaxNLocator
-
-    for curve, colour in zip(curves, itertools.cycle(COLOURS), strict=False):
-        few = np.count_nonzero(np.isfinite(curve.values)) <= FEW_SAMPLES
-        axes.plot(
-            curve.times, curve.values, color=colour, label=_legend(curve, panel.reference),
-            drawstyle="steps-post" if curve.steps else "default", marker="." if few else "",
-        )  # fmt: skip
-    if panel.reference is not None:
-        axes.axhline(panel.reference, color="#555555", linewidth=0.9, linestyle=(0, (5, 3)))
-    if not any(np.isfinite(curve.values).any() for curve in curves):
-        axes.text(0.5, 0.5, "no samples", transform=axes.transAxes, ha="center", color="#777777")
-    if all(curve.steps for curve in curves):
-        axes.yaxis.set_major_locator(MaxNLocator("auto", integer=True))
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel(_pretty(curves[0].unit))
-    axes.set_xlim(*(end if math.isfinite(end) else None for end in (figure.start, figure.stop)))
-    if len(curves) > MOST_CURVES:
-        axes.set_title(panel.title, loc="left")
-    else:
-        # Above the axes, so that it never hides a curve; the panel's title heads it.
-        axes.legend(
-            title=panel.title or None, alignment="left", loc="lower left", bbox_to_anchor=(0.0, 1.0),
-            ncols=math.ceil(len(curves) / LEGEND_ROWS),
-        )  # fmt: skip
-
-
-def _legend(curve: _Curve, reference: float | None) -> str:
-    """Return a curve's name and the RMS of its distance from the reference; counts and truths have none."""
-    distance = curve.values[np.isfinite(curve.values)] - (reference or 0.0)
-    if curve.steps or not distance.size:
-        return curve.label
-    return f"{curve.label}   RMS {np.sqrt(np.mean(distance**2)):.3g} {_pretty(curve.unit)}".rstrip()
-
-
-def _pretty(unit: Unit) -> str:
-    text = str(unit)
-    return "" if text == "1" else text.replace("^2", "²").replace("^3", "³").replace("*", "\u00b7")

@@ -143,6 +143,10 @@ class Recording:
         """Return the times (s) of a signal's N rows."""
         return self.stamps(name) / 1e9
 
+    def rate(self, name: str) -> str:
+        """Return the name of the rate at which a signal's block works; "" if that is not known."""
+        return self.channels[self._find(name)[0]].rate
+
     def __getitem__(self, name: str) -> NDArray[Any]:
         """Return a signal of N rows, shape (N, *shape of the port): float64, int64 or bool."""
         channel, start, field, index = self._find(name)

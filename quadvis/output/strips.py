@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from quadvis.canvas import blank_sheet
 from quadvis.files import PLOT, write_output
-from quadvis.output.plot import COLOURS, STYLE, WIDTHS
+from quadvis.output.style import COLOURS, STYLE, WIDTHS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,17 +66,12 @@ class Strips:
 
 def draw_strips(strips: Strips, path: Path, inputs: Iterable[Path] = ()) -> None:
     """Write a PNG; QuadvisError if it cannot be written, as where there is something else or an input."""
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure as Sheet
-
     count = len(strips.panels)
     columns = 2 if count == 4 else min(len(WIDTHS), max(1, count))
     rows = max(1, math.ceil(count / columns))
     height = TOP + HEIGHT * rows + BOTTOM
-    with mpl.rc_context({**STYLE, "axes.grid.axis": "y", "axes.axisbelow": True}):
-        sheet = Sheet(figsize=(WIDTHS[columns - 1], height), dpi=120)
-        FigureCanvasAgg(sheet)
+    style = {**STYLE, "axes.grid.axis": "y", "axes.axisbelow": True}
+    with blank_sheet(WIDTHS[columns - 1], height, style) as sheet:
         inside = (0.0, BOTTOM / height, 1.0, HEIGHT * rows / height)
         sheet.set_layout_engine("constrained", rect=inside, w_pad=0.1)
         for number, panel in enumerate(strips.panels, 1):

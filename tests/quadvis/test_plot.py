@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from quadvis import load
 from quadvis.errors import DiagramError, Faults, QuadvisError
 from quadvis.output.log import LogWriter
 from quadvis.output.log_reader import read_log
@@ -93,6 +95,10 @@ class Run:
         """Return the times of its rows."""
         return self.signals[name][0]
 
+    def rate(self, name: str) -> str:
+        """Return the rate of its block: the plant is continuous, all else is sampled."""
+        return "continuous" if name.startswith("plant.") else "vision"
+
     def write(self, path: Path, diagram: str) -> None:
         """Log the run."""
         names = list(self.signals)
@@ -101,9 +107,8 @@ class Run:
         for name in names:
             block, _, port = name.rpartition(".")
             kind = kinds[self[name].dtype.kind]
-            channels.append(
-                Channel(f"/{block}", (Field(port, kind, self[name].shape[1:], self.units[name]),))
-            )
+            fields = (Field(port, kind, self[name].shape[1:], self.units[name]),)
+            channels.append(Channel(f"/{block}", fields, self.rate(name)))
         with LogWriter(path, channels, {"diagram": diagram}) as log:
             for index, name in enumerate(names):
                 stamps = np.round(self.times(name) * 1e9).astype(np.int64)
@@ -159,7 +164,7 @@ def test_a_log_is_drawn_as_its_diagram_declares(run: Run, sheets: Sheets, tmp_pa
     plotted = y.get_lines()[0]
     assert np.allclose(plotted.get_ydata(), 20 * np.cos(plotted.get_xdata()), atol=1e-9)
     assert plotted.get_xdata()[[0, -1]] == pytest.approx([40, 140], abs=0.011)
-    assert legend(yaw.axes[0]) == ["plant.yaw   RMS 1 deg"]
+    assert legend(yaw.axes[0]) == ["plant.yaw"]
     assert control.axes[0].get_ylabel() == "N\u00b7m"
 
 
@@ -221,6 +226,11 @@ def test_the_rms_counts_from_the_reference(run: Run, sheets: Sheets, tmp_path: P
     assert sheets[0].axes[0].get_lines()[1].get_ydata() == [147.0, 147.0]
 
 
+def test_without_a_reference_there_is_no_rms(run: Run, sheets: Sheets, tmp_path: Path) -> None:
+    plot_figures(run, [Figure("Height", (Panel((Trace("plant.position[2]"),)),))], tmp_path)
+    assert legend(sheets[0].axes[0]) == ["plant.position[2]"]
+
+
 def test_a_stretch_of_elements_gives_a_curve_each(run: Run, sheets: Sheets, tmp_path: Path) -> None:
     traces = (Trace("vision/detector.centres[1:3,1]"), Trace("vision/detector.centres[0,0]", "first"))
     plot_figures(run, [Figure("Centres", (Panel(traces),))], tmp_path)
@@ -242,7 +252,7 @@ def test_missing_samples_do_not_spoil_the_rms(run: Run, sheets: Sheets, tmp_path
     holes = Run()
     times = np.arange(10.0)
     holes.signals["pose.x"] = times, np.where(times % 2 == 0, 3.0, math.nan), "m"
-    plot_figures(holes, [Figure("Holes", (Panel((Trace("pose.x"),)),))], tmp_path)
+    plot_figures(holes, [Figure("Holes", (Panel((Trace("pose.x"),), reference=0.0),))], tmp_path)
     assert legend(sheets[0].axes[0]) == ["pose.x   RMS 3 m"]
 
 
@@ -372,6 +382,144 @@ def test_an_index_is_split_as_numpy_would_read_it(index: list[Any]) -> None:
 def test_other_texts_are_no_signals(text: str) -> None:
     with pytest.raises(QuadvisError, match="is not a signal"):
         split_signal(text)
+
+
+STAIRS = """
+quadvis: 1
+name: stairs
+rates: {c: 20 Hz, slow: 10 Hz, rare: 1/2 Hz, fast: 1 kHz}
+solver: {method: ode4, step: 1 ms}
+stop_time: 3 s
+blocks:
+  pulse: {block: sources.pulse, rate: c, with: {interval: 1 s}}
+  reference: {block: sources.step, rate: slow, with: {at: 1 s}}
+  rare: {block: sources.sine, rate: rare}
+  fast: {block: sources.sine, rate: fast}
+  truth: {block: sources.constant, rate: continuous, with: {value: 1}}
+  lag: {block: signal.low_pass, rate: continuous, with: {time_constant: 0.2 s}, in: {u: truth.y}}
+figures:
+  - {title: All, signals: [pulse.y, reference.y, rare.y, fast.y, lag.y]}
+  - {title: Late, signals: [rare.y, lag.y], from: 2.5 s, to: 2.9 s}
+"""
+
+
+@pytest.fixture
+def stairs(sheets: Sheets, tmp_path: Path) -> Sheets:
+    """Draw a run of blocks at several rates."""
+    (tmp_path / "stairs.yaml").write_text(STAIRS)
+    load(tmp_path / "stairs.yaml").run(log=tmp_path / "stairs.mcap")
+    plot_log(read_log(tmp_path / "stairs.mcap"))
+    return sheets
+
+
+def test_sampled_signals_are_stairs_and_continuous_ones_lines(stairs: Sheets) -> None:
+    lines = {line.get_label(): line for line in stairs[0].axes[0].get_lines()}
+    drawn = {label: line.get_drawstyle() for label, line in lines.items()}
+    held = dict.fromkeys(("pulse.y", "reference.y", "rare.y", "fast.y"), "steps-post")
+    assert drawn == {**held, "lag.y": "default"}
+
+
+@pytest.mark.parametrize(("time", "value"), [(0.93, 0.0), (0.99, 0.0), (1.0, 1.0), (1.01, 1.0)])
+def test_a_step_is_drawn_when_it_happens(stairs: Sheets, time: float, value: float) -> None:
+    (line,) = (line for line in stairs[0].axes[0].get_lines() if line.get_label() == "reference.y")
+    times, values = line.get_path().vertices.T  # before stairs are made of them
+    assert values[np.searchsorted(times, time, side="right") - 1] == value
+
+
+def test_stairs_reach_from_one_end_of_the_stretch_to_the_other(stairs: Sheets) -> None:
+    (rare, _) = stairs[1].axes[0].get_lines()
+    assert rare.get_xdata().tolist() == pytest.approx([2.5, 2.9])
+    assert np.ptp(rare.get_ydata()) == 0.0
+
+
+def look(line: Any) -> tuple[Any, ...]:
+    """What of a curve tells it from others."""
+    return line.get_color(), str(line._dash_pattern), line.get_linewidth()
+
+
+class Many:
+    """A run of signals with long names and many elements."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self.names = names
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of every signal."""
+        return dict.fromkeys(self.names, "m")
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """Return 100 elements."""
+        return np.sin(self.times(name)[:, None] + np.arange(100.0))
+
+    def times(self, name: str) -> NDArray[np.float64]:
+        """Return the times of all rows."""
+        return np.arange(0.0, 3.0, 0.1)
+
+    def rate(self, name: str) -> str:
+        """All are sampled."""
+        return "vision"
+
+
+SHORT, LONG = "a.y", "long/path/of/parts/with_a_long_block_name.and_a_port_of_many_letters"
+ANOTHER = "another/path_that_shares_nothing/of_its_beginning.with_the_other_one"
+
+
+def of(name: str, count: int, title: str = "", reference: float | None = None) -> Panel:
+    return Panel((Trace(f"{name}[0:{count}]"),), title, reference=reference)
+
+
+def mixed(count: int, title: str = "") -> Panel:
+    return Panel(tuple(Trace(f"{name}[{i}]") for i in range(count) for name in (LONG, ANOTHER)), title)
+
+
+CROWDED = {
+    "12 short": (of(SHORT, 12),),
+    "12 long": (of(LONG, 12, "all of them"),),
+    "40 short": (of(SHORT, 40, "forty"),),
+    "40 long": (of(LONG, 40, reference=0.0),),
+    "two of 12": (of(LONG, 12, "left", 0.0), of(SHORT, 12, "right", 0.0)),
+    "two of 40": (of(LONG, 40, "left"), of(ANOTHER, 40, "right")),
+    "three of 12": (of(LONG, 12, "a", 0.0), of(SHORT, 12, "b"), of(ANOTHER, 12, "c", 0.0)),
+    "three with long titles": tuple(of(name, 3, "a title that is long " * 5) for name in (SHORT, LONG) * 2),
+    "nothing shared": (mixed(6),),
+    "nothing shared, two": (mixed(10, "left"), mixed(6, "right")),
+    "nothing shared, three": (mixed(3), mixed(6), mixed(20)),
+    "one word": (Panel((Trace("a.y[0]", "x" * 300), Trace("a.y[1]", "_y" * 100))), of(SHORT, 1)),
+}
+
+
+@pytest.mark.parametrize("panels", CROWDED.values(), ids=CROWDED)
+def test_legends_fit_and_no_two_curves_look_alike(
+    panels: tuple[Panel, ...], sheets: Sheets, tmp_path: Path
+) -> None:
+    plot_figures(Many((SHORT, LONG, ANOTHER)), [Figure("Crowded " * 40, panels)], tmp_path)
+    (sheet,) = sheets
+    renderer = sheet.canvas.get_renderer()
+    page = sheet.bbox
+    legends = [axes.get_legend().get_window_extent(renderer) for axes in sheet.axes]
+    title = sheet._suptitle.get_window_extent(renderer)
+    frames = [axes.get_window_extent(renderer) for axes in sheet.axes]
+    for part in (*legends, title):
+        assert page.x0 <= part.x0 and part.x1 <= page.x1 and page.y0 <= part.y0 and part.y1 <= page.y1 + 1
+    pieces = [*legends, *frames, title]
+    for one, other in itertools.combinations(pieces, 2):
+        across = min(one.x1, other.x1) - max(one.x0, other.x0)
+        along = min(one.y1, other.y1) - max(one.y0, other.y0)
+        assert across < 1.0 or along < 1.0, (one, other)
+    for axes, frame in zip(sheet.axes, frames, strict=True):
+        assert frame.height >= 1.4 * sheet.dpi and frame.width >= 2.5 * sheet.dpi
+        curves = [line for line in axes.get_lines() if not line.get_label().startswith("_child")]
+        assert len({look(line) for line in curves}) == len(curves)
+        assert len(set(legend(axes))) == len(curves)
+
+
+def test_more_curves_than_can_be_named_have_colours_of_their_own(sheets: Sheets, tmp_path: Path) -> None:
+    plot_figures(Many((SHORT,)), [Figure("All", (of(SHORT, 100, "hundred"),))], tmp_path)
+    (axes,) = sheets[0].axes
+    assert axes.get_legend() is None
+    assert axes.get_title(loc="left") == "hundred: a.y\n100 signals, from dark to light"
+    assert len({look(line) for line in axes.get_lines()}) == 100
 
 
 def test_importing_the_plotter_does_not_import_matplotlib() -> None:

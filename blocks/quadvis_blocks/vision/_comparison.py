@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from quadvis.canvas import blank_sheet
 from quadvis.errors import QuadvisError
 from quadvis.files import PNG, Kind, reason, write_output
 
@@ -133,19 +134,13 @@ def draw(methods: Sequence[Poses], pictures: Sequence[int], path: Path) -> None:
 
     `QuadvisError` if the file cannot be written.
     """
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     style: Any = {
         "axes.spines.right": False,
         "axes.spines.top": False,
         "font.size": 10,
         "grid.color": "#DDDDDD",
     }
-    with mpl.rc_context(style):
-        sheet = Figure(figsize=(13, 9), dpi=120, layout="constrained")
-        FigureCanvasAgg(sheet)
+    with blank_sheet(13.0, 9.0, style, layout="constrained") as sheet:
         grid = sheet.subplots(4, 3, sharex=True, height_ratios=(2, 1, 2, 1))
         for column in range(len(NAMES)):
             row = 2 * (column // 3)
