@@ -7,7 +7,6 @@ exit code, never a traceback. Other exceptions are faults of the program and pas
 
 from __future__ import annotations
 
-import errno
 import os
 import signal
 import sys
@@ -15,12 +14,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from quadvis.errors import QuadvisError, quoted
+from quadvis.errors import QuadvisError
+from quadvis.failures import MEMORY, surroundings
 from quadvis.files import reason
 
 FAILED, REFUSED, INTERRUPTED, PIPE_BROKEN = 1, 2, 130, 141
-ROOM = 1 << 28  # bytes; where so much cannot be had, it is for lack of memory that something failed
-LONGEST = 200  # characters of another library's words
 
 _heard = False  # whether Ctrl-C was pressed
 
@@ -100,55 +98,8 @@ def _ending(error: BaseException) -> tuple[str, int]:
         return "interrupted", INTERRUPTED
     if isinstance(error, QuadvisError):
         return str(error), error.exit_code
-    if isinstance(error, RecursionError):
-        return "this is nested too deeply; use fewer levels", REFUSED
-    if isinstance(error, MemoryError) or (isinstance(error, Exception) and _is_short_of_memory(error)):
-        return "there is not enough memory; free some, or raise the limit (ulimit -v)", FAILED
-    if isinstance(error, OSError):
-        return _refused(error), REFUSED
-    if isinstance(error, ImportError):
-        library = error.name or "a library"
-        return f"{library} cannot be loaded: {_one_line(error)}; install quadvis again", REFUSED
-    if isinstance(error, UnicodeError):
-        return f"a text holds characters that cannot be read or written: {_one_line(error)}", REFUSED
-    return "", FAILED
-
-
-def _refused(error: OSError) -> str:
-    if isinstance(error, FileNotFoundError) and _folder_is_gone():
-        return "the current folder is gone; change to one that exists"
-    if isinstance(error.filename, str | bytes):
-        return f"cannot use {quoted(os.fsdecode(error.filename))}: {reason(error)}"
-    return f"the system refused: {reason(error)}"
-
-
-def _folder_is_gone() -> bool:
-    try:
-        os.getcwd()
-    except OSError:
-        return True
-    return False
-
-
-def _is_short_of_memory(error: Exception) -> bool:
-    """Return whether memory ran out, which libraries tell in many ways."""
-    if isinstance(error, OSError) and error.errno == errno.ENOMEM:
-        return True
-    from mmap import mmap
-
-    try:
-        mmap(-1, ROOM).close()
-    except (OSError, MemoryError):
-        return True
-    return False
-
-
-def _one_line(error: Exception) -> str:
-    """Return the first words of an error; those of a failed import can fill a page."""
-    while isinstance(error.__cause__, Exception):
-        error = error.__cause__
-    lines = [line for line in map(str.strip, str(error).splitlines()) if line]
-    return (lines[0] if lines else type(error).__name__)[:LONGEST]
+    words = surroundings(error)
+    return words, FAILED if words == MEMORY else REFUSED
 
 
 @contextmanager

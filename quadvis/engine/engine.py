@@ -22,8 +22,11 @@ from quadvis.block import ParameterError
 from quadvis.engine.graph import Graph
 from quadvis.engine.plan import TIME, Bound, Call, Plan, make_plan
 from quadvis.engine.solver import Solver, Vector
-from quadvis.errors import QuadvisError, RunError
+from quadvis.errors import QuadvisError, RunError, sentence
+from quadvis.failures import MEMORY, arithmetic, is_short_of_memory, surroundings
 
+SHOWN = 4  # numbers in a message
+SMALLER_STEP = "a smaller solver step may help"
 Observer = Callable[[int], None]  # takes the tick, after the outputs of a step
 
 
@@ -218,8 +221,47 @@ class Engine:
             return error
         if isinstance(error, ParameterError):
             return ParameterError(error.parameter, f"block '{path}': {error}")
-        reason = str(error) if isinstance(error, QuadvisError) else f"{type(error).__name__}: {error}"
-        return RunError(f"cannot {method}: {reason}" if method else reason, block=path, time=self.time)
+        if method:
+            return RunError(f"cannot {method}: {self._reason(error)}", block=path, time=self.time)
+        if not arithmetic(error):
+            return RunError(self._reason(error), block=path, time=self.time)
+        outputs = list(bound.node.block.interface.outputs)
+        reason = sentence(f"{arithmetic(error)}{self._inputs(bound)}", self._remedy(bound))
+        return RunError(reason, block=path, port=outputs[0] if len(outputs) == 1 else "", time=self.time)
+
+    @staticmethod
+    def _reason(error: Exception) -> str:
+        """Return what went wrong in a block."""
+        if isinstance(error, QuadvisError):
+            return str(error)
+        if problem := arithmetic(error):
+            return problem
+        if is_short_of_memory(error):
+            return MEMORY
+        if isinstance(error, RecursionError):
+            return surroundings(error)
+        return f"{type(error).__name__}: {error}"
+
+    def _inputs(self, bound: Bound) -> str:
+        """Return the single numbers that a block reads now, a few of them."""
+        slots = {port: slot for port, slot in bound.inputs.items() if slot.scalar != "frame"}
+        found = [
+            f"{port} = {self.plan.memory.read(slot):g}" for port, slot in slots.items() if not slot.shape
+        ]
+        return f" ({', '.join(found[:SHOWN])}{', ...' * (len(found) > SHOWN)})" if found else ""
+
+    def _remedy(self, bound: Bound) -> str:
+        """Return that a smaller step may help if the solver integrates a state that has its share in it."""
+        waiting, seen = [bound], {bound.node.path}
+        while waiting:
+            step = waiting.pop()
+            if step.node.block.interface.continuous:
+                return SMALLER_STEP
+            for _, wire in step.node.wires():
+                if wire.block not in seen:
+                    seen.add(wire.block)
+                    waiting.append(self.plan[wire.block])
+        return ""
 
     def _not_finite(self, step: _Step) -> RunError:
         """Name the first port, in execution order, that is not finite."""
@@ -229,7 +271,7 @@ class Engine:
                     value = self.plan.memory.read(slot)
                     if not np.isfinite(value).all():
                         text = np.array2string(np.asarray(value), precision=4)
-                        problem = f"the output became {text}"
+                        problem = sentence(f"the output became {text}", self._remedy(bound))
                         return RunError(problem, block=bound.node.path, port=port, time=self.time)
         raise AssertionError("a value that is not finite belongs to a port")
 
@@ -237,7 +279,7 @@ class Engine:
         for bound in self.plan.steps:
             for state in bound.node.block.interface.continuous:
                 if not np.isfinite(self.plan.memory.view(bound.field(state.name))).all():
-                    problem = f"state '{state.name}' left the finite numbers; a smaller solver step may help"
+                    problem = sentence(f"state '{state.name}' left the finite numbers", SMALLER_STEP)
                     return RunError(problem, block=bound.node.path, time=self.time)
         raise AssertionError("a state that is not finite belongs to a block")
 

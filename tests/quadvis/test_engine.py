@@ -632,7 +632,7 @@ def test_an_exception_stops_the_run_and_says_in_which_block_and_when(where: str,
     with pytest.raises(RunError) as caught:
         run(faulty(where, lambda: 1 / 0), 10)
     assert (caught.value.block, caught.value.time) == ("bad", time)
-    assert "ZeroDivisionError: division by zero" in str(caught.value)
+    assert "a division by zero" in str(caught.value)
     assert isinstance(caught.value.__cause__, ZeroDivisionError)
 
 
@@ -786,7 +786,7 @@ def test_a_failure_to_close_is_told_with_its_block() -> None:
 
 def test_a_failure_to_close_does_not_hide_why_the_run_ended() -> None:
     log: list[str] = []
-    with pytest.raises(RunError, match=r"block 'p0', t = 0 s: ZeroDivisionError") as caught:
+    with pytest.raises(RunError, match=r"block 'p0', port 'y', t = 0 s: a division by zero") as caught:
         run(ports(2, log, output0=lambda: 1 / 0, close1=stop(OSError("stuck"))), 1)
     assert log[-2:] == ["close 1", "close 0"]
     assert any("cannot close: OSError: stuck" in note for note in caught.value.__notes__)

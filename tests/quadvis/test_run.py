@@ -230,6 +230,104 @@ class Root(Block):
         return ACTION
 '''
 
+NO_VALUE = "a function was asked for a value that it does not have, such as the root of a negative number"
+FAULTS_OF_ARITHMETIC = {
+    "u / 0.0": "a division by zero (u = 0.25)",
+    "1 % (u - 0.25)": "a division by zero (u = 0.25)",
+    "0.0 ** -u": "a division by zero (u = 0.25)",
+    "math.sqrt(-u)": f"{NO_VALUE} (u = 0.25)",
+    "math.log(0.0 * u)": f"{NO_VALUE} (u = 0.25)",
+    "math.acos(4.1 + u)": f"{NO_VALUE} (u = 0.25)",
+    "math.sin(u * math.inf)": f"{NO_VALUE} (u = 0.25)",
+    "int(u * math.nan)": f"{NO_VALUE} (u = 0.25)",
+    "math.exp(1e4 * u)": "a number grew too large (u = 0.25)",
+    "(1e200 * u) ** 2": "a number grew too large (u = 0.25)",
+    "int(u / 1e-320)": "a number grew too large (u = 0.25)",
+    "math.cosh(1e5 * u)": "a number grew too large (u = 0.25)",
+    "np.linalg.inv(np.zeros((2, 2)))[0, 0]": "a matrix has no inverse or factors (u = 0.25)",
+    "np.linalg.cholesky(-np.eye(2))[0, 0]": "a matrix has no inverse or factors (u = 0.25)",
+    "strict(np.float64(u))": "a calculation gave no finite number (u = 0.25)",
+    "u * math.inf": "the output became inf",
+    "np.float64(u) / 0.0": "the output became inf",
+}
+PREPARED = """
+import math
+
+import numpy as np
+
+
+def strict(u):
+    with np.errstate(all="raise"):
+        return u / np.float64(0.0)
+"""
+DIVERGING = """\
+quadvis: 1
+name: diverging
+rates: {fast: 10 Hz}
+solver: {method: ode1, step: 100 ms}
+stop_time: 1000 s
+blocks:
+  stiff: {block: own.stiff, rate: continuous, in: {u: root.y}}
+  root: {block: own.root, rate: continuous, in: {u: stiff.y}}
+"""
+STIFF = '''\
+"""A decay that is too fast for its solver."""
+
+from quadvis.block import Block, In, Out, State
+
+
+class Stiff(Block):
+    """Decays."""
+
+    u = In(unit="a")
+    x = State(init=1.0, continuous=True)
+    y = Out(unit="a")
+
+    def output(self):
+        """Return the state."""
+        return self.x
+
+    def deriv(self, u):
+        """Decay."""
+        return FALL
+'''
+
+
+@pytest.mark.parametrize(("action", "reason"), FAULTS_OF_ARITHMETIC.items(), ids=FAULTS_OF_ARITHMETIC)
+def test_a_calculation_without_a_result_is_told_in_plain_words(
+    action: str, reason: str, tmp_path: Path
+) -> None:
+    (tmp_path / "blocks" / "own").mkdir(parents=True)
+    text = ROOT.replace("ACTION", f"{action} if u > 0.2 else u").replace("import math\n", PREPARED)
+    (tmp_path / "blocks" / "own" / "root.py").write_text(text)
+    with pytest.raises(RunError) as caught:
+        load_text(FAILING, tmp_path).run()
+    assert str(caught.value) == f"block 'root', port 'y', t = 1.5 s: {reason}"
+
+
+@pytest.mark.parametrize(
+    ("fall", "action", "block", "reason"),
+    [
+        ("-50.0 * self.x**3", "u", "stiff", "a number grew too large"),
+        ("-50.0 * self.x", "math.sqrt(u)", "root", NO_VALUE),
+        ("-50.0 * self.x", "math.exp(u)", "root", "a number grew too large"),
+        ("-50.0 * self.x", "1.0 / max(0.0, u)", "root", "a division by zero"),
+        ("-50.0 * self.x", "u * 1e290", "root", "the output became"),
+        ("-50.0 * self.x", "0.0", "stiff", "state 'x' left the finite numbers"),
+    ],
+)
+def test_where_the_solver_has_its_share_a_smaller_step_is_the_remedy(
+    fall: str, action: str, block: str, reason: str, tmp_path: Path
+) -> None:
+    (tmp_path / "blocks" / "own").mkdir(parents=True)
+    (tmp_path / "blocks" / "own" / "root.py").write_text(ROOT.replace("ACTION", action).replace("^0.5", ""))
+    (tmp_path / "blocks" / "own" / "stiff.py").write_text(STIFF.replace("FALL", fall))
+    with pytest.raises(RunError) as caught:
+        load_text(DIVERGING, tmp_path).run()
+    assert str(caught.value).startswith(f"block '{block}'")
+    assert reason in str(caught.value)
+    assert str(caught.value).endswith("; a smaller solver step may help")
+
 
 @pytest.mark.parametrize(
     ("action", "message"),
@@ -237,7 +335,7 @@ class Root(Block):
         ("math.nan if u > 0.2 else u", r"^block 'root', port 'y', t = 1.5 s: the output became nan$"),
         (
             "1.0 / 0.0 if u > 0.2 else u",
-            r"^block 'root', t = 1.5 s: ZeroDivisionError: float division by zero$",
+            r"^block 'root', port 'y', t = 1.5 s: a division by zero \(u = 0.25\)$",
         ),
     ],
 )
