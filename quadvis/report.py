@@ -76,7 +76,8 @@ class ProgressLine(StatusLine):
         self.duration = duration
 
     def __call__(self, time: float, wall: float) -> None:
-        """Show the simulated time reached and how fast it goes."""
+        """Show the simulated time reached and how fast it goes. The next tick may lie beyond the end."""
+        time = min(time, self.duration)
         bar = self.bar(time / self.duration if self.duration else 1.0)
         self.show(f"{bar} {time:6.1f} / {self.duration:g} s  {time / max(wall, 1e-9):.0f} x real time")
 

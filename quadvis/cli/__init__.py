@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 
+from quadvis.cli.arguments import understood
 from quadvis.cli.options import parser
 from quadvis.shell import ended
 from quadvis.signals import end_orderly
@@ -16,5 +18,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _perform(arguments: Sequence[str] | None) -> int:
-    options = parser().parse_args(arguments)
+    options = understood(parser(), sys.argv[1:] if arguments is None else arguments)
     return int(options.command(options))

@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from quadvis.cli import commands
+from quadvis.cli.arguments import Parser
 from quadvis.version import __version__
 
 JSON_HELP = """\
@@ -37,16 +38,15 @@ limits: {name: {vary, unit, stable_to, reached, reason}}.
 Exit code: 0 stable, 1 not stable, 2 bad input, or a loop that cannot be linearised."""
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     """Return what reads a command and its options."""
-    made = argparse.ArgumentParser(
-        prog="quadvis", description="Block diagrams in YAML that fly a four-rotor craft."
-    )
+    made = Parser(prog="quadvis", description="Block diagrams in YAML that fly a four-rotor craft.")
     made.add_argument("--version", action="version", version=f"quadvis {__version__}")
     subparsers = made.add_subparsers(required=True, metavar="COMMAND")
+    made.commands = subparsers.choices
 
-    def add(name: str, command: Any, words: str, epilog: str = "") -> argparse.ArgumentParser:
-        added: argparse.ArgumentParser = subparsers.add_parser(
+    def add(name: str, command: Any, words: str, epilog: str = "") -> Parser:
+        added: Parser = subparsers.add_parser(
             name, help=words, description=f"{words[:1].upper()}{words[1:]}.", epilog=epilog,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )  # fmt: skip
@@ -105,18 +105,18 @@ def parser() -> argparse.ArgumentParser:
     return made
 
 
-def _own_block_option(parser: argparse.ArgumentParser) -> None:
+def _own_block_option(parser: Parser) -> None:
     words = "refuse the code in the folder blocks beside the diagram, which is run otherwise"
     parser.add_argument("--no-own-blocks", action="store_true", help=words)
 
 
-def _diagram_options(parser: argparse.ArgumentParser) -> None:
+def _diagram_options(parser: Parser) -> None:
     parser.add_argument("file", metavar="FILE", help="the diagram")
     parser.add_argument("--variant", metavar="V", help="one of the diagram's variants")
     _setting_options(parser)
 
 
-def _setting_options(parser: argparse.ArgumentParser) -> None:
+def _setting_options(parser: Parser) -> None:
     words = "file of such settings, which apply before --set; repeat it for more, applied in their order"
     parser.add_argument("--params", action="append", default=[], metavar="FILE", help=words)
     words = "replace a parameter, such as control/roll.bandwidth='2 rad/s'; repeat it for more"
@@ -124,7 +124,7 @@ def _setting_options(parser: argparse.ArgumentParser) -> None:
     _own_block_option(parser)
 
 
-def _sweep_options(parser: argparse.ArgumentParser) -> None:
+def _sweep_options(parser: Parser) -> None:
     parser.add_argument("file", metavar="FILE", help="the diagram")
     words = (
         "seed=0..29, craft.lag='20 ms,50 ms', bandwidth='1..3 step 0.5 rad/s', variant=A,B; repeat for more"

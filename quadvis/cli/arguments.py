@@ -1,0 +1,130 @@
+"""Reads what is typed after `quadvis`, and says in one sentence what is wrong with it.
+
+argparse writes the help and makes the options; the sentences are made here, from what the commands declare.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NoReturn
+
+from quadvis.errors import QuadvisError, quoted, sentence, suggestion
+
+HELP = ("-h", "--help")
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that knows what was declared: ``options`` by name, ``places`` in order, ``commands``."""
+
+    def __init__(self, **more: Any) -> None:
+        super().__init__(**more, allow_abbrev=False)
+        self.options: dict[str, argparse.Action] = {}
+        self.places: list[argparse.Action] = []
+        self.commands: Mapping[str, Parser] = {}
+
+    def add_argument(self, *names: Any, **more: Any) -> argparse.Action:
+        """Declare an option or a place."""
+        action = super().add_argument(*names, **more)
+        if not hasattr(self, "options"):  # of argparse itself, --help
+            return action
+        if action.option_strings:
+            self.options.update(dict.fromkeys(action.option_strings, action))
+        else:
+            self.places.append(action)
+        return action
+
+    def error(self, message: str) -> NoReturn:
+        """Refuse what `understood` let through; it should let nothing through."""
+        raise QuadvisError(f"this is not understood; see '{self.prog} --help'")
+
+
+def understood(parser: Parser, arguments: Sequence[str]) -> argparse.Namespace:
+    """Return the options of a command; QuadvisError says what is wrong with them."""
+    for argument in arguments:
+        if "\0" in argument:
+            raise QuadvisError(f"{quoted(argument)} holds a character that no name and no value can have")
+    for index, word in enumerate(arguments):
+        if word in HELP or word in parser.options:
+            break
+        if word.startswith("-"):
+            raise QuadvisError(
+                f"there is no option {quoted(word)} before a command; see '{parser.prog} --help'"
+            )
+        if word not in parser.commands:
+            remedy = suggestion(word, parser.commands) or f"see '{parser.prog} --help'"
+            raise QuadvisError(f"there is no command {quoted(word)}; {remedy}")
+        rest = _checked(parser.commands[word], arguments[index + 1 :])
+        return parser.parse_args([*arguments[: index + 1], *rest])
+    if not arguments:
+        raise QuadvisError(f"name a command: {', '.join(parser.commands)}; see '{parser.prog} --help'")
+    return parser.parse_args(arguments)
+
+
+def _checked(parser: Parser, words: Sequence[str]) -> list[str]:
+    """Return the words of a command with each value joined to its option, so that it may begin with '-'."""
+    found: list[str] = []
+    placed: list[str] = []
+    waiting = list(words)
+    ended = False  # after '--' there are no options
+    while waiting:
+        word = waiting.pop(0)
+        if not ended and word in HELP:
+            return [word]
+        if ended or not word.startswith("-") or word == "-":
+            placed.append(word)
+        elif word == "--":
+            ended = True
+        else:
+            found += _option(parser, word, waiting)
+    for place, word in zip(parser.places, placed, strict=False):
+        if place.choices is not None and word not in place.choices:
+            remedy = suggestion(word, map(str, place.choices))
+            raise QuadvisError(sentence(f"{_name(place)} cannot be {quoted(word)}", remedy))
+    if len(placed) < len(parser.places):
+        missing = " and ".join(_name(place) for place in parser.places[len(placed) :])
+        raise QuadvisError(f"{missing} is missing; write {_usage(parser)}")
+    if len(placed) > len(parser.places):
+        raise QuadvisError(f"{quoted(placed[len(parser.places)])} is one too many; write {_usage(parser)}")
+    return [*found, "--", *placed] if placed else found
+
+
+def _option(parser: Parser, word: str, waiting: list[str]) -> list[str]:
+    """Return an option as one word, its value taken from those that wait."""
+    name, equals, value = word.partition("=")
+    if not word.startswith("--") and word[:2] in parser.options:
+        name, equals, value = word[:2], word[2:3], word[2:].removeprefix("=")
+    action = parser.options.get(name)
+    if action is None:
+        remedy = suggestion(name, [option for option in parser.options if option.startswith("--")])
+        remedy = remedy or f"see '{parser.prog} --help'"
+        raise QuadvisError(f"there is no option {quoted(name)}; {remedy}")
+    if action.nargs == 0:
+        if equals:
+            raise QuadvisError(f"{name} takes no value; leave {quoted(value)} out")
+        return [name]
+    if not equals and waiting and waiting[0].partition("=")[0] not in (*HELP, *parser.options):
+        equals, value = "=", waiting.pop(0)
+    if not equals or value == "--":
+        raise QuadvisError(f"{name} needs a value; write {name} {_name(action)}")
+    if action.type is not None and not _is_read(action.type, value):
+        raise QuadvisError(f"{name}: {quoted(value)} is not a whole number; write one, such as 3")
+    return [f"{action.option_strings[0]}={value}"]
+
+
+def _is_read(read: Callable[[str], Any] | argparse.FileType | str, value: str) -> bool:
+    """Return whether a value is what an option takes; those that are not texts are whole numbers."""
+    try:
+        read(value)  # type: ignore[operator]
+    except ValueError:
+        return False
+    return True
+
+
+def _name(action: argparse.Action) -> str:
+    return action.metavar if isinstance(action.metavar, str) else action.dest.upper()
+
+
+def _usage(parser: Parser) -> str:
+    places = ("|".join(map(str, place.choices)) if place.choices else _name(place) for place in parser.places)
+    return f"'{' '.join([parser.prog, *places])}'"
