@@ -1,7 +1,8 @@
 """Draw a block diagram as SVG: boxes with named ports, orthogonal wires, colours by rate.
 
 The Eclipse Layout Kernel's layered algorithm places the boxes and routes the wires; it is made for diagrams
-with ports (see `quadvis/output/elkjs`). This module states the sizes, and draws what the engine placed.
+with ports (see `quadvis/output/elkjs`). Large diagrams are placed by `quadvis.output.layers`. This module
+states the sizes, and draws what was placed.
 """
 
 from __future__ import annotations
@@ -9,15 +10,20 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 from quadvis.errors import QuadvisError
 from quadvis.output import _svg as svg
-from quadvis.output.elkjs import layout
+from quadvis.output import elkjs as engine
+from quadvis.output import layers
+from quadvis.output.elkjs import LayoutError
 
 CONTINUOUS = "continuous"
 """The task name of the blocks that the solver integrates."""
+MOST_BLOCKS, MOST_WIRES = 250, 750
+"""The engine takes half a minute for so many."""
 
 
 @dataclass(frozen=True)
@@ -53,11 +59,20 @@ def draw(
     The blocks come in reading order: where a loop has no source of its own, it starts at its first block.
     `constants` are the values set at inputs, by (block, port). `tasks` are the words of the legend by task
     name, `CONTINUOUS` among them. Raises `QuadvisError` if the arguments contradict each other or the layout
-    engine is missing or fails.
+    engine is missing; what it cannot place is placed by a simpler layout.
     """
     plan = _Plan(blocks, wires, constants, tasks)
-    placed = {shape["id"]: shape for shape in _shapes(layout(plan.graph()))}
+    placed = {shape["id"]: shape for shape in _shapes(_laid_out(plan))}
     return _page(title, plan, placed)
+
+
+def _laid_out(plan: _Plan) -> dict[str, Any]:
+    """Return the graph with positions: the engine's, or those of a simpler layout if there is much of it."""
+    graph = plan.graph()
+    if len(plan.blocks) <= MOST_BLOCKS and len(plan.wires) <= MOST_WIRES:
+        with suppress(LayoutError):
+            return engine.layout(graph)
+    return layers.layout(graph)
 
 
 # Sizes in CSS pixels: fonts, then distances.

@@ -7,7 +7,9 @@ import itertools
 import re
 import subprocess
 import sys
+import time
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -20,6 +22,7 @@ from matplotlib.textpath import TextPath
 import quadvis.output.elkjs
 from quadvis.errors import QuadvisError
 from quadvis.output.draw import DrawnBlock, DrawnWire, draw
+from quadvis.output.elkjs import LayoutError
 
 SVG = "{http://www.w3.org/2000/svg}"
 TASKS = {
@@ -28,6 +31,8 @@ TASKS = {
     "control": "control, 20 Hz (50 ms)",
     "vision": "vision, 10 Hz (100 ms)",
 }
+
+Large = tuple[list[DrawnBlock], list[DrawnWire]]
 
 
 @dataclass(frozen=True)
@@ -93,7 +98,7 @@ def extent(text: ElementTree.Element) -> Rectangle:
     return Rectangle(left, y - 0.76 * size, left + width, y + 0.1 * size)
 
 
-def read(svg: str) -> Picture:
+def read(svg: str, *, texts: bool = True) -> Picture:
     picture = Picture(ElementTree.fromstring(svg))
     groups = list(picture.root.iter(f"{SVG}g"))
     for group in groups:
@@ -113,7 +118,8 @@ def read(svg: str) -> Picture:
         elif role == "mark":
             picture.marks.append(group)
     diagram = groups[1]
-    picture.texts = [extent(text) for text in diagram.iter(f"{SVG}text")]
+    if texts:
+        picture.texts = [extent(text) for text in diagram.iter(f"{SVG}text")]
     return picture
 
 
@@ -473,10 +479,164 @@ def test_a_missing_engine_is_one_sentence_with_the_remedy(monkeypatch: pytest.Mo
     assert "\n" not in str(caught.value)
 
 
-def test_a_layout_that_takes_too_long_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_layout_that_takes_too_long_is_given_up_for_a_simpler_one(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("quadvis.output.elkjs.TIME_LIMIT", 0.01)
-    with pytest.raises(QuadvisError, match="could not be laid out"):
-        draw("slow", [block("a")], [], {}, TASKS)
+    with pytest.raises(LayoutError, match="could not be laid out"):
+        quadvis.output.elkjs.layout({"id": "root", "children": [], "edges": []})
+    blocks, wires, constants = hover()
+    assert_well_drawn(read(draw("slow", blocks, wires, constants, TASKS)), blocks, wires)
+
+
+@pytest.fixture
+def simple(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have all diagrams placed by the layout for large ones."""
+    monkeypatch.setattr("quadvis.output.draw.MOST_BLOCKS", -1)
+
+
+@pytest.mark.usefixtures("simple")
+def test_hover_is_well_drawn_by_the_layout_for_large_diagrams() -> None:
+    blocks, wires, constants = hover()
+    svg = draw("hover", blocks, wires, constants, TASKS)
+    picture = read(svg)
+    assert_well_drawn(picture, blocks, wires)
+    assert_texts_apart(picture)
+    assert set(picture.parts) == {"vision", "estimation", "control"}
+    assert draw("hover", blocks, wires, constants, TASKS) == svg
+
+
+@pytest.mark.usefixtures("simple")
+@settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@given(diagrams())
+def test_any_diagram_is_well_drawn_by_the_layout_for_large_ones(
+    diagram: tuple[list[DrawnBlock], list[DrawnWire]],
+) -> None:
+    blocks, wires = diagram
+    assert_well_drawn(read(draw("any", blocks, wires, {}, TASKS), texts=False), blocks, wires)
+
+
+def chain(count: int) -> Large:
+    blocks = [block(f"b{i}", "u" if i else "", "y") for i in range(count)]
+    return blocks, [DrawnWire(f"b{i}.y", f"b{i + 1}", "u") for i in range(count - 1)]
+
+
+def ring(count: int) -> Large:
+    blocks = [block(f"b{i}", "u", "y") for i in range(count)]
+    return blocks, [DrawnWire(f"b{i}.y", f"b{(i + 1) % count}", "u", "hold") for i in range(count)]
+
+
+def apart(count: int) -> Large:
+    return [block(f"b{i}", "u v", "y") for i in range(count)], []
+
+
+def fan(count: int) -> Large:
+    blocks = [block("source", "", "y"), *(block(f"b{i}", "u", "y") for i in range(count - 1))]
+    return blocks, [DrawnWire("source.y", b.path, "u", "hold") for b in blocks[1:]]
+
+
+def funnel(count: int) -> Large:
+    ports = " ".join(f"u{i}" for i in range(count - 1))
+    blocks = [*(block(f"b{i}", "", "y") for i in range(count - 1)), block("sink", ports)]
+    return blocks, [DrawnWire(f"b{i}.y", "sink", f"u{i}") for i in range(count - 1)]
+
+
+def tree(count: int) -> Large:
+    blocks = [block(f"b{i}", "u" if i else "", "y") for i in range(count)]
+    return blocks, [DrawnWire(f"b{(i - 1) // 3}.y", f"b{i}", "u") for i in range(1, count)]
+
+
+def pairs(count: int) -> Large:
+    blocks = [block(f"b{i}", "u" if i % 2 else "", "y") for i in range(count)]
+    return blocks, [DrawnWire(f"b{i}.y", f"b{i + 1}", "u") for i in range(0, count - 1, 2)]
+
+
+def parts(count: int) -> Large:
+    blocks = [block(f"p{i // 100}/q{i // 10}/b{i}", "u v", "y z") for i in range(count)]
+    wires = [DrawnWire(f"{blocks[i - 1].path}.y", b.path, "u") for i, b in enumerate(blocks)]
+    return blocks, wires + [DrawnWire(f"{blocks[(7 * i) % count].path}.z", b.path, "v", "hold")
+                            for i, b in enumerate(blocks) if i % 3]  # fmt: skip
+
+
+def nest(count: int) -> Large:
+    blocks = [
+        block("/".join(["p"] * (i % 9)) + f"/b{i}" if i % 9 else f"b{i}", "u", "y") for i in range(count)
+    ]
+    return blocks, [DrawnWire(f"{blocks[i - 1].path}.y", b.path, "u") for i, b in enumerate(blocks)]
+
+
+def delays(count: int) -> Large:
+    blocks = [block(f"b{i}", "u", "y") for i in range(count)]
+    return blocks, [DrawnWire(f"{b.path}.y", b.path, "u", "delay") for b in blocks]
+
+
+def tangle(count: int) -> Large:
+    blocks = [block(f"b{i}", "a b c", "x y") for i in range(count)]
+    steps = {"a": 17, "b": 101, "c": 2}
+    return blocks, [
+        DrawnWire(f"b{(port_step * i + 5) % count}.{'xy'[i % 2]}", b.path, port)
+        for i, b in enumerate(blocks) for port, port_step in steps.items()
+    ]  # fmt: skip
+
+
+def assert_large_is_well_drawn(svg: str, blocks: list[DrawnBlock], wires: list[DrawnWire]) -> Picture:
+    """The promises of `assert_well_drawn`, on a grid, since pairs of thousands are too many."""
+    picture = read(svg, texts=False)
+    assert list(picture.boxes) == [block.path for block in blocks]
+    assert len(picture.wires) == len(wires)
+    size = Rectangle.of(picture.root)
+    cells: dict[tuple[int, int], list[str]] = {}
+    for path, box in picture.boxes.items():
+        assert size.contains(box.outline)
+        for cell in covered(box.outline):
+            for other in cells.setdefault(cell, []):
+                assert not box.outline.overlaps(picture.boxes[other].outline), (path, other)
+            cells[cell].append(path)
+        for part, frame in picture.parts.items():
+            inside = path.startswith(f"{part}/")
+            assert frame.contains(box.outline) if inside else not frame.overlaps(box.outline), (path, part)
+    for wire in wires:
+        assert_ends_at_its_ports(picture, wire)
+    for ends, line in picture.wires.items():
+        assert all(x == u or y == v for (x, y), (u, v) in itertools.pairwise(line)), ends
+        for piece in segments(line):
+            near = {path for cell in covered(piece) for path in cells.get(cell, ())}
+            assert not any(passes(piece, picture.boxes[path].outline) for path in near), ends
+    return picture
+
+
+def covered(area: Rectangle, size: float = 250.0) -> list[tuple[int, int]]:
+    across = range(int(area.left // size), int(area.right // size) + 1)
+    along = range(int(area.top // size), int(area.bottom // size) + 1)
+    return [(x, y) for x in across for y in along]
+
+
+@pytest.mark.parametrize(
+    ("make", "count"),
+    [
+        (chain, 1000), (chain, 252), (ring, 400), (apart, 4000), (apart, 251), (fan, 500), (funnel, 300),
+        (tree, 600), (pairs, 700), (parts, 300), (nest, 300), (delays, 300), (tangle, 300),
+    ],
+    ids=lambda value: getattr(value, "__name__", str(value)),
+)  # fmt: skip
+def test_a_large_diagram_is_well_drawn_without_the_engine(
+    make: Callable[[int], Large], count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("quadvis.output.elkjs.layout", lambda graph: pytest.fail("it takes too long"))
+    blocks, wires = make(count)
+    picture = assert_large_is_well_drawn(draw(make.__name__, blocks, wires, {}, TASKS), blocks, wires)
+    size = Rectangle.of(picture.root)
+    if make not in (funnel, nest):  # one is as high as its one box
+        assert 0.4 < size.right / size.bottom < 6.0
+
+
+def test_the_time_of_a_large_drawing_grows_with_it_and_no_faster() -> None:
+    def cpu(count: int) -> float:
+        blocks, wires = chain(count)
+        before = time.process_time()
+        draw("chain", blocks, wires, {}, TASKS)
+        return time.process_time() - before
+
+    cpu(300)
+    assert cpu(2000) < 40 * max(cpu(200), cpu(200))
 
 
 def test_importing_the_module_loads_no_engine() -> None:

@@ -10,6 +10,11 @@ from typing import Any
 
 from quadvis.errors import QuadvisError
 
+
+class LayoutError(QuadvisError):
+    """The engine gave up: too much to lay out for its stack, its time or the memory there is."""
+
+
 TIME_LIMIT = 120.0
 """Processor time (s) after which a layout is given up; 100 blocks take about 4 s."""
 
@@ -30,7 +35,7 @@ JSON.stringify(answer.data)
 def layout(graph: Mapping[str, Any]) -> dict[str, Any]:
     """Return a graph in ELK's JSON format with positions filled in; equal graphs get equal positions.
 
-    Raises `QuadvisError` if QuickJS is not installed or the engine fails.
+    Raises `QuadvisError` if QuickJS is not installed, `LayoutError` if the engine fails.
     """
     try:
         quickjs = importlib.import_module("quickjs")
@@ -48,7 +53,5 @@ def layout(graph: Mapping[str, Any]) -> dict[str, Any]:
         placed: dict[str, Any] = json.loads(context.eval(_REQUEST))
     except (quickjs.JSException, quickjs.StackOverflow) as error:
         reason = str(error).partition("\n")[0]
-        raise QuadvisError(
-            f"the diagram could not be laid out ({reason}); draw fewer blocks at a time"
-        ) from error
+        raise LayoutError(f"the diagram could not be laid out ({reason})") from error
     return placed
