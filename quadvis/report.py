@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import sys
+from time import monotonic
 from types import TracebackType
 from typing import Self, TextIO
 
 from quadvis.describe import table
 from quadvis.output.verdict import Entry, Outcome, Verdict
 from quadvis.run import Result
+
+PATIENCE, RENEWED = 2.0, 0.1  # s until a line is shown at all, and until it is shown again
 
 
 class StatusLine:
@@ -66,6 +69,24 @@ def _open_terminal(stream: TextIO) -> int | None:
         return os.open(os.ttyname(stream.fileno()), os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
     except (OSError, ValueError, AttributeError):
         return None
+
+
+class AnalysisLine(StatusLine):
+    """What an analysis is doing, once it has taken a while."""
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        super().__init__(stream)
+        self.next = monotonic() + PATIENCE
+
+    def __call__(self, text: str) -> None:
+        """Show what is being done just now."""
+        if monotonic() >= self.next:
+            self.show(text)
+            self.next = monotonic() + RENEWED
+
+    def clear(self) -> None:
+        """Make room for a line that stays."""
+        self._put("\r\x1b[K")
 
 
 class ProgressLine(StatusLine):

@@ -19,6 +19,7 @@ from quadvis.failures import MEMORY, surroundings
 from quadvis.files import reason
 
 FAILED, REFUSED, INTERRUPTED, PIPE_BROKEN = 1, 2, 130, 141
+AGAIN = 0.01  # s until an interruption that was dropped is repeated
 
 _heard = False  # whether Ctrl-C was pressed
 
@@ -54,8 +55,9 @@ def _interrupt(*_: object) -> None:
 
 def _unraisable(lost: Any) -> None:
     """Interrupt again where Python had to drop it, such as in a callback or while an object is deleted."""
-    if lost.exc_type is KeyboardInterrupt:
-        signal.raise_signal(signal.SIGINT)
+    if lost.exc_type is KeyboardInterrupt and hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGALRM, _interrupt)
+        signal.setitimer(signal.ITIMER_REAL, AGAIN)
     else:
         sys.__unraisablehook__(lost)
 
@@ -126,7 +128,7 @@ def _calm() -> None:
 
 def _discard(descriptor: int) -> None:
     """Send what a stream still holds nowhere; at its end Python would complain about it."""
-    with suppress(OSError, ValueError):
+    with suppress(AttributeError, OSError, ValueError):
         stream = sys.stdout if descriptor == 1 else sys.stderr
         number = stream.fileno()  # another one than the descriptor where output is caught, as in a test
         nowhere = os.open(os.devnull, os.O_WRONLY)

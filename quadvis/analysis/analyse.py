@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
@@ -17,6 +18,8 @@ from quadvis.analysis.probe import AnalysisError
 from quadvis.analysis.systems import closed_loop
 from quadvis.analysis.vary import STABLE, Limits
 from quadvis.diagram.analyse import Cut
+from quadvis.engine.graph import Graph
+from quadvis.errors import DiagramError
 from quadvis.output.verdict import finite
 
 if TYPE_CHECKING:
@@ -120,11 +123,20 @@ def _loop(linear: Linear, cut: Cut, stable: bool) -> Loop:
 
 
 def _check_pictures(diagram: Diagram) -> None:
-    """Refuse pictures: they change in steps of a pixel's value, so they have no derivative."""
-    for node in diagram.graph.nodes:
-        if any(port.signal.scalar == "frame" for port in node.block.interface.outputs.values()):
-            problem = f"block '{node.path}' gives pictures, and these cannot be linearised"
-            raise AnalysisError(f"{problem}; {_way_out(diagram)}")
+    """Refuse pictures that are read: they change in steps of a pixel's value, so they have no derivative."""
+    if (block := _seen(diagram.graph)) is not None:
+        problem = f"block '{block}' gives pictures, and these cannot be linearised"
+        raise AnalysisError(f"{problem}; {_way_out(diagram)}")
+
+
+def _seen(graph: Graph) -> str | None:
+    """Return the first block whose pictures another one reads."""
+    read = {(wire.block, wire.port) for node in graph.nodes for _, wire in node.wires()}
+    for node in graph.nodes:
+        for name, port in node.block.interface.outputs.items():
+            if port.signal.scalar == "frame" and (node.path, name) in read:
+                return node.path
+    return None
 
 
 def _way_out(diagram: Diagram) -> str:
@@ -132,8 +144,8 @@ def _way_out(diagram: Diagram) -> str:
 
     for variant in diagram.variants:
         params = [file.path for file in diagram.parameter_files]
-        nodes = load(diagram.path, variant=variant, settings=diagram.settings, params=params).graph.nodes
-        outputs = [port for node in nodes for port in node.block.interface.outputs.values()]
-        if all(port.signal.scalar != "frame" for port in outputs):
-            return f"the variant '{variant}' has none: --variant {variant}"
+        with suppress(DiagramError):  # it may not fit what is set for this one
+            other = load(diagram.path, variant=variant, settings=diagram.settings, params=params)
+            if _seen(other.graph) is None:
+                return f"the variant '{variant}' has none: --variant {variant}"
     return "use a camera without pictures, such as vision.geometric_camera"

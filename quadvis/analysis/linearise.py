@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.analysis.cut import with_breaks
-from quadvis.analysis.probe import STEP, AnalysisError, Channel, Probe, Vector, silence
+from quadvis.analysis.probe import STEP, AnalysisError, Channel, Probe, Vector, blocks_on_loops, silence
+from quadvis.analysis.progress import tell
 from quadvis.diagram.analyse import Cut
 from quadvis.engine.engine import Engine
 from quadvis.engine.graph import Graph
@@ -60,7 +61,7 @@ def linearised(graph: Graph, cuts: Sequence[Cut], at: float) -> Linear:
     """Return the loop at its operating point, which Newton's method seeks from the state at a time (s).
 
     If it does not find one, it tries again from a later time. AnalysisError if there is no steady state near,
-    if the loop is not smooth there, or if a cut is not on it.
+    if the loop is not smooth there, if a cut is not on it, or if there is neither a loop nor a state.
     """
     try:
         return _linearised(graph, cuts, at)
@@ -69,18 +70,29 @@ def linearised(graph: Graph, cuts: Sequence[Cut], at: float) -> Linear:
 
 
 def _linearised(graph: Graph, cuts: Sequence[Cut], at: float) -> Linear:
+    looped = blocks_on_loops(graph)
+    _check_cuts(graph, looped, cuts)
     signals = {(signal.block, signal.port) for cut in cuts for signal in cut.signals}
     engine = Engine(with_breaks(graph, signals))
     silence(engine)
     with engine:
+        tell("running to the operating point")
         probe = Probe(engine, cuts, at)
-        for cut in cuts:
-            for signal in cut.signals:
-                if signal.block not in probe.loop:
-                    problem = f"cut '{cut.label}': '{signal.text}' comes from a block that is on no loop"
-                    known = [node.path for node in graph.nodes if node.path in probe.loop]
-                    raise AnalysisError(f"{problem}; open the loop behind one of {_some(known)}")
-        return _linearise(probe)
+        linear = _linearise(probe)
+    if not looped and not linear.states:
+        raise AnalysisError("there is nothing to analyse: the diagram has no loop and no state")
+    return linear
+
+
+def _check_cuts(graph: Graph, looped: set[str], cuts: Sequence[Cut]) -> None:
+    """Refuse to open what is not closed."""
+    for cut in cuts:
+        for signal in cut.signals:
+            if signal.block not in looped:
+                problem = f"cut '{cut.label}': '{signal.text}' comes from a block that is on no loop"
+                known = [node.path for node in graph.nodes if node.path in looped]
+                remedy = f"open the loop behind one of {_some(known)}" if known else "the diagram has none"
+                raise AnalysisError(f"{problem}; {remedy}")
 
 
 def _some(names: Sequence[str]) -> str:
@@ -134,6 +146,7 @@ def _columns(probe: Probe) -> tuple[Positions, Columns]:
         reached: set[int] = set()
         passing = np.isin(fresh, probe.signals)
         for place in [*fresh[~passing].tolist(), *_influential(probe, fresh[passing], still)]:
+            tell(f"{len(columns)} states disturbed")
             step = STEP * probe.scale[place]
             one = np.array([place], np.intp)
             above, below = (probe.after(one, sign * step) for sign in (1.0, -1.0))

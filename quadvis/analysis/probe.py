@@ -71,7 +71,7 @@ class Probe:
     def __init__(self, engine: Engine, cuts: Sequence[Cut], at: float) -> None:
         self.engine, self.graph = engine, engine.graph
         self.plan, self.floats = engine.plan, engine.plan.memory.floats
-        self.loop = _looped(self.graph)
+        self.loop = blocks_on_loops(self.graph) or {node.path for node in self.graph.nodes}
         self.tasks = {node.task for node in self.graph.nodes if node.path in self.loop}
         self.span = hyperperiod(self.graph, self.tasks)
         self.names = dict(self._named())
@@ -245,14 +245,13 @@ def _elements(slot: Slot, name: str) -> Iterator[tuple[int, str]]:
         yield slot.position + flat, f"{name}[{','.join(map(str, index))}]" if slot.shape else name
 
 
-def _looped(graph: Graph) -> set[str]:
-    """Return the blocks that lie on a loop of wires; all of them if there is no loop."""
+def blocks_on_loops(graph: Graph) -> set[str]:
+    """Return the blocks that lie on a loop of wires."""
     readers: dict[str, set[str]] = {node.path: set() for node in graph.nodes}
     for node in graph.nodes:
         for _, wire in node.wires():
             readers[wire.block].add(node.path)
-    found = {path for path in readers if path in _downstream(readers, path)}
-    return found or set(readers)
+    return {path for path in readers if path in _downstream(readers, path)}
 
 
 def _downstream(readers: dict[str, set[str]], path: str) -> set[str]:

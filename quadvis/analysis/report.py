@@ -35,11 +35,14 @@ def analysis_lines(analysis: Analysis) -> Iterator[str]:
     count = len(analysis.linear.states)
     way = f"lifted over {format_quantity(analysis.period, SECOND)}" if analysis.period else "continuous"
     yield f"{diagram.name}{variant}: {count} states, {way}"
-    yield from _indented([("closed loop poles", "frequency", "damping"), *_poles(analysis)])
+    rows, more = _poles(analysis)
+    yield from _indented([("closed loop poles", "frequency", "damping"), *rows])
+    if more:
+        yield f"and {more} faster"
     if analysis.loops:
         yield from _indented([HEADS, *map(_row, analysis.loops.values())])
     elif not analysis.limits:
-        yield "  no cut points: name signals with --cut, or under 'analyse: {cuts: ...}'"
+        yield "No loop was opened: name signals with --cut, or under 'analyse: {cuts: ...}'."
     width = max(map(len, analysis.limits), default=0)
     for label, found in analysis.limits.items():
         yield f"  {label.ljust(width)}  {found.text}"
@@ -55,17 +58,18 @@ def _indented(rows: list[tuple[str, ...]]) -> Iterator[str]:
         yield f"  {line}"
 
 
-def _poles(analysis: Analysis) -> list[tuple[str, ...]]:
-    """Return the slowest poles, a pair in one row. A pole that is there many times is known to 1e-3 only."""
+def _poles(analysis: Analysis) -> tuple[list[tuple[str, ...]], int]:
+    """Return the slowest poles, a pair in one row, and how many more there are.
+
+    A pole that is there many times is known to 1e-3 only.
+    """
     upper = [pole for pole in analysis.poles.tolist() if pole.imag >= -REAL * abs(pole)]
     rows: list[tuple[str, ...]] = []
     for pole in upper[:SHOWN]:
         imaginary = f" +- {pole.imag:.4g}j" if pole.imag > REAL * abs(pole) else ""
         damping = -pole.real / abs(pole) if abs(pole) else 0.0
         rows.append((f"{pole.real:.4g}{imaginary}", f"{abs(pole):.4g} rad/s", f"{damping:.3f}"))
-    if len(upper) > SHOWN:
-        rows.append((f"and {len(upper) - SHOWN} faster", "", ""))
-    return rows
+    return rows, max(0, len(upper) - SHOWN)
 
 
 def _grows(analysis: Analysis) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from quadvis.analysis.linearise import linearised
 from quadvis.analysis.margins import growth
 from quadvis.analysis.probe import AnalysisError
+from quadvis.analysis.progress import task
 from quadvis.analysis.systems import library
 from quadvis.diagram.analyse import Limit
 from quadvis.errors import RunError
@@ -47,18 +48,12 @@ class Tolerance:
     def text(self) -> str:
         """The answer in words."""
         if math.isnan(self.value):
-            return f"unstable from {self.shows(self.limit.start)} on"
+            return f"unstable from {shown(self.limit, self.limit.start)} on"
         words = "up to" if self.limit.end > self.limit.start else "down to"
-        found = f"stable {words} {self.shows(self.value)}"
+        found = f"stable {words} {shown(self.limit, self.value)}"
         if self.reason:
             return f"{found}; beyond: {self.reason}"
         return found if self.reached else f"{found} and perhaps further"
-
-    def shows(self, value: float) -> str:
-        """Return a value of the parameter for people."""
-        unit = self.limit.shown
-        number = f"{value / unit.scale:.4g}"
-        return f"{number} {unit}" if unit.symbols else number
 
 
 def tolerance(diagram: Diagram, limit: Limit, at: float) -> Tolerance:
@@ -92,7 +87,15 @@ def tolerance(diagram: Diagram, limit: Limit, at: float) -> Tolerance:
 
 
 def _growth_at(diagram: Diagram, limit: Limit, at: float, value: float) -> float:
-    return growth(linearised(diagram.varied(limit.variable.setting(value)).graph, (), at))
+    words = f"at {shown(limit, value)}, from {shown(limit, limit.start)} to {shown(limit, limit.end)}"
+    with task(words):
+        return growth(linearised(diagram.varied(limit.variable.setting(value)).graph, (), at))
+
+
+def shown(limit: Limit, value: float) -> str:
+    """Return a value of the parameter for people."""
+    number = f"{value / limit.shown.scale:.4g}"
+    return f"{number} {limit.shown}" if limit.shown.symbols else number
 
 
 class Limits(Mapping[str, Tolerance]):
@@ -105,7 +108,8 @@ class Limits(Mapping[str, Tolerance]):
 
     def __getitem__(self, label: str) -> Tolerance:
         if label not in self._found:
-            self._found[label] = tolerance(self._diagram, self._limits[label], self._at)
+            with task(f"limit '{label}'"):
+                self._found[label] = tolerance(self._diagram, self._limits[label], self._at)
         return self._found[label]
 
     def __iter__(self) -> Iterator[str]:

@@ -210,18 +210,24 @@ def describe(options: argparse.Namespace) -> int:
 
 def analyse(options: argparse.Namespace) -> int:
     """Print poles, margins and limits of a diagram's loop; 1 if it is not stable."""
+    from quadvis.analysis.progress import watched
     from quadvis.analysis.questions import read_cuts, read_limits, read_time
     from quadvis.analysis.report import analysis_lines, save_bode_plots
+    from quadvis.report import AnalysisLine
 
     diagram = _load(options)
     cuts, limits, at = read_cuts(options.cut), read_limits(options.vary), read_time(options.at)
-    analysis = diagram.analyse(cuts=cuts, limits=limits, at=at)
-    if not options.json:
-        for line in analysis_lines(analysis):
-            print(line, flush=True)
+    with AnalysisLine() as progress, watched(progress):
+        analysis = diagram.analyse(cuts=cuts, limits=limits, at=at)
+        if options.json:
+            facts = analysis.facts()
+        else:
+            for line in analysis_lines(analysis):
+                progress.clear()
+                print(line, flush=True)
     paths = [str(path) for path in save_bode_plots(analysis, Path(options.output))] if options.output else []
     if options.json:
-        _print_json(analysis.facts() | {"plots": paths})
+        _print_json(facts | {"plots": paths})
     elif paths:
         print("\n".join(paths))
     return 0 if analysis.stable else FAILED

@@ -23,6 +23,7 @@ stand still between their ticks; those of the continuous rate as lines.
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 
 HEIGHT = 3.6  # inches of a row
 TITLE = 0.5  # inches for the title of a picture, and for each line more half of it
+LONGEST_NAME = 200  # bytes of a file's name before its number and ending
 SIDE = 0.5  # inches that a title leaves free
 
 CONTINUOUS = "continuous"  # the rate of what the solver integrates; all others are sampled
@@ -290,7 +292,14 @@ def _elements(recorded: Recorded, trace: Trace) -> Iterator[Curve]:
 
 
 def _file_name(title: str) -> str:
-    return re.sub(r"\W+", "-", title.lower()).strip("-")[:60] or "figure"
+    name = re.sub(r"\W+", "-", title.lower()).strip("-")[:60]
+    try:
+        os.fsencode(name)
+    except UnicodeError:  # the system's names have no such letters
+        name = re.sub(r"[^a-z0-9_]+", "-", name).strip("-")
+    while len(os.fsencode(name)) > LONGEST_NAME:
+        name = name[:-1]
+    return name or "figure"
 
 
 def _draw(figure: Figure, panels: list[list[Curve]], path: Path, inputs: Sequence[Path]) -> None:

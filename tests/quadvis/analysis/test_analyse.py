@@ -1,7 +1,9 @@
 import json
 import math
+import re
 import shutil
 import sys
+from io import StringIO
 from pathlib import Path
 
 import control
@@ -143,3 +145,162 @@ def test_signals_are_split_at_the_commas_outside_of_an_index() -> None:
         "two": ["c.y", "d.y[2]"],
     }
     assert read_limits(["target[3]=0 deg..90 deg"]) == {"target[3]": ("target[3]", "0 deg", "90 deg")}
+
+
+# Diagrams without a loop.
+
+HEAD = "quadvis: 1\nname: open\nrates: {fast: 10 Hz}\nstop_time: 2 s\nblocks:\n"
+SOURCE = "  source: {block: sources.constant, rate: fast, with: {value: 1}}\n"
+SINE = "  source: {block: sources.sine, rate: fast}\n"
+NOISE = "  source: {block: sources.noise, rate: fast}\n"
+GAIN = "  gain: {block: signal.gain, rate: fast, in: {u: source.y}}\n"
+LAG = "  lag: {block: signal.low_pass, rate: fast, with: {time_constant: 0.2 s}, in: {u: source.y}}\n"
+SUM = "  sum: {block: signal.discrete_integrator, rate: fast, in: {u: source.y}}\n"
+FLOW = "  flow: {block: signal.integrator, rate: continuous, in: {u: {from: source.y, across: hold}}}\n"
+SOLVER = "solver: {method: ode4, step: 10 ms}\n"
+
+
+@pytest.mark.parametrize("blocks", [SOURCE, SINE, NOISE, SOURCE + GAIN, SINE + GAIN, NOISE + GAIN])
+@pytest.mark.parametrize("more", [[], ["--json"]])
+def test_nothing_to_analyse_is_a_sentence(blocks, more, tmp_path, capsys) -> None:
+    (tmp_path / "open.yaml").write_text(HEAD + blocks)
+    code, out, error = told(capsys, str(tmp_path / "open.yaml"), *more)
+    assert (code, out) == (2, "")
+    assert error == "there is nothing to analyse: the diagram has no loop and no state\n"
+
+
+@pytest.mark.parametrize(
+    ("blocks", "cut"),
+    [
+        (SOURCE, "source.y"), (SINE, "source.y"), (SOURCE + GAIN, "gain.y"), (SOURCE + LAG, "source.y"),
+        (SOURCE + LAG, "lag.y"), (SOURCE + SUM, "source.y"), (SOURCE + SUM, "sum.y"), (NOISE + SUM, "sum.y"),
+        (SOURCE + FLOW, "flow.y"), (SOURCE + GAIN + LAG + SUM, "gain.y"),
+    ],
+)  # fmt: skip
+def test_a_cut_where_there_is_no_loop_is_the_sentence_of_one_beside_a_loop(
+    blocks, cut, tmp_path, capsys
+) -> None:
+    head = HEAD.replace("stop_time", SOLVER + "stop_time") if "continuous" in blocks else HEAD
+    (tmp_path / "open.yaml").write_text(f"{head}{blocks}analyse: {{cuts: {{here: {cut}}}}}\n")
+    code, out, error = told(capsys, str(tmp_path / "open.yaml"))
+    assert (code, out) == (2, "")
+    assert error == f"cut 'here': '{cut}' comes from a block that is on no loop; the diagram has none\n"
+
+
+CAMERA = '''
+"""A camera of the test."""
+
+from quadvis.block import Block, In, Out
+
+
+class Camera(Block, numeric=False):
+    """Gives no frames."""
+
+    position = In(unit="a")
+    frame = Out("frame")
+    seen = Out(unit="a")
+
+    def output(self, position):
+        """Return nothing new."""
+        from quadvis.block import NO_FRAME
+
+        return NO_FRAME, position
+
+
+class Reader(Block, numeric=False):
+    """Reads frames."""
+
+    frame = In("frame")
+    count = Out()
+
+    def output(self, frame):
+        """Return their number."""
+        return float(frame.sequence)
+'''
+WATCHED = """
+  camera: {block: own.camera, rate: fast, in: {position: {from: place.y, across: sample}}}
+"""
+
+
+def watched_loop(tmp_path: Path, more: str = "") -> str:
+    """Return a loop with a camera beside it."""
+    sampled(tmp_path)
+    (tmp_path / "blocks" / "own").mkdir(parents=True)
+    source, _, reader = CAMERA.partition("\n\nclass Reader")
+    (tmp_path / "blocks" / "own" / "camera.py").write_text(source)
+    head = source.partition("class Camera")[0]
+    (tmp_path / "blocks" / "own" / "reader.py").write_text(f"{head}class Reader{reader}")
+    path = tmp_path / "loop.yaml"
+    path.write_text(path.read_text().replace("analyse:", f"{WATCHED}{more}analyse:"))
+    return str(path)
+
+
+def test_a_camera_whose_pictures_nobody_reads_is_no_obstacle(tmp_path, capsys) -> None:
+    code, out, error = told(capsys, watched_loop(tmp_path))
+    assert (code, error) == (0, "")
+    assert out.splitlines()[-1] == "STABLE"
+
+
+def test_pictures_that_are_read_are_refused(tmp_path, capsys) -> None:
+    reader = "  reader: {block: own.reader, rate: fast, in: {frame: camera.frame}}\n"
+    code, _, error = told(capsys, watched_loop(tmp_path, reader))
+    assert code == 2
+    assert error.startswith("block 'camera' gives pictures, and these cannot be linearised; use a camera")
+
+
+# What is shown meanwhile.
+
+
+class Terminal(StringIO):
+    """A terminal that keeps what it shows."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_what_takes_long_shows_which_limit_is_sought_and_how_far_it_is(monkeypatch, capsys) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr("quadvis.report.PATIENCE", 0.0)
+    monkeypatch.setattr("quadvis.report.RENEWED", 0.0)
+    monkeypatch.setattr(sys, "stderr", terminal)
+    assert main(["analyse", MARGINS, "--vary", "lag=50 ms..1 s"]) == 0
+    out = capsys.readouterr().out
+    shown = terminal.getvalue()
+    assert "running to the operating point" in shown
+    assert re.search(
+        r"limit 'motor lag': at [\d.]+ s, from [\d.]+ s to [\d.]+ s: \d+ states disturbed", shown
+    )
+    assert "limit 'lag': at 50 ms, from 50 ms to" in shown or "limit 'lag': at 0.05" in shown
+    assert shown.endswith("\r\x1b[K")
+    assert "\x1b" not in out and out.splitlines()[-1] == "STABLE"
+
+
+def test_nothing_is_shown_of_what_is_quick_or_where_nobody_watches(monkeypatch, capsys) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr("quadvis.report.PATIENCE", 1e9)
+    with monkeypatch.context() as patched:
+        patched.setattr(sys, "stderr", terminal)
+        main(["analyse", MARGINS])
+    assert not terminal.getvalue().replace("\r\x1b[K", "")
+    monkeypatch.setattr("quadvis.report.PATIENCE", 0.0)
+    assert told(capsys, MARGINS)[2] == ""
+
+
+@pytest.mark.parametrize("step", ["running to", "0 states", "3 states", "limit 'motor lag'", "limit 'yaw"])
+def test_an_interrupted_analysis_ends_with_a_word(step, monkeypatch, capsys) -> None:
+    def interrupt(self, text: str) -> None:
+        if step in text:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("quadvis.report.AnalysisLine.__call__", interrupt)
+    code, _, error = told(capsys, MARGINS)
+    assert (code, error) == (130, "interrupted\n")
+
+
+def test_a_remark_does_not_look_like_a_row_of_a_table(tmp_path, capsys) -> None:
+    path = sampled(tmp_path).path
+    path.write_text(path.read_text().partition("analyse:")[0])
+    out = told(capsys, str(path))[1].splitlines()
+    assert "No loop was opened: name signals with --cut, or under 'analyse: {cuts: ...}'." in out
+    many = told(capsys, str(DIAGRAMS / "margins.yaml"))[1].splitlines()
+    assert all(len(re.split(r"\s{2,}", line.strip())) > 1 for line in many[1:-1] if line.startswith("  "))
