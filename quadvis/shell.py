@@ -62,16 +62,19 @@ def _unraisable(lost: Any) -> None:
         sys.__unraisablehook__(lost)
 
 
-def ended(command: Callable[[], int], name: str = "") -> int:
-    """Run a command and return its exit code; ``name`` stands before its sentences."""
+def ended(command: Callable[[], int], name: str = "", enough: int = PIPE_BROKEN) -> int:
+    """Run a command and return its exit code; ``name`` stands before its sentences.
+
+    ``enough`` is the code where the reader of its output has seen enough and gone.
+    """
     global _heard
     _heard = False
     with _streams():
         try:
             code = _flushed(command)
-        except BrokenPipeError:  # the reader, such as head, has seen enough
+        except BrokenPipeError:  # the reader, such as head
             _discard(1)
-            return PIPE_BROKEN
+            return enough
         except BaseException as error:
             words, code = _ending(error)
             if not words:

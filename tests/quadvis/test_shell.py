@@ -22,7 +22,7 @@ from quadvis import shell
 from quadvis.cli import main
 from quadvis.errors import QuadvisError, RunError
 from quadvis.failures import MEMORY
-from quadvis.output.log import read_log
+from quadvis.output.log_reader import read_log
 
 TOOLS = Path(__file__).parents[2] / "tools"
 LONG, DEEP = "a" * 300, "b/" * 3000
