@@ -378,7 +378,7 @@ sys.exit(main())
         ("numpy", "run step.yaml"),
         ("numpy.linalg", "run step.yaml"),
         ("yaml", "check step.yaml"),
-        ("mcap.writer", "run step.yaml"),
+        ("quadvis.run", "run step.yaml"),
         ("matplotlib", "plot step.mcap"),
         ("matplotlib.figure", "plot step.mcap"),
         ("matplotlib.font_manager", "plot step.mcap"),
