@@ -158,16 +158,24 @@ def _reduced(exponents: frozenset[tuple[str, Fraction]], symbols: tuple[tuple[st
     unit = Unit(exponents, symbols)
     if unit.exponents != unit.dimension or len(symbols) < 2:
         return unit
-    best = min((name * _in_bases(unit / name) for name in _named_powers()), key=_length)
+    powers = dict(exponents)
+    name, _ = min(_named_powers(), key=lambda named: _length_beside(powers, *named))
+    best = name * _in_bases(unit / name)
     shorter = len(best.symbols) <= 1 if _length(unit) <= _SHORT else True
     return best if shorter and _length(best) < _length(unit) else _in_order(unit)
 
 
 @lru_cache(maxsize=1)
-def _named_powers() -> tuple[Unit, ...]:
-    """Return the powers of the names, and 1, by which a unit may be divided."""
-    powers = (name**power for name in map(Unit.parse, _NAMED) for power in (1, -1, 2, -2))
-    return (Unit(), *powers)
+def _named_powers() -> tuple[tuple[Unit, dict[str, int]], ...]:
+    """Return the powers of names, and 1, by which a unit may be divided, each with its powers of bases."""
+    powers = (Unit(), *(name**power for name in map(Unit.parse, _NAMED) for power in (1, -1, 2, -2)))
+    return tuple((unit, {base: int(power) for base, power in unit.exponents}) for unit in powers)
+
+
+def _length_beside(powers: Mapping[str, Fraction], name: Unit, bases: Mapping[str, int]) -> Fraction:
+    """Return the length of a unit, by its powers of bases, that is written as a name times bases."""
+    rest = (abs(powers.get(base, Fraction(0)) - bases.get(base, 0)) for base in {*powers, *bases})
+    return _length(name) + sum(rest, Fraction(0))
 
 
 def _in_bases(unit: Unit) -> Unit:

@@ -211,20 +211,6 @@ class Claim:
             raise _refusal(self.path, self.kind, reason(error)) from error
 
 
-def read_input(path: PathLike, what: str) -> bytes:
-    """Return the contents of a file; QuadvisError says why "the log", or what it is, cannot be read.
-
-    Neither a pipe nor a device is waited for: they are refused.
-    """
-    try:
-        with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                raise QuadvisError(f"cannot read {what} '{path}': it is a device or a pipe, not a file")
-            return file.read()
-    except (OSError, ValueError) as error:
-        raise QuadvisError(f"cannot read {what} '{path}': {reason(error)}") from error
-
-
 def file_name(*names: str) -> str:
     """Return names joined by '+', fit for the name of a file: other names never give the same one.
 

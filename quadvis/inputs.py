@@ -22,31 +22,33 @@ MOST_BYTES = 256_000_000
 _noted: ContextVar[dict[str, str] | None] = ContextVar("noted", default=None)
 
 
-def read_input(path: PathLike, most: int = MOST_BYTES) -> bytes:
-    """Return a file's contents; QuadvisError if it is none, cannot be read, or has more than `most` bytes."""
-    with open_input(path) as file:
+def read_input(path: PathLike, most: int | None = MOST_BYTES, what: str = "") -> bytes:
+    """Return a file's contents; QuadvisError if it is none, cannot be read, or has more than `most` bytes.
+
+    `what` is what the error calls it, such as "the log". Neither a pipe nor a device is waited for.
+    """
+    with open_input(path, what) as file:
         try:
-            data = file.read(most + 1)
+            data = file.read() if most is None else file.read(most + 1)
         except OSError as error:
-            raise _refusal(path, reason(error)) from error
-    if len(data) > most:
-        raise _refusal(path, f"it has more than {most / 1e6:g} MB")
+            raise _refusal(path, reason(error), what) from error
+    if most is not None and len(data) > most:
+        raise _refusal(path, f"it has more than {most / 1e6:g} MB", what)
     note_input(path, data)
     return data
 
 
-def open_input(path: PathLike) -> BufferedReader:
+def open_input(path: PathLike, what: str = "") -> BufferedReader:
     """Open a file for reading. QuadvisError if there is none; a pipe or device is refused without waiting."""
     try:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
     except (OSError, ValueError) as error:
-        raise _refusal(path, reason(error)) from error
+        raise _refusal(path, reason(error), what) from error
     kind = os.fstat(descriptor).st_mode
     if not stat.S_ISREG(kind):
         os.close(descriptor)
-        raise _refusal(
-            path, "it is a folder" if stat.S_ISDIR(kind) else "it is a device or a pipe, not a file"
-        )
+        why = "it is a folder" if stat.S_ISDIR(kind) else "it is a device or a pipe, not a file"
+        raise _refusal(path, why, what)
     return os.fdopen(descriptor, "rb")
 
 
@@ -85,5 +87,5 @@ def noted_inputs() -> Iterator[Mapping[str, str]]:
         _noted.reset(token)
 
 
-def _refusal(path: PathLike, why: str) -> QuadvisError:
-    return QuadvisError(f"cannot read {os.fspath(path)}: {why}")
+def _refusal(path: PathLike, why: str, what: str = "") -> QuadvisError:
+    return QuadvisError(f"cannot read {f'{what} ' if what else ''}'{os.fspath(path)}': {why}")

@@ -17,7 +17,7 @@ from quadvis.catalogue import Catalogue, OwnBlocks
 from quadvis.diagram.analyse import QuestionReader, Questions
 from quadvis.diagram.build import Builder, Made
 from quadvis.diagram.check import WireCheck, rate_text
-from quadvis.diagram.doubts import warn
+from quadvis.diagram.doubts import warn, warn_rates
 from quadvis.diagram.expand import Expansion, Parts
 from quadvis.diagram.loader import FileSpec, read_file, read_text
 from quadvis.diagram.observe import Observation, read_observation
@@ -251,6 +251,7 @@ def check(
         diagram = assembly.diagram(settings=given)
         for variant in assembly.spec.variants:
             assembly.diagram(variant)
+        assembly.warn_rates()
         return replace(diagram, warnings=tuple(sorted(set(faults.warnings))), files=digests)
 
 
@@ -321,6 +322,8 @@ class _Assembly:
         stop = _stop_time(spec, stop_time, faults)
         check_ticks(spec, graph, stop, faults)
         warn(spec, self.parts, stop, faults)
+        if not spec.variants:
+            self.warn_rates()
         shortened = spec.stop_time is not None and stop < spec.stop_time
         observation = read_observation(spec.sections, wiring, graph, stop, shortened, faults)
         nodes = {node.path: node for node in graph.nodes}
@@ -339,6 +342,10 @@ class _Assembly:
             spec.name, spec.path, variant, graph, stop, seed, observation, listing, questions, variants,
             ports=MappingProxyType(ports), sources=sources,
         )  # fmt: skip
+
+    def warn_rates(self) -> None:
+        """Warn of rates that nothing uses; each variant must have been made before, as it may use some."""
+        warn_rates(self.spec, self.parts, self.faults)
 
     def _promised(self, filled: FileSpec) -> Outputs:
         """Return the outputs of what stands in the slots that a variant fills."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
-from pathlib import Path
 
 from quadvis.diagram.expand import Parts
 from quadvis.diagram.loader import BlockSpec, FileSpec, InputSpec
@@ -25,7 +24,6 @@ def warn(spec: FileSpec, parts: Parts, stop: Fraction, faults: Faults) -> None:
                 _warn_window(node, keys, stop, faults)
     for file in (spec, *parts.specs()):
         _warn_parameters(file, faults)
-    _warn_rates(spec, faults)
 
 
 def _entries(section: Node | None) -> Iterator[Mapping]:
@@ -70,24 +68,13 @@ def _warn_parameters(spec: FileSpec, faults: Faults) -> None:
             faults.warn(value.place, f"parameter '{name}' is not used", f"write '${name}' where it belongs")
 
 
-def _warn_rates(spec: FileSpec, faults: Faults) -> None:
-    """Warn of rates at which no block runs, in no variant."""
-    idle = dict(spec.rates)
-    waiting, seen, parts = [spec], {spec.path.resolve()}, Parts(Faults())
-    while waiting and idle:
-        file = waiting.pop()
-        for block in _blocks(file):
-            if block.rate is not None:
-                idle.pop(block.rate[0], None)
-            path = (Path(block.kind_place.file).parent / block.kind).resolve()
-            if block.is_part and path not in seen:
-                seen.add(path)
-                part = parts.read(path)
-                if part is None:
-                    return  # nothing is certain
-                waiting.append(part)
-    for name, rate in idle.items():
-        if rate is not None:
+def warn_rates(spec: FileSpec, parts: Parts, faults: Faults) -> None:
+    """Warn of rates at which no block of a diagram runs; `parts` has read those of all its variants."""
+    if not parts.whole:
+        return  # what could not be read may use any of them
+    used = {block.rate[0] for file in (spec, *parts.specs()) for block in _blocks(file) if block.rate}
+    for name, rate in spec.rates.items():
+        if rate is not None and name not in used:
             faults.warn(
                 rate.place, f"no block runs at the rate '{name}'", "leave it out, or give it to a block"
             )

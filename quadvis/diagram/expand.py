@@ -89,6 +89,11 @@ class Parts:
         """The files that were read."""
         return list(map(Path, self._specs))
 
+    @property
+    def whole(self) -> bool:
+        """Whether all of them could be used."""
+        return None not in self._specs.values()
+
     def specs(self) -> list[FileSpec]:
         """Return what has been read."""
         return [spec for spec in self._specs.values() if spec is not None]

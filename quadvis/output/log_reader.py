@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from quadvis.errors import QuadvisError, quoted
-from quadvis.files import read_input
+from quadvis.inputs import read_input
 from quadvis.output import mcap_records as mcap
 from quadvis.output.log import CDR, DIAGRAM, METADATA, SUMMARY, ports_of
 from quadvis.output.recording import SLOT_TYPES, Channel, Field, Recording
@@ -93,7 +93,7 @@ class Log(Recording):
 def read_log(path: str | Path) -> Log:
     """Read a log, also one that is cut or damaged (`Log.damage`); `QuadvisError` if the file is none."""
     log = Log(Path(path))
-    data = read_input(path, "the log")
+    data = read_input(path, None, "the log")
     if not data:
         raise QuadvisError(f"'{path}' is empty; its run ended before anything was written")
     if len(data) >= len(mcap.MAGIC) and not data.startswith(mcap.MAGIC):
