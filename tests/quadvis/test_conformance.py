@@ -179,4 +179,4 @@ def test_everything_that_is_wrong_is_told_at_once(tmp_path: Path) -> None:
         check_block(block(tmp_path, text))
     lines = str(caught.value).splitlines()
     assert lines[0].startswith("Fan: documented: the docstring's first line must be a sentence")
-    assert any("ZeroDivisionError: division by zero" in line for line in lines[1:])
+    assert any("a division by zero" in line for line in lines[1:])
