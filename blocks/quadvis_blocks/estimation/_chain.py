@@ -16,10 +16,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from quadvis_blocks._stamps import INSTANT
+
 TICKS = 64  # how many ticks are kept, and how many frames
 FRAMES = 64
 STAMP, VALUE, VARIANCE, WIDTH = 0, 1, 4, 7  # a frame: stamp, three positions, their variances
-INSTANT = 1e-9  # s
+STRAIN = 1.0 / 3.0  # share of a new frame in the strain
 NOTHING, TAKEN, REFUSED, LATE, RESET = range(5)  # what becomes of a frame
 
 
@@ -125,14 +127,16 @@ def place(ticks: Any, oldest: int, stamp: float) -> int:
 
 def filtered(
     chains: Any, past: Any, ticks: Any, oldest: int, now: Any, frames: Any, held: int, frame: Any,
-    model: Any, sigma: Any, gate: float, tolerance: float, believe: bool, keep: bool,
-) -> tuple[int, int, int, float]:  # fmt: skip
+    model: Any, sigma: Any, gate: float, tolerance: float, strain: float, limit: float, believe: bool,
+    keep: bool,
+) -> tuple[int, int, int, float, float]:  # fmt: skip
     """Give the estimates at the tick `now`, before its own frames, with a new frame if that is believed.
 
     `now` (4,) is the tick after those in `ticks`, and `frame` has NaN for a stamp if there is
-    none. If `believe`, a frame beyond the gate resets the estimates. Returned are what became of the frame,
-    how many are held, the oldest tick of use, and the frame's squared innovation over its variance. Without
-    `keep` the past stays as it is.
+    none. A frame beyond the gate is refused, and one by which the `strain` goes beyond a limit; if `believe`,
+    it resets the estimates instead. Returned are what became of the frame, how many are held, the oldest tick
+    of use, the frame's squared innovation over its variance, and the strain. Without `keep` the past stays as
+    it is.
     """
     first, verdict, nis = TICKS - 1, NOTHING, math.nan
     if not math.isnan(frame[STAMP]):
@@ -144,18 +148,21 @@ def filtered(
             first, frame[STAMP] = found, stamp
             chains[:] = past[first]
             again(chains, past, ticks, first, now, stamp, frames, held, model, False)
-            nis, greatest = innovation(chains, frame, tolerance)
-            verdict = TAKEN if greatest <= gate * gate else (RESET if believe else REFUSED)
+            nis, greatest, level = innovation(chains, frame, tolerance)
+            near = greatest <= gate * gate
+            if near:  # one frame alone, however far, does not do it
+                strain += STRAIN * (min(level, 2.0 * limit) - strain)
+            verdict = TAKEN if near and strain <= limit else (RESET if believe else REFUSED)
     chains[:] = past[first]
     if verdict == RESET:
-        held, oldest = 0, first
+        held, oldest, strain = 0, first, 0.0
         begin(chains, frame[VALUE:VARIANCE], sigma, model[3:6])
         if keep:
             past[first] = chains
     if verdict in (TAKEN, RESET):
         held = insert(frames, held, frame, float(ticks[oldest, 0]))
     again(chains, past, ticks, first, now, float(now[0]), frames, held, model, keep)
-    return verdict, held, oldest, nis
+    return verdict, held, oldest, nis, strain
 
 
 def again(
@@ -191,16 +198,17 @@ def insert(frames: Any, held: int, frame: Any, horizon: float) -> int:
     return held + 1
 
 
-def innovation(chains: Any, frame: Any, tolerance: float) -> tuple[float, float]:
-    """Return the squared innovation over its variance, summed, and the greatest of what is beyond."""
-    total = greatest = 0.0
+def innovation(chains: Any, frame: Any, tolerance: float) -> tuple[float, float, float]:
+    """Return the squared innovation over its variance: of all, the greatest beyond tolerance, of x and y."""
+    total = greatest = level = 0.0
     for axis in range(3):
         off = float(frame[VALUE + axis]) - float(chains[axis, 0])
         variance = float(chains[axis, 3]) + float(frame[VARIANCE + axis])
         total += off * off / variance
+        level += off * off / variance if axis < 2 else 0.0
         beyond = max(abs(off) - tolerance, 0.0)
         greatest = max(greatest, beyond * beyond / variance)
-    return total, greatest
+    return total, greatest, level
 
 
 def latest(chains: Any, frames: Any, held: int, now: float) -> None:

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from quadvis_blocks._stamps import INSTANT
+
 CAPACITY = 128  # commands: the last that arrived, and those on their way
-INSTANT = 1e-9  # s
 
 
 def wrench(thrust: Any, arm: float, inertia: Any, torque_ratio: float) -> Any:

@@ -7,6 +7,7 @@ from typing import Any
 
 from quadvis.block import Block, In, Out, Param, State
 from quadvis_blocks._angles import wrapped
+from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, note
 
 CAPACITY = 128
 DEGREE = math.pi / 180.0
@@ -20,8 +21,8 @@ class AttitudeFilter(Block):
     is what the rotors give from now to the next tick, as `estimation.rotor_state` tells.
 
     An angle may be late, as the heading that a camera sees: with a ``stamp`` it is held against the estimate
-    of that instant, and the difference corrects the estimate of now. An angle is new if its stamp is not that
-    of the tick before; without a stamp it is new at each tick. Innovations count up to ``gate`` standard
+    of that instant, and the difference corrects the estimate of now. An angle is new if its stamp is
+    news; without a stamp it is new at each tick. Innovations count up to ``gate`` standard
     deviations, so that a wrong measurement does little and a lasting one wins.
 
     Error: an error of the measured angle that lasts goes into the estimate whole. A late angle corrects as
@@ -66,14 +67,23 @@ class AttitudeFilter(Block):
         type="float64[4]", unit="rad rad/s rad/s^2 rad/s", above=0.0, doc="deviations at the start",
     )  # fmt: skip
 
+    restart = Param(
+        RESTART,
+        unit="s",
+        above=0.0,
+        tune=True,
+        doc="how long a clock that started again runs until it counts",
+    )
+
     mean = State("float64[4]")  # before the measurements of this tick
     spread = State("float64[4,4]")
     past = State(f"float64[{CAPACITY}]")  # angles, not wrapped, after the measurements; the newest first
     kept = State("int64")
-    last_stamp = State("float64", math.nan)
+    stamps = State(f"float64[{SIZE}]")
 
     def start(self) -> None:
         """Begin with zeros, as uncertain as the parameter says."""
+        begin(self.stamps)
         for index in range(4):
             self.spread[index, index] = self.initial_sigma[index] ** 2
 
@@ -82,9 +92,9 @@ class AttitudeFilter(Block):
     ) -> tuple[float, float, float, float, Any]:
         """Return the estimate with the measurements of now."""
         mean, spread = self.mean.copy(), self.spread.copy()
-        new = valid and (math.isnan(stamp) or stamp != self.last_stamp)
-        late = 0.0 if math.isnan(stamp) else (time - stamp) / self.period
-        off = _off(angle, late, self.past, self.kept, float(mean[0])) if new else math.nan
+        verdict, made = judge(self.stamps, stamp, time, self.restart)
+        new, late = valid and verdict == NEWS, time - made
+        off = _off(angle, late, self.past, self.kept, float(mean[0]), self.period) if new else math.nan
         _measure(mean, spread, off, gyro, self.angle_noise, self.rate_noise, self.gate)
         return wrapped(float(mean[0])), float(mean[1]), float(mean[2]), float(mean[3]), spread
 
@@ -93,27 +103,27 @@ class AttitudeFilter(Block):
     ) -> None:
         """Take the measurements into account, and carry the estimate to the next tick."""
         mean, spread = self.mean, self.spread
-        new = valid and (math.isnan(stamp) or stamp != self.last_stamp)
-        late = 0.0 if math.isnan(stamp) else (time - stamp) / self.period
-        off = _off(angle, late, self.past, self.kept, float(mean[0])) if new else math.nan
+        verdict, made = note(self.stamps, stamp, time, self.restart)
+        new, late = valid and verdict == NEWS, time - made
+        off = _off(angle, late, self.past, self.kept, float(mean[0]), self.period) if new else math.nan
         _measure(mean, spread, off, gyro, self.angle_noise, self.rate_noise, self.gate)
         self.past[1:] = self.past[:-1].copy()
         self.past[0] = mean[0]
         self.kept = min(self.kept + 1, CAPACITY)
-        self.last_stamp = stamp
         _predict(
             mean, spread, torque, self.period, self.torque_noise, self.disturbance_wander, self.bias_wander
         )
 
 
-def _off(angle: float, late: float, past: Any, kept: int, now: float) -> float:
-    """Return how far a measured angle is from the estimate of `late` ticks ago; NaN if that is not known."""
-    if not math.isfinite(angle) or late < -1e-6 or late > min(kept, CAPACITY - 1) + 1e-6:
+def _off(angle: float, late: float, past: Any, kept: int, now: float, period: float) -> float:
+    """Return how far a measured angle is from the estimate of `late` seconds ago; NaN if not known."""
+    ticks, rounding = late / period, INSTANT / period
+    if not math.isfinite(angle) or ticks > min(kept, CAPACITY - 1) + rounding:
         return math.nan
-    steps = int(late)
-    share = late - steps
+    steps = int(ticks)
+    share = ticks - steps
     newer = now if steps == 0 else float(past[steps - 1])
-    older = newer if share < 1e-6 else float(past[steps])
+    older = newer if share < rounding else float(past[steps])
     return wrapped(angle - newer - share * (older - newer))
 
 

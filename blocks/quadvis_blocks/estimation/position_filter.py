@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks._stamps import AHEAD, BACK, INSTANT, NEWS, RESTART, SIZE, judge, note
+from quadvis_blocks._stamps import begin as begin_clock
 from quadvis_blocks.estimation._chain import (
     FRAMES,
-    INSTANT,
     LATE,
     REFUSED,
     RESET,
@@ -37,9 +38,14 @@ class PositionFilter(Block):
     accelerations alone. The last 64 ticks are kept; a frame from before them is refused.
 
     A frame is refused if along an axis it is further than ``gate`` standard deviations, and ``tolerance`` for
-    what the model leaves out, from where it was expected. When for ``reset_after`` nothing else came, the
-    filter believes it, and begins anew there. A frame is new if its stamp is not that of the tick before; it
-    needs ``valid`` and finite numbers.
+    what the model leaves out, from where it was expected; or if frames are within that, but x and y strain
+    the filter: the mean of their squared innovations over the variances, by a fading memory of some three
+    frames, is above ``strain_limit``. It is 2 when all is well, and rises at once when positions are of other
+    instants than their stamps say, or contradict the known accelerations in another way. When for
+    ``reset_after`` nothing else came, the filter believes it, and begins anew there. A frame counts if its
+    stamp is news, or goes back as that of one overtaken on its way does; it needs ``valid`` and finite
+    numbers. From a refused frame to the next one that is believed the measurements contradict the known
+    accelerations.
 
     Of the libraries, filterpy is no longer kept, and neither it nor scipy takes frames out of order or
     compiles.
@@ -70,6 +76,7 @@ class PositionFilter(Block):
         unit="s", doc="time since the newest frame that was believed, by its stamp; from the start if none"
     )
     ok = Out("bool", doc="whether there was one, and its age is at most max_age")
+    contradicted = Out("bool", doc="whether the newest frame that could be compared was refused by the gate")
     nis = Out(nan=True, doc="squared innovation over its variance, summed, of a new frame; else NaN")
     refused = Out("int64", doc="how many frames were refused")
 
@@ -90,8 +97,21 @@ class PositionFilter(Block):
         doc="correlation time of the disturbance; one that lasts is pulled to zero by it a little",
     )  # fmt: skip
     gate = Param(5.0, above=0.0, tune=True, doc="greatest innovation in standard deviations")
+    strain_limit = Param(
+        12.0,
+        above=0.0,
+        tune=True,
+        doc="greatest squared innovation over its variance, x and y, mean of some frames",
+    )
     tolerance = Param(0.0, unit="m", min=0.0, tune=True, doc="innovation that is never too great")
     reset_after = Param(1.0, unit="s", above=0.0, tune=True, doc="how long to refuse frames before believing")
+    restart = Param(
+        RESTART,
+        unit="s",
+        above=0.0,
+        tune=True,
+        doc="how long a clock that started again runs until it counts",
+    )
     max_age = Param(2.0, unit="s", above=0.0, tune=True, doc="how long accelerations alone are good enough")
     initial = Param((0.0, 0.0, 0.0), type="float64[3]", unit="m", doc="position at the start")
     initial_sigma = Param(
@@ -103,13 +123,15 @@ class PositionFilter(Block):
     oldest = State("int64", TICKS)  # the first tick that frames may go back to; none yet
     frames = State(f"float64[{FRAMES},{WIDTH}]")
     held = State("int64")
-    last_stamp = State("float64", math.nan)
+    stamps = State(f"float64[{SIZE}]")
     newest = State("float64", math.nan)
     refusing = State("float64", math.nan)  # since when
     refusals = State("int64")
+    strain = State()  # squared innovations of x and y over their variances, by fading memory
 
     def start(self) -> None:
         """Begin at rest at the initial position."""
+        begin_clock(self.stamps)
         begin(self.past[TICKS - 1], self.initial, self.initial_sigma, self.wander)
 
     def output(
@@ -117,23 +139,27 @@ class PositionFilter(Block):
     ) -> tuple[Any, ...]:
         """Return the estimate with what is known now."""
         now = _tick(time, acceleration)
-        frame = _frame(position, stamp, valid, measured, self.noise, self.last_stamp)
+        verdict, made = judge(self.stamps, stamp, time, self.restart)
+        frame = _frame(position, _counts(verdict, made, stamp), valid, measured, self.noise)
         frames, chains = self.frames.copy(), self.past[TICKS - 1].copy()
         newest, refused, nis = self.newest, self.refusals, math.nan
+        contradicted = not math.isnan(self.refusing)
         if self.oldest < TICKS:
-            verdict, held, _, nis = filtered(
+            verdict, held, _, nis, _ = filtered(
                 chains, self.past, self.ticks, self.oldest, now, frames, self.held, frame,
                 _model(self.acceleration_noise, self.wander, self.decay), self.initial_sigma, self.gate,
-                self.tolerance, time - self.refusing >= self.reset_after, False,
+                self.tolerance, self.strain, self.strain_limit,
+                time - self.refusing >= self.reset_after, False,
             )  # fmt: skip
             latest(chains, frames, held, time)
-            newest = _newer(newest, stamp, verdict)
+            newest = _newer(newest, made, verdict)
             refused += 1 if verdict in (REFUSED, LATE) else 0
+            contradicted = verdict == REFUSED or (contradicted and verdict not in (TAKEN, RESET))
         age = time - (0.0 if math.isnan(newest) else newest)
         ok = not math.isnan(newest) and age <= self.max_age + INSTANT
         return (
             chains[:, 0].copy(), chains[:, 1].copy(), chains[:, 2].copy(), _covariance(chains),
-            age, ok, nis, refused,
+            age, ok, contradicted, nis, refused,
         )  # fmt: skip
 
     def update(
@@ -142,19 +168,20 @@ class PositionFilter(Block):
         """Keep what came in, and the estimates just before the frames of this instant."""
         now, chains = _tick(time, acceleration), self.past[TICKS - 1].copy()
         if self.oldest < TICKS:
-            frame = _frame(position, stamp, valid, measured, self.noise, self.last_stamp)
-            verdict, self.held, self.oldest, _ = filtered(
+            verdict, made = note(self.stamps, stamp, time, self.restart)
+            frame = _frame(position, _counts(verdict, made, stamp), valid, measured, self.noise)
+            verdict, self.held, self.oldest, _, self.strain = filtered(
                 chains, self.past, self.ticks, self.oldest, now, self.frames, self.held, frame,
                 _model(self.acceleration_noise, self.wander, self.decay), self.initial_sigma, self.gate,
-                self.tolerance, time - self.refusing >= self.reset_after, True,
+                self.tolerance, self.strain, self.strain_limit,
+                time - self.refusing >= self.reset_after, True,
             )  # fmt: skip
-            self.newest = _newer(self.newest, stamp, verdict)
+            self.newest = _newer(self.newest, made, verdict)
             self.refusals += 1 if verdict in (REFUSED, LATE) else 0
             if verdict in (TAKEN, RESET):
                 self.refusing = math.nan
             elif verdict == REFUSED and math.isnan(self.refusing):
                 self.refusing = time
-            self.last_stamp = stamp
         self.oldest = append(self.ticks, self.past, self.oldest, now, chains)
 
 
@@ -166,10 +193,17 @@ def _model(noise: Any, wander: Any, decay: Any) -> Any:
     return np.concatenate((noise, wander, decay))
 
 
-def _frame(position: Any, stamp: float, valid: bool, measured: Any, noise: Any, last: float) -> Any:
-    """Return a frame; its stamp is NaN if it is the last one again, or not fit for use."""
+def _counts(verdict: int, made: float, stamp: float) -> float:
+    """Return the instant of a frame; NaN if it does not count. One that is ahead is there to be refused."""
+    if verdict == AHEAD:
+        return stamp
+    return made if verdict in (NEWS, BACK) and not math.isnan(stamp) else math.nan
+
+
+def _frame(position: Any, stamp: float, valid: bool, measured: Any, noise: Any) -> Any:
+    """Return a frame; its stamp is NaN if it is not fit for use."""
     frame = np.zeros(WIDTH)
-    fit = valid and stamp != last
+    fit = valid
     for axis in range(3):
         frame[VALUE + axis] = position[axis]
         frame[VARIANCE + axis] = measured[axis, axis] + noise[axis] * noise[axis]

@@ -9,6 +9,7 @@ import numpy as np
 
 from quadvis.block import Block, In, Out, Param, State
 from quadvis_blocks._craft import GRAVITY, MASS, MOTOR_LAG
+from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, note
 
 
 class ReckonedHeight(Block):
@@ -31,6 +32,13 @@ class ReckonedHeight(Block):
     lag = Param(MOTOR_LAG, unit="s", above=0.0, tune=True, doc="time constant of a motor")
     gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
     lowest = Param(-10.0, unit="m", tune=True, doc="where the model stops to sink, when the rotors idle")
+    restart = Param(
+        RESTART,
+        unit="s",
+        above=0.0,
+        tune=True,
+        doc="how long a clock that started again runs until it counts",
+    )
     position = In("float64[3]", unit="m", doc="measured position: x, y, h")
     velocity = In("float64[3]", unit="m/s", doc="measured velocity")
     stamp = In(unit="s", doc="instant of the newest frame; NaN for none yet")
@@ -46,9 +54,11 @@ class ReckonedHeight(Block):
     excess = State(unit="m/s^2")
     lift = State(unit="N")
     last = State(unit="s")
+    stamps = State(f"float64[{SIZE}]")
 
     def start(self) -> None:
         """Know nothing yet, in a trimmed hover."""
+        begin(self.stamps)
         self.last = -math.inf
         self.lift = self.mass * self.gravity
 
@@ -73,11 +83,12 @@ class ReckonedHeight(Block):
         time: float,
     ) -> None:
         """Correct the model by a new frame, and let it run for one period."""
-        if stamp > self.last and not blind:
+        verdict, made = note(self.stamps, stamp, time, self.restart)
+        if verdict == NEWS and not math.isnan(stamp) and not blind:
             if self.last == -math.inf:
                 self.h = position[2]
             else:
-                since, age = stamp - self.last, time - stamp
+                since, age = made - self.last, time - made
                 keep = math.exp(-self.bandwidth * since)
                 error = position[2] - (self.h - self.climb * age)
                 forget = 1.0 - keep
@@ -85,7 +96,7 @@ class ReckonedHeight(Block):
                 self.climb += forget * forget / since * error
                 slow = -math.expm1(-self.trim_bandwidth * since)
                 self.excess += slow * forget * forget / (since * since) * error
-            self.last = stamp
+            self.last = made
         upright = math.cos(roll) * math.cos(pitch)
         force = self.lift * upright - self.drag * self.climb
         acceleration = force / self.mass - self.gravity + self.excess

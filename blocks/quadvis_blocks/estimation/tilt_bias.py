@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, note
 
 
 class TiltBias(Block):
@@ -29,36 +30,50 @@ class TiltBias(Block):
     imu_pitch = In(unit="rad", doc="pitch by the inertial unit at the instant of the frame")
     roll = In(unit="rad", doc="roll of the pose; NaN if there is none")
     pitch = In(unit="rad", doc="pitch of the pose; NaN if there is none")
-    stamp = In(unit="s", doc="instant of the frame; the same as at the tick before: no new frame")
+    stamp = In(unit="s", doc="instant of the frame; NaN for none yet")
     valid = In("bool", default=True, doc="whether the pose is good")
     roll_bias = Out(unit="rad", doc="error of the unit's roll")
     pitch_bias = Out(unit="rad", doc="error of the unit's pitch")
 
     time_constant = Param(10.0, unit="s", min=0.0, tune=True, doc="of the average; 0 takes the newest frame")
+    restart = Param(
+        RESTART,
+        unit="s",
+        above=0.0,
+        tune=True,
+        doc="how long a clock that started again runs until it counts",
+    )
     limit = Param(0.1, unit="rad", above=0.0, tune=True, doc="greatest bias; one beyond it is a wrong pose")
 
     by_roll = State(unit="rad")
     by_pitch = State(unit="rad")
     frames = State("int64")
-    last_stamp = State("float64", math.nan)
+    measured = State(unit="s")  # the last frame that counted
+    stamps = State(f"float64[{SIZE}]")
+
+    def start(self) -> None:
+        """Know no frame yet."""
+        begin(self.stamps)
 
     def output(self) -> tuple[float, float]:
         """Return the bias by the frames so far."""
         return self.by_roll, self.by_pitch
 
     def update(
-        self, imu_roll: float, imu_pitch: float, roll: float, pitch: float, stamp: float, valid: bool
-    ) -> None:
+        self, imu_roll: float, imu_pitch: float, roll: float, pitch: float, stamp: float, valid: bool,
+        time: float,
+    ) -> None:  # fmt: skip
         """Take a new frame into account."""
+        verdict, made = note(self.stamps, stamp, time, self.restart)
         off_roll, off_pitch = imu_roll - roll, imu_pitch - pitch
-        if not valid or math.isnan(stamp) or stamp == self.last_stamp:
+        if not valid or math.isnan(stamp) or verdict != NEWS:
             return
         if not (abs(off_roll) <= self.limit and abs(off_pitch) <= self.limit):
             return
         self.frames += 1
-        elapsed = abs(stamp - self.last_stamp) if self.frames > 1 else 0.0
+        elapsed = made - self.measured if self.frames > 1 else 0.0
         share = 1.0 if self.time_constant == 0.0 else -math.expm1(-elapsed / self.time_constant)
         share = max(share, 1.0 / self.frames)
         self.by_roll += share * (off_roll - self.by_roll)
         self.by_pitch += share * (off_pitch - self.by_pitch)
-        self.last_stamp = stamp
+        self.measured = made

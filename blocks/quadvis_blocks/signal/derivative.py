@@ -6,19 +6,18 @@ import math
 from typing import Any
 
 from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, note
 from quadvis_blocks.signal._elements import all_finite
-
-INSTANT = 1e-9  # s
 
 
 class Derivative(Block):
     """Rate of change of a sampled signal by backward difference: ``rate = (u_t - u_{t-T}) / T``.
 
     T is the true time between the two samples, from their stamps; without stamps it is the time between
-    ticks. A repeated frame (a stamp not newer than the last) and a sample that is not valid keep the last
-    rate, so the block may run faster than the camera. A value with NaN counts as not valid. The rate is 0 and
-    ``ok`` false until there are two samples, and again after a gap: when two stamps, or the arrivals of two
-    samples, are further apart than ``gap_reset``. Successive ticks are never a gap.
+    ticks. A frame whose stamp is no news (repeated, back, ahead of the time, NaN) and a sample that is not
+    valid keep the last rate, so the block may run faster than the camera. A value with NaN counts as not
+    valid. The rate is 0 and ``ok`` false until there are two samples, and again after a gap: when two stamps,
+    or the arrivals of two samples, are further apart than ``gap_reset``. Successive ticks are never a gap.
 
     Source: section 6.2. Error: at most ``M T / 2`` for a signal with ``|u''| <= M``; noise of standard
     deviation s in the signal becomes ``s sqrt(2) / T`` in the rate.
@@ -26,6 +25,13 @@ class Derivative(Block):
 
     gap_reset = Param(
         0.4, unit="s", above=0.0, tune=True, doc="longest gap (inclusive) that a difference may span"
+    )
+    restart = Param(
+        RESTART,
+        unit="s",
+        above=0.0,
+        tune=True,
+        doc="how long a clock that started again runs until it counts",
     )
     u = In("float64[*]", unit="a", doc="the signal; NaN where it is missing")
     stamp = In(unit="s", default=math.nan, doc="instant at which u was measured; NaN for now")
@@ -37,9 +43,11 @@ class Derivative(Block):
     last_ok = State("bool")
     measured = State(unit="s")
     arrived = State(unit="s")
+    stamps = State(f"float64[{SIZE}]")
 
     def start(self) -> None:
         """Forget all samples."""
+        begin(self.stamps)
         self.measured = -math.inf
         self.arrived = -math.inf
 
@@ -47,8 +55,9 @@ class Derivative(Block):
         """Return the rate, and whether it means anything."""
         longest = max(self.gap_reset, 1.5 * self.period) + INSTANT
         in_time = time - self.arrived <= longest
-        elapsed = (time if math.isnan(stamp) else stamp) - self.measured
-        if valid and elapsed > 0.0 and all_finite(u):
+        verdict, made = judge(self.stamps, stamp, time, self.restart)
+        elapsed = made - self.measured
+        if valid and verdict == NEWS and elapsed > 0.0 and all_finite(u):
             if in_time and elapsed <= longest:
                 return (u - self.last) / elapsed, True
             return 0.0 * u, False
@@ -59,11 +68,11 @@ class Derivative(Block):
     def update(self, u: Any, stamp: float, valid: bool, time: float) -> None:
         """Keep this sample if it is new and good."""
         longest = max(self.gap_reset, 1.5 * self.period) + INSTANT
-        measured = time if math.isnan(stamp) else stamp
-        elapsed = measured - self.measured
-        if valid and elapsed > 0.0 and all_finite(u):
+        verdict, made = note(self.stamps, stamp, time, self.restart)
+        elapsed = made - self.measured
+        if valid and verdict == NEWS and elapsed > 0.0 and all_finite(u):
             self.last_ok = time - self.arrived <= longest and elapsed <= longest
             self.last_rate = (u - self.last) / elapsed if self.last_ok else 0.0 * u
             self.last = u
-            self.measured = measured
+            self.measured = made
             self.arrived = time

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from quadvis.block import Block, In, Out, State
+from quadvis_blocks._stamps import INSTANT
 
 CAPACITY = 256
 
@@ -14,7 +15,8 @@ class History(Block):
 
     So what arrives late meets what was measured beside it at the time: a frame of a camera, and the angles of
     an inertial unit when the frame was taken. The last 256 samples are kept. An instant before them gives the
-    oldest, one in the future or NaN the newest; ``ok`` is then false.
+    oldest, one in the future or NaN the newest; ``ok`` is then false. An instant is a question, which may go
+    back and be asked again: whether a stamp is news, `supervision.frame_news` finds out.
 
     Error: at most ``M T^2 / 8`` for a signal with ``|u''| <= M``.
     """
@@ -30,11 +32,11 @@ class History(Block):
         """Return the value at the instant."""
         if math.isnan(instant):
             return u, False
-        age = (time - instant) / self.period
-        if age < -1e-6:
+        if instant > time + INSTANT:
             return u, False
         kept = self.kept
-        if age > kept + 1e-6:
+        age = (time - instant) / self.period
+        if age > kept + INSTANT / self.period:
             return (u if kept == 0 else float(self.values[kept - 1])), False
         age = min(max(age, 0.0), float(kept))
         steps = min(int(age), kept - 1)

@@ -6,9 +6,8 @@ import math
 from typing import Any
 
 from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, note
 from quadvis_blocks.signal._elements import all_finite
-
-INSTANT = 1e-9  # s
 
 
 class HoldValid(Block):
@@ -16,12 +15,19 @@ class HoldValid(Block):
 
     A value is valid if ``valid`` is true and all its elements are finite, so NaN never passes, and if its
     ``stamp`` is newer than that of the value held: a frame that was overtaken on its way comes too late, and
-    one that is there still is no news. The age counts from the stamp, or from the tick at which the value
-    came if no stamp is connected; a stamp that is ahead of the time counts as now. Before the first valid
-    value the output is ``initial``, the age counts from the start and ``ok`` is false.
+    one that is there still is no news, nor is one whose stamp is ahead of the time. The age counts from the
+    stamp, or from the tick at which the value came if no stamp is connected. Before the first valid value the
+    output is ``initial``, the age counts from the start and ``ok`` is false.
     """
 
     max_age = Param(0.25, unit="s", min=0.0, tune=True, doc="greatest age (inclusive) that is ok")
+    restart = Param(
+        RESTART,
+        unit="s",
+        above=0.0,
+        tune=True,
+        doc="how long a clock that started again runs until it counts",
+    )
     value = In("float64[*]", unit="a", doc="the measurement; NaN where it is missing")
     valid = In("bool", default=True, doc="whether the measurement is good")
     stamp = In(unit="s", default=math.nan, doc="instant of the measurement; NaN for now")
@@ -32,13 +38,18 @@ class HoldValid(Block):
     last = State("float64[*]")
     measured = State(unit="s")
     seen = State("bool")
+    stamps = State(f"float64[{SIZE}]")
+
+    def start(self) -> None:
+        """Know no value yet."""
+        begin(self.stamps)
 
     def output(
         self, value: Any, valid: bool, stamp: float, initial: Any, time: float
     ) -> tuple[Any, float, bool]:
         """Return the value if it is valid, else the last one that was."""
-        made = _instant(stamp, time)
-        if _is_news(value, valid, made, self.seen, self.measured):
+        verdict, made = judge(self.stamps, stamp, time, self.restart)
+        if verdict == NEWS and _is_good(value, valid, made, self.seen, self.measured):
             held, measured, seen = 1.0 * value, made, True
         elif self.seen:
             held, measured, seen = 1.0 * self.last, self.measured, True
@@ -49,18 +60,13 @@ class HoldValid(Block):
 
     def update(self, value: Any, valid: bool, stamp: float, time: float) -> None:
         """Keep the value if it is valid."""
-        made = _instant(stamp, time)
-        if _is_news(value, valid, made, self.seen, self.measured):
+        verdict, made = note(self.stamps, stamp, time, self.restart)
+        if verdict == NEWS and _is_good(value, valid, made, self.seen, self.measured):
             self.last = value
             self.measured = made
             self.seen = True
 
 
-def _instant(stamp: float, time: float) -> float:
-    """Return the stamp, or now if there is none or it is ahead of the time."""
-    return time if math.isnan(stamp) else min(stamp, time)
-
-
-def _is_news(value: Any, valid: bool, made: float, seen: bool, measured: float) -> bool:
+def _is_good(value: Any, valid: bool, made: float, seen: bool, measured: float) -> bool:
     """Return whether a value is good, and made after the one that is held."""
     return bool(valid and all_finite(value) and not (seen and made <= measured))

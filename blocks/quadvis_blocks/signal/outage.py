@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from quadvis.block import Block, In, Out, Param, ParameterError, State
-
-INSTANT = 1e-9  # s; an outage begins and ends at ticks, which rounding must not move
+from quadvis_blocks._stamps import INSTANT
 
 
 class Outage(Block):

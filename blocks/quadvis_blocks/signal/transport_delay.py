@@ -8,9 +8,9 @@ from typing import Any
 from quadvis.block import Block, In, Out, Param, State
 from quadvis_blocks._craft import RADIO_DELAY
 from quadvis_blocks._delay import check_delay
+from quadvis_blocks._stamps import INSTANT
 
 CAPACITY = 512
-INSTANT = 1e-9  # s; an edge that is due at a tick must not wait for the next one because of rounding
 
 
 class TransportDelay(Block):

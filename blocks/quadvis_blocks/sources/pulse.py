@@ -6,8 +6,7 @@ import math
 from typing import Any
 
 from quadvis.block import Block, Out, Param, ParameterError
-
-INSTANT = 1e-9  # s; edges are on ticks, and neither may be lost to rounding
+from quadvis_blocks._stamps import INSTANT
 
 
 class Pulse(Block):

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks._stamps import INSTANT
 
-INSTANT = 1e-9  # m, s
+TOUCH = 1e-9  # m; a height no further from another one is the same
 
 
 class Landing(Block):
@@ -62,7 +63,7 @@ class Landing(Block):
         seen_again = self.was_blind and not blind
         spot = _spot(self.active, self.spot, position_reference, recapture, seen_again, current, self.gap)
         height = float(current[2])
-        lowest = spot[2] <= self.ground - self.margin + INSTANT
+        lowest = spot[2] <= self.ground - self.margin + TOUCH
         rests = self.active and abs(height - self.rest) <= self.band and height - spot[2] > self.gap
         landed = lowest if blind else rests and time - self.since >= self.settle - INSTANT
         slow = spot[2] <= self.ground + self.flare
@@ -77,7 +78,7 @@ class Landing(Block):
         seen_again = self.was_blind and not blind
         spot = _spot(self.active, self.spot, position_reference, recapture, seen_again, current, self.gap)
         height = float(current[2])
-        lowest = spot[2] <= self.ground - self.margin + INSTANT
+        lowest = spot[2] <= self.ground - self.margin + TOUCH
         rests = self.active and abs(height - self.rest) <= self.band and height - spot[2] > self.gap
         landed = lowest if blind else rests and time - self.since >= self.settle - INSTANT
         if blind or not self.active or abs(height - self.rest) > self.band:

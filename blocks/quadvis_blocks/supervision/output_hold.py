@@ -6,21 +6,28 @@ import math
 from typing import Any
 
 from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, note
 from quadvis_blocks.signal._elements import all_finite
-
-INSTANT = 1e-9  # s
 
 
 class OutputHold(Block):
     """The last good command for a short while, then a safe one: the gate before an actuator.
 
     A command is good if ``valid`` is true, all its elements are finite and its ``stamp`` is newer than all
-    before; without stamps every tick brings a new one. It is held until it is older than ``max_age``; then
-    every element is ``safe`` until the next good one. Before the first good one the output is safe.
+    before and not ahead of the time; without stamps every tick brings a new one. It is held until it is older
+    than ``max_age``; then every element is ``safe`` until the next good one. Before the first good one the
+    output is safe.
     """
 
     max_age = Param(0.25, unit="s", min=0.0, tune=True, doc="how long (inclusive) a command is held")
     safe = Param(0.0, unit="a", tune=True, doc="every element of the safe command: idle, or neutral")
+    restart = Param(
+        RESTART,
+        unit="s",
+        above=0.0,
+        tune=True,
+        doc="how long a clock that started again runs until it counts",
+    )
     u = In("float64[*]", unit="a", doc="the command")
     valid = In("bool", default=True, doc="whether the command is good")
     stamp = In(unit="s", default=math.nan, doc="instant at which it was made; NaN for now")
@@ -28,15 +35,17 @@ class OutputHold(Block):
     stale = Out("bool", doc="whether it is the safe one")
     last = State("float64[*]")
     made = State(unit="s")
+    stamps = State(f"float64[{SIZE}]")
 
     def start(self) -> None:
         """Know no command yet."""
+        begin(self.stamps)
         self.made = -math.inf
 
     def output(self, u: Any, valid: bool, stamp: float, time: float) -> tuple[Any, bool]:
         """Return the command that counts, and whether it is the safe one."""
-        made = time if math.isnan(stamp) else stamp
-        good = valid and all_finite(u) and made > self.made
+        verdict, made = judge(self.stamps, stamp, time, self.restart)
+        good = verdict == NEWS and valid and all_finite(u) and made > self.made
         if time - (made if good else self.made) > self.max_age + INSTANT:
             return 0.0 * self.last + self.safe, True
         if good:
@@ -45,7 +54,7 @@ class OutputHold(Block):
 
     def update(self, u: Any, valid: bool, stamp: float, time: float) -> None:
         """Keep a good command."""
-        made = time if math.isnan(stamp) else stamp
-        if valid and all_finite(u) and made > self.made:
+        verdict, made = note(self.stamps, stamp, time, self.restart)
+        if verdict == NEWS and valid and all_finite(u) and made > self.made:
             self.last = u
             self.made = made

@@ -6,8 +6,7 @@ import math
 from typing import Any
 
 from quadvis.block import Block, In, Out, Param, State
-
-INSTANT = 1e-9  # s
+from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, note
 
 
 class Staleness(Block):
@@ -26,25 +25,32 @@ class Staleness(Block):
         tune=True,
         doc="greatest age (inclusive) that is not stale; 0.1 s suits an IMU",
     )
+    restart = Param(
+        RESTART,
+        unit="s",
+        above=0.0,
+        tune=True,
+        doc="how long a clock that started again runs until it counts",
+    )
     stamp = In(unit="s", default=math.nan, doc="instant of the measurement")
     sequence = In("int64", default=0, doc="number of the measurement")
     value = In("float64[*]", unit="a", default=0.0, doc="the measurement, if it has noise: it never repeats")
     age = Out(unit="s", doc="time since the last news")
     stale = Out("bool", doc="whether that is more than ``max_age``")
-    newest = State(unit="s")
     news = State(unit="s")
     last_sequence = State("int64")
     last_value = State("float64[*]")
+    stamps = State(f"float64[{SIZE}]")
 
     def start(self) -> None:
         """Know nothing yet."""
-        self.newest = -math.inf
+        begin(self.stamps)
 
     def output(self, stamp: float, sequence: int, value: Any, time: float) -> tuple[float, bool]:
         """Return the age, and whether it is too great."""
-        stamped = self.newest < stamp <= time + INSTANT
-        if stamped:
-            age = time - stamp
+        verdict, made = judge(self.stamps, stamp, time, self.restart)
+        if verdict == NEWS and not math.isnan(stamp):
+            age = time - made
         elif sequence != self.last_sequence or _differs(value, self.last_value):
             age = 0.0
         else:
@@ -53,9 +59,9 @@ class Staleness(Block):
 
     def update(self, stamp: float, sequence: int, value: Any, time: float) -> None:
         """Keep what came."""
-        if self.newest < stamp <= time + INSTANT:
-            self.newest = stamp
-            self.news = stamp
+        verdict, made = note(self.stamps, stamp, time, self.restart)
+        if verdict == NEWS and not math.isnan(stamp):
+            self.news = made
         elif sequence != self.last_sequence or _differs(value, self.last_value):
             self.news = time
         self.last_sequence = sequence

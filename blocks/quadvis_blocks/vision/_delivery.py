@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from quadvis.block import Block, Param, ParameterError, Random, State
 from quadvis_blocks._random import uniform
+from quadvis_blocks._stamps import INSTANT
 
 QUEUE = 16  # frames that can be on their way at once
 SEQUENCE, STAMP, ARRIVAL = range(3)  # the first columns of a row, the rest is what was captured
@@ -97,7 +98,7 @@ class DeliveringCamera(Block, numeric=False):
 
     def _now(self, time: float) -> float:
         """Return a moment later: a sum of decimal times must not miss its tick by a rounding error."""
-        return time + 1e-6 * self.period
+        return time + INSTANT
 
     def _arrival(self, stamp: float) -> float:
         """Return when the frame of this tick arrives."""

@@ -220,6 +220,36 @@ def test_after_a_second_of_refusals_it_begins_anew_where_the_frames_are() -> Non
     assert result.refused[-1] == 20
 
 
+def test_frames_contradict_from_a_refused_one_to_the_next_that_is_believed() -> None:
+    times = STEP * np.arange(120)
+    position = np.where((times >= 2.0)[:, None] & (times < 2.5)[:, None], [5.0, 0.0, 0.0], 0.0)
+    result = estimate(np.zeros(3), position, times)
+    assert np.array_equal(result.contradicted, (times >= 2.0) & (times < 2.5))
+
+
+@pytest.mark.parametrize("late", [0.2, 0.3, 0.4, 0.6])
+def test_positions_of_earlier_instants_than_their_stamps_strain_the_filter_until_it_refuses(
+    late: float,
+) -> None:
+    times = STEP * np.arange(160)
+    speed = 1.5
+
+    def place(time: Any) -> Any:
+        return 0.5 * np.column_stack((np.cos(speed * time), np.sin(speed * time), 0.0 * time))
+
+    known = -(speed**2) * place(times)
+    position = place(np.where(times < 4.0, times, times - late)) + np.random.default_rng(1).normal(
+        0, 2e-3, (160, 3)
+    )
+    model: dict[str, Any] = {"noise": (2e-3,) * 3, "initial": (0.5, 0.0, 0.0)}
+    found = estimate(known, position, times, tolerance=0.5, **model)
+    first = np.argmax(found.contradicted[80:])
+    assert found.contradicted[80:].any() and 0 < first <= 10
+    assert not found.contradicted[20:80].any()  # as long as stamps are right
+    lenient = estimate(known, position, times, tolerance=0.5, strain_limit=1e9, **model)
+    assert not lenient.contradicted[80:].any()
+
+
 def test_a_frame_from_before_its_memory_or_from_the_future_is_refused() -> None:
     position = np.zeros((100, 3))
     stamp = STEP * np.arange(100)
