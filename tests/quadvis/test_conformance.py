@@ -139,6 +139,46 @@ FAULTS = [
 ]
 
 
+STAMPED = (
+    GOOD.replace("    model = Param", '    stamp = In(unit="s", doc="when it was wanted")\n    model = Param')
+    .replace("    stream = Random()", '    stream = Random()\n    newest = State(unit="s")')
+    .replace("def update(self, command):", "def update(self, command, stamp, time):\n        NEWS")
+)
+RULE = """if not self.newest < stamp <= time:
+            return
+        self.newest = stamp"""
+TRUSTING = """if not self.newest < stamp:
+            return
+        self.newest = stamp"""
+CHANGED = """if stamp == self.newest or stamp != stamp:
+            return
+        self.newest = stamp"""
+NOW = """made = min(stamp, time)
+        if not self.newest < made:
+            return
+        self.newest = made"""
+
+
+def test_a_block_that_knows_which_stamp_is_news_outlives_hostile_ones(tmp_path: Path) -> None:
+    CHECKS["outlives_hostile_stamps"](Subject(block(tmp_path, STAMPED.replace("NEWS", RULE))))
+
+
+@pytest.mark.parametrize(
+    ("rule", "sentence"),
+    [
+        (TRUSTING, "samples after a stamp 1000 s ahead speed is"),
+        (CHANGED, "samples after a stamp 1000 s ahead speed is"),
+        (NOW, "samples after a stamp 1000 s ahead speed is"),
+    ],
+)
+def test_a_block_that_believes_a_stamp_that_cannot_be_is_told(
+    rule: str, sentence: str, tmp_path: Path
+) -> None:
+    with pytest.raises(AssertionError) as caught:
+        CHECKS["outlives_hostile_stamps"](Subject(block(tmp_path, STAMPED.replace("NEWS", rule))))
+    assert sentence in str(caught.value)
+
+
 @pytest.mark.parametrize(("name", "before", "after", "sentence"), FAULTS)
 def test_each_check_catches_its_fault(
     name: str, before: str, after: str, sentence: str, tmp_path: Path
