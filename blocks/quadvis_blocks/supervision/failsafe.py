@@ -5,14 +5,18 @@ from __future__ import annotations
 from typing import Any
 
 from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks.supervision._vision import COAST, FRESH, LEVEL, REARMING
+from quadvis_blocks.supervision._vision import LAND as LOST
 
 ROLL, PITCH = 1, 2
-FRESH, COAST, LEVEL, LOST = range(4)  # states of vision
 TO_LAND, TO_MANUAL = range(2)
 NEUTRAL, PILOT = range(2)
 ZERO, KEEP = range(2)
 MANUAL, MIXED, AUTOMATIC, COASTING, LEVELLED, LANDING = range(6)
-NONE, SWITCH, STICK, IMU_STALE, STICKS_STALE, NO_FRAMES, TARGET_LOST, REARMING, ASKED, SATURATED = range(10)
+NONE, SWITCH, STICK, IMU_STALE, STICKS_STALE = range(5)
+OF_VISION = 4  # what is added to the first reasons of vision
+ASKED, SATURATED = 8, 9
+MORE_OF_VISION = 6  # what is added to the others
 
 
 class Failsafe(Block):
@@ -29,8 +33,10 @@ class Failsafe(Block):
 
     Modes: 0 MANUAL (no channel automatic), 1 MIXED (some), 2 AUTOMATIC (all), and with any channel automatic
     3 COAST, 4 LEVEL, 5 LAND. Reasons, the first that holds: in LAND what began it; 3 IMU stale; of vision 5
-    no new frames, 6 target not found, 7 not enough good frames yet; 2 a stick took a channel back; 4 sticks
-    stale; 1 a switch is off; 9 a control gave way in the mixer; 0 none. 8: landing was asked for.
+    no new frames, 6 target not found, 7 not enough good frames yet, 10 frames frozen, 11 stamps ahead, back
+    or NaN, 12 their clock started again, 13 a contradiction to the inertial unit; 2 a stick took a channel
+    back; 4 sticks stale; 1 a switch is off; 9 a control gave way in the mixer; 0 none. 8: landing was asked
+    for.
 
     ``freeze`` is for integrators and disturbance estimates: channels that the law does not have, or on which
     it does not get what it wants.
@@ -43,7 +49,7 @@ class Failsafe(Block):
     automatic = In("bool[4]", doc="channels that the pilot leaves to the law: collective, roll, pitch, yaw")
     overridden = In("bool[4]", default=(False,) * 4, doc="channels that a stick took back")
     vision = In("int64", default=FRESH, doc="state of vision: 0 FRESH, 1 COAST, 2 LEVEL, 3 LAND")
-    vision_reason = In("int64", default=0, doc="0 none, 1 no frames, 2 target not found, 3 not enough yet")
+    vision_reason = In("int64", default=0, doc="why, as `supervision.vision_watchdog` says: 0 to 7")
     vision_stale = In("bool", default=False, doc="whether the last good frame is too old")
     imu_stale = In("bool", default=False, doc="whether the IMU's last news is too old")
     sticks_stale = In("bool", default=False, doc="whether the sticks' last news is too old")
@@ -58,7 +64,7 @@ class Failsafe(Block):
     blind = Out("bool", doc="whether vision does not count now: stale, or not FRESH again since LEVEL")
     descend = Out("bool", doc="whether to land")
     mode = Out("int64", doc="0 MANUAL, 1 MIXED, 2 AUTOMATIC, 3 COAST, 4 LEVEL, 5 LAND")
-    reason = Out("int64", doc="why: 0 to 9, see above")
+    reason = Out("int64", doc="why: 0 to 13, see above")
     had = State("bool[4]")
     begun = State("bool")
     landing = State("bool")
@@ -135,7 +141,7 @@ def _landing(
     if landing:
         return True, cause
     if vision == LOST:
-        return True, NO_FRAMES - 1 + max(vision_reason, 1)
+        return True, _of_vision(max(vision_reason, 1))
     return land > 0.5, (ASKED if land > 0.5 else NONE)
 
 
@@ -156,6 +162,11 @@ def _mode(allowed: Any, vision: int, descend: bool) -> int:
     return AUTOMATIC if allowed.all() else MIXED
 
 
+def _of_vision(reason: int) -> int:
+    """Return the failsafe's number of a reason of vision."""
+    return reason + (OF_VISION if reason <= REARMING else MORE_OF_VISION)
+
+
 def _reason(
     flown: bool, all_on: bool, overridden: bool, vision_reason: int, imu_stale: bool, sticks_stale: bool,
     limited: bool,
@@ -164,7 +175,7 @@ def _reason(
     if imu_stale:
         return IMU_STALE
     if flown and vision_reason > 0:
-        return NO_FRAMES - 1 + vision_reason
+        return _of_vision(vision_reason)
     if overridden:
         return STICK
     if sticks_stale:

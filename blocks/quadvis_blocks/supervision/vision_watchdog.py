@@ -5,11 +5,21 @@ from __future__ import annotations
 import math
 
 from quadvis.block import Block, In, Out, Param, ParameterError, State
+from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, note
+from quadvis_blocks.supervision._vision import (
+    COAST,
+    CONTRADICTED,
+    FRESH,
+    LAND,
+    LEVEL,
+    NO_FRAMES,
+    NONE,
+    REARMING,
+    TARGET_LOST,
+    trouble_of,
+)
 
-FRESH, COAST, LEVEL, LAND = range(4)
 OF_TRUST, OF_FRAME = range(2)
-NONE, NO_FRAMES, TARGET_LOST, REARMING = range(4)
-INSTANT = 1e-9  # s
 
 
 class VisionWatchdog(Block):
@@ -32,7 +42,10 @@ class VisionWatchdog(Block):
     It goes down at most one state a tick, and back to FRESH only after ``frames`` good frames in a row, never
     stale in between, over at least ``proof``. It starts in COAST: vision has to prove itself first.
 
-    Reasons: 0 none, 1 no new frames, 2 frames come but the target is not found, 3 too few good frames yet.
+    Reasons: 0 none, 1 no new frames, 2 frames come but the target is not found, 3 too few good frames yet;
+    and frames come, but 4 frozen: the same one again and again, 5 with stamps ahead of the time, from before
+    or NaN, 6 from a clock that started again, 7 in contradiction to the inertial unit. It sees stamps itself;
+    4 and 7 it takes from those who do (``trouble``, ``contradicted``).
 
     With a camera of 10 frames/s and the 20 Hz of the control the default ``coast`` lets one frame be lost,
     and the state changes at most 0.3 s after the last good frame was taken.
@@ -46,10 +59,23 @@ class VisionWatchdog(Block):
     clock = Param(
         "trust", choices=("trust", "frame"), doc="vision is gone since it was FRESH, or since a frame"
     )
+    restart = Param(
+        RESTART,
+        unit="s",
+        above=0.0,
+        tune=True,
+        doc="how long a clock that started again runs until it counts",
+    )
     stamp = In(unit="s", doc="instant of the newest frame; NaN for none yet")
     valid = In("bool", doc="whether it gave a pose")
+    trouble = In(
+        "int64", default=NONE, doc="why frames do not count, as `supervision.frame_news` says; 0 if they do"
+    )
+    contradicted = In("bool", default=False, doc="whether the estimator refused the newest frame")
     state = Out("int64", doc="0 FRESH, 1 COAST, 2 LEVEL, 3 LAND")
-    reason = Out("int64", doc="0 none, 1 no new frames, 2 target not found, 3 not enough good frames yet")
+    reason = Out(
+        "int64", doc="0 none, 1 no new frames, 2 target not found, 3 not enough yet; 4 to 7 see above"
+    )
     age = Out(unit="s", doc="time since the last good frame was taken, or since the start")
     stale = Out("bool", doc="whether that is more than ``coast``")
     rearmed = Out("bool", doc="true for the one tick at which it becomes FRESH")
@@ -59,6 +85,8 @@ class VisionWatchdog(Block):
     since = State(unit="s")  # stamp of the last good frame of the FRESH state
     first = State(unit="s")  # stamp of the first good frame of the row
     row = State("int64")
+    cause = State("int64")  # what is wrong with the stamp that was seen last
+    stamps = State(f"float64[{SIZE}]")
 
     def check(self) -> None:
         """Refuse times that do not follow on each other."""
@@ -71,11 +99,16 @@ class VisionWatchdog(Block):
         """Trust nothing yet."""
         self.newest = -math.inf
         self.now = COAST
+        begin(self.stamps)
 
-    def output(self, stamp: float, valid: bool, time: float) -> tuple[int, int, float, bool, bool]:
+    def output(
+        self, stamp: float, valid: bool, trouble: int, contradicted: bool, time: float
+    ) -> tuple[int, int, float, bool, bool]:
         """Return state, reason, age, whether that is too great, and whether vision has just come back."""
+        verdict, made = judge(self.stamps, stamp, time, self.restart)
+        made = made if verdict == NEWS and not math.isnan(stamp) else -math.inf
         newest, good, first, row = _counted(
-            stamp, valid, time, self.newest, self.good, self.first, self.row, self.coast
+            made, valid and not contradicted, self.newest, self.good, self.first, self.row, self.coast
         )
         age = time - good
         stale = row == 0 or age > self.coast + INSTANT
@@ -85,15 +118,22 @@ class VisionWatchdog(Block):
             reason = NONE
         elif not stale:
             reason = REARMING
+        elif trouble != NONE:
+            reason = trouble
+        elif time - newest > self.coast + INSTANT:
+            reason = max(trouble_of(verdict, self.cause), NO_FRAMES)
         else:
-            reason = NO_FRAMES if time - newest > self.coast + INSTANT else TARGET_LOST
+            reason = CONTRADICTED if contradicted else TARGET_LOST
         return state, reason, age, stale, state == FRESH and self.now != FRESH
 
-    def update(self, stamp: float, valid: bool, time: float) -> None:
+    def update(self, stamp: float, valid: bool, contradicted: bool, time: float) -> None:
         """Keep the state."""
+        verdict, made = note(self.stamps, stamp, time, self.restart)
+        made = made if verdict == NEWS and not math.isnan(stamp) else -math.inf
         newest, good, first, row = _counted(
-            stamp, valid, time, self.newest, self.good, self.first, self.row, self.coast
+            made, valid and not contradicted, self.newest, self.good, self.first, self.row, self.coast
         )
+        self.cause = trouble_of(verdict, self.cause)
         stale = row == 0 or time - good > self.coast + INSTANT
         proven = row >= self.frames and good - first >= self.proof - INSTANT
         self.now = _state(self.now, stale, proven, time - self.since, self.level, self.land)
@@ -104,16 +144,19 @@ class VisionWatchdog(Block):
 
 
 def _counted(
-    stamp: float, valid: bool, time: float, newest: float, good: float, first: float, row: int, longest: float
+    made: float, well: bool, newest: float, good: float, first: float, row: int, longest: float
 ) -> tuple[float, float, float, int]:
-    """Return the stamps of newest and last good frame, and the first and number of good ones in a row."""
-    if not newest < stamp <= time + INSTANT:
+    """Return the instants of newest and last good frame, and the first and number of good ones in a row.
+
+    `made` is that of a new frame, -inf if there is none.
+    """
+    if made == -math.inf:
         return newest, good, first, row
-    if not valid:
-        return stamp, good, first, row
-    if row == 0 or stamp - good > longest + INSTANT:
-        return stamp, stamp, stamp, 1
-    return stamp, stamp, first, row + 1
+    if not well:
+        return made, good, first, row
+    if row == 0 or made - good > longest + INSTANT:
+        return made, made, made, 1
+    return made, made, first, row + 1
 
 
 def _state(state: int, stale: bool, proven: bool, gone: float, level: float, land: float) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import zlib
 from typing import Any
 
 import numpy as np
@@ -23,19 +24,23 @@ from quadvis_blocks.vision._detect import (
 )
 from quadvis_blocks.vision._projection import RADIUS, SIDE
 
+STALE_PICTURE = 0  # of the choices of repeats
 FOLLOW_MAX = 0.5  # s between two pictures; after more than that the target is searched for, not followed
 
 
 class CircleDetector(Block, numeric=False):
     """Where the four coloured circles of the target are in a picture.
 
-    Corners 1 to 4 are clockwise from the upper left of the picture at zero yaw: red, blue, green and
-    black in the paper. A target that was not there before is taken by four circles that make a square, or
-    by three or two (see `fewest`) if their sizes and ellipses agree to a few percent with their distances
-    and nothing else in the picture could be meant; once found, three or two that moved together keep it.
-    A circle that something hides in part, from about a tenth of its diameter on, has no centre, and its
-    quality says why. Steps without a new picture repeat the last result with `fresh` false, also its stamp
-    and sequence number. A frame that is not a picture is a target that is not found.
+    Corners 1 to 4 are clockwise from the upper left of the picture at zero yaw: red, blue, green and black in
+    the paper. A target that was not there before is taken by four circles that make a square, or by three or
+    two (see `fewest`) if their sizes and ellipses agree to a few percent with their distances and nothing
+    else in the picture could be meant; once found, three or two that moved together keep it. A circle that
+    something hides in part, from about a tenth of its diameter on, has no centre, and its quality says why.
+    Steps without a new picture repeat the last result with `fresh` false, also its stamp and sequence number.
+    So do pictures that are the last one to the bit, whatever stamp and number they have: a sensor has noise,
+    and a picture that repeats is a camera that froze. Set `repeats` to `news` for pictures without noise, as
+    a renderer or a recording may give, where nothing moves. A frame that is not a picture is a target that is
+    not found.
 
     `status`: 0 four circles, 1 three, 2 two, 3 target not found, 4 circles of all colours that are no
     square, 5 no picture yet, 7 the frame is not a picture, or has not the size that `calibration` is for.
@@ -54,6 +59,7 @@ class CircleDetector(Block, numeric=False):
     stamp = Out(unit="s", nan=True, doc="instant at which the picture was taken")
     sequence = Out("int64", doc="number of the picture; 0 before the first")
     fresh = Out("bool", doc="a picture that was not there at the step before")
+    frozen = Out("bool", doc="whether the newest frame has the picture of the one before, to the bit")
 
     colours = Param(type="file", doc="colours of the circles (YAML)")
     side = Param(SIDE, unit="m", above=0.0, doc="distance between the centres of neighbouring circles")
@@ -65,11 +71,18 @@ class CircleDetector(Block, numeric=False):
         2, type="int64", min=2, max=4, doc="circles that make a target that was not there before; 4 is safest"
     )
 
+    repeats = Param(
+        "stale", choices=("stale", "news"), doc="a picture that is the last one to the bit: no news, or news"
+    )
+
     last_centres = State("float64[4,2]", math.nan)
     last_quality = State("float64[4]", math.nan)
     last_status = State("int64", STALE)
     last_stamp = State("float64", math.nan)
     last_sequence = State("int64", 0)
+    last_picture = State("int64", 0)  # a checksum of its pixels
+    newest = State("int64", 0)  # number of the frame that came last, frozen or not
+    stuck = State("bool")
     places = State("float64[4,6]")  # of all four circles, to follow them; see Detection
 
     def check(self) -> None:
@@ -100,24 +113,45 @@ class CircleDetector(Block, numeric=False):
         self._target = Target(self._load(), self.radius / self.side, self.radius_min, self.radius_max)
         self._key: tuple[Any, ...] = ()
         self._seen = nothing(STALE)
+        self._summed: tuple[Frame, int] = (Frame.none(), 0)
 
     def output(self, frame: Frame) -> tuple[Any, ...]:
         """Return the circles of a new picture, or the last result again."""
-        if not self._is_new(frame):
+        new, frozen = self._news(frame)
+        if not new:
             centres, quality, status = self.last_centres, self.last_quality, self.last_status
-            return centres, quality, status, status == 0, False, self.last_stamp, self.last_sequence, False
+            last = self.last_stamp, self.last_sequence
+            return centres, quality, status, status == 0, False, *last, False, frozen
         centres, quality, status, _ = self._look(frame)
-        return centres, quality, status, status == 0, status > TWO_CIRCLES, frame.stamp, frame.sequence, True
+        lost = status > TWO_CIRCLES
+        return centres, quality, status, status == 0, lost, frame.stamp, frame.sequence, True, False
 
     def update(self, frame: Frame) -> None:
         """Keep the result of a new picture."""
-        if self._is_new(frame):
+        new, self.stuck = self._news(frame)
+        self.newest = frame.sequence
+        if new:
             seen = self._look(frame)
             self.last_centres, self.last_quality, self.last_status, self.places = seen
             self.last_stamp, self.last_sequence = frame.stamp, frame.sequence
+            self.last_picture = self._checksum(frame)
 
-    def _is_new(self, frame: Frame) -> bool:
-        return frame.sequence not in (0, self.last_sequence)
+    def _news(self, frame: Frame) -> tuple[bool, bool]:
+        """Return whether there is a new picture, and whether the camera is frozen."""
+        if frame.sequence in (0, self.newest):
+            return False, self.stuck
+        known = self.last_sequence != 0 and self.repeats == STALE_PICTURE and usable(frame.pixels)
+        frozen = known and self._checksum(frame) == self.last_picture
+        return not frozen, frozen
+
+    def _checksum(self, frame: Frame) -> int:
+        """Return a number that tells the pixels of one picture from those of another; 0 for no picture."""
+        if not usable(frame.pixels):
+            return 0
+        if self._summed[0] is not frame:
+            pixels = np.ascontiguousarray(frame.pixels)
+            self._summed = (frame, zlib.crc32(pixels.data, zlib.crc32(repr(pixels.shape).encode())))
+        return self._summed[1]
 
     def _look(self, frame: Frame) -> Detection:
         """Return what the picture shows. `output` and `update` need it both, so the last one is kept."""

@@ -47,6 +47,7 @@ class GeometricCamera(DeliveringCamera, numeric=False):
     stamp = Out(unit="s", nan=True, doc="instant of the measurement")
     sequence = Out("int64", doc="number of the measurement; 0 before the first")
     fresh = Out("bool", doc="a measurement that was not there at the step before")
+    frozen = Out("bool", doc="false: there are no pictures that could repeat")
 
     calibration = Param(type="file", doc="camera calibration file (YAML)")
     ceiling = Param(4.5, unit="m", doc="height of the target; 3 m above a hover at 1.5 m")
@@ -89,14 +90,15 @@ class GeometricCamera(DeliveringCamera, numeric=False):
         sequence = int(row[SEQUENCE])
         fresh = sequence != self.last_sequence
         if sequence == 0:
-            return np.full((4, 2), math.nan), np.full(4, math.nan), STALE, False, False, math.nan, 0, False
+            nothing = np.full((4, 2), math.nan), np.full(4, math.nan)
+            return *nothing, STALE, False, False, math.nan, 0, False, False
         centres = row[CONTENT:].reshape(4, 2)
         seen = np.isfinite(centres[:, 0])
         count = int(seen.sum())
         status = 4 - count if count >= 2 else NOT_FOUND
         quality = np.where(seen, 1.0, math.nan)
         lost = fresh and status > TWO_CIRCLES
-        return centres, quality, status, status == 0, lost, row[STAMP], sequence, fresh
+        return centres, quality, status, status == 0, lost, row[STAMP], sequence, fresh, False
 
     def update(self, position: Any, attitude: Any, time: float) -> None:
         """Keep what was measured at this tick, and what has arrived."""

@@ -154,3 +154,54 @@ def check_every_change(found: Driven, good: np.ndarray, needed: int, proof: floa
 def test_times_that_do_not_follow_on_each_other_are_refused(name: str, value: Any) -> None:
     with pytest.raises(ParameterError, match=f"{name} must be above"):
         VisionWatchdog(**{name: value})
+
+
+FROZEN, BAD_STAMP, CLOCK_RESTARTED, CONTRADICTED = range(4, 8)
+
+
+def seen(stamp: Any, **more: Any) -> Driven:
+    """Drive the watchdog at 20 Hz with a camera of 10 frames/s; its stamps are a function of right ones."""
+    times = TICK * np.arange(160)
+    right = np.floor(times / FRAME + 1e-9) * FRAME - LATENCY
+    stamps = np.array([stamp(time, taken) for time, taken in zip(times, right, strict=True)])
+    given = {name: np.where((times >= 3.0) & (times < 6.0), value, 0) for name, value in more.items()}
+    if "contradicted" in given:
+        given["contradicted"] = given["contradicted"].astype(bool)
+    return drive(VisionWatchdog(), stamp=stamps, valid=True, rate="20 Hz", **given)
+
+
+def check_three_seconds(found: Driven, reason: int) -> None:
+    """Check that vision is not FRESH from 0.3 s after 3 s on, for that reason, and is again at the end."""
+    assert 3.0 <= entered(found, COAST, 1.0) <= 3.3 + 1e-9
+    during = (found.time > 3.35) & (found.time < 4.0)
+    assert (found.reason[during] == reason).all()
+    assert found.signals["state"][-1] == FRESH and found.reason[-1] == NONE
+
+
+@pytest.mark.parametrize("wrong", [1000.0, 1e300, math.inf, -math.inf, math.nan])
+def test_stamps_that_cannot_be_are_told_from_a_camera_that_is_dead(wrong: float) -> None:
+    check_three_seconds(seen(lambda time, right: wrong if 3.0 <= time < 6.0 else right), BAD_STAMP)
+
+
+@pytest.mark.parametrize("back", [0.3, 1.0, 2.5, 1000.0])
+def test_a_clock_that_started_again_is_said_and_trusted_after_its_time_and_its_proof(back: float) -> None:
+    found = seen(lambda time, right: right - back if time >= 3.0 else right)
+    assert entered(found, COAST, 1.0) <= 3.3
+    waiting = (found.time >= 3.35) & (found.time < 3.95)
+    assert (found.reason[waiting] == CLOCK_RESTARTED).all()
+    assert entered(found, FRESH, 3.35) == pytest.approx(4.5, abs=0.1)
+    assert found.age[-1] <= 0.25
+
+
+def test_a_frozen_camera_has_its_own_reason() -> None:
+    found = seen(lambda time, right: min(right, 2.9) if time < 6.0 else right, trouble=FROZEN)
+    check_three_seconds(found, FROZEN)
+
+
+def test_frames_that_contradict_the_inertial_unit_are_not_good_ones() -> None:
+    check_three_seconds(seen(lambda time, right: right, contradicted=True), CONTRADICTED)
+
+
+def test_one_stamp_ahead_does_not_hide_that_the_camera_is_dead() -> None:
+    found = seen(lambda time, right: 1000.0 if time == 3.0 else min(right, 2.9))
+    assert entered(found, COAST, 1.0) <= 3.3 and (found.stale[found.time > 3.3]).all()

@@ -500,3 +500,49 @@ def test_circles_of_the_expected_sizes_cost_what_the_best_square_leaves_of_their
 
 def test_four_circles_in_one_place_are_no_square():
     assert square_cost([3 + 4j] * 4, [5.0] * 4, [5.0] * 4) == math.inf
+
+
+def stuck(seed=1):
+    """Six noisy shots, of which the fourth and fifth have the pixels of the third under new numbers."""
+    rng = np.random.default_rng(seed)
+    shots = frames([expose(scene(random_pose(rng))[0], rng) for _ in range(6)])
+    return [
+        Frame(shots[2].pixels.copy(), frame.stamp, frame.sequence) if place in (3, 4) else frame
+        for place, frame in enumerate(shots)
+    ]
+
+
+def test_a_picture_that_repeats_to_the_bit_is_no_news_whatever_its_stamp_and_number():
+    found = drive(CircleDetector(colours=COLOURS), frame=stuck(), rate="10 Hz")
+    assert found.fresh.tolist() == [True, True, True, False, False, True]
+    assert found.frozen.tolist() == [False, False, False, True, True, False]
+    assert found.sequence.tolist() == [1, 2, 3, 3, 3, 6]
+    assert found.stamp[3:5].tolist() == [found.stamp[2]] * 2
+    assert not found.lost.any()
+
+
+def test_pictures_without_noise_may_repeat_where_the_user_says_so():
+    found = drive(CircleDetector(colours=COLOURS, repeats="news"), frame=stuck(), rate="10 Hz")
+    assert found.fresh.all() and not found.frozen.any()
+    assert found.sequence.tolist() == [1, 2, 3, 4, 5, 6]
+
+
+def test_a_frame_that_is_there_still_leaves_the_camera_frozen_or_not():
+    shots = stuck()
+    held = [shots[2], shots[2], shots[3], shots[3], shots[5], shots[5]]
+    found = drive(CircleDetector(colours=COLOURS), frame=held, rate="20 Hz")
+    assert found.frozen.tolist() == [False, False, True, True, False, False]
+    assert found.fresh.tolist() == [True, False, False, False, True, False]
+
+
+@pytest.mark.parametrize(
+    "pixels", [np.zeros((0, 0, 3), np.uint8), np.full((322, 452, 3), np.nan), None, "no"]
+)
+def test_what_is_no_picture_may_repeat_and_does_no_harm(pixels):
+    rng = np.random.default_rng(2)
+    good = frames([expose(scene(random_pose(rng))[0], rng) for _ in range(2)])
+    bad = [Frame(pixels, 0.1 * number, number) for number in (3, 4)]
+    after = Frame(good[0].pixels, 0.5, 5)
+    found = drive(CircleDetector(colours=COLOURS), frame=[*good, *bad, after], rate="10 Hz")
+    assert found.status[2] == 7 and found.lost[2] and not found.frozen.any()
+    assert found.fresh[4] and found.found[4]

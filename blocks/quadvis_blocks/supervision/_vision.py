@@ -1,0 +1,17 @@
+"""What the states of vision and the reasons for them are called, by all blocks that hand them on."""
+
+from __future__ import annotations
+
+from quadvis_blocks._stamps import NEWS, REPEATED, RESTARTED
+
+FRESH, COAST, LEVEL, LAND = range(4)
+NONE, NO_FRAMES, TARGET_LOST, REARMING, FROZEN, BAD_STAMP, CLOCK_RESTARTED, CONTRADICTED = range(8)
+
+
+def trouble_of(verdict: int, before: int) -> int:
+    """Return what is wrong with the newest stamp, by the verdict on that of now and what was wrong before."""
+    if verdict == REPEATED:
+        return before
+    if verdict == NEWS:
+        return NONE
+    return CLOCK_RESTARTED if verdict == RESTARTED else BAD_STAMP

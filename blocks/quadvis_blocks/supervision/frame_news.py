@@ -1,0 +1,83 @@
+"""Which frames are news, and when they were taken."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, judge, note
+from quadvis_blocks.supervision._vision import FROZEN, trouble_of
+
+
+class FrameNews(Block):
+    """The stamp of the newest frame that is news, in the time of the run; it stands still while none is.
+
+    A frame is news if its stamp is (later than all before, not ahead of the time, finite) and if what was
+    measured in it is not the same to the last bit as in the frame before: a camera has noise, so a picture or
+    a measurement that repeats is a camera that froze, whatever stamps and numbers it gives. Leave ``value``
+    out for a measurement without noise, which may repeat because nothing moves. A clock that started again
+    counts again after ``restart``, with its stamps shifted into the time of the run.
+
+    Put it where frames come in, and hand its stamp to all that ask for one: they agree then on which frames
+    count.
+
+    Reasons: 0 none, 4 frozen, 5 a stamp ahead of the time, from before or NaN, 6 a clock that started again.
+    """
+
+    restart = Param(
+        RESTART,
+        unit="s",
+        above=0.0,
+        tune=True,
+        doc="how long a clock that started again runs until it counts",
+    )
+    stamp = In(unit="s", doc="instant of the newest frame as the camera says; NaN for none yet")
+    value = In("float64[*]", unit="a", default=math.nan, doc="what was measured in it, if it has noise")
+    frozen = In("bool", default=False, doc="whether whoever looks at the pictures says that they repeat")
+    instant = Out(unit="s", nan=True, doc="instant of the newest frame that was news; NaN before the first")
+    fresh = Out("bool", doc="whether there is one at this tick")
+    reason = Out("int64", doc="what was wrong with the newest: 0 nothing, 4 frozen, 5 its stamp, 6 its clock")
+    taken = State(unit="s", init=math.nan)
+    last = State("float64[*]", math.nan)
+    cause = State("int64")
+    stamps = State(f"float64[{SIZE}]")
+
+    def start(self) -> None:
+        """Know no frame yet."""
+        begin(self.stamps)
+
+    def output(self, stamp: float, value: Any, frozen: bool, time: float) -> tuple[float, bool, int]:
+        """Return the instant of the newest frame that was news, whether it is new, and what is wrong."""
+        verdict, made = judge(self.stamps, stamp, time, self.restart)
+        if frozen or (verdict == NEWS and _same(value, self.last)):
+            return self.taken, False, FROZEN
+        cause = trouble_of(verdict, self.cause)
+        if verdict != NEWS or math.isnan(stamp):
+            return self.taken, False, cause
+        return made, True, cause
+
+    def update(self, stamp: float, value: Any, frozen: bool, time: float) -> None:
+        """Keep a new frame."""
+        verdict, made = note(self.stamps, stamp, time, self.restart)
+        if frozen or (verdict == NEWS and _same(value, self.last)):
+            self.cause = FROZEN
+            return
+        self.cause = trouble_of(verdict, self.cause)
+        if verdict == NEWS and not math.isnan(stamp):
+            self.taken = made
+            self.last = value
+
+
+def _same(value: Any, last: Any) -> bool:
+    """Return whether two measurements are the same to the bit; those without a number are not."""
+    if isinstance(value, float):
+        return bool(value == last)
+    numbers = 0
+    for place in range(value.size):
+        element, other = value.flat[place], last.flat[place]
+        if element == element or other == other:
+            if element != other:
+                return False
+            numbers += 1
+    return numbers > 0
