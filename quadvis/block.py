@@ -413,6 +413,9 @@ def _interface(cls: type[Block]) -> Interface:
                 problem = f"{cls.__name__}.{method} asks for '{name}', which is not one of its inputs"
                 raise TypeError(sentence(problem, suggestion(name, allowed)))
         arguments[method] = names
+    if cls.numeric and any(state.signal.scalar == "frame" for state in states.values()):
+        problem = f"{cls.__name__} keeps a frame as a state, which no compiled method can"
+        raise TypeError(sentence(problem, "say numeric=False"))
     if any(state.continuous for state in states.values()) != ("deriv" in arguments):
         raise TypeError(f"{cls.__name__}: continuous states and a deriv method go together")
     if outputs and "output" not in arguments:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.block import SCALARS, Block, Shape, Sizes
+from quadvis.block import NO_FRAME, SCALARS, Block, Shape, Sizes
 
 SLOT = 8
 C_TYPES = {"float64": ctypes.c_double, "int64": ctypes.c_int64, "bool": ctypes.c_bool}
@@ -68,10 +68,10 @@ class Record:
 
     @staticmethod
     def of(block: Block, sizes: Sizes) -> Record:
-        """Lay out a block whose symbolic sizes are known; parameters that are texts stay outside."""
+        """Lay out a block whose symbolic sizes are known; texts and frames stay outside."""
         fields, offset = [Field("period", "float64", (), 0)], 1
         for declared in (*block.interface.params.values(), *block.interface.states.values()):
-            if declared.signal.scalar == "str":
+            if declared.signal.scalar in ("str", "frame"):
                 continue
             shape = declared.signal.resolve(sizes)
             fields.append(Field(declared.name, declared.signal.scalar, shape, offset))
@@ -173,7 +173,11 @@ class Memory:
             else:
                 setattr(bound, name, value)
         for state in block.interface.states.values():
-            setattr(bound, state.name, SCALARS[state.signal.scalar](state.init))
+            if state.signal.scalar == "frame":
+                bound.__dict__[_array_key(state.name)] = (self.frames, len(self.frames))
+                self.frames.append(NO_FRAME)
+            else:
+                setattr(bound, state.name, SCALARS[state.signal.scalar](state.init))
         return bound
 
 
@@ -221,6 +225,9 @@ def _bound_class(block: type[Block], record: Record) -> type[Block]:
             fields.append((item.name, C_TYPES[item.scalar]))
             if item.scalar == "bool":
                 fields.append((f"{item.name}.rest", ctypes.c_uint8 * (SLOT - 1)))
+    for state in block.interface.states.values():
+        if state.signal.scalar == "frame":
+            attributes[state.name] = _frame_property(_array_key(state.name))
     return types.new_class(
         block.__name__, (block, ctypes.Structure), {"bound": True}, lambda body: body.update(attributes)
     )
@@ -236,3 +243,15 @@ def _array_property(key: str) -> property:
         block.__dict__[key][...] = value
 
     return property(lambda block: block.__dict__[key], write)
+
+
+def _frame_property(key: str) -> property:
+    def read(block: Any) -> Any:
+        frames, place = block.__dict__[key]
+        return frames[place]
+
+    def write(block: Any, value: Any) -> None:
+        frames, place = block.__dict__[key]
+        frames[place] = value
+
+    return property(read, write)

@@ -3,6 +3,7 @@ import pytest
 
 from quadvis.block import Block, Frame, In, Out, Param, State
 from quadvis.engine.memory import SLOT, Memory, Record, Slot
+from quadvis.testing import drive
 
 
 class Mixed(Block):
@@ -208,3 +209,53 @@ def test_what_is_read_is_a_copy_and_a_view_is_not() -> None:
     read, view = memory.read(place), memory.view(place)
     memory.write(place, [5.0, 6.0])
     assert read.tolist() == [0.0, 0.0] and view.tolist() == [5.0, 6.0]
+
+
+class Keeper(Block, numeric=False):
+    """A block that keeps the two frames before."""
+
+    frame = In("frame")
+    older = Out("frame")
+    one = State("frame")
+    two = State("frame")
+
+    def output(self):
+        return self.two
+
+    def update(self, frame):
+        self.one, self.two = frame, self.one
+
+
+def test_a_frame_that_is_a_state_lives_in_memory_beside_the_frames_of_ports() -> None:
+    block = Keeper()
+    record = Record.of(block, {})
+    memory = Memory(record.size, [Frame.none()])
+    first, second = (memory.bind(block, record, 0, 0.1) for _ in range(2))
+    frame = Frame(np.zeros((2, 2, 3), np.uint8), 0.0, 1)
+    assert [field.name for field in record.fields] == ["period"] and len(memory.frames) == 5
+    assert first.one.sequence == 0
+    first.one = frame
+    assert first.one is frame and memory.frames[1] is frame and second.one.sequence == 0
+
+
+def test_a_frame_that_is_a_state_comes_back_with_a_snapshot() -> None:
+    frames = [Frame(np.full((2, 2, 3), k, np.uint8), 0.1 * k, k + 1) for k in range(6)]
+    assert [frame.sequence for frame in drive(Keeper(), frame=frames, rate="10 Hz").older] == [
+        0,
+        0,
+        1,
+        2,
+        3,
+        4,
+    ]
+    engine = drive(Keeper(), frame=frames, rate="10 Hz").engine
+    snapshot = engine.snapshot()
+    (bound,) = engine.plan.steps
+    bound.self.two = frames[0]
+    engine.restore(snapshot)
+    assert bound.self.two is frames[4] and bound.self.one is frames[5]
+
+
+def test_a_numeric_block_may_not_keep_a_frame() -> None:
+    with pytest.raises(TypeError, match="Wrong keeps a frame as a state"):
+        type("Wrong", (Block,), {"one": State("frame")})
