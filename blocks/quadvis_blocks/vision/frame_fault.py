@@ -1,0 +1,81 @@
+"""A camera that fails for a while, on purpose."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from quadvis.block import Block, Frame, In, Out, Param, Random, State
+from quadvis_blocks._random import uniform
+from quadvis_blocks.vision._faults import NO_FAULT, TIMING, comes, is_on, shows, stamped
+from quadvis_blocks.vision._picture_faults import PICTURES
+
+KINDS = (NO_FAULT, *TIMING, *PICTURES)
+
+
+class FrameFault(Block, numeric=False):
+    """Frames as they come, and with a fault of one kind for ``duration`` from ``begin`` on.
+
+    Put it between a camera and those who look, to see what they make of it. For ``drop``, ``bursts``,
+    ``late`` and ``swap`` frames do not come, or not when they should; with ``freeze``, ``stutter`` and
+    ``outdated`` an old picture comes under a new stamp and number; the kinds in ``_stamp`` and
+    ``clock_restart`` change the stamps alone; all others change the picture and leave stamp and number as
+    they are. It counts a frame a tick, so it runs at the rate of the camera.
+    """
+
+    kind = Param(NO_FAULT, choices=KINDS, doc="what goes wrong")
+    begin = Param(0.0, unit="s", doc="begin of the fault (inclusive)")
+    duration = Param(3.0, unit="s", min=0.0, doc="its length")
+    frame = In("frame", doc="the newest frame of a camera")
+    faulty = Out("frame", doc="what comes of it")
+    active = Out("bool", doc="whether the fault is there")
+    chance = Random()
+    drawn = State()  # for the picture of the coming tick
+    ticks = State("int64")  # of the fault so far
+    shown = State("frame")  # at the tick before
+    one = State("frame")  # that came a tick ago
+    two = State("frame")
+    three = State("frame")
+
+    def open(self) -> None:
+        """Keep no picture yet."""
+        self._key: object = None
+        self._made = Frame.none()
+
+    def start(self) -> None:
+        """Draw what the first picture needs."""
+        self.drawn = uniform(self.chance)
+
+    def output(self, frame: Frame, time: float) -> tuple[Frame, bool]:
+        """Return the frame or what is left of it, and whether there is a fault."""
+        return self._faulty(frame, time), is_on(time, self.begin, self.duration)
+
+    def update(self, frame: Frame, time: float) -> None:
+        """Keep what came and what was shown."""
+        self.shown = self._faulty(frame, time)
+        self.one, self.two, self.three = frame, self.one, self.two
+        self.ticks = self.ticks + 1 if is_on(time, self.begin, self.duration) else 0
+        self.drawn = uniform(self.chance)
+
+    def _faulty(self, frame: Frame, time: float) -> Frame:
+        """Return what comes of a frame. `output` and `update` need it both, so the last one is kept."""
+        kind = KINDS[self.kind]
+        if kind == NO_FAULT or frame.sequence == 0 or not is_on(time, self.begin, self.duration):
+            return frame
+        key = (frame, time, self.shown, self.drawn)
+        if self._key != key:
+            self._key, self._made = key, self._broken(kind, frame)
+        return self._made
+
+    def _broken(self, kind: str, frame: Frame) -> Frame:
+        shown: Frame = self.shown
+        past = (frame, self.one, self.two, self.three)
+        which = comes(kind, self.ticks)
+        if which < 0 or past[which].sequence == 0:
+            return shown
+        frame, picture = past[which], shows(kind, self.ticks)
+        pixels = shown.pixels if picture < 0 else past[which + picture].pixels
+        if kind in PICTURES:
+            chance = np.random.default_rng(int(self.drawn * 2**53))
+            pixels = PICTURES[kind](frame.pixels, self.one.pixels, chance)
+        stamp = stamped(kind, frame.stamp, self.ticks, self.period, self.begin, shown.stamp)
+        return Frame(pixels, stamp, frame.sequence)

@@ -1,0 +1,93 @@
+"""A detector whose measurements fail for a while, on purpose."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, In, Out, Param, Random, State
+from quadvis_blocks._random import fill_normal
+from quadvis_blocks.vision._faults import LATE, NO_FAULT, TIMING, comes, is_on, shows, stamped
+
+SHAPES = ("no_target", "turned", "mirrored", "shifted", "noise", "other_colours", "half_gone", "two_left")
+KINDS = (NO_FAULT, *TIMING, *SHAPES)
+STAMP, CENTRES, WIDTH = 0, 1, 9  # a measurement: stamp, u, v of four circles
+SHOWN = LATE + 1  # the measurement that was shown last, after those of so many ticks ago
+
+
+class MeasurementFault(Block, numeric=False):
+    """Measured centres as they come, and with a fault of one kind for ``duration`` from ``begin`` on.
+
+    What `vision.frame_fault` does to pictures, for `vision.geometric_camera`, which has none: the kinds that
+    concern time and stamps are the same; of the others there are those that a detector would not notice, or
+    would answer by finding nothing.
+    """
+
+    kind = Param(NO_FAULT, choices=KINDS, doc="what goes wrong")
+    begin = Param(0.0, unit="s", doc="begin of the fault (inclusive)")
+    duration = Param(3.0, unit="s", min=0.0, doc="its length")
+    middle = Param((226.0, 161.0), type="float64[2]", unit="px", doc="middle of the picture")
+    centres = In("float64[4,2]", unit="px", doc="u, v of circles 1 to 4; NaN rows are missing")
+    instant = In(unit="s", doc="instant of the measurement, its stamp; NaN for none yet")
+    faulty = Out("float64[4,2]", unit="px", nan=True, doc="what comes of the centres")
+    faulty_stamp = Out(unit="s", nan=True, doc="what comes of the stamp")
+    active = Out("bool", doc="whether the fault is there")
+    chance = Random()
+    drawn = State("float64[8]")  # for the measurement of the coming tick
+    ticks = State("int64")  # of the fault so far
+    kept = State(f"float64[{SHOWN + 1},{WIDTH}]", math.nan)  # of this tick and before, and the one shown
+
+    def start(self) -> None:
+        """Draw what the first measurement needs."""
+        fill_normal(self.chance, self.drawn)
+
+    def output(self, centres: Any, instant: float, time: float) -> tuple[Any, float, bool]:
+        """Return the measurement or what is left of it, and whether there is a fault."""
+        row = self._faulty(centres, instant, time)
+        return row[CENTRES:].reshape(4, 2), row[STAMP], is_on(time, self.begin, self.duration)
+
+    def update(self, centres: Any, instant: float, time: float) -> None:
+        """Keep what came and what was shown."""
+        shown = self._faulty(centres, instant, time)
+        self.kept[1:SHOWN] = self.kept[: SHOWN - 1].copy()
+        self.kept[0] = _row(centres, instant)
+        self.kept[SHOWN] = shown
+        self.ticks = self.ticks + 1 if is_on(time, self.begin, self.duration) else 0
+        fill_normal(self.chance, self.drawn)
+
+    def _faulty(self, centres: Any, stamp: float, time: float) -> Any:
+        """Return stamp and centres (9,) as they come of a measurement."""
+        row, kind = _row(centres, stamp), KINDS[self.kind]
+        if kind == NO_FAULT or math.isnan(stamp) or not is_on(time, self.begin, self.duration):
+            return row
+        past = (row, *self.kept[:LATE])
+        which = comes(kind, self.ticks)
+        if which < 0 or math.isnan(past[which][STAMP]):
+            return self.kept[SHOWN].copy()
+        row, picture = past[which].copy(), shows(kind, self.ticks)
+        row[CENTRES:] = self.kept[SHOWN][CENTRES:] if picture < 0 else past[which + picture][CENTRES:]
+        before = float(self.kept[SHOWN][STAMP])
+        row[STAMP] = stamped(kind, float(row[STAMP]), self.ticks, self.period, self.begin, before)
+        row[CENTRES:] = self._moved(kind, row[CENTRES:].reshape(4, 2)).ravel()
+        return row
+
+    def _moved(self, kind: str, centres: Any) -> Any:
+        """Return the centres (4, 2) of a picture that has the fault."""
+        off = centres - self.middle
+        moved = {
+            "no_target": np.full((4, 2), math.nan),
+            "turned": self.middle - off,
+            "mirrored": self.middle + off * np.array([-1.0, 1.0]),
+            "shifted": centres + np.array([60.0, 0.0]),
+            "noise": centres + 50.0 * np.asarray(self.drawn).reshape(4, 2),
+            "other_colours": np.roll(centres, 1, axis=0),
+            "half_gone": np.where(off[:, :1] > 0.0, math.nan, centres),
+            "two_left": np.where(np.arange(4)[:, None] < 2, centres, math.nan),
+        }
+        return moved.get(kind, centres)
+
+
+def _row(centres: Any, stamp: float) -> Any:
+    return np.concatenate(([stamp], np.asarray(centres).ravel()))

@@ -1,0 +1,80 @@
+"""Flights under the failsafe with a camera that fails in each of many ways: the craft stays where it is."""
+
+from pathlib import Path
+
+import pytest
+
+from quadvis_blocks.vision._picture_faults import PICTURES
+from quadvis_blocks.vision.frame_fault import KINDS as OF_FRAMES
+from quadvis_blocks.vision.measurement_fault import KINDS as OF_POINTS
+
+from .faults import PLACES, Flight, fly
+
+NO_FRAMES, TARGET_LOST, FROZEN, BAD_STAMP, CLOCK_RESTARTED, CONTRADICTED = 1, 2, 4, 5, 6, 7
+DESIGNS = (None, "fused")
+TICK = 0.05  # s
+# Frames from which nothing can be learned, or that do not say of when they are; and what the watchdog says.
+NO_TRUTH = {
+    "drop": NO_FRAMES, "freeze": FROZEN, "repeated_stamp": NO_FRAMES, "future_stamp": BAD_STAMP,
+    "nan_stamp": BAD_STAMP, "inf_stamp": BAD_STAMP, "falling_stamp": BAD_STAMP, "back_stamp": CLOCK_RESTARTED,
+    "lagging_stamp": CLOCK_RESTARTED, "clock_restart": CLOCK_RESTARTED, "no_target": TARGET_LOST,
+    "turned": CONTRADICTED, "black": FROZEN, "white": FROZEN, "noise": TARGET_LOST, "blur": TARGET_LOST,
+    "inverted": TARGET_LOST, "mirrored": TARGET_LOST, "wrong_shape": TARGET_LOST, "one_channel": TARGET_LOST,
+    "wrong_type": TARGET_LOST, "nan_pixels": TARGET_LOST, "no_pixels": TARGET_LOST,
+}  # fmt: skip
+FEW = ("freeze", "future_stamp", "lagging_stamp", "clock_restart", "turned", "outdated")
+
+
+def check(flight: Flight, kind: str) -> None:
+    """Check that the craft was not lost, and that the failsafe took notice where it had to."""
+    assert not flight.lost, flight
+    if kind in NO_TRUTH:
+        assert flight.left <= 0.3 + 1e-9, flight
+        assert NO_TRUTH[kind] in flight.reasons, flight
+
+
+@pytest.mark.parametrize("kind", FEW)
+def test_the_better_design_outlasts_three_seconds_of_a_faulty_camera(kind: str, tmp_path: Path) -> None:
+    flight = fly(tmp_path, "blackout", "fused", kind, seed=1, pictures=False)
+    check(flight, kind)
+    assert flight.back and flight.farthest < 1.5
+
+
+@pytest.mark.parametrize("kind", ["freeze", "black"])
+def test_so_does_the_paper_s_with_pictures(kind: str, tmp_path: Path) -> None:
+    flight = fly(tmp_path, "blackout", None, kind, seed=1, pictures=True)
+    check(flight, kind)
+    assert flight.back and flight.farthest < 1.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", OF_POINTS)
+@pytest.mark.parametrize("design", DESIGNS)
+@pytest.mark.parametrize("place", ["blackout", "descent", "takeover"])
+def test_no_fault_of_stamps_or_measurements_loses_a_craft(
+    place: str, design: str | None, kind: str, tmp_path: Path
+) -> None:
+    flight = fly(tmp_path, place, design, kind, seed=1, pictures=False)
+    check(flight, kind)
+    assert flight.back or PLACES[place].lands
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [kind for kind in OF_FRAMES if kind in PICTURES or kind in FEW])
+@pytest.mark.parametrize("design", DESIGNS)
+def test_no_fault_of_pictures_does(design: str | None, kind: str, tmp_path: Path) -> None:
+    flight = fly(tmp_path, "blackout", design, kind, seed=1, pictures=True)
+    check(flight, kind)
+    assert flight.back
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(1, 6))
+@pytest.mark.parametrize("duration", [1.0, 3.0])
+@pytest.mark.parametrize("place", ["blackout", "landing", "descent", "takeover"])
+def test_a_frozen_camera_does_not_lose_the_better_design_in_any_wind(
+    place: str, duration: float, seed: int, tmp_path: Path
+) -> None:
+    flight = fly(tmp_path, place, "fused", "freeze", seed, pictures=False, duration=duration)
+    check(flight, "freeze")
+    assert flight.farthest < 1.0
