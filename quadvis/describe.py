@@ -15,6 +15,7 @@ from quadvis.catalogue import Catalogue
 
 LEAST = 20  # columns left for the words about a port, however narrow the terminal
 WIDEST = 30  # columns for a default value
+MANY = 60  # characters of choices beside each other
 LINE = 90  # columns of an example
 
 
@@ -61,9 +62,13 @@ def _output_row(port: Out) -> tuple[str, ...]:
 def _param_row(param: Param) -> tuple[str, ...]:
     default = default_text(param)
     given = "required" if default is None else f"= {default}"
-    words = [" | ".join(param.choices), bounds(param), "tunable" if param.tune else ""]
+    choices = " | ".join(param.choices)
+    doc = param.doc
+    if len(choices) > MANY:  # into the column that wraps
+        choices, doc = f"{len(param.choices)} choices", f"{doc}: {', '.join(param.choices)}"
+    words = [choices, bounds(param), "tunable" if param.tune else ""]
     kind = "" if param.choices else _kind(param)
-    return param.name, kind, _short(given), "; ".join(filter(None, words)), param.doc
+    return param.name, kind, _short(given), "; ".join(filter(None, words)), doc
 
 
 def _state_row(state: State) -> tuple[str, ...]:
