@@ -1,12 +1,21 @@
-"""Flights under the failsafe with a camera that fails for three seconds, and what became of them."""
+"""Flights under the failsafe with a camera that fails for three seconds, and what became of them.
 
+``python -m tests.diagrams.faults``, or the same with ``pictures``, flies all kinds in five seeds and prints a
+line for each; the tests fly one seed.
+"""
+
+import sys
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 import quadvis
+from quadvis_blocks.vision.frame_fault import KINDS as OF_FRAMES
+from quadvis_blocks.vision.measurement_fault import KINDS as OF_POINTS
 
 DIAGRAMS = Path(__file__).parents[2] / "diagrams"
 BEGIN, DURATION, END = 4.0, 3.0, 10.0  # s
@@ -100,3 +109,16 @@ def _judged(result: Any, where: Place) -> Flight:
         float(away.max()), lowest, highest, bool(away.max() > LOST or hit),
         float(gone[0] - where.begin) if len(gone) else np.inf, reasons, bool(state[-1] == FRESH),
     )  # fmt: skip
+
+
+def sweep(pictures: bool, seeds: int) -> None:
+    """Print what becomes of every place, design, kind and seed: ``python -m tests.diagrams.faults``."""
+    kinds = OF_FRAMES if pictures else OF_POINTS
+    for place, variant, kind, seed in product(PLACES, (None, "fused"), kinds, range(1, seeds + 1)):
+        with TemporaryDirectory() as folder:
+            flight = fly(Path(folder), place, variant, kind, seed, pictures)
+        print("LOST" if flight.lost else "    ", place, variant or "paper", kind, seed, flight, flush=True)
+
+
+if __name__ == "__main__":
+    sweep(pictures="pictures" in sys.argv[1:], seeds=5)

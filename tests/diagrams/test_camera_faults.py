@@ -5,10 +5,8 @@ from pathlib import Path
 import pytest
 
 from quadvis_blocks.vision._picture_faults import PICTURES
-from quadvis_blocks.vision.frame_fault import KINDS as OF_FRAMES
-from quadvis_blocks.vision.measurement_fault import KINDS as OF_POINTS
 
-from .faults import PLACES, Flight, fly
+from .faults import OF_FRAMES, OF_POINTS, PLACES, Flight, fly
 
 NO_FRAMES, TARGET_LOST, FROZEN, BAD_STAMP, CLOCK_RESTARTED, CONTRADICTED = 1, 2, 4, 5, 6, 7
 DESIGNS = (None, "fused")
