@@ -163,7 +163,7 @@ def read_correspondences(path: str | Path) -> tuple[Floats, Floats]:
     try:
         lines = read_input(path).decode("utf-8-sig").splitlines()
     except (QuadvisError, UnicodeDecodeError) as error:
-        problem = error if isinstance(error, QuadvisError) else f"cannot read {path}: it is not text"
+        problem = error if isinstance(error, QuadvisError) else f"cannot read '{path}': it is not text"
         raise QuadvisError(f"{problem}; give a CSV file with {','.join(_COLUMNS)}") from None
     table = csv.DictReader(lines, skipinitialspace=True)
     names = {_ALSO.get(name.strip(), name.strip()): name for name in table.fieldnames or ()}

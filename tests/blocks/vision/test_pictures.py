@@ -335,7 +335,7 @@ def test_a_file_of_many_gigabytes_is_refused_by_its_length(tmp_path: Path) -> No
     with (tmp_path / "picture.png").open("wb") as file:
         file.write(WHOLE["png"][:30])
         file.truncate(MOST_BYTES + 1)
-    with pytest.raises(QuadvisError, match=r"picture\.png: it has more than 256 MB"):
+    with pytest.raises(QuadvisError, match=r"picture\.png': it has more than 256 MB"):
         read_coded(tmp_path / "picture.png")
 
 
