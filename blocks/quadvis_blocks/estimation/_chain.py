@@ -151,7 +151,7 @@ def filtered(
             nis, greatest, level = innovation(chains, frame, tolerance)
             near = greatest <= gate * gate
             if near:  # one frame alone, however far, does not do it
-                strain += STRAIN * (min(level, 2.0 * limit) - strain)
+                strain += STRAIN * (min(level, 2.0 * limit) - strain) if limit < math.inf else -strain
             verdict = TAKEN if near and strain <= limit else (RESET if believe else REFUSED)
     chains[:] = past[first]
     if verdict == RESET:

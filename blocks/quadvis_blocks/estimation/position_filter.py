@@ -37,15 +37,16 @@ class PositionFilter(Block):
     that are late and out of order give what they would have given in time. Without frames it goes on by the
     accelerations alone. The last 64 ticks are kept; a frame from before them is refused.
 
-    A frame is refused if along an axis it is further than ``gate`` standard deviations, and ``tolerance`` for
-    what the model leaves out, from where it was expected; or if frames are within that, but x and y strain
-    the filter: the mean of their squared innovations over the variances, by a fading memory of some three
-    frames, is above ``strain_limit``. It is 2 when all is well, and rises at once when positions are of other
-    instants than their stamps say, or contradict the known accelerations in another way. When for
-    ``reset_after`` nothing else came, the filter believes it, and begins anew there. A frame counts if its
-    stamp is news, or goes back as that of one overtaken on its way does; it needs ``valid`` and finite
-    numbers. From a refused frame to the next one that is believed the measurements contradict the known
-    accelerations.
+    A frame is refused if along an axis it is further than ``gate`` standard deviations, and ``tolerance``
+    for what the model leaves out, from where it was expected; or if frames are within that, but x and y
+    strain the filter: the mean of their squared innovations over the variances, by a fading memory of
+    some three frames, is above ``strain_limit``. It is 2 when all is well, and rises at once when
+    positions are of other instants than their stamps say, or contradict the known accelerations in
+    another way. Up to the height ``contact`` the ground may carry and hold the craft, which the
+    accelerations do not know: nothing strains there. When for ``reset_after`` nothing else came, the
+    filter believes it, and begins anew there. A frame counts if its stamp is news, or goes back as that
+    of one overtaken on its way does; it needs ``valid`` and finite numbers. From a refused frame to the
+    next one that is believed the measurements contradict the known accelerations.
 
     Of the libraries, filterpy is no longer kept, and neither it nor scipy takes frames out of order or
     compiles.
@@ -103,6 +104,7 @@ class PositionFilter(Block):
         tune=True,
         doc="greatest squared innovation over its variance, x and y, mean of some frames",
     )
+    contact = Param(0.2, unit="m", tune=True, doc="height up to which the ground may touch the craft")
     tolerance = Param(0.0, unit="m", min=0.0, tune=True, doc="innovation that is never too great")
     reset_after = Param(1.0, unit="s", above=0.0, tune=True, doc="how long to refuse frames before believing")
     restart = Param(
@@ -148,7 +150,7 @@ class PositionFilter(Block):
             verdict, held, _, nis, _ = filtered(
                 chains, self.past, self.ticks, self.oldest, now, frames, self.held, frame,
                 _model(self.acceleration_noise, self.wander, self.decay), self.initial_sigma, self.gate,
-                self.tolerance, self.strain, self.strain_limit,
+                self.tolerance, self.strain, _limit(position, self.contact, self.strain_limit),
                 time - self.refusing >= self.reset_after, False,
             )  # fmt: skip
             latest(chains, frames, held, time)
@@ -173,7 +175,7 @@ class PositionFilter(Block):
             verdict, self.held, self.oldest, _, self.strain = filtered(
                 chains, self.past, self.ticks, self.oldest, now, self.frames, self.held, frame,
                 _model(self.acceleration_noise, self.wander, self.decay), self.initial_sigma, self.gate,
-                self.tolerance, self.strain, self.strain_limit,
+                self.tolerance, self.strain, _limit(position, self.contact, self.strain_limit),
                 time - self.refusing >= self.reset_after, True,
             )  # fmt: skip
             self.newest = _newer(self.newest, made, verdict)
@@ -191,6 +193,11 @@ def _tick(time: float, acceleration: Any) -> Any:
 
 def _model(noise: Any, wander: Any, decay: Any) -> Any:
     return np.concatenate((noise, wander, decay))
+
+
+def _limit(position: Any, contact: float, limit: float) -> float:
+    """Return how much frames may strain the filter at a measured height."""
+    return limit if position[2] > contact else math.inf
 
 
 def _counts(verdict: int, made: float, stamp: float) -> float:

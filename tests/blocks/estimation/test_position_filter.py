@@ -232,22 +232,23 @@ def test_positions_of_earlier_instants_than_their_stamps_strain_the_filter_until
     late: float,
 ) -> None:
     times = STEP * np.arange(160)
-    speed = 1.5
+    speed, height = 1.5, np.array([0.0, 0.0, 1.0])
 
     def place(time: Any) -> Any:
-        return 0.5 * np.column_stack((np.cos(speed * time), np.sin(speed * time), 0.0 * time))
+        return 0.5 * np.column_stack((np.cos(speed * time), np.sin(speed * time), 0.0 * time)) + height
 
-    known = -(speed**2) * place(times)
+    known = -(speed**2) * (place(times) - height)
     position = place(np.where(times < 4.0, times, times - late)) + np.random.default_rng(1).normal(
         0, 2e-3, (160, 3)
     )
-    model: dict[str, Any] = {"noise": (2e-3,) * 3, "initial": (0.5, 0.0, 0.0)}
+    model: dict[str, Any] = {"noise": (2e-3,) * 3, "initial": (0.5, 0.0, 1.0)}
     found = estimate(known, position, times, tolerance=0.5, **model)
     first = np.argmax(found.contradicted[80:])
     assert found.contradicted[80:].any() and 0 < first <= 10
     assert not found.contradicted[20:80].any()  # as long as stamps are right
-    lenient = estimate(known, position, times, tolerance=0.5, strain_limit=1e9, **model)
-    assert not lenient.contradicted[80:].any()
+    for more in ({"strain_limit": 1e9}, {"contact": 1.2}):
+        lenient = estimate(known, position, times, tolerance=0.5, **model, **more)
+        assert not lenient.contradicted[80:].any()
 
 
 def test_a_frame_from_before_its_memory_or_from_the_future_is_refused() -> None:
