@@ -1,0 +1,94 @@
+"""The golden file: hash and signals of every shipped diagram and variant, so that each change is a decision.
+
+    python -m tests.diagrams.golden renew   # write golden.json anew, after a change that was meant
+    python -m tests.diagrams.golden bits    # print a SHA-256 of all signals: equal before and after a pure move
+
+Signals differ in their last bits from processor to processor, so the file holds one number a signal, the mean
+of its values under fixed weights, and the test compares with a tolerance. ``bits`` compares two trees on one
+machine.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+import quadvis
+
+DIAGRAMS = Path(__file__).parents[2] / "diagrams"
+FILE = Path(__file__).with_name("golden.json")
+DURATION = 1.5  # s; all tasks, transitions and cameras have worked by then
+MISSING = 0.123  # stands for NaN
+
+
+def cases() -> list[tuple[str, str | None]]:
+    """Return every diagram, by itself and with each of its variants."""
+    return [
+        (path.name, variant)
+        for path in sorted(DIAGRAMS.glob("*.yaml"))
+        for variant in (None, *yaml.safe_load(path.read_text()).get("variants", {}))
+    ]
+
+
+def flown(folder: Path, name: str, variant: str | None) -> Any:
+    """Return the run of a diagram in a copy of their folder; it stops early."""
+    loaded = quadvis.load(folder / name, variant=variant)
+    return quadvis.load(folder / name, variant=variant, stop_time=min(DURATION, loaded.duration)).run()
+
+
+def mean(values: np.ndarray[Any, Any]) -> float:
+    """Return the mean of a signal under weights that no exchange of rows or elements leaves alone."""
+    flat = np.nan_to_num(np.asarray(values, float), nan=MISSING).ravel()
+    return float(np.mean(flat * (1.0 + np.arange(flat.size) % 997 / 997.0))) if flat.size else 0.0
+
+
+def facts(folder: Path, name: str, variant: str | None) -> dict[str, Any]:
+    """Return what the golden file holds of one diagram."""
+    result = flown(folder, name, variant)
+    return {
+        "hash": quadvis.load(DIAGRAMS / name, variant=variant).hash,
+        "signals": {signal: float(f"{mean(result[signal]):.10g}") for signal in result},
+    }
+
+
+def bits(folder: Path, name: str, variant: str | None) -> str:
+    """Return the SHA-256 of all signals of a run and of their names."""
+    result, digest = flown(folder, name, variant), hashlib.sha256()
+    for signal in result:
+        digest.update(signal.encode())
+        digest.update(result.times(signal).tobytes())
+        digest.update(result[signal].tobytes())
+    return digest.hexdigest()
+
+
+def title(name: str, variant: str | None) -> str:
+    """Return the name of a case, such as hover.yaml:plane."""
+    return f"{name}:{variant}" if variant else name
+
+
+def main() -> int:
+    """Write the golden file, or print the digests."""
+    if sys.argv[1:] not in (["renew"], ["bits"]):
+        print(__doc__)
+        return 2
+    with tempfile.TemporaryDirectory() as there:
+        folder = Path(shutil.copytree(DIAGRAMS, Path(there) / "diagrams"))
+        if sys.argv[1] == "bits":
+            for case in cases():
+                print(bits(folder, *case), title(*case))
+        else:
+            found = {title(*case): facts(folder, *case) for case in cases()}
+            FILE.write_text(json.dumps(found, indent=0) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
