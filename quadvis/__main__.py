@@ -10,7 +10,7 @@ try:
     # One BLAS thread: matrices are small here, and a pool of threads costs more than importing numpy.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-    from quadvis.shell import listen
+    from quadvis.machine.exits import listen
 
     listen()
 

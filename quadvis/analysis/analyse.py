@@ -17,7 +17,7 @@ from quadvis.analysis.margins import Loop, rates
 from quadvis.analysis.probe import AnalysisError
 from quadvis.analysis.systems import closed_loop
 from quadvis.analysis.vary import STABLE, Limits
-from quadvis.diagram.analyse import Cut
+from quadvis.diagram.questions import Cut
 from quadvis.engine.graph import Graph
 from quadvis.errors import DiagramError
 from quadvis.output.verdict import finite

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from quadvis.analysis.cut import with_breaks
 from quadvis.analysis.probe import STEP, AnalysisError, Channel, Probe, Vector, blocks_on_loops, silence
 from quadvis.analysis.progress import tell
-from quadvis.diagram.analyse import Cut
+from quadvis.diagram.questions import Cut
 from quadvis.engine.engine import Engine
 from quadvis.engine.graph import Graph
 from quadvis.engine.plan import Positions

@@ -11,10 +11,10 @@ import numpy as np
 
 from quadvis.analysis.analyse import Analysis
 from quadvis.analysis.margins import Loop
-from quadvis.canvas import blank_sheet
-from quadvis.describe import table
 from quadvis.errors import QuadvisError
-from quadvis.files import PNG, file_name, write_output
+from quadvis.machine.files import PNG, file_name, write_output
+from quadvis.output.canvas import blank_sheet
+from quadvis.output.columns import table
 from quadvis.output.style import COLOURS, STYLE
 from quadvis.units import Unit, format_quantity
 

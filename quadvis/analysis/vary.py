@@ -16,7 +16,7 @@ from quadvis.analysis.margins import growth
 from quadvis.analysis.probe import AnalysisError
 from quadvis.analysis.progress import task
 from quadvis.analysis.systems import library
-from quadvis.diagram.analyse import Limit
+from quadvis.diagram.questions import Limit
 from quadvis.errors import RunError
 
 if TYPE_CHECKING:

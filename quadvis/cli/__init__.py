@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from quadvis.cli.arguments import understood
 from quadvis.cli.options import parser
-from quadvis.shell import ended
-from quadvis.signals import end_orderly
+from quadvis.machine.exits import ended
+from quadvis.machine.interrupts import end_orderly
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quadvis.errors import Fault, QuadvisError, RunError
-from quadvis.files import SVG, Kind, file_name, write_output
+from quadvis.machine.files import SVG, Kind, file_name, write_output
 
 if TYPE_CHECKING:
-    from quadvis.catalogue import Catalogue, OwnBlocks
     from quadvis.diagram.diagram import Diagram
+    from quadvis.library.catalogue import Catalogue, OwnBlocks
 
 SCHEMA = Kind("the schema", (b"{",), rb'"\$schema"')
 FAILED = 1
@@ -43,8 +43,9 @@ def _own_blocks(options: argparse.Namespace) -> OwnBlocks:
 
 def run(options: argparse.Namespace) -> int:
     """Run a diagram and print how it went; 1 if it misses what is expected."""
-    from quadvis.report import ProgressLine, summary_lines
-    from quadvis.run import run as run_diagram
+    from quadvis.machine.status_line import ProgressLine
+    from quadvis.run.report import summary_lines
+    from quadvis.run.session import run as run_diagram
 
     diagram = _load(options, stop_time=options.stop_time, seed=options.seed)
     log = _log_path(options.log, diagram)
@@ -103,7 +104,7 @@ def _log_path(given: str | None, diagram: Diagram) -> Path | None:
     if given is not None:
         return Path(given) if given else None
     from quadvis.output.log_place import claim_log
-    from quadvis.run import metadata
+    from quadvis.run.session import metadata
 
     names = diagram.name, diagram.variant, *(file.name for file in diagram.parameter_files)
     return claim_log(_runs_folder("log", "--log"), "-".join(filter(None, names)), metadata(diagram))
@@ -170,7 +171,7 @@ def _told(faults: Iterable[Fault]) -> list[dict[str, Any]]:
 
 def list_blocks(options: argparse.Namespace) -> int:
     """Print all blocks; 2 if a library cannot be loaded."""
-    from quadvis.describe import catalogue_lines, facts
+    from quadvis.library.describe import catalogue_lines, facts
 
     catalogue = _catalogue(options)
     if options.json:
@@ -184,7 +185,7 @@ def list_blocks(options: argparse.Namespace) -> int:
 
 def _catalogue(options: argparse.Namespace) -> Catalogue:
     """Return the blocks that a diagram in the working directory could use."""
-    from quadvis.catalogue import Catalogue
+    from quadvis.library.catalogue import Catalogue
 
     return Catalogue(Path(), _own_blocks(options))
 
@@ -198,7 +199,7 @@ def _all_loaded(failures: list[str]) -> int:
 
 def describe(options: argparse.Namespace) -> int:
     """Print what a block declares."""
-    from quadvis.describe import description, facts
+    from quadvis.library.describe import description, facts
 
     block = _catalogue(options).find(options.block)
     if options.json:
@@ -213,7 +214,7 @@ def analyse(options: argparse.Namespace) -> int:
     from quadvis.analysis.progress import watched
     from quadvis.analysis.questions import read_cuts, read_limits, read_time
     from quadvis.analysis.report import analysis_lines, save_bode_plots
-    from quadvis.report import AnalysisLine
+    from quadvis.machine.status_line import AnalysisLine
 
     diagram = _load(options)
     cuts, limits, at = read_cuts(options.cut), read_limits(options.vary), read_time(options.at)
@@ -264,7 +265,7 @@ def schema(options: argparse.Namespace) -> int:
 
 def new(options: argparse.Namespace) -> int:
     """Write the skeleton of a block or of a diagram."""
-    from quadvis.skeleton import new_block, new_diagram
+    from quadvis.library.skeleton import new_block, new_diagram
 
     for path in (new_block if options.kind == "block" else new_diagram)(options.name):
         print(path)

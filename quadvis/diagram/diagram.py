@@ -13,8 +13,6 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from quadvis.block import Block
-from quadvis.catalogue import Catalogue, OwnBlocks
-from quadvis.diagram.analyse import QuestionReader, Questions
 from quadvis.diagram.build import Builder, Made
 from quadvis.diagram.check import WireCheck, rate_text
 from quadvis.diagram.doubts import warn, warn_rates
@@ -22,23 +20,25 @@ from quadvis.diagram.expand import Expansion, Parts
 from quadvis.diagram.loader import FileSpec, read_file, read_text
 from quadvis.diagram.observe import Observation, read_observation
 from quadvis.diagram.outputs import check_writers
+from quadvis.diagram.questions import QuestionReader, Questions
 from quadvis.diagram.settings import Files, Given, ParameterFile, Settings, read_settings, setting_texts
 from quadvis.diagram.slots import Outputs, check_slots, fill_slots
 from quadvis.diagram.ticks import check_ticks
 from quadvis.diagram.times import read_duration
 from quadvis.diagram.wiring import Wiring
-from quadvis.discretion import quoting_only
 from quadvis.document import Scalar
 from quadvis.engine.graph import Graph, Wire
 from quadvis.engine.names import wire_text
 from quadvis.errors import DiagramError, Doubt, Fault, Faults, Place, quoted
-from quadvis.files import reading
-from quadvis.inputs import noted_inputs
+from quadvis.errors.discretion import quoting_only
+from quadvis.library.catalogue import Catalogue, OwnBlocks
+from quadvis.machine.files import reading
+from quadvis.machine.inputs import noted_inputs
 
 if TYPE_CHECKING:
     from quadvis.analysis.analyse import Analysis
     from quadvis.output.verdict import Entry, Judging, Outcome, Signals
-    from quadvis.run import Progress, Result
+    from quadvis.run.session import Progress, Result
 
 
 @dataclass(frozen=True)
@@ -142,8 +142,8 @@ class Diagram:
         progress: Progress | None = None,
         keep: Sequence[str] | None = None,
     ) -> Result:
-        """Run to the stop time; see ``quadvis.run.run``."""
-        from quadvis.run import run
+        """Run to the stop time; see ``quadvis.run.session.run``."""
+        from quadvis.run.session import run
 
         return run(self, log=log, progress=progress, keep=keep)
 

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from quadvis.block import Block
-from quadvis.catalogue import Catalogue, CatalogueError
 from quadvis.diagram.loader import BlockSpec, FileSpec, read_file
 from quadvis.diagram.names import absent, remedy_for
 from quadvis.diagram.settings import Settings
 from quadvis.diagram.values import substitute
 from quadvis.document import Node, Scalar
 from quadvis.errors import DiagramError, Faults, Place, quoted, suggestion
-from quadvis.missing_file import file_trouble
+from quadvis.library.catalogue import Catalogue, CatalogueError
+from quadvis.machine.missing_file import file_trouble
 from quadvis.units import Unit, UnitError, split_quantity
 
 MAX_BLOCKS = 5_000  # parts in parts multiply

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 
-from quadvis.characters import cleaned, first_odd, replacement, with_article
 from quadvis.diagram.reference import Reference, read_reference
 from quadvis.diagram.times import Rate, read_duration, read_rate, read_step
 from quadvis.diagram.values import QUANTITY_KEYS, read_constant
 from quadvis.document import Mapping, Node, Scalar, parse_yaml, read_yaml
 from quadvis.engine.graph import CROSSINGS, SOLVERS, TOLD
 from quadvis.errors import Faults, Place, closest, quoted
+from quadvis.errors.characters import cleaned, first_odd, replacement, with_article
 
 VERSION = 1
 CONTINUOUS = "continuous"

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from quadvis.block import Block
 from quadvis.diagram.flow import Draft
 from quadvis.errors import Faults, Place, QuadvisError, quoted
-from quadvis.files import same_file
+from quadvis.machine.files import same_file
 
 
 class Writer(NamedTuple):

@@ -21,7 +21,7 @@ from quadvis.document import dump_yaml
 from quadvis.engine.graph import Graph, Node, Wire
 from quadvis.engine.names import wire_text
 from quadvis.errors import Faults
-from quadvis.inputs import file_digest
+from quadvis.machine.inputs import file_digest
 
 
 def resolved_text(

@@ -11,8 +11,6 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from quadvis.block import Block, Declared, Param
-from quadvis.describe import default_text, first_line
-from quadvis.diagram.analyse import ANALYSE_KEYS, LIMIT_KEYS
 from quadvis.diagram.loader import (
     BLOCK_KEYS,
     CONTINUOUS,
@@ -26,10 +24,12 @@ from quadvis.diagram.loader import (
     WIRE_KEYS,
 )
 from quadvis.diagram.observe import LOG_KEYS, STRETCH_KEYS, SUMMARY_KEYS
+from quadvis.diagram.questions import ANALYSE_KEYS, LIMIT_KEYS
 from quadvis.diagram.settings import PARAMETERS_KEYS, PARAMETERS_REQUIRED
 from quadvis.diagram.times import RATE_KEYS
 from quadvis.diagram.values import QUANTITY_KEYS
 from quadvis.engine.graph import CROSSINGS, SOLVERS
+from quadvis.library.describe import default_text, first_line
 from quadvis.output.plot import FIGURE_KEYS, PANEL_KEYS, TRACE_KEYS
 from quadvis.output.statistics import STATISTICS
 from quadvis.output.verdict import EXPECTATIONS

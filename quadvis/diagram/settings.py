@@ -20,12 +20,12 @@ from pathlib import Path
 from typing import Any
 
 from quadvis import document as yaml
-from quadvis.characters import first_odd
 from quadvis.diagram.loader import is_version
 from quadvis.diagram.values import read_constant
 from quadvis.document import Node, parse_yaml, read_yaml
 from quadvis.errors import DiagramError, Faults, Odd, Place
-from quadvis.missing_file import file_trouble
+from quadvis.errors.characters import first_odd
+from quadvis.machine.missing_file import file_trouble
 
 COMMAND_LINE = "--set"
 ARGUMENT = "settings"  # of the functions for those who work in Python

@@ -12,8 +12,8 @@ from typing import Any
 from quadvis import document as yaml
 from quadvis.block import Param, SignalType
 from quadvis.document import Node, Scalar, measure
+from quadvis.document.number_lists import Numbers
 from quadvis.errors import Faults, quoted, suggestion
-from quadvis.number_lists import Numbers
 from quadvis.units import Unit, parse_quantity, split_quantity
 
 QUANTITY_KEYS = ("value", "unit")

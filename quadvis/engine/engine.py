@@ -23,7 +23,7 @@ from quadvis.engine.graph import Graph
 from quadvis.engine.plan import TIME, Bound, Call, Plan, make_plan
 from quadvis.engine.solver import Solver, Vector
 from quadvis.errors import QuadvisError, RunError, sentence
-from quadvis.failures import MEMORY, arithmetic, is_short_of_memory, surroundings
+from quadvis.machine.failures import MEMORY, arithmetic, is_short_of_memory, surroundings
 
 SHOWN = 4  # numbers in a message
 SMALLER_STEP = "a smaller solver step may help"

@@ -15,9 +15,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from quadvis.errors import QuadvisError
-from quadvis.output import _svg as svg
 from quadvis.output import elkjs as engine
-from quadvis.output import layers
+from quadvis.output import layers, svg
 from quadvis.output.elkjs import LayoutError
 
 CONTINUOUS = "continuous"

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.errors import RunError
-from quadvis.files import LOG, open_output
+from quadvis.machine.files import LOG, open_output
 from quadvis.output.recording import Buffer, Channel
 from quadvis.output.sink import Sink
 

@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from quadvis.files import LONGEST
+from quadvis.machine.files import LONGEST
 from quadvis.output.log_reader import log_facts
 
 SAME = ("name", "variant", "params")  # what the runs share whose logs replace each other

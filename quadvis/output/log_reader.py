@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from quadvis.errors import QuadvisError, quoted
-from quadvis.inputs import read_input
+from quadvis.machine.inputs import read_input
 from quadvis.output import mcap_records as mcap
 from quadvis.output.log import CDR, DIAGRAM, METADATA, SUMMARY, ports_of
 from quadvis.output.recording import SLOT_TYPES, Channel, Field, Recording

@@ -33,11 +33,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis import nodes
-from quadvis.canvas import blank_sheet
+from quadvis.document import nodes
 from quadvis.engine.names import read_name
 from quadvis.errors import DiagramError, Faults, QuadvisError, quoted, suggestion
-from quadvis.files import PNG, write_output
+from quadvis.machine.files import PNG, write_output
+from quadvis.output.canvas import blank_sheet
 from quadvis.output.panel import Curve, draw_panel, legend_of
 from quadvis.output.stretch import NANOSECONDS, stamp
 from quadvis.output.style import STYLE, WIDTHS, fitted, measure

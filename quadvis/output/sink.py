@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from time import monotonic
 from typing import BinaryIO
 
-from quadvis.files import reason
+from quadvis.machine.files import reason
 
 ROOM = 8 << 20  # bytes that may wait for the disk
 HUNG = 5.0  # s after which a disk that takes nothing at all is given up at the end

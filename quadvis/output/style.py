@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-from quadvis.canvas import text_width
+from quadvis.output.canvas import text_width
 from quadvis.units import Unit
 
 # Okabe and Ito's colours, which colour-blind readers tell apart.

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.output.strips import Cloud, StripPanel, Strips, draw_strips
 from quadvis.sweeps.axes import SEED, Axis
+from quadvis.sweeps.strip_chart import Cloud, StripPanel, Strips, draw_strips
 from quadvis.sweeps.summary import extent, shown_quantities
 from quadvis.sweeps.table import FAILURE, PASSED, Table
 from quadvis.sweeps.worker import Quantity

@@ -20,7 +20,7 @@ from queue import Empty, SimpleQueue
 from types import ModuleType
 
 from quadvis.errors import RunError
-from quadvis.signals import held_back
+from quadvis.machine.interrupts import held_back
 from quadvis.sweeps.worker import ONE_THREAD, Job, Row, begin, perform
 
 IDLE = 1.0  # s without a row after which the caller has its turn all the same

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.describe import table as aligned
-from quadvis.report import StatusLine
+from quadvis.machine.status_line import StatusLine
+from quadvis.output.columns import table as aligned
 from quadvis.sweeps.axes import SEED
 from quadvis.sweeps.table import FAILURE, PASSED, Table
 from quadvis.sweeps.worker import Quantity

@@ -14,12 +14,12 @@ from typing import Any, Self
 
 import numpy as np
 
-from quadvis.catalogue import OwnBlocks
 from quadvis.diagram.settings import Files, Given, value_text
 from quadvis.errors import QuadvisError, quoted
-from quadvis.files import PLOT, Claim, check_output
+from quadvis.library.catalogue import OwnBlocks
+from quadvis.machine.files import PLOT, Claim, check_output
 from quadvis.sweeps.axes import SEED, VARIANT, Axis, Over, points, read_axes
-from quadvis.sweeps.plan import Plan
+from quadvis.sweeps.grid import Plan
 from quadvis.sweeps.pool import perform_all, processors
 from quadvis.sweeps.table import FAILURE, HASH, PASSED, WALL, Table, read_rows, table_kind
 from quadvis.sweeps.worker import Configuration, Job, Quantity, Row, diagram_of, quantities

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.errors import QuadvisError
-from quadvis.files import Kind, write_output
+from quadvis.machine.files import Kind, write_output
 from quadvis.sweeps.axes import SEED, Axis
 from quadvis.sweeps.worker import Quantity
 

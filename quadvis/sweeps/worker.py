@@ -10,12 +10,12 @@ from multiprocessing import parent_process
 from typing import TYPE_CHECKING
 
 from quadvis.errors import QuadvisError
+from quadvis.machine.interrupts import leave_to_parent
 from quadvis.output.statistics import COUNT, FINAL
-from quadvis.signals import leave_to_parent
 
 if TYPE_CHECKING:
-    from quadvis.catalogue import OwnBlocks
     from quadvis.diagram.diagram import Diagram
+    from quadvis.library.catalogue import OwnBlocks
     from quadvis.output.verdict import Outcome, Part
 
 # Where runs share the processors, threads inside a run only take turns.
@@ -169,7 +169,7 @@ def _end_with_parent() -> None:
 
 def perform(job: Job) -> Row:
     """Do one run. What is wrong with it, or stops it, becomes its row."""
-    from quadvis.run import run
+    from quadvis.run.session import run
 
     digest = ""
     try:

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from quadvis.block import Frame
-from quadvis.catalogue import Catalogue
-from quadvis.conformance import CHECKS, Subject
+from quadvis.library.catalogue import Catalogue
 from quadvis.testing import drive
-from quadvis_blocks.vision._calibration import CameraCalibration
+from quadvis.testing.conformance import CHECKS, Subject
 from quadvis_blocks.vision.rendered_camera import RenderedCamera
+from quadvis_vision.camera.calibration import CameraCalibration
 
 ROOT = Path(__file__).parents[2]
 CALIB = ROOT / "diagrams" / "calib"

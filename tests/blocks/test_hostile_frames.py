@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from quadvis.block import Block, Frame
-from quadvis.catalogue import Catalogue
+from quadvis.library.catalogue import Catalogue
 from quadvis.testing import drive
 
 ROOT = Path(__file__).parents[2]

@@ -1,7 +1,7 @@
 """The golden file: hash and signals of every shipped diagram and variant, so that each change is a decision.
 
     python -m tests.diagrams.golden renew   # write golden.json anew, after a change that was meant
-    python -m tests.diagrams.golden bits    # print a SHA-256 of all signals: equal before and after a pure move
+    python -m tests.diagrams.golden bits    # print a SHA-256 of all signals: no pure move changes it
 
 Signals differ in their last bits from processor to processor, so the file holds one number a signal, the mean
 of its values under fixed weights, and the test compares with a tolerance. ``bits`` compares two trees on one

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from quadvis_blocks.vision._picture_faults import PICTURES
+from quadvis_vision.simulation.picture_faults import PICTURES
 
 from .faults import OF_FRAMES, OF_POINTS, PLACES, Flight, fly
 

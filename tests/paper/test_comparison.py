@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from quadvis_blocks.vision import _comparison
-from quadvis_blocks.vision._comparison import Poses
+from quadvis_vision.trials import comparison
+from quadvis_vision.trials.comparison import Poses
 
 # x, y, z in the paper's unit of length, three angles in degrees. One heading misprints the method, and one
 # number: "-0-2" is -0.2.
@@ -33,25 +33,25 @@ METHODS = [method("n points", FIRST), method("plane", SECOND)]
 
 
 def test_the_methods_of_the_paper_differ_by_this_much():
-    found = _comparison.difference(*METHODS)
+    found = comparison.difference(*METHODS)
     assert found.count == 4
     assert found.rms[:3] * 100 == pytest.approx([0.381, 0.158, 3.633], abs=1e-3)
     assert np.degrees(found.rms[3:]) == pytest.approx([0.972, 0.771, 1.347], abs=1e-3)
 
 
 def test_the_first_method_of_the_paper_is_farther_away_by_these_ratios():
-    assert _comparison.difference(*METHODS).ratios == pytest.approx([1.146, 1.155, 1.133, 1.113], abs=1e-3)
+    assert comparison.difference(*METHODS).ratios == pytest.approx([1.146, 1.155, 1.133, 1.113], abs=1e-3)
 
 
 def test_the_differences_are_told_with_the_digits_of_the_paper():
-    told = _comparison.sentences(_comparison.differences(METHODS))
+    told = comparison.sentences(comparison.differences(METHODS))
     assert told.startswith("n points - plane, rms of 4 pictures: x 0.3808  y 0.1581  z 3.633 cm")
     assert "phi 0.9721  theta 0.7714  psi 1.347 deg" in told
     assert "z ratio 1.1365 (1.1130 to 1.1546)" in told
 
 
 def test_the_table_is_printed_number_for_number():
-    lines = _comparison.table(METHODS, [1, 2, 3, 4]).splitlines()
+    lines = comparison.table(METHODS, [1, 2, 3, 4]).splitlines()
     assert lines[0].split() == ["n", "points", "plane"]
     assert lines[1].split() == ["picture", *["x", "y", "z", "phi", "theta", "psi"] * 2]
     for number, (line, first, second) in enumerate(zip(lines[3:], FIRST, SECOND, strict=True), 1):

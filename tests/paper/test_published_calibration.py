@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quadvis_blocks.vision import _two_planes as two_planes
-from quadvis_blocks.vision._calibration import CameraCalibration
-from quadvis_blocks.vision._two_planes import TwoPlanesCalibration
+from quadvis_vision.camera import two_planes
+from quadvis_vision.camera.calibration import CameraCalibration
+from quadvis_vision.camera.two_planes import TwoPlanesCalibration
 
 CALIBRATIONS = Path(__file__).parents[2] / "diagrams" / "calib"
 

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from quadvis_blocks.vision._level import level_pose
-from quadvis_blocks.vision._pose import pose_from_n_points, pose_from_plane
-from quadvis_blocks.vision._projection import attitude_of
+from quadvis_vision.camera.projection import attitude_of
+from quadvis_vision.pose.level import level_pose
+from quadvis_vision.pose.pose import pose_from_n_points, pose_from_plane
 
 # x, y, z and three angles in degrees. One heading misprints the method, and one number: "-0-2" is -0.2.
 FIRST = np.array([

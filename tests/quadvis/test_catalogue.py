@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from quadvis.catalogue import Catalogue, CatalogueError
+from quadvis.library.catalogue import Catalogue, CatalogueError
 
 FAN = '''"""A fan."""
 from quadvis.block import Block, Out
@@ -169,7 +169,7 @@ def test_an_installed_library_without_its_package_is_told(library: Path) -> None
 
 def test_looking_at_the_library_loads_none_of_the_heavy_packages() -> None:
     code = (
-        "import sys; from quadvis.catalogue import Catalogue; c = Catalogue();"
+        "import sys; from quadvis.library.catalogue import Catalogue; c = Catalogue();"
         "[c.find(name) for name in c.names()];"
         "print([m for m in ('cv2', 'control', 'scipy', 'numba', 'matplotlib') if m in sys.modules])"
     )

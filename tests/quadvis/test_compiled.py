@@ -7,7 +7,7 @@ import pytest
 
 from quadvis.block import Block, In, Out, Param, Random, State
 from quadvis.engine.memory import Memory, Record, Slot
-from quadvis.rig import alone, parameter_sizes
+from quadvis.testing.alone import alone, parameter_sizes
 
 numba = pytest.importorskip("numba")
 

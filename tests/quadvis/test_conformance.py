@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from quadvis.block import Block
-from quadvis.catalogue import Catalogue
-from quadvis.conformance import CHECKS, Subject, check_block
+from quadvis.library.catalogue import Catalogue
+from quadvis.testing.conformance import CHECKS, Subject, check_block
 
 GOOD = '''"""A fan."""
 

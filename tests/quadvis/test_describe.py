@@ -11,11 +11,19 @@ from typing import Any
 import pytest
 
 from quadvis.block import Block, In, Out, Param, State
-from quadvis.catalogue import Catalogue
-from quadvis.describe import catalogue_lines, default_text, description, example, facts, first_line, table
 from quadvis.diagram.diagram import load_text
 from quadvis.document import parse_yaml
 from quadvis.errors import DiagramError
+from quadvis.library.catalogue import Catalogue
+from quadvis.library.describe import (
+    catalogue_lines,
+    default_text,
+    description,
+    example,
+    facts,
+    first_line,
+    table,
+)
 
 
 class Sample(Block):

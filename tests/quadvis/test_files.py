@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from quadvis.errors import QuadvisError
-from quadvis.files import LOG, PNG, SVG, Kind, check_output, open_output, same_file, write_output
+from quadvis.machine.files import LOG, PNG, SVG, Kind, check_output, open_output, same_file, write_output
 
 TEXT = Kind("the notes")
 LOG_HEAD = LOG.heads[0]
@@ -110,7 +110,7 @@ def test_places_that_are_no_files_are_refused_and_nothing_waits(here):
 
 
 def test_a_file_that_is_being_written_is_refused_also_to_another_process(here):
-    other = "import sys; from quadvis.files import *; open_output('log', LOG)"
+    other = "import sys; from quadvis.machine.files import *; open_output('log', LOG)"
     with open_output("log", LOG) as file:
         file.write(LOG_HEAD)
         file.flush()
@@ -123,7 +123,7 @@ def test_a_file_that_is_being_written_is_refused_also_to_another_process(here):
 
 
 def test_the_lock_ends_with_the_process(here):
-    other = "import os; from quadvis.files import *; open_output('log', LOG); os.kill(os.getpid(), 9)"
+    other = "import os; from quadvis.machine.files import *; open_output('log', LOG); os.kill(os.getpid(), 9)"
     assert subprocess.run([sys.executable, "-c", other]).returncode == -9
     open_output("log", LOG).close()
 

@@ -15,7 +15,7 @@ import quadvis
 from quadvis.block import Block, Frame, Out, Param, ParameterError
 from quadvis.diagram.diagram import Diagram, load_text
 from quadvis.errors import QuadvisError
-from quadvis.inputs import file_digest, note_digest, note_input, noted_inputs, open_input, read_input
+from quadvis.machine.inputs import file_digest, note_digest, note_input, noted_inputs, open_input, read_input
 from quadvis.output.log_reader import read_log
 from quadvis.sweeps import sweep as sweeping
 from quadvis.sweeps import worker
@@ -277,7 +277,7 @@ def test_a_file_that_changes_between_two_blocks_is_refused(
                 other_number(Path(path))
         return read(path, *others)
 
-    monkeypatch.setattr("quadvis_blocks.vision._calibration_file.read_yaml", edited)
+    monkeypatch.setattr("quadvis_vision.camera.calibration_file.read_yaml", edited)
     with pytest.raises(QuadvisError, match=r"camera\.yaml' was changed while it was being read; try again"):
         quadvis.load(project / "recorded.yaml")
     assert len(seen) >= 2

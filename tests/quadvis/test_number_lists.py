@@ -8,11 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from quadvis import number_lists
 from quadvis.diagram.diagram import check, load_text
-from quadvis.document import MAX_BYTES, Node, parse_yaml
+from quadvis.document import MAX_BYTES, Node, number_lists, parse_yaml
+from quadvis.document.number_lists import Numbers, find_lists, hide_lists
 from quadvis.errors import DiagramError
-from quadvis.number_lists import Numbers, find_lists, hide_lists
 
 rng = random.Random(7)
 LONG = ", ".join(f"{rng.uniform(-9, 9):.6g}" for _ in range(120))

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from quadvis.characters import advice, cleaned, meant, odd_characters
 from quadvis.diagram.diagram import load_text
 from quadvis.document import parse_yaml
 from quadvis.errors import DiagramError, Fault
+from quadvis.errors.characters import advice, cleaned, meant, odd_characters
 
 DIAGRAM = """\
 quadvis: 1

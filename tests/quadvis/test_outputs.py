@@ -19,9 +19,9 @@ import pytest
 import quadvis
 from quadvis.cli import main
 from quadvis.errors import DiagramError, QuadvisError
-from quadvis.files import LOG, Claim, Kind, file_name, open_output, reading, write_output
+from quadvis.machine.files import LOG, Claim, Kind, file_name, open_output, reading, write_output
+from quadvis.machine.interrupts import ENDS
 from quadvis.output.log_reader import read_log
-from quadvis.signals import ENDS
 
 LOOP = """\
 quadvis: 1

@@ -11,9 +11,9 @@ import yaml
 from jsonschema import Draft202012Validator
 
 import quadvis
-from quadvis.catalogue import Catalogue
 from quadvis.cli import main
 from quadvis.diagram.schema import diagram_schema
+from quadvis.library.catalogue import Catalogue
 
 DIAGRAM = """\
 quadvis: 1

@@ -10,7 +10,7 @@ import pytest
 from quadvis.diagram.diagram import check, load, load_text
 from quadvis.document import read_yaml
 from quadvis.errors import DiagramError, Fault, closest, suggestion
-from quadvis.missing_file import file_trouble
+from quadvis.machine.missing_file import file_trouble
 
 HEAD = "quadvis: 1\nname: n\nrates: {fast: 100 Hz, slow: 10 Hz}\nstop_time: 1 s\n"
 DIAGRAM = HEAD + (

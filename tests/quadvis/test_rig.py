@@ -3,7 +3,8 @@ from fractions import Fraction
 import numpy as np
 
 from quadvis.block import Block, In, Out, Param, ParameterError, State
-from quadvis.rig import STEPS, VECTOR, Rig, Subject, alone, parameter_sizes, rigs
+from quadvis.testing.alone import alone, parameter_sizes
+from quadvis.testing.rig import STEPS, VECTOR, Rig, Subject, rigs
 
 
 class Blend(Block):

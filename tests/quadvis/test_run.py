@@ -12,8 +12,9 @@ import pytest
 
 from quadvis.diagram.diagram import Diagram, load_text
 from quadvis.errors import RunError
+from quadvis.machine.status_line import ProgressLine
 from quadvis.output.log_reader import read_log
-from quadvis.report import ProgressLine, summary_lines
+from quadvis.run.report import summary_lines
 
 RAMP = """\
 quadvis: 1
@@ -159,7 +160,7 @@ def test_a_run_without_expectations_passes_without_a_word_about_it() -> None:
 
 
 def test_progress_tells_the_time_reached(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("quadvis.run.SLICE", 0.0)
+    monkeypatch.setattr("quadvis.run.session.SLICE", 0.0)
     seen: list[tuple[float, float]] = []
     ramp().run(progress=lambda time, wall: seen.append((time, wall)))
     times = [time for time, _ in seen]

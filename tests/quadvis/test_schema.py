@@ -9,9 +9,9 @@ import pytest
 import yaml
 from jsonschema import Draft202012Validator
 
-from quadvis.catalogue import Catalogue
 from quadvis.diagram.diagram import load
 from quadvis.diagram.schema import diagram_schema
+from quadvis.library.catalogue import Catalogue
 
 from .corpus import all_cases
 

@@ -18,10 +18,10 @@ from typing import Any
 
 import pytest
 
-from quadvis import shell
 from quadvis.cli import main
 from quadvis.errors import QuadvisError, RunError
-from quadvis.failures import MEMORY
+from quadvis.machine import exits as shell
+from quadvis.machine.failures import MEMORY
 from quadvis.output.log_reader import read_log
 
 TOOLS = Path(__file__).parents[2] / "tools"
@@ -230,7 +230,7 @@ def test_a_run_goes_on_when_the_terminal_of_its_progress_has_gone(monkeypatch: p
 
 
 def test_progress_never_goes_beyond_the_end() -> None:
-    from quadvis.report import ProgressLine
+    from quadvis.machine.status_line import ProgressLine
 
     shown = []
     line = ProgressLine(1.0)
@@ -369,16 +369,16 @@ sys.exit(main())
     mostly_slow([
         ("numpy._core._multiarray_umath", "run step.yaml"),
         ("matplotlib.rcsetup", "plot step.mcap"),
-        ("quadvis.shell", "list"),
+        ("quadvis.machine.exits", "list"),
         ("quadvis.errors", "list"),
         ("quadvis.cli", "list"),
         ("argparse", "list"),
         ("quadvis.cli.options", "list"),
-        ("quadvis.catalogue", "list"),
+        ("quadvis.library.catalogue", "list"),
         ("numpy", "run step.yaml"),
         ("numpy.linalg", "run step.yaml"),
         ("yaml", "check step.yaml"),
-        ("quadvis.run", "run step.yaml"),
+        ("quadvis.run.session", "run step.yaml"),
         ("matplotlib", "plot step.mcap"),
         ("matplotlib.figure", "plot step.mcap"),
         ("matplotlib.font_manager", "plot step.mcap"),

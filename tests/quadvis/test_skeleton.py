@@ -11,7 +11,7 @@ import pytest
 
 from quadvis.diagram.diagram import load
 from quadvis.errors import QuadvisError
-from quadvis.skeleton import new_block, new_diagram
+from quadvis.library.skeleton import new_block, new_diagram
 
 
 @pytest.fixture(autouse=True)

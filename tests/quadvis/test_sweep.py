@@ -24,8 +24,8 @@ from hypothesis import strategies as st
 import quadvis
 from quadvis.cli import main
 from quadvis.errors import QuadvisError, RunError
-from quadvis.files import Claim, Kind
-from quadvis.signals import ENDS
+from quadvis.machine.files import Claim, Kind
+from quadvis.machine.interrupts import ENDS
 from quadvis.sweeps import sweep as sweeping
 from quadvis.sweeps.axes import points, read_axes
 from quadvis.sweeps.summary import SweepLine, duration_text, sweep_lines

@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 from quadvis import document
-from quadvis.composer import MAX_DEPTH
 from quadvis.document import parse_yaml
+from quadvis.document.composer import MAX_DEPTH
 from quadvis.errors import DiagramError, Faults
 
 LOADERS = [yaml.SafeLoader, *([yaml.CSafeLoader] if yaml.__with_libyaml__ else [])]

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quadvis_blocks.vision._scenes import CONDITIONS, draw_pose, homography
+from quadvis_vision.trials.scenes import CONDITIONS, draw_pose, homography
 
 PROGRAM = Path(__file__).parents[2] / "tools" / "bench_detector"
 SMALL = ("--size", "320x240", "--pictures", "2", "--rounds", "2")

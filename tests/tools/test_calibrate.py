@@ -15,8 +15,8 @@ import cv2
 import numpy as np
 import pytest
 
-from quadvis_blocks.vision._calibration import CameraCalibration
-from quadvis_blocks.vision._two_planes import TwoPlanesCalibration
+from quadvis_vision.camera.calibration import CameraCalibration
+from quadvis_vision.camera.two_planes import TwoPlanesCalibration
 
 from .script import run_script
 

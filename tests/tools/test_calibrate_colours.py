@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 import pytest
 
-from quadvis_blocks.vision._colours import ColourCalibration
-from quadvis_blocks.vision._scenes import CONDITIONS, shoot
+from quadvis_vision.detection.colours import ColourCalibration
+from quadvis_vision.trials.scenes import CONDITIONS, shoot
 
 from .script import run_script
 

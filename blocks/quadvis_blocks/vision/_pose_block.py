@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.block import Block, In, Out, Param
-from quadvis_blocks.vision._calibration import CameraCalibration
-from quadvis_blocks.vision._lens import by_point
-from quadvis_blocks.vision._pose import Pose, camera_points, seen_centres
-from quadvis_blocks.vision._projection import CAMERA_FROM_BODY, SIDE, attitude_of, target_corners
-from quadvis_blocks.vision._refine import View, pose_of, refine, unknowns_of
-from quadvis_blocks.vision._two_planes import TwoPlanesCalibration
+from quadvis_vision.camera.calibration import CameraCalibration
+from quadvis_vision.camera.lens import by_point
+from quadvis_vision.camera.projection import CAMERA_FROM_BODY, SIDE, attitude_of, target_corners
+from quadvis_vision.camera.two_planes import TwoPlanesCalibration
+from quadvis_vision.pose.pose import Pose, camera_points, seen_centres
+from quadvis_vision.pose.refine import View, pose_of, refine, unknowns_of
 
 if TYPE_CHECKING:
     _Base = Block

@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 from quadvis.block import Block, Frame, In, Out, Param
-from quadvis_blocks.vision._calibration import CameraCalibration
-from quadvis_blocks.vision._overlay import Finding, Overlay
-from quadvis_blocks.vision._projection import RADIUS, SIDE
+from quadvis_vision.camera.calibration import CameraCalibration
+from quadvis_vision.camera.projection import RADIUS, SIDE
+from quadvis_vision.pictures.overlay import Finding, Overlay
 
 UNKNOWN = (math.nan, math.nan, math.nan)
 

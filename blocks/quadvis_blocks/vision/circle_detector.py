@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, Frame, In, Out, Param, ParameterError, State
-from quadvis_blocks.vision._calibration import CameraCalibration
-from quadvis_blocks.vision._circles import Target
-from quadvis_blocks.vision._colours import ColourCalibration
-from quadvis_blocks.vision._detect import (
+from quadvis_vision.camera.calibration import CameraCalibration
+from quadvis_vision.camera.projection import RADIUS, SIDE
+from quadvis_vision.detection.circles import Target
+from quadvis_vision.detection.colours import ColourCalibration
+from quadvis_vision.detection.detect import (
     STALE,
     TWO_CIRCLES,
     UNUSABLE,
@@ -22,7 +23,6 @@ from quadvis_blocks.vision._detect import (
     search,
     usable,
 )
-from quadvis_blocks.vision._projection import RADIUS, SIDE
 
 STALE_PICTURE = 0  # of the choices of repeats
 FOLLOW_MAX = 0.5  # s between two pictures; after more than that the target is searched for, not followed

@@ -6,8 +6,8 @@ import numpy as np
 
 from quadvis.block import Block, Frame, In, Out, Param, Random, State
 from quadvis_blocks._random import uniform
-from quadvis_blocks.vision._faults import NO_FAULT, TIMING, comes, is_on, shows, stamped
-from quadvis_blocks.vision._picture_faults import PICTURES
+from quadvis_blocks.vision._fault_timing import NO_FAULT, TIMING, comes, is_on, shows, stamped
+from quadvis_vision.simulation.picture_faults import PICTURES
 
 KINDS = (NO_FAULT, *TIMING, *PICTURES)
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from quadvis.block import Block, Frame, In, Param, ParameterError, State
 from quadvis.errors import QuadvisError, RunError
-from quadvis.files import JPG, PNG, check_output, write_output
-from quadvis_blocks.vision._drawing import is_picture
+from quadvis.machine.files import JPG, PNG, check_output, write_output
+from quadvis_vision.pictures.drawing import is_picture
 
 KINDS = {".png": PNG, ".jpg": JPG}
 NAMES = r"\d{6,}\.(png|jpg)"  # of the pictures that it writes

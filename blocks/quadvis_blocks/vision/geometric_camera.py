@@ -9,10 +9,9 @@ import numpy as np
 
 from quadvis.block import In, Out, Param, Random, State
 from quadvis_blocks._random import fill_normal
-from quadvis_blocks.vision._calibration import CameraCalibration
-from quadvis_blocks.vision._delivery import CONTENT, QUEUE, SEQUENCE, STAMP, DeliveringCamera, Row
-from quadvis_blocks.vision._detect import NOT_FOUND, STALE, TWO_CIRCLES
-from quadvis_blocks.vision._projection import (
+from quadvis_blocks.vision._delayed_camera import CONTENT, QUEUE, SEQUENCE, STAMP, DeliveringCamera, Row
+from quadvis_vision.camera.calibration import CameraCalibration
+from quadvis_vision.camera.projection import (
     RADIUS,
     SIDE,
     camera_pose,
@@ -20,6 +19,7 @@ from quadvis_blocks.vision._projection import (
     plane_homography,
     target_corners,
 )
+from quadvis_vision.detection.detect import NOT_FOUND, STALE, TWO_CIRCLES
 
 WIDTH = CONTENT + 8  # of a row: u, v of four circles
 PICTURE, UNBOUNDED = range(2)

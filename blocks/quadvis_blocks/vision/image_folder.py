@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from quadvis.block import Block, Frame, Out, Param, ParameterError, State
 from quadvis.errors import QuadvisError
-from quadvis.inputs import note_digest
-from quadvis_blocks.vision._pictures import SUFFIXES, read_coded
+from quadvis.machine.inputs import note_digest
+from quadvis_vision.pictures.reader import SUFFIXES, read_coded
 
 FileState = tuple[int, int]
 

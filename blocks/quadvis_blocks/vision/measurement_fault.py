@@ -9,7 +9,7 @@ import numpy as np
 
 from quadvis.block import Block, In, Out, Param, Random, State
 from quadvis_blocks._random import fill_normal
-from quadvis_blocks.vision._faults import LATE, NO_FAULT, TIMING, comes, is_on, shows, stamped
+from quadvis_blocks.vision._fault_timing import LATE, NO_FAULT, TIMING, comes, is_on, shows, stamped
 
 SHAPES = ("no_target", "turned", "mirrored", "shifted", "noise", "other_colours", "half_gone", "two_left")
 KINDS = (NO_FAULT, *TIMING, *SHAPES)

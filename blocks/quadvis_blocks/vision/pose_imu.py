@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, In, Out, Param
-from quadvis_blocks.vision._detect import INCONSISTENT, NOT_FOUND
-from quadvis_blocks.vision._level import level_covariance, level_pose
 from quadvis_blocks.vision._pose_block import NOTHING, Array, Bools, PoseFromCircles
-from quadvis_blocks.vision._projection import RADIUS
-from quadvis_blocks.vision._refine import Estimate, Tilt, View, pose_of, refine
+from quadvis_vision.camera.projection import RADIUS
+from quadvis_vision.detection.detect import INCONSISTENT, NOT_FOUND
+from quadvis_vision.pose.level import level_covariance, level_pose
+from quadvis_vision.pose.refine import Estimate, Tilt, View, pose_of, refine
 
 LEVEL, MAP = range(2)
 NO_TILT = 8  # a status; those below are the detector's

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from quadvis_blocks.vision._pose import Array, Pose, pose_from_n_points
 from quadvis_blocks.vision._pose_block import PoseFromFour
+from quadvis_vision.pose.pose import Array, Pose, pose_from_n_points
 
 
 class PoseNPoints(PoseFromFour, numeric=False):

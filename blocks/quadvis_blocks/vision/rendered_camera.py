@@ -9,10 +9,10 @@ import numpy as np
 
 from quadvis.block import Frame, In, Out, Param, ParameterError, Random, State
 from quadvis_blocks._random import uniform
-from quadvis_blocks.vision._calibration import CameraCalibration
-from quadvis_blocks.vision._delivery import CONTENT, QUEUE, SEQUENCE, STAMP, DeliveringCamera, Row
-from quadvis_blocks.vision._projection import RADIUS, SIDE
-from quadvis_blocks.vision._renderer import Renderer, Scene
+from quadvis_blocks.vision._delayed_camera import CONTENT, QUEUE, SEQUENCE, STAMP, DeliveringCamera, Row
+from quadvis_vision.camera.calibration import CameraCalibration
+from quadvis_vision.camera.projection import RADIUS, SIDE
+from quadvis_vision.simulation.renderer import Renderer, Scene
 
 # What a picture depends on, after the columns of every row.
 LIGHT, NOISE = CONTENT, CONTENT + 1

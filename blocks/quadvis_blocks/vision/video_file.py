@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from quadvis.block import Block, Frame, Out, Param, ParameterError, State
 from quadvis.errors import QuadvisError
-from quadvis_blocks.vision._drawing import is_picture
-from quadvis_blocks.vision._pictures import not_a_video, open_video
+from quadvis_vision.pictures.drawing import is_picture
+from quadvis_vision.pictures.reader import not_a_video, open_video
 
 
 class VideoFile(Block, numeric=False):

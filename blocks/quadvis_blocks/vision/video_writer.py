@@ -9,8 +9,8 @@ import numpy as np
 
 from quadvis.block import Block, Frame, In, Param, ParameterError, State
 from quadvis.errors import QuadvisError, RunError
-from quadvis.files import Kind, check_output, open_output
-from quadvis_blocks.vision._drawing import Picture, is_picture
+from quadvis.machine.files import Kind, check_output, open_output
+from quadvis_vision.pictures.drawing import Picture, is_picture
 
 CODECS = {".mp4": "mp4v", ".avi": "MJPG", ".mkv": "FFV1"}
 HEADS = {".mp4": rb"\A[\s\S]{4}ftyp", ".avi": rb"\ARIFF[\s\S]{4}AVI ", ".mkv": rb"\A\x1aE\xdf\xa3"}

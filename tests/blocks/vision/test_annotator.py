@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from quadvis.block import Frame, ParameterError
 from quadvis.testing import drive
-from quadvis_blocks.vision import _detect, _overlay
 from quadvis_blocks.vision.annotator import Annotator
+from quadvis_vision.detection import detect
+from quadvis_vision.pictures import overlay
 
 CAMERA = str(Path(__file__).parents[3] / "diagrams/calib/camera.yaml")
 MATRIX = np.array([[430.0, 2, 226], [0, 438, 161], [0, 0, 1]])  # (38)
@@ -108,27 +109,27 @@ def test_before_the_first_picture_there_is_none():
 
 def test_the_pose_is_told_in_centimetres_and_degrees():
     known = {"centres": np.zeros((4, 2)), "quality": np.ones(4), "status": 0, "rotation": TURN}
-    found = _overlay.Finding(
+    found = overlay.Finding(
         **known, position=np.array([0.1234, -0.05, 3.012]), yaw=math.radians(-3.25), has_pose=True
     )
-    assert _overlay.pose_text(found) == "x +12.3  y -5.0  z 301.2 cm   yaw -3.2 deg"
-    found = _overlay.Finding(**known, position=POSITION, yaw=math.nan, has_pose=True)
-    assert _overlay.pose_text(found) == "x +20.0  y -10.0  z 340.0 cm"
-    found = _overlay.Finding(**known, position=np.full(3, math.nan), yaw=0.0, has_pose=True)
-    assert _overlay.pose_text(found) == "no pose"
+    assert overlay.pose_text(found) == "x +12.3  y -5.0  z 301.2 cm   yaw -3.2 deg"
+    found = overlay.Finding(**known, position=POSITION, yaw=math.nan, has_pose=True)
+    assert overlay.pose_text(found) == "x +20.0  y -10.0  z 340.0 cm"
+    found = overlay.Finding(**known, position=np.full(3, math.nan), yaw=0.0, has_pose=True)
+    assert overlay.pose_text(found) == "no pose"
 
 
 def test_the_words_are_those_of_the_detectors_statuses():
     words = {
-        _detect.FOUR_CIRCLES: "four circles",
-        _detect.THREE_CIRCLES: "three circles",
-        _detect.TWO_CIRCLES: "two circles",
-        _detect.NOT_FOUND: "no target",
-        _detect.INCONSISTENT: "four circles that are no square",
-        _detect.STALE: "no picture yet",
-        _detect.UNUSABLE: "not a picture",
+        detect.FOUR_CIRCLES: "four circles",
+        detect.THREE_CIRCLES: "three circles",
+        detect.TWO_CIRCLES: "two circles",
+        detect.NOT_FOUND: "no target",
+        detect.INCONSISTENT: "four circles that are no square",
+        detect.STALE: "no picture yet",
+        detect.UNUSABLE: "not a picture",
     }
-    assert {status: _overlay.STATUS[status] for status in words} == words
+    assert {status: overlay.STATUS[status] for status in words} == words
 
 
 def test_the_caption_changes_with_the_status():
@@ -156,7 +157,7 @@ BROKEN = [
 
 @pytest.mark.parametrize("pixels", BROKEN, ids=lambda pixels: f"{pixels.dtype}{pixels.shape}")
 def test_what_is_not_a_picture_becomes_grey_of_the_cameras_size(pixels):
-    shown = annotated(Frame(pixels, 1.0, 3), status=_detect.UNUSABLE)
+    shown = annotated(Frame(pixels, 1.0, 3), status=detect.UNUSABLE)
     assert shown.pixels.shape == annotated().pixels.shape
     assert np.ptp(shown.pixels[:322]) == 0
 

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadvis.errors import DiagramError
-from quadvis_blocks.vision._calibration import CameraCalibration
-from quadvis_blocks.vision._evidence import CalibrationError, Evidence
+from quadvis_vision.camera.calibration import CameraCalibration
+from quadvis_vision.camera.provenance import CalibrationError, Evidence
 
 PAPER = Path(__file__).parents[3] / "diagrams" / "calib" / "camera.yaml"
 PAPER_K = np.array([[430.0, 2.0, 226.0], [0.0, 438.0, 161.0], [0.0, 0.0, 1.0]])

@@ -9,10 +9,10 @@ import pytest
 
 import quadvis
 from quadvis.errors import QuadvisError
-from quadvis_blocks.vision._calibration import CameraCalibration
-from quadvis_blocks.vision._colours import ColourCalibration
-from quadvis_blocks.vision._homogeneous import read_correspondences
-from quadvis_blocks.vision._two_planes import TwoPlanesCalibration
+from quadvis_vision.camera.calibration import CameraCalibration
+from quadvis_vision.camera.homogeneous import read_correspondences
+from quadvis_vision.camera.two_planes import TwoPlanesCalibration
+from quadvis_vision.detection.colours import ColourCalibration
 
 CALIB = Path(__file__).parents[3] / "diagrams" / "calib"
 READERS: dict[str, Callable[[Path], Any]] = {

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from quadvis.errors import QuadvisError
-from quadvis_blocks.vision import _chessboard as chessboard
-from quadvis_blocks.vision import _lens, _opencv
-from quadvis_blocks.vision._bundle import adjust
-from quadvis_blocks.vision._calibration import CameraCalibration
-from quadvis_blocks.vision._homogeneous import calibrate
-from quadvis_blocks.vision._pictures import read_coded
-from quadvis_blocks.vision._residuals import draw_residuals
+from quadvis_vision.calibrate import chessboard
+from quadvis_vision.calibrate.bundle import adjust
+from quadvis_vision.calibrate.residuals import draw_residuals
+from quadvis_vision.camera import lens as lens_model
+from quadvis_vision.camera.calibration import CameraCalibration
+from quadvis_vision.camera.homogeneous import calibrate
+from quadvis_vision.pictures.reader import read_coded
+from quadvis_vision.trials import opencv
 
 BOARD = chessboard.Board(9, 6, 0.025)
 SIZE = (640, 480)
@@ -103,7 +104,7 @@ def test_the_bundle_adjustment_reaches_what_calibrate_camera_reaches():
     noisy = [view + rng.normal(0, 0.3, view.shape) for view in views()]
     noisy = [view.astype(np.float32).astype(float) for view in noisy]
     ours = chessboard.calibrate_views(BOARD, noisy, SIZE)
-    theirs = _opencv.calibrate_views(BOARD.points, noisy, SIZE)
+    theirs = opencv.calibrate_views(BOARD.points, noisy, SIZE)
     assert ours.bundle.matrix == pytest.approx(theirs.matrix, abs=1e-2)
     assert ours.bundle.distortion == pytest.approx(theirs.distortion, abs=1e-3)
     assert ours.bundle_rms == pytest.approx(theirs.rms, abs=1e-6)
@@ -179,12 +180,12 @@ def test_points_in_space_go_through_opencv_too():
     rng = np.random.default_rng(2)
     local = np.column_stack([rng.uniform(-1, 1, (30, 2)), rng.uniform(3, 6, 30)])
     e = local @ K.T
-    found = _opencv.calibrate_points(
+    found = opencv.calibrate_points(
         local + np.array([5, -3, 2]), e[:, :2] / e[:, 2:], K + np.diag([5.0, -5, 0])
     )
     assert found.matrix == pytest.approx(K, abs=0.05)
     off = K - np.array([[0, 0, 400.0], [0, 0, 0], [0, 0, 0]])
-    assert _opencv.calibrate_points(local, e[:, :2] / e[:, 2:], off) is None
+    assert opencv.calibrate_points(local, e[:, :2] / e[:, 2:], off) is None
 
 
 def test_residuals_are_drawn_as_arrows_over_the_picture():
@@ -204,7 +205,7 @@ def test_the_lens_is_that_of_opencv():
     lens = rng.uniform(-0.1, 0.1, 5)
     points = np.column_stack([normalised, np.ones(50)])
     theirs = cv2.projectPoints(points, np.zeros(3), np.zeros(3), np.eye(3), lens)[0].reshape(-1, 2)
-    assert _lens.distort(normalised, lens) == pytest.approx(theirs, abs=1e-12)
+    assert lens_model.distort(normalised, lens) == pytest.approx(theirs, abs=1e-12)
 
 
 def test_derivatives_of_the_lens_are_those_of_small_steps():
@@ -212,13 +213,15 @@ def test_derivatives_of_the_lens_are_those_of_small_steps():
     normalised, lens, step = rng.uniform(-0.6, 0.6, (50, 2)), rng.uniform(-0.1, 0.1, 5), 1e-6
 
     def slope(change_point, change_lens):
-        ends = [_lens.distort(normalised + s * change_point, lens + s * change_lens) for s in (step, -step)]
+        ends = [
+            lens_model.distort(normalised + s * change_point, lens + s * change_lens) for s in (step, -step)
+        ]
         return (ends[0] - ends[1]) / (2 * step)
 
     by_point = np.stack([slope(row, np.zeros(5)) for row in np.eye(2)], axis=-1)
     by_lens = np.stack([slope(np.zeros(2), row) for row in np.eye(5)], axis=-1)
-    assert _lens.by_point(normalised, lens) == pytest.approx(by_point, abs=1e-8)
-    assert _lens.by_lens(normalised) == pytest.approx(by_lens, abs=1e-8)
+    assert lens_model.by_point(normalised, lens) == pytest.approx(by_point, abs=1e-8)
+    assert lens_model.by_lens(normalised) == pytest.approx(by_lens, abs=1e-8)
 
 
 needs_photographs = pytest.mark.skipif(

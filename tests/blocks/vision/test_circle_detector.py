@@ -13,9 +13,9 @@ from hypothesis.extra.numpy import arrays
 
 from quadvis.block import Frame, ParameterError
 from quadvis.testing import drive
-from quadvis_blocks.vision._detect import INCONSISTENT, NOT_FOUND, STALE, UNUSABLE
-from quadvis_blocks.vision._square import MISFIT_MAX, expected_radii, motion, square_cost, square_homography
 from quadvis_blocks.vision.circle_detector import CircleDetector
+from quadvis_vision.detection.detect import INCONSISTENT, NOT_FOUND, STALE, UNUSABLE
+from quadvis_vision.detection.square import MISFIT_MAX, expected_radii, motion, square_cost, square_homography
 
 REPO = Path(__file__).parents[3]
 COLOURS = str(REPO / "diagrams/calib/colours.yaml")

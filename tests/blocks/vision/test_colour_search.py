@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from quadvis.errors import QuadvisError
-from quadvis_blocks.vision._circles import Target
-from quadvis_blocks.vision._colour_calibration import calibrate_colours
-from quadvis_blocks.vision._colour_names import HUES, named, nearest_name
-from quadvis_blocks.vision._colours import ColourCalibration
-from quadvis_blocks.vision._detect import search
-from quadvis_blocks.vision._scenery import CEILING, Condition
-from quadvis_blocks.vision._scenes import CONDITIONS, PAINT, RADIUS, shoot
+from quadvis_vision.calibrate.colour_calibration import calibrate_colours
+from quadvis_vision.calibrate.colour_names import HUES, named, nearest_name
+from quadvis_vision.detection.circles import Target
+from quadvis_vision.detection.colours import ColourCalibration
+from quadvis_vision.detection.detect import search
+from quadvis_vision.trials.scenery import CEILING, Condition
+from quadvis_vision.trials.scenes import CONDITIONS, PAINT, RADIUS, shoot
 
 SMALL, LARGE = (320, 240), (640, 480)
 WHOLE = [name for name, condition in CONDITIONS.items() if not condition.missing and not condition.cover]

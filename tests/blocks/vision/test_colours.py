@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadvis.errors import DiagramError, QuadvisError
-from quadvis_blocks.vision._colours import ColourCalibration
+from quadvis_vision.detection.colours import ColourCalibration
 
 REPO = Path(__file__).parents[3]
 FILE = REPO / "diagrams/calib/colours.yaml"

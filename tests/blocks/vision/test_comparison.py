@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadvis.errors import QuadvisError
-from quadvis_blocks.vision import _comparison
-from quadvis_blocks.vision._comparison import Poses
+from quadvis_vision.trials import comparison
+from quadvis_vision.trials.comparison import Poses
 
 
 def poses(values, name="a"):
@@ -31,7 +31,7 @@ def test_a_constant_offset_is_the_difference_and_whole_turns_do_not_count(offset
     first = random_poses(count)
     values = first.values + offset
     values[:, 3:] += 2 * math.pi * turns
-    found = _comparison.difference(first, poses(values, "b"))
+    found = comparison.difference(first, poses(values, "b"))
     assert found.rms == pytest.approx(np.abs(offset), abs=1e-9)
     assert found.ratios == pytest.approx(first.values[:, 2] / values[:, 2])
 
@@ -41,7 +41,7 @@ def test_pictures_without_a_pose_by_either_method_do_not_count():
     second.values[:] = first.values + 0.25
     first.values[0, 2] = math.nan
     second.values[[3, 4]] = math.nan
-    found = _comparison.difference(first, second)
+    found = comparison.difference(first, second)
     assert found.count == 2
     assert found.rms == pytest.approx(np.full(6, 0.25))
 
@@ -49,18 +49,18 @@ def test_pictures_without_a_pose_by_either_method_do_not_count():
 def test_methods_that_never_meet_are_told_so():
     first, second = random_poses(2), random_poses(2, "b")
     first.values[0], second.values[1] = math.nan, math.nan
-    found = _comparison.difference(first, second)
+    found = comparison.difference(first, second)
     assert found.count == 0 and np.isnan(found.rms).all() and not len(found.ratios)
-    assert _comparison.sentences([found]) == "a - b: no picture with a pose by both"
+    assert comparison.sentences([found]) == "a - b: no picture with a pose by both"
 
 
 def test_methods_of_different_rates_are_refused():
     with pytest.raises(QuadvisError, match="3 and 4 pictures; give both one rate"):
-        _comparison.difference(random_poses(3), random_poses(4, "b"))
+        comparison.difference(random_poses(3), random_poses(4, "b"))
 
 
 def test_every_method_is_compared_with_every_other():
-    found = _comparison.differences([random_poses(3, name) for name in "abcd"])
+    found = comparison.differences([random_poses(3, name) for name in "abcd"])
     assert [pair.first + pair.second for pair in found] == ["ab", "ac", "ad", "bc", "bd", "cd"]
 
 
@@ -69,7 +69,7 @@ def test_pictures_for_the_table_are_spread_over_those_with_a_pose(found, count):
     method = random_poses(len(found))
     method.values[~np.array(found, dtype=bool)] = math.nan
     good = [number for number, there in enumerate(found, 1) if there]
-    chosen = _comparison.spread([method, random_poses(len(found), "b")], count)
+    chosen = comparison.spread([method, random_poses(len(found), "b")], count)
     assert len(chosen) == min(count, len(good))
     assert set(chosen) <= set(good) and chosen == sorted(set(chosen))
     if len(chosen) > 1:
@@ -77,7 +77,7 @@ def test_pictures_for_the_table_are_spread_over_those_with_a_pose(found, count):
 
 
 def test_a_missing_pose_is_a_dash_and_nothing_is_minus_zero():
-    lines = _comparison.table([poses([[math.nan] * 6, [-1e-5] * 6])], [1, 2]).splitlines()
+    lines = comparison.table([poses([[math.nan] * 6, [-1e-5] * 6])], [1, 2]).splitlines()
     assert lines[3].split() == ["1", *["-"] * 6]
     assert lines[4].split() == ["2", *["0.0"] * 6]
 
@@ -87,7 +87,7 @@ def test_the_figure_shows_every_method(tmp_path, count):
     methods = [random_poses(count, name, seed) for seed, name in enumerate("abc")]
     methods[1].values[::2] = math.nan
     path = tmp_path / "new" / "figure.png"
-    _comparison.draw(methods, [1, count], path)
+    comparison.draw(methods, [1, count], path)
     picture = cv2.imread(str(path)).astype(int)
     assert picture.shape[1] == 1560
     for blue_green_red in [(0xB2, 0x72, 0x00), (0x00, 0x5E, 0xD5), (0x73, 0x9E, 0x00)]:
@@ -96,11 +96,11 @@ def test_the_figure_shows_every_method(tmp_path, count):
 
 def test_a_figure_without_any_pose_is_drawn_too(tmp_path):
     methods = [poses(np.full((3, 6), math.nan), name) for name in "ab"]
-    _comparison.draw(methods, [], tmp_path / "figure.png")
+    comparison.draw(methods, [], tmp_path / "figure.png")
     assert (tmp_path / "figure.png").is_file()
 
 
 def test_a_figure_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(QuadvisError, match="cannot write the figure"):
-        _comparison.draw([random_poses(2)], [], tmp_path / "file" / "figure.png")
+        comparison.draw([random_poses(2)], [], tmp_path / "file" / "figure.png")

@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quadvis_blocks.vision._calibration import CameraCalibration
-from quadvis_blocks.vision._circles import Target
-from quadvis_blocks.vision._colours import ColourCalibration
-from quadvis_blocks.vision._detect import follow, search
-from quadvis_blocks.vision._projection import camera_pose, ellipse_centres, target_corners
-from quadvis_blocks.vision._scenery import Condition, project
-from quadvis_blocks.vision._scenes import (
+from quadvis_vision.camera.calibration import CameraCalibration
+from quadvis_vision.camera.projection import camera_pose, ellipse_centres, target_corners
+from quadvis_vision.detection.circles import Target
+from quadvis_vision.detection.colours import ColourCalibration
+from quadvis_vision.detection.detect import follow, search
+from quadvis_vision.trials.scenery import Condition, project
+from quadvis_vision.trials.scenes import (
     CONDITIONS,
     CORNERS,
     RADIUS,

@@ -9,7 +9,7 @@ import pytest
 
 from quadvis.block import Out, ParameterError
 from quadvis.testing import drive
-from quadvis_blocks.vision._delivery import SEQUENCE, STAMP, DeliveringCamera
+from quadvis_blocks.vision._delayed_camera import SEQUENCE, STAMP, DeliveringCamera
 from quadvis_blocks.vision.geometric_camera import GeometricCamera
 from quadvis_blocks.vision.rendered_camera import RenderedCamera
 

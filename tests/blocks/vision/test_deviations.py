@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 
 from quadvis.errors import QuadvisError
-from quadvis_blocks.vision import _chessboard as chessboard
-from quadvis_blocks.vision._bundle import LENS as LENS_NAMES
-from quadvis_blocks.vision._bundle import adjust, free_parameters
-from quadvis_blocks.vision._deviations import (
+from quadvis_vision.calibrate import chessboard
+from quadvis_vision.calibrate.bundle import LENS as LENS_NAMES
+from quadvis_vision.calibrate.bundle import adjust, free_parameters
+from quadvis_vision.calibrate.deviations import (
     LEAST_NOISE,
     NAMES,
     Deviations,
     bundle_deviations,
     homogeneous_deviations,
 )
-from quadvis_blocks.vision._homogeneous import calibrate
+from quadvis_vision.camera.homogeneous import calibrate
 
 BOARD = chessboard.Board(9, 6, 0.025)
 SIZE = (640, 480)

@@ -6,9 +6,9 @@ import pytest
 
 from quadvis.block import Frame
 from quadvis.testing import drive
-from quadvis_blocks.vision._faults import TIMING
-from quadvis_blocks.vision._picture_faults import PICTURES
+from quadvis_blocks.vision._fault_timing import TIMING
 from quadvis_blocks.vision.frame_fault import KINDS, FrameFault
+from quadvis_vision.simulation.picture_faults import PICTURES
 
 BEGIN, END, COUNT = 10, 20, 30  # ticks
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from quadvis.block import Frame, ParameterError
-from quadvis.files import reading
+from quadvis.machine.files import reading
 from quadvis.testing import drive
 from quadvis_blocks.vision.frame_writer import FrameWriter
 from quadvis_blocks.vision.image_folder import ImageFolder

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadvis.errors import QuadvisError
-from quadvis_blocks.vision import _homogeneous as homogeneous
+from quadvis_vision.camera import homogeneous
 
 SEEDS = st.integers(0, 2**32 - 1)
 

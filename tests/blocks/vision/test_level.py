@@ -10,8 +10,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from quadvis_blocks.vision._level import level_covariance, level_pose
-from quadvis_blocks.vision._refine import View
+from quadvis_vision.pose.level import level_covariance, level_pose
+from quadvis_vision.pose.refine import View
 
 SIDE = 1.3
 CORNERS = np.array([[-1.0, 1], [1, 1], [1, -1], [-1, -1]]) * SIDE / 2

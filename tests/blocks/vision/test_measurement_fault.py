@@ -3,7 +3,7 @@ import pytest
 
 from quadvis.block import Frame
 from quadvis.testing import Driven, drive
-from quadvis_blocks.vision._faults import TIMING
+from quadvis_blocks.vision._fault_timing import TIMING
 from quadvis_blocks.vision.frame_fault import FrameFault
 from quadvis_blocks.vision.measurement_fault import KINDS, SHAPES, MeasurementFault
 

@@ -11,11 +11,11 @@ import pytest
 
 from quadvis.block import ParameterError
 from quadvis.errors import QuadvisError
-from quadvis.inputs import MOST_BYTES
+from quadvis.machine.inputs import MOST_BYTES
 from quadvis.testing import drive
-from quadvis_blocks.vision._pictures import CodedPicture, open_video, read_coded, turned_note
 from quadvis_blocks.vision.image_folder import ImageFolder
 from quadvis_blocks.vision.video_file import VideoFile
+from quadvis_vision.pictures.reader import CodedPicture, open_video, read_coded, turned_note
 
 SIZE = (40, 24)  # width and height of all that is made here, unless said
 

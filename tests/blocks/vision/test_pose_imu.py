@@ -13,13 +13,13 @@ from hypothesis.extra.numpy import arrays
 
 from quadvis.block import ParameterError
 from quadvis.testing import drive
-from quadvis_blocks.vision._calibration import CameraCalibration
-from quadvis_blocks.vision._two_planes import TwoPlanesCalibration
 from quadvis_blocks.vision.circle_detector import CircleDetector
 from quadvis_blocks.vision.pose_imu import PoseImu
 from quadvis_blocks.vision.pose_n_points import PoseNPoints
 from quadvis_blocks.vision.pose_plane import PosePlane
 from quadvis_blocks.vision.rendered_camera import RenderedCamera
+from quadvis_vision.camera.calibration import CameraCalibration
+from quadvis_vision.camera.two_planes import TwoPlanesCalibration
 
 CALIB = Path(__file__).parents[3] / "diagrams/calib"
 CAMERA = str(CALIB / "camera.yaml")

@@ -12,11 +12,11 @@ from hypothesis.extra.numpy import arrays
 
 from quadvis.block import ParameterError
 from quadvis.testing import drive
-from quadvis_blocks.vision._calibration import CameraCalibration
-from quadvis_blocks.vision._pose import pose_from_n_points, pose_from_plane
-from quadvis_blocks.vision._two_planes import TwoPlanesCalibration
 from quadvis_blocks.vision.pose_n_points import PoseNPoints
 from quadvis_blocks.vision.pose_plane import PosePlane
+from quadvis_vision.camera.calibration import CameraCalibration
+from quadvis_vision.camera.two_planes import TwoPlanesCalibration
+from quadvis_vision.pose.pose import pose_from_n_points, pose_from_plane
 
 REPO = Path(__file__).parents[3]
 CAMERA = str(REPO / "diagrams/calib/camera.yaml")

@@ -5,7 +5,7 @@ import cv2
 import numpy as np
 import pytest
 
-from quadvis_blocks.vision._pose import pose_from_n_points, pose_from_plane
+from quadvis_vision.pose.pose import pose_from_n_points, pose_from_plane
 
 CORNERS = np.array([[-0.5, 0.5], [0.5, 0.5], [0.5, -0.5], [-0.5, -0.5]])
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadvis_blocks.vision._calibration import CameraCalibration
-from quadvis_blocks.vision._projection import (
+from quadvis_vision.camera.calibration import CameraCalibration
+from quadvis_vision.camera.projection import (
     attitude_of,
     camera_pose,
     circle_outline,

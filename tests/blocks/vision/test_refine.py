@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from quadvis_blocks.vision._level import level_pose
-from quadvis_blocks.vision._pose import Pose, pose_from_plane
-from quadvis_blocks.vision._refine import Tilt, View, pose_of, refine, unknowns_of
+from quadvis_vision.pose.level import level_pose
+from quadvis_vision.pose.pose import Pose, pose_from_plane
+from quadvis_vision.pose.refine import Tilt, View, pose_of, refine, unknowns_of
 
 SIDE = 1.0
 CORNERS = np.array([[-0.5, 0.5, 0], [0.5, 0.5, 0], [0.5, -0.5, 0], [-0.5, -0.5, 0]])

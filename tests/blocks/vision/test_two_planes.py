@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadvis.errors import QuadvisError
-from quadvis_blocks.vision import _two_planes as two_planes
-from quadvis_blocks.vision._two_planes import TwoPlanesCalibration
+from quadvis_vision.camera import two_planes
+from quadvis_vision.camera.two_planes import TwoPlanesCalibration
 
 SEEDS = st.integers(0, 2**32 - 1)
 AXES = np.diag([1.0, -1.0, -1.0])  # calibration frame: x right, y up, z toward the camera

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from quadvis.block import Frame, ParameterError
 from quadvis.errors import RunError
-from quadvis.files import Kind, open_output, reading
+from quadvis.machine.files import Kind, open_output, reading
 from quadvis.testing import drive
 from quadvis_blocks.vision.video_file import VideoFile
 from quadvis_blocks.vision.video_writer import CODECS, VideoWriter, frame_rate

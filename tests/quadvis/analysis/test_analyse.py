@@ -262,8 +262,8 @@ class Terminal(StringIO):
 
 def test_what_takes_long_shows_which_limit_is_sought_and_how_far_it_is(monkeypatch, capsys) -> None:
     terminal = Terminal()
-    monkeypatch.setattr("quadvis.report.PATIENCE", 0.0)
-    monkeypatch.setattr("quadvis.report.RENEWED", 0.0)
+    monkeypatch.setattr("quadvis.machine.status_line.PATIENCE", 0.0)
+    monkeypatch.setattr("quadvis.machine.status_line.RENEWED", 0.0)
     monkeypatch.setattr(sys, "stderr", terminal)
     assert main(["analyse", MARGINS, "--vary", "lag=50 ms..1 s"]) == 0
     out = capsys.readouterr().out
@@ -279,12 +279,12 @@ def test_what_takes_long_shows_which_limit_is_sought_and_how_far_it_is(monkeypat
 
 def test_nothing_is_shown_of_what_is_quick_or_where_nobody_watches(monkeypatch, capsys) -> None:
     terminal = Terminal()
-    monkeypatch.setattr("quadvis.report.PATIENCE", 1e9)
+    monkeypatch.setattr("quadvis.machine.status_line.PATIENCE", 1e9)
     with monkeypatch.context() as patched:
         patched.setattr(sys, "stderr", terminal)
         main(["analyse", MARGINS])
     assert not terminal.getvalue().replace("\r\x1b[K", "")
-    monkeypatch.setattr("quadvis.report.PATIENCE", 0.0)
+    monkeypatch.setattr("quadvis.machine.status_line.PATIENCE", 0.0)
     assert told(capsys, MARGINS)[2] == ""
 
 
@@ -294,7 +294,7 @@ def test_an_interrupted_analysis_ends_with_a_word(step, monkeypatch, capsys) -> 
         if step in text:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr("quadvis.report.AnalysisLine.__call__", interrupt)
+    monkeypatch.setattr("quadvis.machine.status_line.AnalysisLine.__call__", interrupt)
     code, _, error = told(capsys, MARGINS)
     assert (code, error) == (130, "interrupted\n")
 

@@ -1,0 +1,1 @@
+"""What tools/calibrate and tools/calibrate_colours do: from photographs to calibration files."""

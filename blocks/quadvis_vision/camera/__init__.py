@@ -1,0 +1,1 @@
+"""The camera model: intrinsics and lens, calibration files, projection, two planes."""

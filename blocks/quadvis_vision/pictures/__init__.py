@@ -1,0 +1,1 @@
+"""Picture files of any origin, and drawing into pictures."""

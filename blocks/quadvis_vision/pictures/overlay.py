@@ -1,0 +1,200 @@
+"""What was found in a picture, drawn into it: circles, square, axes and a caption."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from quadvis_vision.camera.projection import circle_outline, target_corners
+from quadvis_vision.pictures.drawing import (
+    PLATE,
+    SHIFT,
+    Colour,
+    Picture,
+    is_picture,
+    sixteenths,
+    width_of,
+    write,
+    write_on_plate,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from quadvis_vision.camera.calibration import CameraCalibration
+
+    Floats = NDArray[np.float64]
+
+# What a status of the detector means, by its number.
+STATUS = (
+    "four circles",
+    "three circles",
+    "two circles",
+    "no target",
+    "four circles that are no square",
+    "no picture yet",
+    "no calibration",
+    "not a picture",
+)
+_PARTIAL, _LOST = 1, 3  # statuses from which on something, or everything, is missing
+
+# Blue-green-red. Axes in the usual order red, green, blue.
+_GOOD, _WARNING, _BAD, _PLAIN = (120, 230, 120), (60, 190, 255), (90, 90, 255), (235, 235, 235)
+_SQUARE = (255, 210, 60)
+_AXES = (("x", (60, 60, 255)), ("y", (60, 220, 60)), ("z", (255, 120, 60)))
+_GROUND = 96  # grey of a picture that is none
+
+_SCALE = 0.65  # of the letters in the caption; smaller if a line like this one would not fit
+_LONG = "t 100.00 s   picture 1000   four circles that are no square"
+_STEPS = 12  # pieces of an edge, which a lens bends
+_REDUCED = 0.9  # of the expected radius: a circle below it has something before it
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What is known of one picture: circles (4, 2) px, their quality (4,), and the pose; NaN is unknown.
+
+    `status` is the detector's, -1 if it is not known. `position` (3,) m is that of the camera in target axes,
+    `rotation` (3, 3) from target to camera axes; `has_pose` says whether both are to be believed.
+    """
+
+    centres: Floats
+    quality: Floats
+    status: int
+    position: Floats
+    rotation: Floats
+    yaw: float
+    has_pose: bool
+
+
+class Overlay:
+    """Draws findings into pictures of one camera; sizes in m, pictures `zoom` times enlarged."""
+
+    def __init__(self, camera: CameraCalibration, side: float, radius: float, zoom: int) -> None:
+        self.camera, self.zoom, self.side = camera, zoom, side
+        corners = target_corners(side)
+        self._edges = _polygon(corners)
+        self._outlines = [circle_outline(corner[:2].tolist(), radius) for corner in corners]
+
+    def draw(self, pixels: object, found: Finding, title: str) -> Picture:
+        """Return the enlarged picture with marks, and a caption of two lines below it.
+
+        What is not a picture becomes grey of the camera's size. The title begins the caption.
+        """
+        canvas = self._canvas(pixels)
+        with np.errstate(all="ignore"):  # a pose may be anything
+            if _has_view(found):
+                self._draw_target(canvas, found, found.rotation, -found.rotation @ found.position)
+            self._draw_circles(canvas, found)
+        return np.vstack((canvas, _caption(canvas.shape[1], found, title)))
+
+    def _canvas(self, pixels: object) -> Any:
+        import cv2
+
+        if not is_picture(pixels):
+            width, height = self.camera.size
+            return np.full((height * self.zoom, width * self.zoom, 3), _GROUND, dtype=np.uint8)
+        whole: Any = np.ascontiguousarray(pixels)
+        if self.zoom == 1:
+            return whole.copy()
+        return cv2.resize(whole, None, fx=self.zoom, fy=self.zoom, interpolation=cv2.INTER_LINEAR)
+
+    def _draw_target(self, canvas: Any, found: Finding, turn: Floats, shift: Floats) -> None:
+        """Draw what the pose says: the square, its axes, and circles that were not seen."""
+        self._line(canvas, self._edges, turn, shift, _SQUARE, 1)
+        reach = 0.4 * self.side
+        for axis, (name, colour) in enumerate(_AXES):
+            way = np.zeros((_STEPS + 1, 3))
+            way[:, axis] = np.linspace(0, reach, _STEPS + 1)
+            end = self._line(canvas, way, turn, shift, colour, 2)
+            if end is not None:
+                self._word(canvas, name, end, (6, -6), colour)
+        for number, (outline, centre) in enumerate(zip(self._outlines, found.centres, strict=True), 1):
+            missing = not np.isfinite(centre).all()
+            closed = np.vstack((outline, outline[:1]))
+            colour = _WARNING if missing else _GOOD
+            self._line(canvas, closed, turn, shift, colour, 1)
+            if missing:
+                (pixel,) = self.camera.project(outline.mean(axis=0) @ turn.T + shift)
+                if np.isfinite(pixel).all():
+                    self._word(canvas, f"{number} missing", pixel, (-30, 5), _WARNING)
+
+    def _draw_circles(self, canvas: Any, found: Finding) -> None:
+        """Mark the circles that were seen by a cross and their number, and what share of one is hidden."""
+        import cv2
+
+        for number, (centre, quality) in enumerate(zip(found.centres, found.quality, strict=True), 1):
+            if not np.isfinite(centre).all():
+                continue
+            arm = 4.0 / self.zoom + 1.0
+            for step in (np.array([arm, 0.0]), np.array([0.0, arm])):
+                first, last = sixteenths(np.stack((centre - step, centre + step)), self.zoom).tolist()
+                for colour, width in (((20, 20, 20), 3), (_PLAIN, 1)):
+                    cv2.line(canvas, first, last, colour, width, cv2.LINE_AA, SHIFT)
+            text = f"{number} ({quality:.2f})" if quality < _REDUCED else str(number)
+            self._word(canvas, text, centre, (9, -9), _PLAIN)
+
+    def _line(
+        self, canvas: Any, points: Floats, turn: Floats, shift: Floats, colour: Colour, width: int
+    ) -> Floats | None:
+        """Draw a line through points (n, 3) of the target; return its last pixel, None if it has none."""
+        import cv2
+
+        pixels = self.camera.project(points @ turn.T + shift)
+        if not np.isfinite(pixels).all():
+            return None
+        path = sixteenths(pixels, self.zoom).reshape(-1, 1, 2)
+        cv2.polylines(canvas, [path], False, colour, max(1, width * self.zoom // 2), cv2.LINE_AA, SHIFT)
+        return np.asarray(pixels[-1])
+
+    def _word(self, canvas: Any, text: str, pixel: Floats, offset: tuple[int, int], colour: Colour) -> None:
+        x, y = (sixteenths(pixel[None], self.zoom)[0] >> SHIFT).tolist()
+        write_on_plate(canvas, text, (x + offset[0], y + offset[1]), colour, 0.5)
+
+
+def pose_text(found: Finding) -> str:
+    """Return position (cm) and yaw (deg) in words, of what is known of them."""
+    if not _has_position(found):
+        return "no pose"
+    x, y, z = (100 * found.position).tolist()
+    text = f"x {x:+.1f}  y {y:+.1f}  z {z:.1f} cm"
+    return f"{text}   yaw {math.degrees(found.yaw):+.1f} deg" if math.isfinite(found.yaw) else text
+
+
+def _status(status: int) -> tuple[str, Colour]:
+    if not 0 <= status < len(STATUS):
+        return "", _PLAIN
+    return STATUS[status], _GOOD if status < _PARTIAL else _WARNING if status < _LOST else _BAD
+
+
+def _polygon(corners: Floats) -> Floats:
+    """Return the closed outline (n, 3) of corners (m, 3), each edge in pieces."""
+    share = np.linspace(0, 1, _STEPS, endpoint=False)[:, None]
+    edges = [a + share * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+    return np.vstack((*edges, corners[:1]))
+
+
+def _caption(width: int, found: Finding, title: str) -> Picture:
+    """Return the bar below the picture, of a height that depends on the width alone."""
+    said, colour = _status(found.status)
+    pose = pose_text(found)
+    first = f"{title}   "
+    usual = min(_SCALE, max(1, width - 16) / width_of(_LONG))
+    line = max(8, round(36 * usual))
+    bar = np.full((2 * line + 8, width, 3), PLATE, dtype=np.uint8)
+    scale = min(usual, max(1, width - 16) / max(width_of(first + said), width_of(pose)))
+    write(bar, first, (8, line), _PLAIN, scale)
+    write(bar, said, (8 + round(scale * width_of(first)), line), colour, scale)
+    write(bar, pose, (8, 2 * line), _PLAIN if _has_position(found) else _WARNING, scale)
+    return bar
+
+
+def _has_position(found: Finding) -> bool:
+    return found.has_pose and bool(np.isfinite(found.position).all())
+
+
+def _has_view(found: Finding) -> bool:
+    return _has_position(found) and bool(np.isfinite(found.rotation).all())

@@ -1,0 +1,113 @@
+"""The one reader of pictures: pixels as the sensor gave them, or one sentence that says why not.
+
+A calibration is about pixels as the sensor gave them. So the orientation that a file may ask for is ignored,
+and so are bytes behind the end of the picture, transparency and colour profiles. Grey becomes three equal
+channels where colours are wanted; of 16 bits the upper 8 count. What is cut short is refused: a decoder would
+fill it up.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from quadvis.errors import QuadvisError
+from quadvis.machine.inputs import open_input, read_input
+from quadvis_vision.pictures.formats import FormatFault, layout
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Pixels = NDArray[np.uint8]
+
+MOST_PIXELS = 64_000_000  # in one picture: more than cameras on a craft have, and 200 MB of memory
+SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png")  # of the files in a folder that are pictures
+
+
+@dataclass(frozen=True, eq=False)
+class CodedPicture:
+    """A picture that has been read but not decoded: its size (width, height) is known, and it is whole.
+
+    `turned` says that the file asks to be turned or mirrored, which is not done.
+    """
+
+    path: str
+    size: tuple[int, int]
+    turned: bool
+    data: bytes
+
+    def decode(self, *, grey: bool = False) -> Pixels:
+        """Return (height, width, 3) blue-green-red, or (height, width) in grey; QuadvisError if damaged."""
+        import cv2
+
+        flags = cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR
+        picture: Any = None
+        try:
+            coded = np.frombuffer(self.data, dtype=np.uint8)
+            picture = cv2.imdecode(coded, flags | cv2.IMREAD_IGNORE_ORIENTATION)
+        except cv2.error:
+            pass
+        if picture is None or picture.shape[1::-1] != self.size or picture.dtype != np.uint8:
+            raise QuadvisError(
+                f"{self.path} is damaged, or coded in a way that is not read here; save it as PNG"
+            )
+        return np.asarray(picture, dtype=np.uint8)
+
+
+def read_coded(path: str | Path) -> CodedPicture:
+    """Read a picture's file and its header; QuadvisError, in one sentence with the path, if it is unusable.
+
+    Memory is taken for the bytes of the file alone, whatever size of a picture they declare.
+    """
+    name = os.fspath(path)
+    data = read_input(name)
+    try:
+        found = layout(data)
+    except FormatFault as fault:
+        raise QuadvisError(f"{name} {fault}") from None
+    size = found.width, found.height
+    if min(size) < 1:
+        raise QuadvisError(f"{name} declares {size[0]} x {size[1]} px; give a picture with pixels")
+    if size[0] * size[1] > MOST_PIXELS:
+        bound = f"at most {MOST_PIXELS // 1_000_000} million pixels are read"
+        raise QuadvisError(f"{name} declares {size[0]} x {size[1]} px; {bound}")
+    return CodedPicture(name, size, found.turned, found.coded)
+
+
+def turned_note(pictures: Iterable[CodedPicture]) -> list[str]:
+    """Return what to say once about files that ask to be turned; nothing if there are none."""
+    names = [Path(picture.path).name for picture in pictures if picture.turned]
+    if not names:
+        return []
+    asks = "asks" if len(names) == 1 else "ask"
+    return [
+        f"{', '.join(names)} {asks} to be turned or mirrored (orientation tag); the pixels are taken as the "
+        "sensor gave them"
+    ]
+
+
+def open_video(path: str | Path) -> Any:
+    """Return OpenCV's capture of a video whose frames come as the sensor gave them, too.
+
+    QuadvisError if there is no such file, or no video of a size that is read.
+    """
+    import cv2
+
+    open_input(path).close()  # neither a folder nor a pipe
+    video = cv2.VideoCapture(os.fspath(path))
+    video.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
+    size = int(video.get(cv2.CAP_PROP_FRAME_WIDTH)), int(video.get(cv2.CAP_PROP_FRAME_HEIGHT))
+    if not video.isOpened() or not 0 < size[0] * size[1] <= MOST_PIXELS:
+        video.release()
+        raise not_a_video(path)
+    return video
+
+
+def not_a_video(path: str | Path) -> QuadvisError:
+    """Return the sentence about a file that is not a video."""
+    return QuadvisError(f"'{path}' is not a video that OpenCV can read; convert it, e.g. to mp4")

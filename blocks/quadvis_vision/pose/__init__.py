@@ -1,0 +1,1 @@
+"""From four centres in a picture to the pose of the craft."""

@@ -1,0 +1,1 @@
+"""Scenes and comparisons by which the eyes are measured."""

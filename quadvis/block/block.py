@@ -1,0 +1,174 @@
+"""The contract of a block: ports, parameters and state declared once, behaviour in plain methods.
+
+A block's direct feedthrough is what its ``output`` asks for by name. Its parameters and states live in memory
+that the engine owns (see ``quadvis.engine.memory``): snapshot, replay, tuning and scopes ask nothing of
+the author.
+"""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, TypeVar
+
+from quadvis.block.declare import Declared, In, Out, Param, ParameterError, State
+from quadvis.errors import QuadvisError, sentence, suggestion
+from quadvis.machine.inputs import file_digest
+from quadvis.units import Unit
+
+METHODS = ("start", "output", "update", "deriv")
+CHECKS = ("check", "check_period", "doubts")
+FILES = ("reads", "read_file", "verify_files")
+RESERVED = {"self", "time", "period", "interface", "numeric", *CHECKS, *FILES, "open", "close", *METHODS}
+
+_Read = TypeVar("_Read")
+
+
+@dataclass(frozen=True)
+class Interface:
+    """All that a block class declares, collected when the class is defined."""
+
+    inputs: Mapping[str, In]
+    outputs: Mapping[str, Out]
+    params: Mapping[str, Param]
+    states: Mapping[str, State]
+    arguments: Mapping[str, tuple[str, ...]]  # method -> the names it asks for
+
+    @property
+    def feedthrough(self) -> frozenset[str]:
+        """The inputs that ``output`` asks for."""
+        return frozenset(self.arguments.get("output", ())) & frozenset(self.inputs)
+
+    @property
+    def continuous(self) -> tuple[State, ...]:
+        """The states that a solver integrates."""
+        return tuple(state for state in self.states.values() if state.continuous)
+
+
+class Block:
+    """One reusable unit of computation or input/output; see the module's docstring for the contract.
+
+    ``Gain(factor=2.0)`` is a block with its parameters chosen; ParameterError if one is unknown, missing or
+    out of range. It runs once the engine has bound it to memory.
+    """
+
+    interface: ClassVar[Interface]
+    numeric: ClassVar[bool] = True
+    period: float
+
+    def __init_subclass__(cls, *, numeric: bool | None = None, bound: bool = False) -> None:
+        if bound:
+            return
+        if numeric is not None:
+            cls.numeric = numeric
+        cls.interface = _interface(cls)
+
+    def __init__(self, **parameters: Any) -> None:
+        declared = self.interface.params
+        for name in parameters:
+            if name not in declared:
+                problem = f"{type(self).__name__} has no parameter '{name}'"
+                raise ParameterError(name, sentence(problem, suggestion(name, declared)))
+        for name, param in declared.items():
+            value = parameters.get(name, param.default)
+            if value is None:
+                raise ParameterError(name, f"parameter '{name}' is missing; give {param.wanted()}")
+            self.__dict__[name] = param.accept(value)
+        self._kept: dict[str, Any] = {}  # what was made of files, by parameter
+        self.check()
+        self._digests = {
+            param.name: file_digest(getattr(self, param.name))
+            for param in declared.values()
+            if param.is_file and not param.writes and param.name not in self._kept
+            if os.path.isfile(getattr(self, param.name))
+        }
+
+    def check(self) -> None:
+        """Refuse parameters that contradict each other or name unreadable files, with ParameterError."""
+
+    def reads(self) -> list[str]:
+        """Return the files that a run reads: those that parameters name, and all files of a folder."""
+        files = (param for param in self.interface.params.values() if param.is_file and not param.writes)
+        return [path for path in (getattr(self, param.name) for param in files) if path]
+
+    def check_period(self) -> None:
+        """Refuse parameters that do not go with ``self.period`` (s), with ParameterError.
+
+        It is called when a diagram is checked, as soon as the block's rate is known, and again before a run.
+        """
+
+    def doubts(self) -> list[ParameterError]:
+        """Return what can be run, but is surely not what was meant at ``self.period`` (s): the warnings."""
+        return []
+
+    def read_file(self, name: str, read: Callable[[str], _Read]) -> _Read:
+        """Return ``read(path)`` of the file that a parameter names; ParameterError tells what is wrong in it.
+
+        It is read at the first call and kept, so that what ``check`` has seen is what ``open`` gets, whatever
+        happens to the file meanwhile. Do not change what this returns.
+        """
+        if name not in self._kept:
+            try:
+                self._kept[name] = read(getattr(self, name))
+            except ParameterError:
+                raise
+            except QuadvisError as error:
+                reasons = "; ".join(str(error).splitlines())
+                raise ParameterError(name, f"{name} is not usable: {reasons}") from None
+        found: _Read = self._kept[name]
+        return found
+
+    def verify_files(self) -> None:
+        """Refuse a file that was not kept and is not what it was when the block was made; before ``open``."""
+        for name, digest in self._digests.items():
+            path = getattr(self, name)
+            if not os.path.isfile(path) or file_digest(path) != digest:
+                problem = f"file '{path}' is not what it was when the diagram was loaded"
+                raise ParameterError(name, sentence(problem, "load it again"))
+
+    def open(self) -> None:
+        """Acquire what the block needs outside the engine: a file, a port, a device."""
+
+    def close(self) -> None:
+        """Release it, hardware outputs at their safe value first; called even if ``open`` failed halfway."""
+
+
+def _interface(cls: type[Block]) -> Interface:
+    found: dict[str, Declared] = {}
+    for base in reversed(cls.__mro__):
+        found.update({name: value for name, value in vars(base).items() if isinstance(value, Declared)})
+    for name in found:
+        if name in RESERVED:
+            raise TypeError(f"{cls.__name__}: '{name}' is reserved; choose another name")
+
+    def of(kind: type[Any]) -> dict[str, Any]:
+        return {name: value for name, value in found.items() if isinstance(value, kind)}
+
+    inputs, outputs, states = of(In), of(Out), of(State)
+    arguments = {}
+    for method in METHODS:
+        function = getattr(cls, method, None)
+        if function is None:
+            continue
+        names = tuple(inspect.signature(function).parameters)[1:]
+        allowed = () if method == "start" else (*inputs, "time")
+        for name in names:
+            if name not in allowed:
+                problem = f"{cls.__name__}.{method} asks for '{name}', which is not one of its inputs"
+                raise TypeError(sentence(problem, suggestion(name, allowed)))
+        arguments[method] = names
+    if cls.numeric and any(state.signal.scalar == "frame" for state in states.values()):
+        problem = f"{cls.__name__} keeps a frame as a state, which no compiled method can"
+        raise TypeError(sentence(problem, "say numeric=False"))
+    if any(state.continuous for state in states.values()) != ("deriv" in arguments):
+        raise TypeError(f"{cls.__name__}: continuous states and a deriv method go together")
+    if outputs and "output" not in arguments:
+        raise TypeError(f"{cls.__name__} declares outputs but has no output method")
+    return Interface(inputs, outputs, of(Param), states, arguments)
+
+
+def units_of(declared: Declared, count: int) -> tuple[Unit, ...]:
+    """Return one unit per element of a port with ``count`` elements; a single unit holds for all of them."""
+    return declared.units * count if len(declared.units) == 1 else declared.units

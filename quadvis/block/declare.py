@@ -1,0 +1,198 @@
+"""What a block class declares: ports, states and parameters, with their types, units and bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.block.signals import SCALARS, SignalType
+from quadvis.errors import QuadvisError, sentence, suggestion
+from quadvis.units import parse_units
+
+
+class ParameterError(QuadvisError):
+    """A value that a parameter cannot take: ``parameter`` names it, the text says what would be right."""
+
+    def __init__(self, parameter: str, message: str) -> None:
+        super().__init__(message)
+        self.parameter = parameter
+
+
+@dataclass(eq=False)
+class Declared:
+    """Base of everything that a block class declares; the class attribute's name becomes its name."""
+
+    type: str
+    unit: str = "1"
+    doc: str = field(default="", kw_only=True)
+    name: str = field(default="", init=False)
+
+    def __post_init__(self) -> None:
+        self.signal = SignalType.parse(self.type)
+        self.units = parse_units(self.unit)
+
+    def __set_name__(self, owner: Any, name: str) -> None:
+        self.name = name
+
+    def __get__(self, block: Any, owner: Any = None) -> Any:
+        if block is None:
+            return self
+        try:
+            return block.__dict__[self.name]
+        except KeyError:
+            problem = f"{type(block).__name__}.{self.name} has no value before the block runs"
+            raise AttributeError(problem) from None
+
+    def __set__(self, block: Any, value: Any) -> None:
+        block.__dict__[self.name] = value
+
+
+@dataclass(eq=False)
+class In(Declared):
+    """An input port. With a ``default`` it may stay unconnected."""
+
+    type: str = "float64"
+    default: Any = field(default=None, kw_only=True)
+
+
+@dataclass(eq=False)
+class Out(Declared):
+    """An output port. ``nan=True`` where NaN says "missing"; elsewhere NaN or infinity stops the run."""
+
+    type: str = "float64"
+    nan: bool = field(default=False, kw_only=True)
+
+
+@dataclass(eq=False)
+class State(Declared):
+    """A state; only ``start`` and ``update`` change it, or the solver through ``deriv`` if ``continuous``."""
+
+    type: str = "float64"
+    init: float = 0.0
+    unit: str = field(default="1", kw_only=True)
+    continuous: bool = field(default=False, kw_only=True)
+
+
+class Random(State):
+    """A random stream (MRG32k3a), seeded by the engine from the run's seed and the block's path."""
+
+    def __init__(self) -> None:
+        super().__init__("int64[6]", doc="random stream")
+
+
+class Param(Declared):
+    """A parameter: typed, with unit and bounds (``min``/``max`` inclusive, ``above``/``below`` exclusive).
+
+    Without a default it must be given. ``choices`` makes it a name out of a few; the methods see its index.
+    ``tune=True`` lets it change between ticks of a run. Type ``file`` is a path relative to the diagram, of a
+    file or folder that the block reads, or with ``writes=True`` of one that it writes.
+    """
+
+    def __init__(
+        self,
+        default: Any = None,
+        type: str = "float64",
+        unit: str = "1",
+        *,
+        min: float | None = None,
+        max: float | None = None,
+        above: float | None = None,
+        below: float | None = None,
+        choices: tuple[str, ...] = (),
+        tune: bool = False,
+        writes: bool = False,
+        doc: str = "",
+    ) -> None:
+        self.writes = writes
+        self.default, self.choices, self.tune = default, choices, tune
+        self.min, self.max, self.above, self.below = min, max, above, below
+        self.is_file, self.is_text = type == "file", type in ("str", "file")
+        super().__init__("int64" if choices or self.is_text else type, unit, doc=doc)
+        if self.is_text:
+            self.type, self.signal = type, SignalType("str", ())
+
+    @property
+    def required(self) -> bool:
+        """True if a diagram must give a value."""
+        return self.default is None
+
+    def accept(self, value: Any) -> Any:
+        """Return ``value`` as the methods will see it; ParameterError if type, shape or range is wrong."""
+        if self.choices:
+            return self._accept_choice(value)
+        if self.is_text:
+            if not isinstance(value, str):
+                raise ParameterError(self.name, f"{self.name} must be a text, got {value!r}")
+            return value
+        array = _numbers(value)
+        if array is None or not _fits(array, self.signal.scalar):
+            raise ParameterError(self.name, f"{self.name} must be {self.wanted()}, got {value!r}")
+        if not self.signal.unify(array.shape, {}):
+            found = f"{self.name} must be {self.wanted()}, got {_shape_text(array.shape)}"
+            raise ParameterError(self.name, found)
+        self._check_range(array)
+        if array.shape:
+            return array.astype(self.signal.scalar)
+        return SCALARS[self.signal.scalar](array)
+
+    def _accept_choice(self, value: Any) -> int:
+        if value in self.choices:
+            return self.choices.index(value)
+        problem = f"{self.name} must be {self.wanted()}, got {value!r}"
+        raise ParameterError(self.name, sentence(problem, suggestion(str(value), self.choices)))
+
+    def _check_range(self, array: NDArray[np.float64]) -> None:
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        for bound, words, holds in (
+            (self.min, "at least", np.greater_equal),
+            (self.max, "at most", np.less_equal),
+            (self.above, "above", np.greater),
+            (self.below, "below", np.less),
+        ):
+            if bound is not None and not holds(array, bound).all():
+                wrong = array[~holds(array, bound)].flat[0] if array.shape else float(array)
+                problem = f"{self.name} must be {words} {bound:g}{unit}, got {wrong:g}{unit}"
+                raise ParameterError(self.name, problem)
+
+    def wanted(self) -> str:
+        """Say in words what a right value is."""
+        if self.choices:
+            return "one of " + ", ".join(self.choices)
+        one, many = _WORDS[self.signal.scalar]
+        unit = "" if self.unit == "1" else f" in {self.unit}"
+        if self.signal.shape == ("*",):
+            return f"{one} or an array of {many}{unit}"
+        return f"{_shape_text(self.signal.shape)}, {many}{unit}" if self.signal.shape else f"{one}{unit}"
+
+
+_WORDS = {
+    "float64": ("a number", "numbers"),
+    "int64": ("a whole number", "whole numbers"),
+    "bool": ("true or false", "true or false"),
+    "str": ("a text", "texts"),
+}
+
+
+def _numbers(value: Any) -> NDArray[np.float64] | None:
+    """Return a value as an array of numbers, None if it is something else; NaN is no number."""
+    try:
+        if np.asarray(value).dtype.kind in "SU":
+            return None
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return None if np.isnan(array).any() else array
+
+
+def _fits(array: NDArray[np.float64], scalar: str) -> bool:
+    """Return whether a slot can hold the numbers."""
+    if scalar == "bool":
+        return bool(((array == 0) | (array == 1)).all())
+    return scalar == "float64" or bool(((array == np.round(array)) & (np.abs(array) < 2.0**63)).all())
+
+
+def _shape_text(shape: tuple[int | str, ...]) -> str:
+    return f"{' x '.join(map(str, shape))} values" if shape else "one value"

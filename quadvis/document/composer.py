@@ -1,0 +1,351 @@
+"""From the events of a YAML parser to nodes, without recursion; what is refused on the way is kept."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import yaml
+
+from quadvis.document.damage import ORIGINALS
+from quadvis.document.nodes import Mapping, Node, Scalar, Sequence
+from quadvis.document.number_lists import MARK, NumberList, Numbers, numbers_in
+from quadvis.errors import DiagramError, Fault, Faults, Odd, Place, quoted
+from quadvis.errors.characters import (
+    NAMELESS,
+    character_name,
+    first_odd,
+    odd_characters,
+    replacement,
+    with_article,
+)
+
+MAX_NODES = 100_000
+MAX_DEPTH = 50
+MAX_KEY = 200
+
+# Control characters; line breaks that editors do not count; signs that reorder the text that people see.
+FORBIDDEN = re.compile(
+    "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufeff"
+    "\ufffe\uffff]"
+)
+LINE_END = re.compile("\r\n|\r|\n")
+_NO_BLANK = re.compile(r"([A-Za-z_]\w*)([:\u2236\ua789\ufe55\uff1a])([^\s/\\].*| .*)", re.ASCII)
+# In a block, the beginning of a list or map, or a blank that is none, makes the key go on behind its ':'.
+_RUN_ON = re.compile("[A-Za-z_][A-Za-z0-9_]*:(?=[{\\[\u00a0\u1680\u2000-\u200a\u202f\u205f\u3000])")
+_FRACTION = re.compile(r"[0-9]+(?:[eE][+-]?[0-9]+)?(?: *[A-Za-z%/°µ].*)?")
+_WHOLE = re.compile(r"[+-]?[0-9]+")
+_MOST_LINES = 5  # named for a key that is there again and again
+
+
+class MisreadError(Exception):
+    """A list of numbers was part of a longer text, or too long."""
+
+
+class RunOnError(Exception):
+    """A key goes on behind its ':' at this line and column, from 0."""
+
+    def __init__(self, line: int, column: int) -> None:
+        super().__init__(line, column)
+        self.line, self.column = line, column
+
+
+class Position:
+    """Turns lines and columns of the parser, from 0, into places; ``blanks`` were put in for a repair."""
+
+    def __init__(self, name: str, blanks: list[tuple[int, int]]) -> None:
+        self.name, self.blanks = name, blanks
+
+    def of(self, line: int, column: int) -> tuple[str, int, int]:
+        """Return file, line and column."""
+        moved = sum(line == other and column > start for other, start in self.blanks) if self.blanks else 0
+        return self.name, line + 1, column + 1 - moved
+
+
+@dataclass
+class _Level:
+    """A list or map that is not complete: the key that waits for its value, and keys that are there twice."""
+
+    node: Sequence | Mapping
+    is_flow: bool
+    key: Scalar | None = None
+    doubles: list[tuple[Scalar, Node]] = field(default_factory=list)
+    in_key: bool = False  # it stands in place of a key, which has been reported
+
+
+class Composer:
+    """Builds nodes from events, on a stack of its own."""
+
+    def __init__(
+        self,
+        position: Position,
+        faults: Faults,
+        text: str,
+        lists: list[NumberList] | None = None,
+        *,
+        repaired: bool = False,
+    ) -> None:
+        self.position, self.faults, self.text, self.repaired = position, faults, text, repaired
+        self.is_ascii = text.isascii() and "\t" not in text and not lists
+        self.lists = {at: (found, source) for at, found, source in numbers_in(lists or [], text)}
+        self.stack: list[_Level] = []
+        self.root: Node | None = None
+        self.documents = self.nodes = 0
+
+    def compose(self, events: Iterator[Any]) -> Node:
+        """Return the root; raise if there is none."""
+        for event in events:
+            kind = type(event)
+            if kind is yaml.ScalarEvent:
+                self._add(self._scalar(event), event)
+            elif kind is yaml.MappingStartEvent:
+                self._open(Mapping({}, {}, *self._position(event)), event)
+            elif kind is yaml.SequenceStartEvent:
+                self._open(Sequence([], *self._position(event)), event)
+            elif kind is yaml.MappingEndEvent or kind is yaml.SequenceEndEvent:
+                self._close()
+            elif kind is yaml.AliasEvent:
+                self._refuse(event, f"the alias {quoted('*' + event.anchor)} is not allowed", "write it out")
+                self._add(Scalar("", True, *self._position(event)), event)
+            elif kind is yaml.DocumentStartEvent:
+                self.documents += 1
+                if self.documents > 1:
+                    raise self._fatal(event, "a second document begins here", "keep one document in a file")
+        if self.root is None or (isinstance(self.root, Scalar) and self.root.plain and not self.root.value):
+            raise DiagramError(
+                [*self.faults, Fault(Place(self.position.name, 1, 1), "", "the file is empty")]
+            )
+        return self.root
+
+    def _position(self, event: Any) -> tuple[str, int, int]:
+        mark = event.start_mark
+        return self.position.of(mark.line, mark.column)
+
+    def _scalar(self, event: Any) -> Scalar | Numbers:
+        value, plain = event.value, not event.style
+        if self.is_ascii:
+            return Scalar(value, plain, *self._position(event))
+        if self.lists and MARK in value:
+            mark = event.start_mark
+            if value != MARK or not plain or (mark.line, mark.column) not in self.lists:
+                raise MisreadError
+            found, source = self.lists[mark.line, mark.column]
+            self.nodes += found.count
+            if self.nodes >= MAX_NODES:
+                raise MisreadError  # read it again, to say at which element it is too much
+            return Numbers(found, source, *self._position(event))
+        if value.isascii() and "\t" not in value:
+            return Scalar(value, plain, *self._position(event))
+        if self.repaired:
+            value = value.translate(ORIGINALS)
+        return Scalar(value, plain, *self._position(event), odd=self._odd(event))
+
+    def _odd(self, event: Any) -> Odd | None:
+        """Return the first character of a text that was taken for an ASCII one, with its place."""
+        if event.style in ("|", ">"):
+            return None
+        start, end = event.start_mark, event.end_mark
+        for number, line in enumerate(self.lines[start.line : end.line + 1], start.line):
+            first = start.column if number == start.line else 0
+            last = end.column if number == end.line else len(line)
+            for column, char in odd_characters(line, first, last):
+                if char != "\t" or line[:column].strip():
+                    return Odd(*self.position.of(number, column)[1:], char)
+        return None
+
+    @cached_property
+    def lines(self) -> list[str]:
+        """The lines of the text, without their ends."""
+        return LINE_END.split(self.text)
+
+    def _refuse(self, event: Any, problem: str, remedy: str) -> None:
+        self.faults.add(Place(*self._position(event)), problem, remedy)
+
+    def _fatal(self, event: Any, problem: str, remedy: str) -> DiagramError:
+        return DiagramError([*self.faults, Fault(Place(*self._position(event)), "", problem, remedy)])
+
+    def _open(self, node: Sequence | Mapping, event: Any) -> None:
+        self._add(node, event)
+        if len(self.stack) >= MAX_DEPTH:
+            raise self._fatal(event, f"this is nested deeper than {MAX_DEPTH} levels", "write it flatter")
+        outer = self.stack[-1] if self.stack else None
+        in_key = outer is not None and (outer.in_key or outer.key is _NO_KEY)
+        self.stack.append(_Level(node, bool(event.flow_style), in_key=in_key))
+
+    def _close(self) -> None:
+        level = self.stack.pop()
+        if level.doubles:
+            assert isinstance(level.node, Mapping)
+            self._refuse_doubles(level.node, level.doubles)
+
+    def _add(self, node: Node, event: Any) -> None:
+        """Put a node where it belongs: below the waiting key, at the end of the list, or as a key itself."""
+        self.nodes += 1
+        if self.nodes > MAX_NODES:
+            raise self._fatal(event, f"the file holds more than {MAX_NODES} values", "split it")
+        self._check_properties(event)
+        if not self.stack:
+            self.root = node
+            return
+        level = self.stack[-1]
+        parent = level.node
+        if isinstance(parent, Sequence):
+            node.key = f"{parent.key}[{len(parent.values)}]"
+            parent.values.append(node)
+        elif level.key is None:
+            level.key = self._key(node, event)
+        else:
+            key, level.key = level.key, None
+            if key is not _NO_KEY:
+                self._put(level, parent, key, node)
+
+    def _put(self, level: _Level, parent: Mapping, key: Scalar, node: Node) -> None:
+        """Put a value under its key; a key without one in ``{}`` may be a slip with ':' or ','."""
+        if level.is_flow and key.plain and isinstance(node, Scalar) and node.plain and not node.value:
+            if self._is_fraction(parent, key):
+                return
+            key, node = self._split(key, node)
+        node.key = key.value
+        if key.value in parent.keys:
+            level.doubles.append((key, node))
+        else:
+            parent.keys[key.value], parent.values[key.value] = key, node
+
+    def _is_fraction(self, parent: Mapping, key: Scalar) -> bool:
+        """Refuse the second half of ``0,5 m``, which stands as a key behind the value 0."""
+        before = next(reversed(parent.values.values()), None)
+        if (
+            not isinstance(before, Scalar)
+            or not before.plain
+            or (before.line, before.column + len(before.value) + 1) != (key.line, key.column)
+            or not _WHOLE.fullmatch(before.value)
+            or not _FRACTION.fullmatch(key.value)
+        ):
+            return False
+        wrong, right = f"{before.value},{key.value}", f"{before.value}.{key.value}"
+        self.faults.add(before.place, f"{quoted(wrong)} has a decimal comma", f"write {quoted(right)}")
+        before.value = right
+        return True
+
+    def _split(self, key: Scalar, node: Scalar) -> tuple[Scalar, Scalar]:
+        """Return the two halves of ``c:10 Hz``, which is refused."""
+        match = _NO_BLANK.fullmatch(key.value)
+        if match is None:
+            return key, node
+        name, colon, rest = match.groups()
+        value = rest.lstrip()
+        column = key.column + len(name)
+        if colon != ":":
+            problem, remedy = f"this is {with_article(colon)}", replacement(colon)
+            self.faults.add(Place(key.file, key.line, column), problem, remedy)
+        elif value == rest:
+            problem = f"a blank is missing behind {quoted(name + ':')}"
+            self.faults.add(Place(*_where(key)), problem, f"write {quoted(f'{name}: {value}')}")
+        else:  # a blank that YAML takes for a letter
+            problem = f"this is {with_article(rest[0])}"
+            self.faults.add(Place(key.file, key.line, column + 1), problem, replacement(rest[0]))
+        odd = key.odd if first_odd(value) else None
+        column += 1 + len(rest) - len(value)
+        return Scalar(name, True, key.file, key.line, key.column), Scalar(
+            value, True, key.file, key.line, column, odd=odd
+        )
+
+    def _refuse_doubles(self, parent: Mapping, doubles: list[tuple[Scalar, Node]]) -> None:
+        """Refuse keys that were there before, each once; what else stands below them is read, too."""
+        again: dict[str, list[Scalar]] = {}
+        for key, node in doubles:
+            again.setdefault(key.value, []).append(key)
+            _merge(parent.values[key.value], node)
+        for name, keys in again.items():
+            lines = [str(key.line) for key in keys[1 : 1 + _MOST_LINES]]
+            lines += ["..."] * (len(keys) > 1 + _MOST_LINES)
+            more = f", and again in line {', '.join(lines)}" if lines else ""
+            problem = f"key {quoted(name)} is already in line {parent.keys[name].line}{more}"
+            self.faults.add(Place(*_where(keys[0])), problem, "keep one of them")
+
+    def _check_properties(self, event: Any) -> None:
+        if getattr(event, "style", "") == '"':
+            escaped = FORBIDDEN.search(event.value)
+            if escaped is not None:
+                problem, remedy = forbidden(escaped)
+                if ord(escaped.group()) < 0x20:
+                    remedy = "write '/' between folders, and '\\\\' for '\\' in double quotes"
+                self._refuse(event, problem, remedy)
+        if event.anchor is not None and type(event) is not yaml.AliasEvent:
+            self._refuse(event, f"the anchor {quoted('&' + event.anchor)} is not allowed", "leave it out")
+        if getattr(event, "tag", None) is not None:
+            remedy = "leave it out, or put a text that begins with '!' in quotes"
+            tag = event.tag.replace("tag:yaml.org,2002:", "!!")
+            self._refuse(event, f"the tag {quoted(tag)} is not allowed", remedy)
+
+    def _key(self, node: Node, event: Any) -> Scalar:
+        """Return the key to put the next value under, `_NO_KEY` if it is refused."""
+        if type(event) is yaml.AliasEvent:
+            return _NO_KEY
+        problem, remedy = _wrong_key(node)
+        if isinstance(node, Scalar) and not problem:
+            if node.plain and ":" in node.value and not self.stack[-1].is_flow:
+                self._check_run_on(node, event)
+            return node
+        if not self.stack[-1].in_key:
+            self._refuse(event, problem, remedy)
+        return _NO_KEY
+
+    def _check_run_on(self, key: Scalar, event: Any) -> None:
+        match = _RUN_ON.match(key.value)
+        if match is not None:
+            mark = event.start_mark
+            raise RunOnError(mark.line, mark.column + match.end())
+
+
+def forbidden(found: re.Match[str]) -> tuple[str, str]:
+    """Return what is wrong with a character that is allowed nowhere, and what would be right."""
+    char = found.group()
+    name = character_name(char).partition(" (")[0]
+    remedy = "remove it" if name == NAMELESS else f"remove this {name}"
+    return f"the control character U+{ord(char):04X} is not allowed", remedy
+
+
+def _where(node: Node) -> tuple[str, int, int]:
+    return node.file, node.line, node.column
+
+
+def _merge(first: Node, second: Node) -> None:
+    """Add what stands under a key the second time, unless that describes another thing of the same name."""
+    if not isinstance(first, Mapping) or not isinstance(second, Mapping) or not _agree(first, second):
+        return
+    for key, node in second.pairs():
+        if key.value in first:
+            _merge(first[key.value], node)
+        else:
+            first.keys[key.value], first.values[key.value] = key, node
+
+
+def _agree(first: Mapping, second: Mapping) -> bool:
+    """Say whether the texts under common keys are the same."""
+    pairs = [(first[key], second[key]) for key in second if key in first]
+    return all(
+        one.value == other.value
+        if isinstance(one, Scalar) and isinstance(other, Scalar)
+        else isinstance(one, Mapping) and isinstance(other, Mapping)
+        for one, other in pairs
+    )
+
+
+def _wrong_key(node: Node) -> tuple[str, str]:
+    """Return what is wrong with a key, and what would be right; nothing if it will do."""
+    if not isinstance(node, Scalar):
+        return "a key must be a text", "put a text that begins with '{' or '[' in quotes"
+    if not node.value:
+        return "a key is missing before ':'", "write 'key: value'"
+    if len(node.value) > MAX_KEY:
+        return f"the key {quoted(node.value)} is longer than {MAX_KEY} characters", "shorten it"
+    if node.value == "<<" and node.plain:
+        return "the merge key '<<' is not allowed", "write the values out"
+    return "", ""
+
+
+_NO_KEY = Scalar("", True, "", 0, 0)

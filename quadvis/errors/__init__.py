@@ -1,0 +1,10 @@
+"""Faults with their places, and the words in which they are reported. The names that all rooms use."""
+
+from quadvis.errors.faults import DiagramError, Doubt, Fault, Faults, Odd, Place, QuadvisError, RunError
+from quadvis.errors.spelling import closest, suggestion
+from quadvis.errors.words import quoted, sentence
+
+__all__ = [
+    "DiagramError", "Doubt", "Fault", "Faults", "Odd", "Place", "QuadvisError", "RunError",
+    "closest", "quoted", "sentence", "suggestion",
+]  # fmt: skip

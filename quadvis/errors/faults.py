@@ -1,0 +1,181 @@
+"""Faults that a user can put right: where they are, what is wrong, what would be right.
+
+Everything that a user's mistake can cause derives from `QuadvisError` and is shown as plain sentences, never
+as a traceback. A check reports all faults at once: collect them in `Faults`, then call `Faults.check`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, NamedTuple, ParamSpec, TypeVar
+
+from quadvis.errors.characters import advice, character_name
+from quadvis.errors.discretion import is_foreign, without_quotes
+from quadvis.errors.words import on_one_line, sentence
+
+_Arguments = ParamSpec("_Arguments")
+_Result = TypeVar("_Result")
+
+
+class QuadvisError(Exception):
+    """A fault with a message for the user; the command line prints it and ends with `exit_code`."""
+
+    exit_code: ClassVar[int] = 2
+
+
+class Odd(NamedTuple):
+    """A character that was taken for an ASCII one, and where it stands."""
+
+    line: int
+    column: int
+    character: str
+
+
+@dataclass(frozen=True, order=True, slots=True)
+class Place:
+    """A position in a file; lines and columns count from 1, line 0 means the file as a whole.
+
+    Of options of one name on a command line, ``column`` is the number, and ``line`` is 0.
+
+    ``odd`` is a character of the text that begins there: should the text turn out to be wrong, that is why.
+    """
+
+    file: str
+    line: int = 0
+    column: int = 0
+    odd: Odd | None = field(default=None, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        """Return `file:line:column`."""
+        return f"{self.file}:{self.line}:{self.column}" if self.line else self.file
+
+
+@dataclass(frozen=True, order=True, slots=True)
+class Fault:
+    """One thing that is wrong at one place; `subject` is a phrase such as "block 'velocity'"."""
+
+    place: Place
+    subject: str
+    problem: str
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        """Return `file:line:column: block 'x': what is wrong; what would be right`."""
+        subject = f"{self.subject}: " if self.subject else ""
+        return on_one_line(f"{self.place}: {subject}{sentence(self.problem, self.remedy)}")
+
+    def explained(self) -> Fault:
+        """Return the fault at the odd character of the text, if it holds one, with what to write for it."""
+        odd = self.place.odd
+        if odd is None:
+            return self
+        line, column = (odd.line, odd.column) if self.place.line else (0, self.place.column)
+        named = character_name(odd.character) in self.problem
+        remedy = self.remedy if named else advice(odd.character)
+        return Fault(Place(self.place.file, line, column), self.subject, self.problem, remedy)
+
+    def discreet(self) -> Fault:
+        """Return the fault without a word of its file, if that is one whose contents are none of ours."""
+        file = self.place.file
+        if not self.place.line or not is_foreign(file):
+            return self
+        words = (without_quotes(part, file) for part in (self.subject, self.problem, self.remedy))
+        return Fault(self.place, *words)
+
+
+@dataclass(frozen=True, order=True, slots=True)
+class Doubt(Fault):
+    """What can be run, and is surely not what was meant."""
+
+    def __str__(self) -> str:
+        """Return `file:line:column: warning: block 'x': what is odd; what would be right`."""
+        subject = f"{self.subject}: " if self.subject else ""
+        return f"{self.place}: warning: {subject}{sentence(self.problem, self.remedy)}"
+
+
+class DiagramError(QuadvisError):
+    """Everything that is wrong with a diagram, one fault a line in the order of the files."""
+
+    def __init__(self, faults: Iterable[Fault]) -> None:
+        """Keep the faults, sorted by place and without repetitions."""
+        self.faults: list[Fault] = sorted({fault.explained().discreet() for fault in faults})
+        super().__init__("\n".join(str(fault) for fault in self.faults))
+
+
+class RunError(QuadvisError):
+    """A run that had to stop: which block and port, at which time (s), and why."""
+
+    exit_code: ClassVar[int] = 1
+
+    def __init__(self, reason: str, *, block: str = "", port: str = "", time: float | None = None) -> None:
+        """Keep the parts; the message reads "block 'x', port 'y', t = 1.25 s: reason"."""
+        self.reason, self.block, self.port, self.time = reason, block, port, time
+        where = [f"block '{block}'"] if block else []
+        where += [f"port '{port}'"] if port else []
+        where += [f"t = {time:.9g} s"] if time is not None else []
+        super().__init__(f"{', '.join(where)}: {reason}" if where else reason)
+
+
+class Faults(list[Fault]):
+    """The faults found so far; a check goes on after the first one, but not for ever.
+
+    A file that is wrong everywhere would otherwise cost minutes and pages: at `LIMIT` faults `append` raises.
+    """
+
+    LIMIT = 200
+
+    def __init__(self) -> None:
+        """Begin with no fault, no warning and no subject."""
+        super().__init__()
+        self.subject = ""
+        self.warnings: list[Doubt] = []
+        self._explained: set[str] = set()
+
+    def append(self, fault: Fault) -> None:
+        """Keep a fault; raise `DiagramError` with all of them once there are too many to go on."""
+        super().append(fault)
+        if len(self) >= self.LIMIT:
+            raise DiagramError(self)
+
+    def add(self, place: Place, problem: str, remedy: str = "", *, subject: str | None = None) -> None:
+        """Keep a fault about the present subject, or about the one given."""
+        self.append(Fault(place, self.subject if subject is None else subject, problem, remedy))
+
+    def once(self, rule: str) -> str:
+        """Return a sentence that explains a rule the first time, and nothing after that."""
+        if rule in self._explained:
+            return ""
+        self._explained.add(rule)
+        return rule
+
+    def warn(self, place: Place, problem: str, remedy: str = "", *, subject: str | None = None) -> None:
+        """Keep a warning; it does not keep a diagram from running."""
+        self.warnings.append(Doubt(place, self.subject if subject is None else subject, problem, remedy))
+
+    def collect(
+        self, read: Callable[_Arguments, _Result], *args: _Arguments.args, **kwargs: _Arguments.kwargs
+    ) -> _Result | None:
+        """Return what `read` returns, or None after keeping its faults: `faults.collect(node.number)`."""
+        try:
+            return read(*args, **kwargs)
+        except DiagramError as error:
+            for fault in error.faults:
+                if fault not in self:
+                    self.append(fault if fault.subject else replace(fault, subject=self.subject))
+            return None
+
+    @contextmanager
+    def about(self, subject: str) -> Iterator[None]:
+        """Name the subject of every fault added inside: `with faults.about("block 'velocity'"): ...`."""
+        before, self.subject = self.subject, subject
+        try:
+            yield
+        finally:
+            self.subject = before
+
+    def check(self) -> None:
+        """Raise `DiagramError` if there is any fault."""
+        if self:
+            raise DiagramError(self)

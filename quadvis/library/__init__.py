@@ -1,0 +1,1 @@
+"""Blocks by their names: found, described, and begun."""

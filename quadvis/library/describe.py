@@ -1,0 +1,170 @@
+"""Words about blocks, made from their declarations: `quadvis list` and `quadvis describe`."""
+
+from __future__ import annotations
+
+import inspect
+import math
+import textwrap
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, Declared, In, Out, Param, State
+from quadvis.library.catalogue import Catalogue
+from quadvis.output.columns import table
+
+WIDEST = 30  # columns for a default value
+MANY = 60  # characters of choices beside each other
+LINE = 90  # columns of an example
+
+
+def first_line(block: type[Block]) -> str:
+    """Return the sentence that says what a block does."""
+    return (inspect.getdoc(block) or "").partition("\n")[0]
+
+
+def catalogue_lines(catalogue: Catalogue, width: int | None = None) -> tuple[list[str], list[str]]:
+    """Return one line per block, and one per block that cannot be loaded: those are told, never skipped."""
+    blocks, failures = catalogue.load_all()
+    return table([(name, first_line(block)) for name, block in blocks.items()], width), failures
+
+
+def description(name: str, block: type[Block], width: int | None = None) -> str:
+    """Return a block's docstring, ports, parameters and states as text, and how a diagram uses it."""
+    interface = block.interface
+    lines = [name, "", *(inspect.getdoc(block) or "").splitlines(), ""]
+    feedthrough = interface.feedthrough
+    for title, rows in (
+        ("inputs", [_input_row(port, port.name in feedthrough) for port in interface.inputs.values()]),
+        ("outputs", [_output_row(port) for port in interface.outputs.values()]),
+        ("parameters", [_param_row(param) for param in interface.params.values()]),
+        ("states", [_state_row(state) for state in interface.states.values()]),
+    ):
+        if rows:
+            lines += [title, *(f"  {line}" for line in table(rows, width and width - 2)), ""]
+    lines += ["in a diagram", *(f"  {line}" for line in example(name, block))]
+    return "\n".join(lines)
+
+
+def _input_row(port: In, direct: bool) -> tuple[str, ...]:
+    words = [] if direct else ["no direct feedthrough"]
+    if port.default is not None:
+        default = "" if _is_nan(port.default) else f", {_short(value_text(port, port.default))}"
+        words.append(f"optional{default}")
+    return port.name, _kind(port), "; ".join(words), port.doc
+
+
+def _output_row(port: Out) -> tuple[str, ...]:
+    return port.name, _kind(port), "NaN means missing" if port.nan else "", port.doc
+
+
+def _param_row(param: Param) -> tuple[str, ...]:
+    default = default_text(param)
+    given = "required" if default is None else f"= {default}"
+    choices = " | ".join(param.choices)
+    doc = param.doc
+    if len(choices) > MANY:  # into the column that wraps
+        choices, doc = f"{len(param.choices)} choices", f"{doc}: {', '.join(param.choices)}"
+    words = [choices, bounds(param), "tunable" if param.tune else ""]
+    kind = "" if param.choices else _kind(param)
+    return param.name, kind, _short(given), "; ".join(filter(None, words)), doc
+
+
+def _state_row(state: State) -> tuple[str, ...]:
+    return state.name, _kind(state), "continuous" if state.continuous else "", state.doc
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= WIDEST else f"{text[: WIDEST - 3]}..."
+
+
+def _kind(item: Declared) -> str:
+    """Return what a port holds, as short as it is clear: "m", "[3] m", "bool"."""
+    kind = item.type.removeprefix("float64")
+    unit = textwrap.shorten(item.unit, WIDEST, placeholder=" ...") if item.unit != "1" else ""
+    return " ".join(filter(None, (kind, unit))) or "number"
+
+
+def example(name: str, block: type[Block]) -> list[str]:
+    """Return an entry of a diagram with all that must be given."""
+    interface = block.interface
+    lines = [f"{name.rpartition('.')[2].rpartition(':')[2]}:", f"  block: {name}"]
+    lines += [] if interface.continuous else ["  rate: ..."]
+    required = {param.name: _sample(param) for param in interface.params.values() if param.required}
+    wired = {port.name: "block.port" for port in interface.inputs.values() if port.default is None}
+    for key, values in (("with", required), ("in", wired)):
+        entries = [f"{item}: {text}" for item, text in values.items()]
+        line = f"  {key}: {{{', '.join(entries)}}}"
+        if entries:
+            lines += [line] if len(line) <= LINE else [f"  {key}:", *(f"    {entry}" for entry in entries)]
+    return lines
+
+
+def _sample(param: Param) -> str:
+    if param.is_file:
+        return "path"
+    return param.choices[0] if param.choices else "..."
+
+
+def facts(name: str, block: type[Block]) -> dict[str, Any]:
+    """Return the same as plain data."""
+
+    def plain(items: Iterable[Declared]) -> dict[str, Any]:
+        return {item.name: {"type": item.type, "unit": item.unit, "doc": item.doc} for item in items}
+
+    interface = block.interface
+    params = plain(interface.params.values())
+    for param in interface.params.values():
+        params[param.name] |= {"default": default_text(param), "bounds": bounds(param), "tune": param.tune}
+        if param.choices:
+            params[param.name] |= {"type": "choice", "choices": list(param.choices)}
+    inputs = plain(interface.inputs.values())
+    for port in interface.inputs.values():
+        inputs[port.name]["optional"] = port.default is not None
+    return {
+        "block": name,
+        "doc": inspect.getdoc(block) or "",
+        "inputs": inputs,
+        "outputs": plain(interface.outputs.values()),
+        "params": params,
+        "states": plain(interface.states.values()),
+        "feedthrough": sorted(interface.feedthrough),
+        "numeric": block.numeric,
+    }
+
+
+def default_text(param: Param) -> str | None:
+    """Return a parameter's default as a diagram would write it; None if it must be given."""
+    if param.required:
+        return None
+    if param.is_text or param.choices:
+        return str(param.default)
+    return value_text(param, param.default)
+
+
+def value_text(declared: Declared, value: Any) -> str:
+    """Return a value as a diagram would write it; units that are left open are left out."""
+    text = _plain_text(np.asarray(value).tolist())
+    unit = declared.unit
+    if unit == "1" or any(each.variables for each in declared.units) or not np.any(value):
+        return text
+    return f"{{value: {text}, unit: {unit}}}" if text.startswith("[") else f"{text} {unit}"
+
+
+def _plain_text(value: Any) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(map(_plain_text, value))}]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _is_nan(value: Any) -> bool:
+    return isinstance(value, float) and math.isnan(value)
+
+
+def bounds(param: Param) -> str:
+    """Return what a parameter's value must keep to."""
+    marks = ((param.min, ">="), (param.above, ">"), (param.max, "<="), (param.below, "<"))
+    return ", ".join(f"{mark} {bound:g}" for bound, mark in marks if bound is not None)

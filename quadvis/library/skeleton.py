@@ -1,0 +1,171 @@
+"""Skeletons that run at once: `quadvis new block GROUP.NAME` and `quadvis new diagram FILE`."""
+
+from __future__ import annotations
+
+import keyword
+import re
+from pathlib import Path
+
+from quadvis.errors import QuadvisError
+from quadvis.library.catalogue import STANDARD, Catalogue
+from quadvis.machine.files import Kind, reason, write_output
+
+SKELETON = Kind("the skeleton")
+TAKEN = ("Any", "Block", "In", "Out", "Param", "State")  # what the skeleton imports
+
+BLOCK = '''"""{title}."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from quadvis.block import Block, In, Out, Param, State
+
+
+class {name}(Block):
+    """First-order lag of a signal: what the block does, in one sentence.
+
+    ``y[k] = y[k-1] + share * (u[k] - y[k-1])``, from zero. Say here where it comes from
+    and how far it holds.
+    """
+
+    share = Param(0.5, above=0.0, max=1.0, tune=True, doc="part of the way per tick")
+    u = In(unit="a", doc="the signal")
+    y = Out(unit="a", doc="the lagged signal")
+    last = State()
+
+    def output(self, u: Any) -> Any:
+        """Return the lagged signal."""
+        return self.last + self.share * (u - self.last)
+
+    def update(self, u: Any) -> None:
+        """Keep it for the next tick."""
+        self.last += self.share * (u - self.last)
+'''
+
+TEST = '''"""Tests of the block {path}."""
+
+{head}
+
+def test_a_step_is_followed_by_a_geometric_row() -> None:
+    y = drive({name}(share=0.5), u=[1.0] * 5, rate="10 Hz").y
+    assert y == pytest.approx([0.5, 0.75, 0.875, 0.9375, 0.96875])
+
+
+def test_a_share_above_one_is_refused() -> None:
+    with pytest.raises(ParameterError, match="share must be at most 1"):
+        {name}(share=1.5)
+'''
+
+OWN_HEAD = """from pathlib import Path
+
+import pytest
+from quadvis.block import ParameterError
+from quadvis.library.catalogue import Catalogue
+from quadvis.testing.conformance import check_block
+from quadvis.testing import drive
+
+BLOCKS = Catalogue(Path(__file__).parents[{up}])
+{name} = BLOCKS.find("{path}")
+
+
+def test_it_does_what_every_block_must_do() -> None:
+    check_block({name}, test=Path(__file__))
+"""
+
+STANDARD_HEAD = """import pytest
+
+from quadvis.block import ParameterError
+from quadvis.testing import drive
+from {module} import {name}
+"""
+
+DIAGRAM = """# A signal through a lag: change it into your own.
+# `quadvis list` shows all blocks, `quadvis describe BLOCK` one of them.
+quadvis: 1
+name: {name}
+doc: What this diagram is for.
+
+rates: {{fast: 100 Hz}}
+stop_time: 5 s
+
+blocks:
+  source:
+    block: sources.step
+    rate: fast
+    with: {{before: 0 m, after: 1 m, at: 1 s}}
+  lag:
+    block: signal.low_pass
+    rate: fast
+    with: {{time_constant: 0.5 s}}
+    in: {{u: source.y}}
+
+expect:
+  - {{signal: lag.y, after: 4 s, within: 1 cm, of: 1 m}}
+
+summary:
+  lag: {{signal: lag.y, show: [final, max], unit: cm}}
+
+figures:
+  - title: Step response
+    panels:
+      - {{signals: [source.y, lag.y], unit: cm}}
+"""
+
+
+def new_block(name: str) -> list[Path]:
+    """Write a block and its test below the working directory, and return both paths.
+
+    In a folder that holds the standard library they go there, else into ``blocks/`` and ``tests/``.
+    QuadvisError if the name is no block's, is taken, or a file is there already.
+    """
+    if re.fullmatch(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*", name) is None:
+        raise QuadvisError(
+            f"'{name}' cannot name a block; write group.name in lower case, such as signal.my_filter"
+        )
+    *groups, last = name.split(".")
+    kind = "".join(part.capitalize() for part in last.split("_"))
+    if any(map(keyword.iskeyword, (*groups, last))) or kind in TAKEN:
+        raise QuadvisError(
+            f"'{name}' cannot name a block, since Python uses a word of it; choose another name"
+        )
+    if name in Catalogue().names():
+        raise QuadvisError(f"'{name}' is in the standard library; choose another name")
+    library = Path("blocks", STANDARD)
+    ours = library.is_dir()
+    block = Path(library if ours else "blocks", *groups, f"{last}.py")
+    test = Path("tests", "blocks", *groups, f"test_{last}.py")
+    _refuse_existing(block, test)
+    words = {"name": kind, "path": name, "title": last.replace("_", " ").capitalize()}
+    head = STANDARD_HEAD.format(module=f"{STANDARD}.{name}", **words) if ours else OWN_HEAD.format(
+        up=len(test.parts) - 1, **words
+    )  # fmt: skip
+    _write(block, BLOCK.format(**words))
+    _write(test, TEST.format(head=head, **words))
+    return [block, test]
+
+
+def new_diagram(file: str) -> list[Path]:
+    """Write a small diagram that runs, and return its path; QuadvisError if the file is there already."""
+    path = Path(file)
+    if path.suffix not in (".yaml", ".yml"):
+        raise QuadvisError(f"'{file}' is not a YAML file; write a name such as loop.yaml")
+    if re.fullmatch(r"[A-Za-z_][\w-]*", path.stem, re.ASCII) is None:
+        raise QuadvisError(f"'{path.stem}' cannot name a diagram; use letters, digits, '_' and '-'")
+    _refuse_existing(path)
+    _write(path, DIAGRAM.format(name=path.stem))
+    return [path]
+
+
+def _refuse_existing(*paths: Path) -> None:
+    for path in paths:
+        if path.exists():
+            raise QuadvisError(f"'{path}' is there already; choose another name, or remove it")
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise QuadvisError(f"cannot write '{path}': {reason(error)}") from error
+    write_output(path, SKELETON, text)

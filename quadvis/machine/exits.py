@@ -1,0 +1,169 @@
+"""The one door through which commands and tools end, whatever surrounds them.
+
+What surrounds a command is no fault of a diagram: Ctrl-C, streams that are closed or full, a folder that is
+gone, little memory, names that the system does not take. Each becomes one sentence on standard error and an
+exit code, never a traceback. Other exceptions are faults of the program and pass through.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from quadvis.errors import QuadvisError
+from quadvis.machine.failures import MEMORY, surroundings
+from quadvis.machine.files import reason
+
+FAILED, REFUSED, INTERRUPTED, PIPE_BROKEN = 1, 2, 130, 141
+AGAIN = 0.01  # s until an interruption that was dropped is repeated
+
+_heard = False  # whether Ctrl-C was pressed
+
+
+class OutputError(QuadvisError):
+    """Standard output takes no more: what was to be printed is lost, and nothing else."""
+
+    exit_code = FAILED
+
+
+def listen() -> None:
+    """Note Ctrl-C from now on, and open the standard streams that are closed.
+
+    A library may turn the interruption of its import into an error of its own; `ended` then knows better. A
+    closed stream would lend its number to the next file, such as a log, and what is printed would go there.
+    """
+    for descriptor in range(3):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)  # takes the lowest number that is free
+    with suppress(ValueError):  # signals belong to the main thread
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # it may be ignored
+            signal.signal(signal.SIGINT, _interrupt)
+            sys.unraisablehook = _unraisable
+
+
+def _interrupt(*_: object) -> None:
+    global _heard
+    _heard = True
+    raise KeyboardInterrupt
+
+
+def _unraisable(lost: Any) -> None:
+    """Interrupt again where Python had to drop it, such as in a callback or while an object is deleted."""
+    if lost.exc_type is KeyboardInterrupt and hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGALRM, _interrupt)
+        signal.setitimer(signal.ITIMER_REAL, AGAIN)
+    else:
+        sys.__unraisablehook__(lost)
+
+
+def ended(command: Callable[[], int], name: str = "", enough: int = PIPE_BROKEN) -> int:
+    """Run a command and return its exit code; ``name`` stands before its sentences.
+
+    ``enough`` is the code where the reader of its output has seen enough and gone.
+    """
+    global _heard
+    _heard = False
+    with _streams():
+        try:
+            code = _flushed(command)
+        except BrokenPipeError:  # the reader, such as head
+            _discard(1)
+            return enough
+        except BaseException as error:
+            words, code = _ending(error)
+            if not words:
+                raise
+            with suppress(QuadvisError, BrokenPipeError):
+                sys.stdout.flush()
+            prefix = f"{name}: " if name else ""
+            print(f"{prefix}{words}", *getattr(error, "__notes__", ()), sep="\n", file=sys.stderr)
+        return code
+
+
+def _flushed(command: Callable[[], int]) -> int:
+    """Return the code of a command all of whose output has gone out."""
+    try:
+        code = command()
+    except SystemExit:  # of --help, whose text may still wait
+        sys.stdout.flush()
+        raise
+    sys.stdout.flush()
+    return code
+
+
+def _ending(error: BaseException) -> tuple[str, int]:
+    """Return what to say of an exception and the exit code; no words if it is not for the user."""
+    if isinstance(error, KeyboardInterrupt) or (_heard and isinstance(error, Exception)):
+        return "interrupted", INTERRUPTED
+    if isinstance(error, QuadvisError):
+        return str(error), error.exit_code
+    words = surroundings(error)
+    return words, FAILED if words == MEMORY else REFUSED
+
+
+@contextmanager
+def _streams() -> Iterator[None]:
+    """Have standard output and error tell or forget what they cannot take."""
+    before = sys.stdout, sys.stderr
+    with open(os.devnull, "w", encoding="utf-8") as nowhere:
+        sys.stdout = _Stream(before[0] or nowhere, 1)
+        sys.stderr = _Stream(before[1] or nowhere, 2)
+        _calm()
+        try:
+            yield
+        finally:
+            sys.stdout, sys.stderr = before
+
+
+def _calm() -> None:
+    """Show the warnings of libraries that PYTHONWARNINGS would turn into errors."""
+    if any(option.startswith("e") for option in sys.warnoptions):
+        import warnings
+
+        warnings.simplefilter("default")
+
+
+def _discard(descriptor: int) -> None:
+    """Send what a stream still holds nowhere; at its end Python would complain about it."""
+    with suppress(AttributeError, OSError, ValueError):
+        stream = sys.stdout if descriptor == 1 else sys.stderr
+        number = stream.fileno()  # another one than the descriptor where output is caught, as in a test
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, number)
+        os.close(nowhere)
+
+
+class _Stream:
+    """A text stream whose refusals are sentences; those of standard error are dropped, as nobody reads it."""
+
+    def __init__(self, stream: Any, descriptor: int) -> None:
+        self._stream, self._descriptor = stream, descriptor
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")  # a name may hold what the terminal cannot show
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        """Write a text; OutputError if standard output does not take it."""
+        return self._guarded(self._stream.write, text) or len(text)
+
+    def flush(self) -> None:
+        """Hand all of it on; OutputError as above."""
+        self._guarded(self._stream.flush)
+
+    def _guarded(self, method: Callable[..., Any], *arguments: str) -> Any:
+        try:
+            return method(*arguments)
+        except OSError as error:
+            if self._descriptor == 1 and isinstance(error, BrokenPipeError):
+                raise
+            _discard(self._descriptor)
+            if self._descriptor == 1:
+                raise OutputError(f"cannot write to standard output: {reason(error)}") from error

@@ -1,0 +1,91 @@
+"""Files that are read: each one once, whole, within bounds, and known by the SHA-256 of what was read.
+
+What flies must be what was checked. So whoever reads a file says so with `note_input`, and whoever loads a
+diagram keeps the digests that were noted: a file that changes between two readings is refused.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import stat
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from io import BufferedReader
+
+from quadvis.errors import QuadvisError
+from quadvis.machine.files import PathLike, reason
+
+MOST_BYTES = 256_000_000
+
+_noted: ContextVar[dict[str, str] | None] = ContextVar("noted", default=None)
+
+
+def read_input(path: PathLike, most: int | None = MOST_BYTES, what: str = "") -> bytes:
+    """Return a file's contents; QuadvisError if it is none, cannot be read, or has more than `most` bytes.
+
+    `what` is what the error calls it, such as "the log". Neither a pipe nor a device is waited for.
+    """
+    with open_input(path, what) as file:
+        try:
+            data = file.read() if most is None else file.read(most + 1)
+        except OSError as error:
+            raise _refusal(path, reason(error), what) from error
+    if most is not None and len(data) > most:
+        raise _refusal(path, f"it has more than {most / 1e6:g} MB", what)
+    note_input(path, data)
+    return data
+
+
+def open_input(path: PathLike, what: str = "") -> BufferedReader:
+    """Open a file for reading. QuadvisError if there is none; a pipe or device is refused without waiting."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
+    except (OSError, ValueError) as error:
+        raise _refusal(path, reason(error), what) from error
+    kind = os.fstat(descriptor).st_mode
+    if not stat.S_ISREG(kind):
+        os.close(descriptor)
+        why = "it is a folder" if stat.S_ISDIR(kind) else "it is a device or a pipe, not a file"
+        raise _refusal(path, why, what)
+    return os.fdopen(descriptor, "rb")
+
+
+def note_input(path: PathLike, data: bytes) -> None:
+    """Note that this is what was read of a file; QuadvisError if it was something else before."""
+    if _noted.get() is not None:
+        note_digest(path, hashlib.sha256(data).hexdigest())
+
+
+def note_digest(path: PathLike, digest: str) -> None:
+    """Do the same for what is known by a digest alone."""
+    noted = _noted.get()
+    if noted is not None and noted.setdefault(os.fspath(path), digest) != digest:
+        raise QuadvisError(f"'{os.fspath(path)}' was changed while it was being read; try again")
+
+
+def file_digest(path: PathLike) -> str:
+    """Return the SHA-256 of a file of any size, and note it; QuadvisError if it cannot be read."""
+    with open_input(path) as file:
+        try:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        except OSError as error:
+            raise _refusal(path, reason(error)) from error
+    note_digest(path, digest)
+    return digest
+
+
+@contextmanager
+def noted_inputs() -> Iterator[Mapping[str, str]]:
+    """Collect the SHA-256 of all that is read inside, by path."""
+    found: dict[str, str] = {}
+    token = _noted.set(found)
+    try:
+        yield found
+    finally:
+        _noted.reset(token)
+
+
+def _refusal(path: PathLike, why: str, what: str = "") -> QuadvisError:
+    return QuadvisError(f"cannot read {f'{what} ' if what else ''}'{os.fspath(path)}': {why}")

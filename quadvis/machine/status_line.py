@@ -1,0 +1,99 @@
+"""A line on the terminal that says what is going on."""
+
+from __future__ import annotations
+
+import os
+import sys
+from time import monotonic
+from types import TracebackType
+from typing import Self, TextIO
+
+PATIENCE, RENEWED = 2.0, 0.1  # s until a line is shown at all, and until it is shown again
+
+
+class StatusLine:
+    """One line on standard error that is rewritten while something goes on; nothing where no one watches.
+
+    A terminal that takes nothing, or has gone, holds up nobody: the line is not shown then.
+    """
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        self.stream = stream or sys.stderr
+        self.shown = self.stream.isatty()
+        self._terminal = _open_terminal(self.stream) if self.shown else None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def show(self, text: str) -> None:
+        """Put a text in place of the one before."""
+        self._put(f"\r\x1b[K{text} ")
+
+    def _put(self, text: str) -> None:
+        if not self.shown:
+            return
+        try:
+            if self._terminal is None:
+                self.stream.write(text)
+                self.stream.flush()
+            else:
+                os.write(self._terminal, text.encode(errors="replace"))
+        except BlockingIOError:
+            pass  # there is no room now; the next text may find some
+        except (OSError, ValueError):  # the terminal has gone; what goes on does not end with it
+            self.shown = False
+
+    @staticmethod
+    def bar(part: float) -> str:
+        """Return a bar that is filled up to a part of 0 to 1."""
+        filled = int(24 * min(1.0, part))
+        return f"[{'#' * filled}{'.' * (24 - filled)}]"
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._put("\r\x1b[K")
+        if self._terminal is not None:
+            os.close(self._terminal)
+            self._terminal = None
+            self.shown = False
+
+
+def _open_terminal(stream: TextIO) -> int | None:
+    """Open the terminal behind a stream anew, to be written without waiting; None where that cannot be."""
+    try:
+        return os.open(os.ttyname(stream.fileno()), os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
+    except (OSError, ValueError, AttributeError):
+        return None
+
+
+class AnalysisLine(StatusLine):
+    """What an analysis is doing, once it has taken a while."""
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        super().__init__(stream)
+        self.next = monotonic() + PATIENCE
+
+    def __call__(self, text: str) -> None:
+        """Show what is being done just now."""
+        if monotonic() >= self.next:
+            self.show(text)
+            self.next = monotonic() + RENEWED
+
+    def clear(self) -> None:
+        """Make room for a line that stays."""
+        self._put("\r\x1b[K")
+
+
+class ProgressLine(StatusLine):
+    """How far a run of so many seconds is, and how fast it goes."""
+
+    def __init__(self, duration: float, stream: TextIO | None = None) -> None:
+        super().__init__(stream)
+        self.duration = duration
+
+    def __call__(self, time: float, wall: float) -> None:
+        """Show the simulated time reached and how fast it goes. The next tick may lie beyond the end."""
+        time = min(time, self.duration)
+        bar = self.bar(time / self.duration if self.duration else 1.0)
+        self.show(f"{bar} {time:6.1f} / {self.duration:g} s  {time / max(wall, 1e-9):.0f} x real time")

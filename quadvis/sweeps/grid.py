@@ -1,0 +1,102 @@
+"""The runs of a sweep as jobs: which diagram, which settings, which seed at which point of the grid."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from quadvis.diagram.diagram import Diagram
+from quadvis.diagram.settings import COMMAND_LINE
+from quadvis.errors import DiagramError, Fault, Place, QuadvisError
+from quadvis.library.catalogue import OwnBlocks
+from quadvis.sweeps.axes import NONE, PARAMS, SEED, VARIANT, Axis
+from quadvis.sweeps.worker import Configuration, Job
+
+CHECKED = 50  # values at each end of an axis
+NOT_SET = (SEED, VARIANT, PARAMS)  # axes that are no parameters of the diagram
+
+
+class Plan:
+    """The runs of a sweep as jobs for the workers."""
+
+    def __init__(
+        self,
+        axes: Sequence[Axis],
+        grid: Sequence[tuple[int, ...]],
+        base: Configuration,
+        seed: int | None,
+        own_blocks: OwnBlocks,
+    ) -> None:
+        self.axes, self.grid, self.base, self.seed = axes, grid, base, seed
+        self.inputs: set[Path] = set()  # the files that the runs depend on, as far as diagrams were loaded
+        self.files: dict[str, str] = {}  # SHA-256 of what the diagrams were read from, by path
+        self.own_blocks = own_blocks
+
+    def configuration(self, point: Sequence[int]) -> Configuration:
+        """Return the diagram at a point of the grid."""
+        values = {axis.name: axis.values[index] for axis, index in zip(self.axes, point, strict=True)}
+        base = self.base
+        variant, file = values.get(VARIANT, base.variant), values.get(PARAMS, NONE)
+        own = tuple(f"{name}={text}" for name, text in values.items() if name not in NOT_SET)
+        return Configuration(
+            base.file,
+            None if variant == NONE else variant,
+            base.settings + own,
+            base.params if file == NONE else (*base.params, file),
+            base.stop_time,
+            base.own_blocks,
+        )
+
+    def check(self) -> Diagram:
+        """Load the diagram with each value of each axis, the others at their first; return the first one.
+
+        Of a long axis only the ends are looked at; what is wrong elsewhere becomes a row of the table.
+        """
+        first = [0] * len(self.axes)
+        diagram = self._load(first)
+        for number, axis in enumerate(self.axes):
+            count = len(axis.values) if axis.name != SEED else 1
+            for index in sorted({*range(1, min(count, CHECKED)), *range(max(1, count - CHECKED), count)}):
+                self._load([*first[:number], index, *first[number + 1 :]])
+        return diagram
+
+    def _load(self, point: Sequence[int]) -> Diagram:
+        try:
+            diagram = self.configuration(point).load(self.own_blocks)
+            self.inputs.update(diagram.inputs)
+            for path, digest in diagram.files.items():
+                if self.files.setdefault(path, digest) != digest:
+                    raise QuadvisError(f"'{path}' was changed while it was being read; sweep again")
+            return diagram
+        except DiagramError as error:
+            found = DiagramError(self._placed(fault, point) for fault in error.faults)
+            if str(found) == str(error):  # no fault says which value of which axis brought it about
+                for axis, index in zip(self.axes, point, strict=True):
+                    if index and axis.name not in NOT_SET:
+                        found.add_note(f"with --over {axis.name}={axis.values[index]}")
+            raise found from None
+
+    def _placed(self, fault: Fault, point: Sequence[int]) -> Fault:
+        """Return a fault of a value that is swept over with the place where it was given."""
+        for axis, index in zip(self.axes, point, strict=True):
+            parameter = axis.name.rpartition(".")[2]
+            if fault.place.file == COMMAND_LINE and axis.name not in NOT_SET and parameter in str(fault):
+                return replace(fault, place=Place(f"--over {axis.name}={axis.values[index]}"))
+        return fault
+
+    def jobs(self, folder: Path | None) -> Iterator[Job]:
+        """Yield all runs in the order of the table."""
+        for row, point in enumerate(self.grid):
+            chosen = {axis.name: index for axis, index in zip(self.axes, point, strict=True)}
+            seeds = next((axis.values for axis in self.axes if axis.name == SEED), ())
+            seed = int(seeds[chosen[SEED]]) if seeds else self.seed
+            log = str(folder / f"{self._log_name(row, point)}.mcap") if folder else None
+            yield Job(row, self.configuration(point), seed, log, self.files)
+
+    def _log_name(self, row: int, point: Sequence[int]) -> str:
+        """Return the number of the row and the values of the axes, fit for the name of a file."""
+        values = [f"{axis.name}={axis.label(index)}" for axis, index in zip(self.axes, point, strict=True)]
+        digits = len(str(len(self.grid) - 1))
+        return re.sub(r"[^A-Za-z0-9_.=-]+", "-", "-".join([f"{row:0{digits}}", *values]))[:120]

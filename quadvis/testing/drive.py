@@ -1,0 +1,114 @@
+"""Run a single block without a diagram, for unit tests and for trying things out."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block
+from quadvis.engine.engine import Engine
+from quadvis.engine.memory import Slot
+from quadvis.testing.alone import alone, parameter_sizes
+from quadvis.units import parse_period
+
+
+class Driven:
+    """What a driven block gave: one attribute per output, with a leading time axis, and ``time`` (s)."""
+
+    def __init__(self, time: np.ndarray[Any, Any], signals: dict[str, Any], engine: Engine) -> None:
+        self.time = time
+        self.signals = signals
+        self.engine = engine
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self.__dict__["signals"][name]
+        except KeyError:
+            raise AttributeError(f"the block has no output '{name}'") from None
+
+    def state(self, name: str) -> Any:
+        """Return a state, or a parameter, as it is after the last step."""
+        (bound,) = self.engine.plan.steps
+        return self.engine.plan.memory.read(bound.field(name))
+
+
+def drive(
+    block: Block,
+    *,
+    rate: str | float | Fraction = 1,
+    steps: int | None = None,
+    solver: str = "ode4",
+    seed: int = 0,
+    **inputs: Any,
+) -> Driven:
+    """Feed a block step by step and return its outputs.
+
+    Each input is one constant value or an array (a list for frames) with a leading time axis. ``rate`` is a
+    rate such as "10 Hz" or a period such as "5 ms", a number means Hz. ``steps`` is needed when no input has
+    a time axis. TypeError if an input is unknown, missing or does not fit.
+    """
+    interface = block.interface
+    for name in inputs:
+        if name not in interface.inputs:
+            known = ", ".join(interface.inputs) or "none"
+            raise TypeError(f"{type(block).__name__} has no input '{name}'; it has {known}")
+    sizes = parameter_sizes(block)
+    series = {}
+    for name, port in interface.inputs.items():
+        value = inputs.get(name, port.default)
+        if value is None:
+            raise TypeError(f"{type(block).__name__} needs its input '{name}'")
+        series[name] = _series(name, port.signal, value, sizes, steps)
+    counts = {len(values) for values, constant in series.values() if not constant}
+    if len(counts) > 1 or (not counts and steps is None):
+        raise TypeError("inputs must have one length, or give steps")
+    if counts and not 0 < (steps or 1) <= min(counts):
+        raise TypeError("inputs must have at least one sample, and one for each of the steps")
+    count = steps if steps is not None else counts.pop()
+    period = parse_period(rate) if isinstance(rate, str) else 1 / Fraction(str(rate))
+    first = {name: values[0] for name, (values, _) in series.items()}
+    return _drive(alone(block, first, sizes, period, solver, seed), series, count)
+
+
+def _series(name: str, signal: Any, value: Any, sizes: dict[str, Any], steps: int | None) -> tuple[Any, bool]:
+    """Return the input's values and whether it is one constant value."""
+    if signal.scalar == "frame":
+        return (value, False) if isinstance(value, list | tuple) else ([value], True)
+    array = np.asarray(value)
+    trial = dict(sizes)
+    if signal.shape != ("*",) and signal.unify(array.shape, trial):
+        sizes.update(trial)
+        return array[None], True
+    if signal.shape == ("*",) and (array.ndim == 0 or sizes.get("*") == array.shape):
+        # A scalar for a block of any shape is a constant: it takes the shape of the other inputs.
+        return array[None], True
+    if array.ndim == 0 or not signal.unify(array.shape[1:], sizes):
+        raise TypeError(f"input '{name}' has shape {array.shape}, the block wants {signal}")
+    return array, False
+
+
+def _drive(engine: Engine, series: dict[str, tuple[Any, bool]], count: int) -> Driven:
+    (bound,) = engine.plan.steps
+    rows: dict[str, list[Any]] = {name: [] for name in bound.outputs}
+    memory = engine.plan.memory
+
+    def record(_: int) -> None:
+        for name, slot in bound.outputs.items():
+            rows[name].append(memory.read(slot))
+
+    engine.observe(bound.node.task.name, record)
+    with engine:
+        for k in range(count):
+            for name, (values, constant) in series.items():
+                memory.write(bound.inputs[name], values[0 if constant else k])
+            engine.run(1)
+    time = np.array([float(k * engine.period) for k in range(count)])
+    signals = {name: _array(rows[name], slot) for name, slot in bound.outputs.items()}
+    return Driven(time, signals, engine)
+
+
+def _array(rows: list[Any], slot: Slot) -> Any:
+    """Return the values with a leading time axis; frames stay a list."""
+    return rows if slot.scalar == "frame" else np.array(rows, slot.scalar).reshape(-1, *slot.shape)

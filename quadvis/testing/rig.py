@@ -1,0 +1,213 @@
+"""Many ways to make and feed one block, for the conformance suite."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Block, Frame, In, Param, ParameterError, Shape, Sizes
+from quadvis.engine.engine import Engine
+from quadvis.engine.memory import SLOT
+from quadvis.engine.plan import Bound
+from quadvis.testing.alone import alone, parameter_sizes
+
+STEPS = 16
+PERIOD = Fraction(1, 10)
+VECTOR = 3  # length of what may have any
+BOOL = In("bool").signal
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A block class to be checked, and what cannot be made up for it.
+
+    ``given`` has values for parameters, at least for those without a default; ``inputs`` has lists of values
+    for inputs which random numbers do not suit, taken in turn; ``test`` is where the block's own test should
+    lie.
+    """
+
+    block: type[Block]
+    given: Mapping[str, Any] = field(default_factory=dict)
+    inputs: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    test: Any = None
+
+    def make(self, **parameters: Any) -> Block:
+        """Return the block with some parameters, the others as given or at their defaults.
+
+        ParameterError if they do not go with each other or with ``PERIOD``.
+        """
+        block = self.block(**{**self.given, **parameters})
+        block.period = float(PERIOD)
+        block.check_period()
+        return block
+
+
+@dataclass
+class Rig:
+    """A block alone in an engine, and the inputs that it will be fed with, one for each of ``STEPS``."""
+
+    engine: Engine
+    series: list[dict[str, Any]]
+
+    @property
+    def bound(self) -> Bound:
+        """The block in its place."""
+        return self.engine.plan.steps[0]
+
+    def feed(self, step: int) -> None:
+        """Write the inputs of a step."""
+        for name, value in self.series[step].items():
+            self.engine.plan.memory.write(self.bound.inputs[name], value)
+
+    def record(self) -> bytes:
+        """Return the bytes of the block's parameters and states."""
+        start = self.bound.position * SLOT
+        return bytes(self.engine.plan.memory.raw[start : start + self.bound.record.size * SLOT])
+
+    def contents(self) -> tuple[Any, ...]:
+        """Return all of memory and all pictures, fit to be compared."""
+        memory = self.engine.plan.memory
+        frames = [(frame.pixels.shape, frame.pixels.tobytes()) for frame in memory.frames]
+        return bytes(memory.raw), frames, [(repr(frame.stamp), frame.sequence) for frame in memory.frames]
+
+    def run(self, steps: range) -> list[tuple[Any, ...]]:
+        """Return the contents after each step."""
+        found = []
+        for step in steps:
+            self.feed(step)
+            self.engine.run(1)
+            found.append(self.contents())
+        return found
+
+
+def rigs(subject: Subject, *, missing: bool = False) -> Iterator[Rig]:
+    """Yield a rig for every shape and choice; ``missing`` strews NaN among the inputs.
+
+    The same subject has the same rigs every time.
+    """
+    interface = subject.block.interface
+    declared = (*interface.inputs.values(), *interface.outputs.values(), *interface.params.values())
+    free = any(item.signal.shape == ("*",) for item in declared)
+    for shape in ((), (VECTOR,)) if free else ((),):
+        for parameters in _parameters(subject, shape):
+            yield _rig(subject, subject.make(**parameters), {"*": shape} if free else {}, missing)
+
+
+def extreme_rigs(subject: Subject) -> Iterator[tuple[str, Any, Rig]]:
+    """Yield each parameter with each extreme value that is not refused, and a rig of a block that has it."""
+    params = subject.block.interface.params
+    arrays = {
+        name: param.default
+        for name, param in params.items()
+        if param.signal.shape == ("*",) and name not in subject.given
+    }
+    for name, param in params.items():
+        for value in () if param.is_text or param.choices else _extremes(param):
+            try:
+                block = subject.make(**arrays | {name: value})
+            except ParameterError:
+                continue
+            yield name, value, _rig(subject, block, {"*": ()}, False)
+
+
+def _extremes(param: Param) -> Iterator[Any]:
+    """Yield values at the bounds of a parameter and far beyond what anybody would choose."""
+    bounds = [bound for bound in (param.min, param.max) if bound is not None]
+    bounds += [
+        float(np.nextafter(bound, way))
+        for bound, way in ((param.above, np.inf), (param.below, -np.inf))
+        if bound is not None
+    ]
+    whole = param.signal.scalar == "int64"
+    numbers = [0, 1, -1, 10**6, 2**62] if whole else [0.0, 1e-300, 1e-9, 1.0, -1.0, 1e3, 1e9, -1e9, 1e300]
+    shape = param.signal.resolve({})
+    for number in dict.fromkeys((*bounds, *numbers)):
+        yield np.full(shape, number).tolist()
+
+
+def _rig(subject: Subject, block: Block, sizes: Sizes, missing: bool) -> Rig:
+    interface = block.interface
+    sizes |= parameter_sizes(block)
+    for name, values in subject.inputs.items():
+        interface.inputs[name].signal.unify(np.shape(values[0]), sizes)
+    for item in (*interface.inputs.values(), *interface.outputs.values(), *interface.states.values()):
+        for size in item.signal.shape:
+            if isinstance(size, str) and size != "*":
+                sizes.setdefault(size, VECTOR)
+    series = _series(subject, sizes, missing)
+    return Rig(alone(block, series[0], sizes, PERIOD, seed=1), series)
+
+
+def _parameters(subject: Subject, shape: Shape) -> Iterator[dict[str, Any]]:
+    """Yield the defaults, each other choice, and for a numeric block random numbers within the bounds.
+
+    Choices that do not go with the rest are left out.
+    """
+    params = {
+        name: param for name, param in subject.block.interface.params.items() if name not in subject.given
+    }
+    arrays = {
+        name: np.full(shape, param.default).tolist()
+        for name, param in params.items()
+        if param.signal.shape == ("*",)
+    }
+    yield arrays
+    others = [{name: value} for name, param in params.items() for value in _choices(param)]
+    real = {name: param for name, param in params.items() if param.signal.scalar == "float64"}
+    if subject.block.numeric and real:
+        others.append({name: _shaken(param, shape) for name, param in real.items()})
+    for other in others:
+        try:
+            subject.make(**arrays | other)
+        except ParameterError:
+            continue
+        yield arrays | other
+
+
+def _choices(param: Param) -> list[Any]:
+    """Return the values of a parameter with few of them, other than its default."""
+    values: tuple[Any, ...] = (False, True) if param.signal == BOOL else param.choices
+    return [value for value in values if value != param.default]
+
+
+def _shaken(param: Param, shape: Shape) -> Any:
+    """Return numbers near the default and within the inclusive bounds."""
+    rng = np.random.default_rng(zlib.crc32(param.name.encode()))
+    default = np.broadcast_to(np.asarray(param.default, float), param.signal.resolve({"*": shape}))
+    factor = rng.uniform(0.6, 1.4, default.shape)
+    value = np.where(default == 0.0, factor, factor * default)
+    least, most = -np.inf if param.min is None else param.min, np.inf if param.max is None else param.max
+    return np.clip(value, least, most).tolist()
+
+
+def _series(subject: Subject, sizes: Sizes, missing: bool) -> list[dict[str, Any]]:
+    rng = np.random.default_rng(zlib.crc32(subject.block.__name__.encode()))
+    series: list[dict[str, Any]] = []
+    for step in range(STEPS):
+        row: dict[str, Any] = {}
+        for name, port in subject.block.interface.inputs.items():
+            if name in subject.inputs:
+                row[name] = subject.inputs[name][step % len(subject.inputs[name])]
+            elif series and rng.random() < 0.3:
+                row[name] = series[-1][name]
+            else:
+                row[name] = _random(port, port.signal.resolve(sizes), rng, step, missing)
+        series.append(row)
+    return series
+
+
+def _random(port: In, shape: Shape, rng: np.random.Generator, step: int, missing: bool) -> Any:
+    if port.signal.scalar == "frame":
+        pixels = rng.integers(0, 256, (48, 64, 3), np.uint8)
+        return Frame(pixels, float(step * PERIOD), step + 1) if rng.random() < 0.8 else Frame.none()
+    if port.signal.scalar == "bool":
+        return rng.random(shape) < 0.7
+    if port.signal.scalar == "int64":
+        return rng.integers(-2, 9, shape)
+    value = rng.normal(size=shape) * rng.choice([0.1, 1.0, 10.0])
+    return np.where(rng.random(shape) < 0.1, np.nan, value) if missing else value

@@ -1,0 +1,18 @@
+"""Units, and quantities as people write them: "50 ms", "1/30 s", "2.5 rad/s", "90 %"."""
+
+from quadvis.units.quantity import (
+    format_quantity,
+    parse_number,
+    parse_period,
+    parse_quantity,
+    parse_rational,
+    read_quantity,
+    require_unit,
+    split_quantity,
+)
+from quadvis.units.unit import Unit, UnitError, advised, parse_units, unify
+
+__all__ = [
+    "Unit", "UnitError", "advised", "format_quantity", "parse_number", "parse_period", "parse_quantity",
+    "parse_rational", "parse_units", "read_quantity", "require_unit", "split_quantity", "unify",
+]  # fmt: skip

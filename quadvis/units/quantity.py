@@ -1,0 +1,201 @@
+"""Quantities as people write them: "50 ms", "1/30 s", "2.5 rad/s", "90 %"; and the units from `dimension`."""
+
+from __future__ import annotations
+
+import math
+import re
+from fractions import Fraction
+from functools import lru_cache
+
+from quadvis.errors import quoted
+from quadvis.units.unit import LONGEST, Unit, UnitError, advised
+
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_OTHER_BASE = re.compile(r"[+-]?0(?:[xX][0-9a-fA-F]|[oO][0-7]|[bB][01])")  # 0x10, but not 0 ohm
+_RATIO = re.compile(r"([0-9]+) */ *([0-9]+)(?![0-9.])")
+
+
+def _exact(number: str, text: str) -> Fraction:
+    """Return a decimal number or ratio exactly; what no float can hold is refused."""
+    ratio = _RATIO.fullmatch(number)
+    if ratio is not None:
+        if len(number) > LONGEST or not int(ratio[2]):
+            raise UnitError(f"{quoted(text)} is not a number", "write a ratio such as 1/30")
+        return Fraction(int(ratio[1]), int(ratio[2]))
+    parse_number(number)
+    return Fraction(number)
+
+
+def parse_number(text: str) -> float:
+    """Return a decimal number: 2, -0.5, .5, 1e-3; nothing that YAML or Python would read as another."""
+    match = _NUMBER.fullmatch(text)
+    if match is None or len(text) > LONGEST:
+        raise _not_a_number(text)
+    digits = text.lstrip("+-")
+    if digits[:1] == "0" and digits[1:2].isdigit():
+        plain = digits.lstrip("0")
+        plain = plain if plain[:1].isdigit() else f"0{plain}"
+        raise UnitError(f"{quoted(text)} begins with a zero", f"write '{text[: -len(digits)]}{plain}'")
+    value = float(text)
+    if math.isinf(value) or (value == 0.0 and digits.lower().partition("e")[0].strip("0.")):
+        raise UnitError(f"{quoted(text)} is outside the range of numbers", "stay between 1e-300 and 1e300")
+    return value
+
+
+def _not_a_number(text: str) -> UnitError:
+    remedy = "write it as in 0.5, -2 or 1e-3"
+    plain = text.lower().lstrip("+-.")
+    if plain in ("nan", "inf", "infinity"):
+        return UnitError(f"{quoted(text)} is not a finite number", remedy)
+    for wrong, right in (("_", ""), (",", ".")):
+        better = text.replace(wrong, right)
+        if wrong in text and _NUMBER.fullmatch(better) and len(better) < LONGEST:
+            remedy = f"write '{better}'"
+    return UnitError(f"{quoted(text)} is not a number", remedy)
+
+
+def split_quantity(text: str) -> tuple[str, str]:
+    """Return the number and the unit of "50 ms", "50ms", "1/30 s" or "5/s", as texts; either may be empty."""
+    plain = text.strip()
+    match = _RATIO.match(plain) or _NUMBER.match(plain)
+    if match is None:
+        return "", plain
+    unit = plain[match.end() :].strip()
+    return match.group(), f"1{unit}" if unit[:1] == "/" else unit
+
+
+def parse_quantity(text: str) -> tuple[float, Unit]:
+    """Return the SI value and the unit as written: "50 ms" gives 0.05 and ms, a bare number has unit 1."""
+    number, unit = _parts(text)
+    return _to_si(number, unit, text), unit
+
+
+def parse_rational(text: str, unit: Unit | None = None) -> Fraction:
+    """Return the exact SI value of "33.3 ms", "10 Hz" or "1/30 s".
+
+    A `unit` demands its dimension, and that a number which is not 0 has a unit. Units whose scale is
+    irrational (deg) are refused.
+    """
+    number, written = _parts(text, unit)
+    ratio, rest = written.exact_scale
+    if rest != 1.0:
+        raise UnitError(f"{quoted(text)} has no exact value", "write it in an SI unit")
+    if unit is not None:
+        require_unit(text, unit)
+        if number or split_quantity(text)[1]:
+            _require_dimension(text, written, unit)
+    return number * ratio
+
+
+def parse_period(text: str) -> Fraction:
+    """Return the exact period in seconds of a rate ("10 Hz") or a period ("50 ms"); it is above zero."""
+    second, hertz = Unit.parse("s"), Unit.parse("Hz")
+    _, unit = _parts(text, second, hertz)
+    rate = unit.dimension_equals(hertz)
+    value = parse_rational(text, hertz if rate or not split_quantity(text)[1] else second)
+    if value <= 0:
+        raise UnitError(f"{quoted(text)} is no rate", "write one above zero, such as '20 Hz' or '50 ms'")
+    return 1 / value if rate else value
+
+
+def read_quantity(text: str, unit: Unit, *, bare: bool = True) -> float:
+    """Return a quantity as a number of `unit`; a bare number is one already, unless `bare` is false."""
+    if bare and _NUMBER.fullmatch(text):
+        return parse_number(text)
+    number, written = _parts(text, None if unit.variables else unit)
+    if not split_quantity(text)[1]:
+        require_unit(text, unit)
+        return float(number)
+    if unit.variables:
+        return _to_si(number, written, text)
+    _require_dimension(text, written, unit)
+    return _to_si(number, _quotient(written, unit), text)
+
+
+@lru_cache(maxsize=1024)
+def _quotient(written: Unit, unit: Unit) -> Unit:
+    """Return the quotient of two units; a diagram has few pairs of them and many quantities."""
+    return written / unit
+
+
+def require_unit(text: str, unit: Unit) -> None:
+    """Refuse a bare number, 0 excepted, if `unit` has a dimension: "did you mean '50 ms'?"."""
+    number, written = split_quantity(text)
+    if written or not number or not unit.dimension:
+        return
+    value = float(_exact(number, text))
+    if value:
+        likely = _likely(abs(value), unit)
+        raise UnitError(f"{quoted(text)} has no unit", f"did you mean {quoted(f'{number} {likely}')}?")
+
+
+def format_quantity(value: float, unit: Unit, digits: int = 4) -> str:
+    """Return an SI value for people: (0.05, s) gives "50 ms", (0.032, m) "3.2 cm", (0.5236, deg) "30 deg"."""
+    rounded = float(f"{value:.{digits}g}")
+    if unit.scale == 1.0 and rounded and math.isfinite(rounded):
+        for name in reversed(_ladder(str(unit))):
+            step = Unit.parse(name)
+            if abs(rounded) >= step.scale * (1 - 1e-12):
+                unit = step
+                break
+    number = f"{value / unit.scale:.{digits}g}"
+    return number if not unit.symbols else f"{number} {unit}"
+
+
+# Units that people read a bare dimension in, smallest first.
+_LADDERS = ("us ms s", "um mm cm m km", "Hz kHz MHz", "mV V kV", "mA A", "mN N kN", "mW W kW", "Pa kPa")
+
+
+@lru_cache(maxsize=64)
+def _ladder(unit: str) -> tuple[str, ...]:
+    """Return the names to choose from for a unit; none if it is a product of its own."""
+    for names in map(str.split, _LADDERS):
+        if unit in names:
+            return tuple(names)
+    return ()
+
+
+def _likely(value: float, unit: Unit) -> str:
+    """Guess the unit that was left out, from the size of the number."""
+    small = {"s": ("ms", 10.0), "m": ("mm", 20.0), "rad": ("deg", 6.3)}.get(str(unit))
+    return small[0] if small and value >= small[1] else str(unit)
+
+
+def _parts(text: str, *wanted: Unit | None) -> tuple[Fraction, Unit]:
+    """Return the number and the unit; advice for a text that is none goes by what is wanted, if known."""
+    number, unit = split_quantity(text)
+    if not number:
+        raise UnitError(f"{quoted(text)} does not begin with a number", "write it as in '50 ms'")
+    if _OTHER_BASE.match(text.strip()) or unit[:1] in tuple("_,.:"):
+        raise _not_a_number(text)
+    known = [each for each in wanted if each is not None]
+    written = Unit.parse(unit or "1", *known)
+    if written.variables:
+        raise advised(
+            UnitError(f"{quoted(unit)} is not a unit", "use m, s, rad, kg, N, V, Hz, px ..."), unit, known
+        )
+    return _exact(number, text), written
+
+
+def _require_dimension(text: str, written: Unit, unit: Unit) -> None:
+    if written.dimension_equals(unit):
+        return
+    if str(written) == "g" and unit == Unit.parse("m/s^2"):
+        raise UnitError(f"{quoted(text)} is in grams, not in {unit}", "write gravity as 9.80665 m/s^2")
+    if not unit.dimension:
+        raise UnitError(f"{quoted(text)} has a unit where none belongs", "write a number without unit")
+    usual = [name for name in _ladder(str(unit)) if Unit.parse(name).scale >= 1e-3]
+    choice = " or ".join(usual or [str(unit)])
+    raise UnitError(f"{quoted(text)} is in {written}, not in {unit}", f"write it in {choice}")
+
+
+def _to_si(number: Fraction, unit: Unit, text: str) -> float:
+    """Return the float nearest to the number of units, rounded once where the scale is rational."""
+    ratio, rest = unit.exact_scale
+    try:
+        value = float(number * ratio) * rest
+    except OverflowError:
+        value = math.inf
+    if math.isinf(value):
+        raise UnitError(f"{quoted(text)} is outside the range of numbers")
+    return value

@@ -1,0 +1,372 @@
+"""Physical units of ports and parameters: reading, comparing, combining and unifying them.
+
+A unit is a product of powers. Its scale to SI is kept exactly, as powers of primes and pi, beside the powers
+of the dimensions m, kg, s, rad, px, A, K and of the unit variables a, b, c; hence nothing is ever rounded.
+Angles have a dimension of their own, so that Hz and rad/s are told apart.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property, lru_cache
+
+from quadvis.errors import QuadvisError, quoted, sentence
+from quadvis.units.names import (
+    BASES,
+    DERIVED,
+    PREFIXED,
+    PREFIXES,
+    PRIMES,
+    SCALES,
+    SPELLINGS,
+    VARIABLES,
+)
+from quadvis.units.spelling import elsewhere, spellings
+
+_LARGEST_POWER = 60
+LONGEST = 80
+_GENERAL = "use m, s, rad, kg, N, V, Hz, px ..."
+
+_TOKEN = re.compile(r"([A-Za-z%]+)|([0-9]+(?:\.[0-9]+)?)|([*/^()-])")
+_RAISED = re.compile("\N{SUPERSCRIPT MINUS}([¹²³])")
+_AROUND_OPERATOR = re.compile(r"\s*([*/^])\s*")
+
+
+class UnitError(QuadvisError):
+    """A text that is not a unit or not a quantity: the problem, and what would be right."""
+
+    def __init__(self, problem: str, remedy: str = "") -> None:
+        """Keep both halves of the sentence apart, for messages that name a place."""
+        self.problem, self.remedy = problem, remedy
+        super().__init__(sentence(problem, remedy))
+
+
+def _powers(items: Iterable[tuple[str, Fraction]]) -> tuple[tuple[str, Fraction], ...]:
+    """Return the sum of the exponents of each symbol, in the order of first mention."""
+    total: dict[str, Fraction] = {}
+    for symbol, exponent in items:
+        total[symbol] = total.get(symbol, Fraction(0)) + exponent
+    if any(abs(exponent) > _LARGEST_POWER for exponent in total.values()):
+        raise UnitError(f"a unit has an exponent beyond {_LARGEST_POWER}")
+    return tuple((symbol, exponent) for symbol, exponent in total.items() if exponent)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit; equal to every other with the same dimensions and scale (Hz and 1/s), however written."""
+
+    exponents: frozenset[tuple[str, Fraction]] = frozenset()
+    symbols: tuple[tuple[str, Fraction], ...] = field(default=(), compare=False, repr=False)
+
+    @staticmethod
+    def parse(text: str, *wanted: Unit) -> Unit:
+        """Return the unit written as "rad/s^2", "N*m", "1/s", "deg/s", "%", "Hz^0.5", "W/(m*K)" or "1".
+
+        UnitError if it is none; what it then suggests has the dimension of a unit that is ``wanted``.
+        """
+        try:
+            return _parse(text)
+        except UnitError as error:
+            raise advised(error, text, wanted) from None
+
+    def __str__(self) -> str:
+        """Return the unit as it was written, in one spelling; `Unit.parse` reads it back."""
+        above = "*".join(_power(symbol, exponent) for symbol, exponent in self.symbols if exponent > 0)
+        below = "".join(f"/{_power(symbol, -exponent)}" for symbol, exponent in self.symbols if exponent < 0)
+        return (above or "1") + below
+
+    def __mul__(self, other: Unit) -> Unit:
+        """Return the unit of a product."""
+        return _unit((*self.exponents, *other.exponents), (*self.symbols, *other.symbols))
+
+    def __truediv__(self, other: Unit) -> Unit:
+        """Return the unit of a quotient."""
+        return self * other**-1
+
+    def __pow__(self, exponent: Fraction | int) -> Unit:
+        """Return the unit of a power, roots included."""
+        return _unit(
+            ((symbol, power * exponent) for symbol, power in self.exponents),
+            ((symbol, power * exponent) for symbol, power in self.symbols),
+        )
+
+    @cached_property
+    def scale(self) -> float:
+        """The value of this unit in SI units: 0.001 for ms."""
+        ratio, rest = self.exact_scale
+        return float(ratio) * rest
+
+    @cached_property
+    def exact_scale(self) -> tuple[Fraction, float]:
+        """The scale as an exact ratio, and the irrational rest (pi, roots)."""
+        ratio, rest = Fraction(1), 1.0
+        for symbol, exponent in sorted(self.exponents):  # sets differ in order from one process to the next
+            if symbol in PRIMES and exponent.denominator == 1:
+                ratio *= Fraction(PRIMES[symbol]) ** int(exponent)
+            elif symbol in SCALES:
+                rest *= float(PRIMES.get(symbol, math.pi)) ** float(exponent)
+        return ratio, rest
+
+    @cached_property
+    def dimension(self) -> frozenset[tuple[str, Fraction]]:
+        """The powers of the dimensions and variables, without the scale."""
+        return frozenset((symbol, exponent) for symbol, exponent in self.exponents if symbol not in SCALES)
+
+    @cached_property
+    def variables(self) -> frozenset[str]:
+        """The unit variables that it holds."""
+        return frozenset(symbol for symbol, _ in self.exponents if symbol in VARIABLES)
+
+    def dimension_equals(self, other: Unit) -> bool:
+        """Say whether a quantity in one unit can be converted into the other: m and mm."""
+        return self.dimension == other.dimension
+
+    @cached_property
+    def reduced(self) -> Unit:
+        """The same unit in fewer names, where those that came together say it at length: s*N/kg/m is 1/s."""
+        return _reduced(self.exponents, self.symbols)
+
+    def substitute(self, bindings: Mapping[str, Unit]) -> Unit:
+        """Return the unit with the variables replaced that are bound."""
+        result = _unit(
+            (item for item in self.exponents if item[0] not in bindings),
+            (item for item in self.symbols if item[0] not in bindings),
+        )
+        for symbol, exponent in sorted(self.exponents):
+            if symbol in bindings:
+                result *= bindings[symbol] ** exponent
+        return result
+
+
+def _unit(exponents: Iterable[tuple[str, Fraction]], symbols: Iterable[tuple[str, Fraction]]) -> Unit:
+    return Unit(frozenset(_powers(exponents)), _powers(symbols))
+
+
+# Names that stand for a product of dimensions, the best known first.
+_ORDER = (*VARIABLES, "kg", "m", "A", "K", "rad", "px", "s")
+_SHORT = 3  # factors of a unit that only a single name replaces: N*s/m stays, N/kg/m is 1/s^2
+_NAMED = ("N", "W", "V", "ohm", "Pa", "T", "H", "F", "C")
+
+
+@lru_cache(maxsize=4096)
+def _reduced(exponents: frozenset[tuple[str, Fraction]], symbols: tuple[tuple[str, Fraction], ...]) -> Unit:
+    """Return the shortest product of bases and a power of one name; the unit if it is as short."""
+    unit = Unit(exponents, symbols)
+    if unit.exponents != unit.dimension or len(symbols) < 2:
+        return unit
+    powers = dict(exponents)
+    name, _ = min(_named_powers(), key=lambda named: _length_beside(powers, *named))
+    best = name * _in_bases(unit / name)
+    shorter = len(best.symbols) <= 1 if _length(unit) <= _SHORT else True
+    return best if shorter and _length(best) < _length(unit) else _in_order(unit)
+
+
+@lru_cache(maxsize=1)
+def _named_powers() -> tuple[tuple[Unit, dict[str, int]], ...]:
+    """Return the powers of names, and 1, by which a unit may be divided, each with its powers of bases."""
+    powers = (Unit(), *(name**power for name in map(Unit.parse, _NAMED) for power in (1, -1, 2, -2)))
+    return tuple((unit, {base: int(power) for base, power in unit.exponents}) for unit in powers)
+
+
+def _length_beside(powers: Mapping[str, Fraction], name: Unit, bases: Mapping[str, int]) -> Fraction:
+    """Return the length of a unit, by its powers of bases, that is written as a name times bases."""
+    rest = (abs(powers.get(base, Fraction(0)) - bases.get(base, 0)) for base in {*powers, *bases})
+    return _length(name) + sum(rest, Fraction(0))
+
+
+def _in_bases(unit: Unit) -> Unit:
+    return Unit(unit.exponents, tuple(sorted(unit.exponents, key=lambda item: _ORDER.index(item[0]))))
+
+
+def _in_order(unit: Unit) -> Unit:
+    """Return the unit with its factors in the usual order: m*s, not s*m; names of products come first."""
+    places = {symbol: place for place, symbol in enumerate(_ORDER)}
+    return Unit(unit.exponents, tuple(sorted(unit.symbols, key=lambda item: places.get(item[0], -1))))
+
+
+def _length(unit: Unit) -> Fraction:
+    return sum((abs(exponent) for _, exponent in unit.symbols), Fraction(0))
+
+
+def _power(symbol: str, exponent: Fraction) -> str:
+    if exponent == 1:
+        return symbol
+    return f"{symbol}^{exponent}" if exponent.denominator == 1 else f"{symbol}^({exponent})"
+
+
+def unify(pattern: Unit, actual: Unit, bindings: dict[str, Unit]) -> bool:
+    """Say whether the units agree, and bind the variable of the pattern that this settles.
+
+    "a/s" against "m/s" binds a = m. With two unknown variables nothing is settled: the answer is True, the
+    bindings stay, and the caller asks again when others are known. On False the bindings are as before.
+    """
+    try:
+        wanted = pattern.substitute(bindings)
+        if len(wanted.variables) != 1:
+            return bool(wanted.variables) or wanted == actual
+        (variable,) = wanted.variables
+        exponent = dict(wanted.exponents)[variable]
+        found = (actual / wanted.substitute({variable: Unit()})) ** (1 / exponent)
+    except UnitError:
+        return False
+    bindings[variable] = found
+    return True
+
+
+@lru_cache(maxsize=1)
+def _table() -> dict[str, Unit]:
+    """Return every unit by its symbol."""
+    one = Fraction(1)
+    table = {name: Unit(frozenset({(name, one)}), ((name, one),)) for name in (*BASES, *SCALES)}
+    for name, made_of in DERIVED.items():
+        table[name] = Unit(_Reader(made_of, table).unit().exponents, ((name, one),))
+    for name in sorted(PREFIXED):
+        power = Fraction(PREFIXES[name[0]])
+        scaled = _unit((("2", power), ("5", power), *table[name[1:]].exponents), ((name, one),))
+        table[name] = scaled
+    for name in SCALES:
+        del table[name]
+    return table
+
+
+def _plain(text: str) -> str:
+    """Return the text in the one spelling that the reader knows, without blanks around operators."""
+    powers = _RAISED.sub(lambda match: f"^-{'¹²³'.index(match[1]) + 1}", text)
+    return _AROUND_OPERATOR.sub(r"\1", powers.translate(SPELLINGS)).strip()
+
+
+@lru_cache(maxsize=1024)
+def _parse(text: str) -> Unit:
+    plain = _plain(text)
+    if not plain:
+        raise UnitError("the unit is empty", "write '1' for a number without unit")
+    if len(plain) > LONGEST:
+        raise UnitError(f"{quoted(text)} is too long for a unit")
+    if re.search(r"\s", plain):
+        raise UnitError(f"{quoted(text)} holds a space", "write '*' for a product")
+    return _Reader(plain, _table()).unit()
+
+
+class _Reader:
+    """Reads one unit: factors joined by `*` and `/`, left to right, each with an optional `^` power."""
+
+    def __init__(self, text: str, table: Mapping[str, Unit]) -> None:
+        self.text, self.table = text, table
+        self.tokens = self._split()
+        self.at = 0
+
+    def _split(self) -> list[str]:
+        tokens, position = [], 0
+        while position < len(self.text):
+            match = _TOKEN.match(self.text, position)
+            if match is None:
+                wrong = quoted(self.text[position])
+                raise UnitError(f"{quoted(self.text)} is not a unit", f"{wrong} is no part of one")
+            tokens.append(match.group())
+            position = match.end()
+        return tokens
+
+    def _next(self) -> str:
+        return self.tokens[self.at] if self.at < len(self.tokens) else ""
+
+    def _take(self) -> str:
+        token = self._next()
+        self.at += 1
+        return token
+
+    def unit(self) -> Unit:
+        result = self._product()
+        if self._next():
+            raise self._fault(self.at)
+        return result
+
+    def _product(self) -> Unit:
+        result = self._factor()
+        while self._next() in ("*", "/"):
+            result = result * self._factor() if self._take() == "*" else result / self._factor()
+        return result
+
+    def _factor(self) -> Unit:
+        token = self._take()
+        if token == "(":
+            result = self._product()
+            if self._take() != ")":
+                raise UnitError(f"{quoted(self.text)} lacks a ')'")
+        elif token == "1":
+            result = Unit()
+        elif token in self.table:
+            result = self.table[token]
+        else:
+            raise self._fault(self.at - 1)
+        if self._next() == "^":
+            self.at += 1
+            result **= self._exponent()
+        return result
+
+    def _exponent(self) -> Fraction:
+        if self._next() != "(":
+            return self._signed()
+        self.at += 1
+        result = self._signed()
+        if self._next() == "/":
+            self.at += 1
+            below = self._signed()
+            if not below:
+                raise UnitError(f"{quoted(self.text)} divides by zero")
+            result /= below
+        if self._take() != ")":
+            raise UnitError(f"{quoted(self.text)} lacks a ')'")
+        return result
+
+    def _signed(self) -> Fraction:
+        sign = -1 if self._next() == "-" else 1
+        self.at += sign < 0
+        token = self._take()
+        if not token[:1].isdigit() or len(token) > 5:
+            raise UnitError(f"{quoted(self.text)} has no exponent after '^'", "write such as 's^2' or 's^-1'")
+        return sign * Fraction(token)
+
+    def _fault(self, position: int) -> UnitError:
+        token = self.tokens[position] if position < len(self.tokens) else ""
+        if token in ("", *"*/^()-"):
+            missing = "a unit is missing at its end" if not token else f"'{token}' stands where it cannot"
+            return UnitError(f"{quoted(self.text)} is not a unit", missing)
+        if token[0].isdigit():
+            return UnitError(f"{quoted(self.text)} is not a unit", f"leave out the number {token}")
+        return UnitError(f"{quoted(token)} is not a unit", _GENERAL)
+
+
+def advised(error: UnitError, text: str, wanted: Sequence[Unit] = ()) -> UnitError:
+    """Return the error with what may have been meant; only a unit of a dimension that is wanted, if known."""
+    plain = _plain(text)
+    name, why, remedy = elsewhere(plain) or ("", "", "")
+    if name:
+        return UnitError(f"{quoted(name)} is not a unit here{why}", remedy)
+    table = _table()
+    likely = [name for name, unit in table.items() if any(map(unit.dimension_equals, wanted))]
+    for near in spellings(plain, table, likely) if len(plain) <= LONGEST else ():
+        try:
+            meant = _parse(near)
+        except UnitError:
+            continue
+        if not wanted or any(map(meant.dimension_equals, wanted)):
+            is_product = near == "*".join(plain.split()) != plain
+            remedy = f"write {quoted(near)} for a product" if is_product else f"did you mean {quoted(near)}?"
+            return UnitError(
+                f"{quoted(text.strip())} {'holds a space' if is_product else 'is not a unit'}", remedy
+            )
+    if not wanted:
+        return error
+    return UnitError(error.problem, f"write it in {' or '.join(map(str, wanted))}")
+
+
+def parse_units(text: str) -> tuple[Unit, ...]:
+    """Return the units of a port's elements: one for all of them ("m/s"), or one each ("m m m rad")."""
+    plain = _plain(text).split()
+    if not plain:
+        raise UnitError("the unit is empty", "write '1' for a number without unit")
+    return tuple(map(Unit.parse, plain))
