@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from quadvis.diagram.times import read_duration
-from quadvis.document import Scalar
+from quadvis.document import YamlScalar
 from quadvis.errors import QuadvisError
 
 
@@ -48,4 +48,4 @@ def read_limits(texts: Sequence[str]) -> dict[str, tuple[str, str, str]]:
 
 def read_time(text: str | None) -> float | None:
     """Read ``5 s``; DiagramError if it is no time."""
-    return None if text is None else float(read_duration(Scalar(text, False, "--at", 0, 0)))
+    return None if text is None else float(read_duration(YamlScalar(text, False, "--at", 0, 0)))

@@ -26,7 +26,7 @@ from quadvis.diagram.slots import Outputs, check_slots, fill_slots
 from quadvis.diagram.ticks import check_ticks
 from quadvis.diagram.times import read_duration
 from quadvis.diagram.wiring import Wiring
-from quadvis.document import Scalar
+from quadvis.document import YamlScalar
 from quadvis.engine.graph import Graph, Wire
 from quadvis.engine.names import wire_text
 from quadvis.errors import DiagramError, Doubt, Fault, Faults, Place, quoted
@@ -359,7 +359,7 @@ class _Assembly:
 def _stop_time(spec: FileSpec, given: str | float | None, faults: Faults) -> Fraction:
     if given is not None:
         text = given if isinstance(given, str) else f"{float(given)!r} s"
-        return faults.collect(read_duration, Scalar(text, False, "--stop-time", 0, 0)) or Fraction(0)
+        return faults.collect(read_duration, YamlScalar(text, False, "--stop-time", 0, 0)) or Fraction(0)
     if spec.stop_time is None:
         faults.add(spec.top, "key 'stop_time' is missing", "add 'stop_time: 10 s', or give --stop-time")
         return Fraction(0)

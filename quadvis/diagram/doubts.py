@@ -9,7 +9,7 @@ from quadvis.diagram.expand import Parts
 from quadvis.diagram.loader import BlockSpec, FileSpec, InputSpec
 from quadvis.diagram.times import read_duration, time_text
 from quadvis.diagram.values import named_parameters
-from quadvis.document import Mapping, Node, Sequence
+from quadvis.document import YamlList, YamlMap, YamlNode
 from quadvis.errors import Faults
 
 # The sections with windows, and the keys of a window's begin and end.
@@ -26,16 +26,16 @@ def warn(spec: FileSpec, parts: Parts, stop: Fraction, faults: Faults) -> None:
         _warn_parameters(file, faults)
 
 
-def _entries(section: Node | None) -> Iterator[Mapping]:
-    entries: Iterable[Node] = ()
-    if isinstance(section, Sequence):
+def _entries(section: YamlNode | None) -> Iterator[YamlMap]:
+    entries: Iterable[YamlNode] = ()
+    if isinstance(section, YamlList):
         entries = section
-    elif isinstance(section, Mapping):
+    elif isinstance(section, YamlMap):
         entries = section.values.values()
-    yield from (entry for entry in entries if isinstance(entry, Mapping))
+    yield from (entry for entry in entries if isinstance(entry, YamlMap))
 
 
-def _warn_window(entry: Mapping, keys: tuple[str, str], stop: Fraction, faults: Faults) -> None:
+def _warn_window(entry: YamlMap, keys: tuple[str, str], stop: Fraction, faults: Faults) -> None:
     """Warn of a window that holds no instant of the run, or none at all."""
     silent = Faults()
     begin, end = (silent.collect(read_duration, entry[key]) if key in entry else None for key in keys)
@@ -61,7 +61,7 @@ def _warn_parameters(spec: FileSpec, faults: Faults) -> None:
         inputs = (block.inputs or {}).values()
         sources = (given.source for given in inputs if isinstance(given, InputSpec))
         for node in (*block.parameters.values(), *sources):
-            if isinstance(node, Node):
+            if isinstance(node, YamlNode):
                 used |= named_parameters(node)
     for name, value in spec.params.items():
         if name not in used and value is not None:

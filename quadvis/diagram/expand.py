@@ -12,7 +12,7 @@ from quadvis.diagram.loader import BlockSpec, FileSpec, read_file
 from quadvis.diagram.names import absent, remedy_for
 from quadvis.diagram.settings import Settings
 from quadvis.diagram.values import substitute
-from quadvis.document import Node, Scalar
+from quadvis.document import YamlNode, YamlScalar
 from quadvis.errors import DiagramError, Faults, Place, quoted, suggestion
 from quadvis.library.catalogue import Catalogue, CatalogueError
 from quadvis.machine.missing_file import file_trouble
@@ -28,7 +28,7 @@ class Scope:
 
     prefix: str
     spec: FileSpec
-    params: Mapping[str, Node | None]
+    params: Mapping[str, YamlNode | None]
     parent: Scope | None = None
     instance: BlockSpec | None = None
     children: dict[str, Scope] = field(default_factory=dict)
@@ -48,7 +48,7 @@ class FlatBlock:
     spec: BlockSpec
     scope: Scope
     kind: type[Block] | None
-    parameters: dict[str, Node]
+    parameters: dict[str, YamlNode]
     places: Mapping[str, Place]  # of the names of the parameters
 
     @property
@@ -124,12 +124,12 @@ class Expansion:
         self._expand(self.root, (os.path.realpath(spec.path),))
         self._tell_unused()
 
-    def _setting(self, path: str, name: str) -> Node | None:
+    def _setting(self, path: str, name: str) -> YamlNode | None:
         self._used.add((path, name))
         setting = self.settings.get(path, {}).get(name)
         return setting.value if setting is not None else None
 
-    def _chosen(self, path: str, name: str, own: Node | None) -> Node | None:
+    def _chosen(self, path: str, name: str, own: YamlNode | None) -> YamlNode | None:
         """Return the value of a parameter: the setting if there is one; None if it is wrong.
 
         A setting without a unit for a value with one is refused here, before others are blamed for it.
@@ -137,7 +137,7 @@ class Expansion:
         value = self._setting(path, name)
         if value is None:
             return own
-        if not isinstance(value, Scalar) or not isinstance(own, Scalar):
+        if not isinstance(value, YamlScalar) or not isinstance(own, YamlScalar):
             return value
         number, unit = split_quantity(value.value)
         wanted = split_quantity(own.value)[1]
@@ -188,9 +188,9 @@ class Expansion:
                     places = self._places(block, path)
                     self.blocks[path] = FlatBlock(path, block, scope, kind, values, places)
 
-    def _values(self, scope: Scope, block: BlockSpec, path: str) -> dict[str, Node]:
+    def _values(self, scope: Scope, block: BlockSpec, path: str) -> dict[str, YamlNode]:
         """Return the parameters of a block or part."""
-        values: dict[str, Node] = {}
+        values: dict[str, YamlNode] = {}
         for name, node in block.parameters.items():
             value = substitute(node, scope.params, self.faults)
             if value is not None:
@@ -219,7 +219,7 @@ class Expansion:
             return None
 
     def _expand_part(
-        self, scope: Scope, block: BlockSpec, values: dict[str, Node], files: tuple[str, ...]
+        self, scope: Scope, block: BlockSpec, values: dict[str, YamlNode], files: tuple[str, ...]
     ) -> None:
         file = Path(block.kind_place.file).parent / block.kind
         spec = self._part(block, file, files)

@@ -10,7 +10,7 @@ from pathlib import Path
 from quadvis.diagram.reference import Reference, read_reference
 from quadvis.diagram.times import Rate, read_duration, read_rate, read_step
 from quadvis.diagram.values import QUANTITY_KEYS, read_constant
-from quadvis.document import Mapping, Node, Scalar, parse_yaml, read_yaml
+from quadvis.document import YamlMap, YamlNode, YamlScalar, parse_yaml, read_yaml
 from quadvis.engine.graph import CROSSINGS, SOLVERS, TOLD
 from quadvis.errors import Faults, Place, closest, quoted
 from quadvis.errors.characters import cleaned, first_odd, replacement, with_article
@@ -40,7 +40,7 @@ class InputSpec:
     """What an input is given: a signal or a constant, and how the wire crosses between rates."""
 
     place: Place
-    source: Reference | Node | None  # None: what is wrong has been told
+    source: Reference | YamlNode | None  # None: what is wrong has been told
     across: str | None = None
     across_place: Place | None = None
 
@@ -56,7 +56,7 @@ class BlockSpec:
     is_part: bool
     rate: tuple[str, Place] | None = None
     slot: Place | None = None
-    parameters: dict[str, Node] = field(default_factory=dict)
+    parameters: dict[str, YamlNode] = field(default_factory=dict)
     parameter_places: dict[str, Place] = field(default_factory=dict)
     inputs: dict[str, InputSpec] | None = None  # None: no 'in' was written
     told: frozenset[str] = frozenset()  # keys that are wrong or misspelt: what they lack is no news
@@ -70,7 +70,7 @@ class FileSpec:
     place: Place  # of the file as a whole
     top: Place  # where its keys begin
     name: str = ""
-    params: dict[str, Node | None] = field(default_factory=dict)  # None: what is wrong has been told
+    params: dict[str, YamlNode | None] = field(default_factory=dict)  # None: what is wrong has been told
     blocks: dict[str, BlockSpec] = field(default_factory=dict)
     broken: set[str] = field(default_factory=set)  # entries under blocks that could not be read
     inputs: dict[str, Place] = field(default_factory=dict)  # of a part
@@ -82,10 +82,10 @@ class FileSpec:
     step_told: bool = False
     stop_time: Fraction | None = None
     seed: int = 0
-    files: dict[str, Node] = field(default_factory=dict)
+    files: dict[str, YamlNode] = field(default_factory=dict)
     variants: dict[str, dict[str, BlockSpec | None]] = field(default_factory=dict)
     bases: dict[str, tuple[str, Place]] = field(default_factory=dict)  # the variant on which one builds
-    sections: dict[str, Node] = field(default_factory=dict)  # those about signals
+    sections: dict[str, YamlNode] = field(default_factory=dict)  # those about signals
 
 
 def read_file(path: Path, faults: Faults, *, part: bool) -> FileSpec | None:
@@ -98,7 +98,7 @@ def read_text(text: str, path: Path, faults: Faults) -> FileSpec | None:
     return _read(path, faults.collect(parse_yaml, text, str(path), faults), faults, part=False)
 
 
-def _read(path: Path, node: Node | None, faults: Faults, part: bool) -> FileSpec | None:
+def _read(path: Path, node: YamlNode | None, faults: Faults, part: bool) -> FileSpec | None:
     root = faults.collect(node.mapping) if node is not None else None
     if root is None or not _is_ours(root, faults, part):
         return None
@@ -121,7 +121,7 @@ def _read(path: Path, node: Node | None, faults: Faults, part: bool) -> FileSpec
     return spec
 
 
-def is_version(root: Mapping, faults: Faults) -> bool:
+def is_version(root: YamlMap, faults: Faults) -> bool:
     """Tell a file of another version in one sentence, not by all that is odd in it."""
     version = root.get("quadvis")
     if version is not None and faults.collect(version.integer) not in (VERSION, None):
@@ -131,7 +131,7 @@ def is_version(root: Mapping, faults: Faults) -> bool:
     return True
 
 
-def _is_ours(root: Mapping, faults: Faults, part: bool) -> bool:
+def _is_ours(root: YamlMap, faults: Faults, part: bool) -> bool:
     """Tell a file of another version or of another kind in one sentence."""
     if not is_version(root, faults):
         return False
@@ -152,12 +152,12 @@ def _is_ours(root: Mapping, faults: Faults, part: bool) -> bool:
     return True
 
 
-def _map(node: Node | None, faults: Faults) -> list[tuple[str, Node]]:
+def _map(node: YamlNode | None, faults: Faults) -> list[tuple[str, YamlNode]]:
     mapping = faults.collect(node.mapping) if node is not None else None
     return list(mapping.values.items()) if mapping is not None else []
 
 
-def _named(root: Mapping, key: str, what: str, faults: Faults) -> list[tuple[str, Node]]:
+def _named(root: YamlMap, key: str, what: str, faults: Faults) -> list[tuple[str, YamlNode]]:
     """Return the entries of a map from names; keys that are no names are told."""
     node = root.get(key)
     mapping = faults.collect(_with_clean_names, node, faults) if node is not None else None
@@ -167,7 +167,7 @@ def _named(root: Mapping, key: str, what: str, faults: Faults) -> list[tuple[str
     return list(mapping.values.items()) if mapping is not None else []
 
 
-def _with_clean_names(node: Node, faults: Faults) -> Mapping:
+def _with_clean_names(node: YamlNode, faults: Faults) -> YamlMap:
     """Return a map of which the keys are names; those with odd characters are refused, and read as meant."""
     mapping = node.mapping()
     for key in list(mapping.keys.values()):
@@ -179,12 +179,12 @@ def _with_clean_names(node: Node, faults: Faults) -> Mapping:
     return mapping
 
 
-def _refuse_name(key: Scalar, what: str, faults: Faults) -> None:
+def _refuse_name(key: YamlScalar, what: str, faults: Faults) -> None:
     remedy = "use letters, digits and '_', and begin with a letter"
     faults.add(key.place, f"'{key.value}' cannot name a {what}", remedy)
 
 
-def _read_blocks(spec: FileSpec, root: Mapping, faults: Faults) -> None:
+def _read_blocks(spec: FileSpec, root: YamlMap, faults: Faults) -> None:
     node = root.get("blocks")
     mapping = faults.collect(_with_clean_names, node, faults) if node is not None else None
     if mapping is not None and not mapping.values:
@@ -205,7 +205,7 @@ def _read_blocks(spec: FileSpec, root: Mapping, faults: Faults) -> None:
             spec.blocks[name] = block
 
 
-def read_block(name: str, place: Place, node: Node, faults: Faults) -> BlockSpec | None:
+def read_block(name: str, place: Place, node: YamlNode, faults: Faults) -> BlockSpec | None:
     """Read one entry under ``blocks`` or under a variant's ``slots``; None if it does not say what it is."""
     fields = faults.collect(node.fields, (), BLOCK_KEYS, faults)
     if fields is None:
@@ -240,13 +240,13 @@ def read_block(name: str, place: Place, node: Node, faults: Faults) -> BlockSpec
     )
 
 
-def _read_input(node: Node, faults: Faults) -> InputSpec:
+def _read_input(node: YamlNode, faults: Faults) -> InputSpec:
     """Read ``block.port``, ``{from: block.port, across: hold}``, ``1 m`` or ``{value: ..., unit: ...}``."""
-    is_value = isinstance(node, Mapping) and any(key in node for key in QUANTITY_KEYS)
-    if isinstance(node, Mapping) and is_value and "from" in node:
+    is_value = isinstance(node, YamlMap) and any(key in node for key in QUANTITY_KEYS)
+    if isinstance(node, YamlMap) and is_value and "from" in node:
         faults.add(node.place, "a signal and a value are given at once", "keep 'from' or 'value'")
         return InputSpec(node.place, None)
-    if isinstance(node, Mapping) and not is_value:
+    if isinstance(node, YamlMap) and not is_value:
         node = node.fields(WIRE_KEYS[:1], WIRE_KEYS[1:], faults)
         source = read_reference(node["from"], faults) if "from" in node else None
         across = node.get("across")
@@ -254,7 +254,7 @@ def _read_input(node: Node, faults: Faults) -> InputSpec:
         if crossing is None and len(node) > 1:
             crossing = TOLD
         return InputSpec(node.place, source, crossing, across.place if across is not None else None)
-    if isinstance(node, Scalar) and _is_reference(node.value):
+    if isinstance(node, YamlScalar) and _is_reference(node.value):
         return InputSpec(node.place, read_reference(node, faults))
     return InputSpec(node.place, node)
 
@@ -264,7 +264,7 @@ def _is_reference(text: str) -> bool:
     return (text[:1].isalpha() or text[:1] == "_") and text not in ("true", "false")
 
 
-def _read_ports(spec: FileSpec, root: Mapping, faults: Faults) -> None:
+def _read_ports(spec: FileSpec, root: YamlMap, faults: Faults) -> None:
     node = root.get("ports")
     fields = faults.collect(node.fields, (), PORT_KEYS, faults) if node is not None else None
     if fields is None:
@@ -280,7 +280,7 @@ def _read_ports(spec: FileSpec, root: Mapping, faults: Faults) -> None:
         spec.outputs[name] = read_reference(value, faults)
 
 
-def _read_time(spec: FileSpec, root: Mapping, faults: Faults) -> None:
+def _read_time(spec: FileSpec, root: YamlMap, faults: Faults) -> None:
     for name, value in _named(root, "rates", "rate", faults):
         spec.rates[name] = faults.collect(read_rate, value)
         if name == CONTINUOUS:
@@ -300,7 +300,7 @@ def _read_time(spec: FileSpec, root: Mapping, faults: Faults) -> None:
         spec.seed = faults.collect(root["seed"].integer) or 0
 
 
-def _read_variants(spec: FileSpec, root: Mapping, faults: Faults) -> None:
+def _read_variants(spec: FileSpec, root: YamlMap, faults: Faults) -> None:
     for variant, value in _named(root, "variants", "variant", faults):
         spec.variants[variant] = {}
         with faults.about(f"variant '{variant}'"):

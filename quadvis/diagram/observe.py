@@ -9,15 +9,13 @@ from fnmatch import fnmatchcase
 from fractions import Fraction
 from typing import Any
 
-from quadvis import document as yaml
 from quadvis.diagram.flow import misfit
 from quadvis.diagram.reference import read_reference
 from quadvis.diagram.times import read_duration
 from quadvis.diagram.unit_flow import words
 from quadvis.diagram.wiring import Wiring
-from quadvis.document import Node, Scalar
-from quadvis.engine.graph import Graph, Wire, selected
-from quadvis.engine.graph import Node as Block
+from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar
+from quadvis.engine.graph import Graph, Node, Wire, selected
 from quadvis.engine.names import wire_text
 from quadvis.errors import Faults, Place, suggestion
 from quadvis.output.plot import read_figures
@@ -58,7 +56,7 @@ class Observation:
 
 
 def read_observation(
-    sections: Mapping[str, Node],
+    sections: Mapping[str, YamlNode],
     wiring: Wiring,
     graph: Graph,
     stop: Fraction,
@@ -95,7 +93,7 @@ class _Reader:
         self.result = Observation()
         self.names: dict[Place, str] = {}  # the full name of each signal, by where it is written
 
-    def log(self, node: Node | None) -> None:
+    def log(self, node: YamlNode | None) -> None:
         """Read which blocks are logged, and how often: ``{signals: [craft, "eyes/*"], every: {imu: 10}}``."""
         fields = self.faults.collect(node.fields, (), LOG_KEYS, self.faults) if node is not None else None
         patterns = (
@@ -125,7 +123,7 @@ class _Reader:
             elif count is not None:
                 self.result.every[key.value] = count
 
-    def _matching(self, pattern: Node) -> list[str]:
+    def _matching(self, pattern: YamlNode) -> list[str]:
         """Return the blocks that a pattern names, by themselves, by a part around them or by a signal."""
         text = self.faults.collect(pattern.text)
         if text is None:
@@ -140,13 +138,13 @@ class _Reader:
             self.faults.add(pattern.place, f"no block is called '{text}'", remedy)
         return found
 
-    def _signal(self, node: Node) -> tuple[Part, str] | None:
+    def _signal(self, node: YamlNode) -> tuple[Part, str] | None:
         """Return a signal over the whole run, with its scalar kind; None if it is told to be wrong."""
         reference = read_reference(node, self.faults)
         source = (
             self.wiring.find(self.wiring.expansion.root, reference).source if reference is not None else None
         )
-        if isinstance(source, Node):
+        if isinstance(source, YamlNode):
             self.faults.add(node.place, "this is a constant, not a signal", "name an output of a block")
         if not isinstance(source, Wire) or source.block not in self.nodes:
             return None
@@ -183,13 +181,13 @@ class _Reader:
         stretch = Stretch(self._sampling(found))
         return Part(source.source, source.index, text, unit, shown, 0.0, stretch, shape), scalar
 
-    def _sampling(self, node: Block) -> Sampling:
+    def _sampling(self, node: Node) -> Sampling:
         """Return when a block's outputs are recorded."""
         task = node.task
         every = self.result.every.get(task.name, 1)
         return Sampling(task.offset, task.period * every, self.stop, self.shortened)
 
-    def _part(self, fields: yaml.Mapping) -> tuple[Part, str] | None:
+    def _part(self, fields: YamlMap) -> tuple[Part, str] | None:
         """Return the part that an expectation or a line of the summary is about."""
         found = self._signal(fields["signal"]) if "signal" in fields else None
         after, before = (
@@ -202,7 +200,7 @@ class _Reader:
         stretch = replace(found[0].stretch, after=after or Fraction(0), before=before)
         return replace(found[0], of=of or 0.0, stretch=stretch), found[1]
 
-    def expectation(self, node: Node) -> None:
+    def expectation(self, node: YamlNode) -> None:
         """Read ``{signal: plant.position[0], after: 20 s, within: 0.15 m}``."""
         fields = self.faults.collect(node.fields, ("signal",), (*STRETCH_KEYS, *EXPECTATIONS), self.faults)
         if fields is None:
@@ -223,10 +221,10 @@ class _Reader:
                 part = found[0] if is_count else replace(found[0], shown=shown)
                 self.result.expectations.append(Expectation(part, kind, limit))
 
-    def entry(self, label: str, node: Node) -> None:
+    def entry(self, label: str, node: YamlNode) -> None:
         """Read a line of the summary: ``x: {signal: plant.position[0], after: 40 s, show: [rms, max]}``."""
-        if not isinstance(node, yaml.Mapping):
-            node = yaml.Mapping({}, {"signal": node}, node.file, node.line, node.column)
+        if not isinstance(node, YamlMap):
+            node = YamlMap({}, {"signal": node}, node.file, node.line, node.column)
         fields = self.faults.collect(node.fields, ("signal",), SUMMARY_KEYS, self.faults)
         if fields is None:
             return
@@ -244,7 +242,7 @@ class _Reader:
         shown = tuple(name for name in show if name is not None) or default
         self.result.summary.append(Entry(label, replace(part, shown=unit or part.shown), shown))
 
-    def figures(self, node: Node) -> None:
+    def figures(self, node: YamlNode) -> None:
         """Read the figures as ``quadvis.output.plot`` will, and look for their signals."""
         read_figures(node, self.faults)
         told = {fault.place for fault in self.faults}
@@ -261,34 +259,34 @@ class _Reader:
                     self.faults.add(name.place, problem, "give it a panel of its own")
 
 
-def _written(node: Node) -> Unit | None:
+def _written(node: YamlNode) -> Unit | None:
     """Return the unit in which a quantity was written."""
     unit = split_quantity(node.text())[1]
     return Unit.parse(unit) if unit else None
 
 
-def _panels(node: Node) -> Iterator[yaml.Mapping]:
+def _panels(node: YamlNode) -> Iterator[YamlMap]:
     """Yield the panels of figures as far as they are maps; a figure may be its own panel."""
-    for figure in node if isinstance(node, yaml.Sequence) else ():
-        panels = figure.get("panels") if isinstance(figure, yaml.Mapping) else None
-        for panel in panels if isinstance(panels, yaml.Sequence) else (figure,):
-            if isinstance(panel, yaml.Mapping):
+    for figure in node if isinstance(node, YamlList) else ():
+        panels = figure.get("panels") if isinstance(figure, YamlMap) else None
+        for panel in panels if isinstance(panels, YamlList) else (figure,):
+            if isinstance(panel, YamlMap):
                 yield panel
 
 
-def _signals(panel: yaml.Mapping) -> Iterator[Node]:
+def _signals(panel: YamlMap) -> Iterator[YamlNode]:
     """Yield the names of signals in a panel."""
     signals = panel.get("signals")
-    for item in signals if isinstance(signals, yaml.Sequence) else (signals,):
-        name = item.get("signal") if isinstance(item, yaml.Mapping) else item
-        if isinstance(name, Scalar):
+    for item in signals if isinstance(signals, YamlList) else (signals,):
+        name = item.get("signal") if isinstance(item, YamlMap) else item
+        if isinstance(name, YamlScalar):
             yield name
 
 
-def _plain(node: Node, names: Mapping[Place, str]) -> Any:
+def _plain(node: YamlNode, names: Mapping[Place, str]) -> Any:
     """Return a section as plain data, with every signal by its full name."""
-    if isinstance(node, yaml.Sequence):
+    if isinstance(node, YamlList):
         return [_plain(child, names) for child in node]
-    if isinstance(node, yaml.Mapping):
+    if isinstance(node, YamlMap):
         return {key: _plain(child, names) for key, child in node.values.items()}
     return names.get(node.place) or node.to_python()

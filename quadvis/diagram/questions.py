@@ -9,13 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from quadvis import document as yaml
 from quadvis.diagram.flow import misfit
 from quadvis.diagram.reference import read_reference
 from quadvis.diagram.times import read_duration
 from quadvis.diagram.variable import Variable, find_variable
 from quadvis.diagram.wiring import Wiring
-from quadvis.document import Node, Scalar
+from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar
 from quadvis.engine.graph import Graph, Wire
 from quadvis.engine.names import wire_text
 from quadvis.errors import Faults
@@ -80,20 +79,20 @@ class Questions:
         return self.cuts + added, self.limits + tuple(limit for limit in sought if limit is not None)
 
 
-def _text(text: str, place: str, key: str = "") -> Scalar:
-    return Scalar(text, False, place, 0, 0, key)
+def _text(text: str, place: str, key: str = "") -> YamlScalar:
+    return YamlScalar(text, False, place, 0, 0, key)
 
 
-def _list(signals: str | Sequence[str]) -> Node:
+def _list(signals: str | Sequence[str]) -> YamlNode:
     texts = [signals] if isinstance(signals, str) else list(signals)
-    return yaml.Sequence([_text(text, "--cut") for text in texts], "--cut", 0, 0)
+    return YamlList([_text(text, "--cut") for text in texts], "--cut", 0, 0)
 
 
-def _map(limit: tuple[str, str, str]) -> yaml.Mapping:
-    values: dict[str, Node] = {
+def _map(limit: tuple[str, str, str]) -> YamlMap:
+    values: dict[str, YamlNode] = {
         key: _text(text, "--vary", key) for key, text in zip(LIMIT_KEYS, limit, strict=True)
     }
-    return yaml.Mapping({}, values, "--vary", 0, 0)
+    return YamlMap({}, values, "--vary", 0, 0)
 
 
 @dataclass(frozen=True)
@@ -104,7 +103,7 @@ class QuestionReader:
     graph: Graph
     nodes: Mapping[str, Any] = field(default_factory=dict)
 
-    def read(self, node: Node | None, faults: Faults) -> Questions:
+    def read(self, node: YamlNode | None, faults: Faults) -> Questions:
         """Read the section; faults are collected."""
         with faults.about("analyse"):
             fields = faults.collect(node.fields, (), ANALYSE_KEYS, faults) if node is not None else None
@@ -122,21 +121,21 @@ class QuestionReader:
             tuple(limit for limit in sought if limit is not None),
         )
 
-    def cut(self, label: str, node: Node, faults: Faults) -> Cut | None:
+    def cut(self, label: str, node: YamlNode, faults: Faults) -> Cut | None:
         """Read ``[control/heading.right, control/heading.right_velocity]`` or one signal."""
-        items = node.values if isinstance(node, yaml.Sequence) else [node]
+        items = node.values if isinstance(node, YamlList) else [node]
         if not items:
             faults.add(node.place, f"cut '{label}' has no signals", "name one, such as control/roll.torque")
         found = [self._signal(item, faults) for item in items]
         signals = tuple(signal for signal in found if signal is not None)
         return Cut(label, signals) if signals and len(signals) == len(items) else None
 
-    def _signal(self, node: Node, faults: Faults) -> CutSignal | None:
+    def _signal(self, node: YamlNode, faults: Faults) -> CutSignal | None:
         reference = read_reference(node, faults)
         if reference is None:
             return None
         source = self.wiring.find(self.wiring.expansion.root, reference).source
-        if isinstance(source, Node):
+        if isinstance(source, YamlNode):
             faults.add(node.place, "this is a constant, not a signal", "name an output of a block")
         if not isinstance(source, Wire) or source.block not in self.nodes:
             return None
@@ -157,7 +156,7 @@ class QuestionReader:
         elements = tuple(int(element) for element in np.ravel(flat))
         return CutSignal(wire_text(source), source.block, source.port, elements)
 
-    def limit(self, label: str, node: Node, faults: Faults) -> Limit | None:
+    def limit(self, label: str, node: YamlNode, faults: Faults) -> Limit | None:
         """Read ``{vary: eyes/camera.latency, from: 50 ms, to: 2 s}``."""
         fields = faults.collect(node.fields, LIMIT_KEYS, (), faults)
         if fields is None or any(key not in fields for key in LIMIT_KEYS):

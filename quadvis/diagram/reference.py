@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from quadvis.document import Node
+from quadvis.document import YamlNode
 from quadvis.engine.graph import Index
 from quadvis.engine.names import read_name
 from quadvis.errors import Faults, Place
@@ -20,7 +20,7 @@ class Reference:
     index: Index = ()
 
 
-def read_reference(node: Node, faults: Faults) -> Reference | None:
+def read_reference(node: YamlNode, faults: Faults) -> Reference | None:
     """Read the name of a signal; None if it is none, which is told."""
     text = faults.collect(node.text)
     if text is None:

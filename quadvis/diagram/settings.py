@@ -19,10 +19,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from quadvis import document as yaml
 from quadvis.diagram.loader import is_version
 from quadvis.diagram.values import read_constant
-from quadvis.document import Node, parse_yaml, read_yaml
+from quadvis.document import YamlList, YamlMap, YamlNode, parse_yaml, read_yaml
 from quadvis.errors import DiagramError, Faults, Odd, Place
 from quadvis.errors.characters import first_odd
 from quadvis.machine.missing_file import file_trouble
@@ -39,7 +38,7 @@ class Setting:
     """A value given from outside, and where its name stands; None: what is wrong with it has been told."""
 
     place: Place
-    value: Node | None
+    value: YamlNode | None
 
 
 @dataclass(frozen=True)
@@ -120,7 +119,7 @@ def _read_file(
     return texts.get("name")
 
 
-def _is_parameters(root: yaml.Mapping, faults: Faults) -> bool:
+def _is_parameters(root: YamlMap, faults: Faults) -> bool:
     """Tell a diagram or a part in one sentence, not by all that is odd in it."""
     if "set" in root or "blocks" not in root:
         return True
@@ -162,7 +161,7 @@ def _odd(name: str) -> Odd | None:
     return Odd(0, 0, char) if char is not None else None
 
 
-def _value(text: str, parameter: str, place: Place) -> Node:
+def _value(text: str, parameter: str, place: Place) -> YamlNode:
     """Read a value that stands in no file. A file named there is relative to the working directory."""
     try:
         node = parse_yaml(text, place.file)
@@ -173,16 +172,16 @@ def _value(text: str, parameter: str, place: Place) -> Node:
     return node
 
 
-def _put_at(node: Node, number: int) -> None:
+def _put_at(node: YamlNode, number: int) -> None:
     """Give a value and all that is in it the place of the setting."""
     node.line, node.column = 0, number
-    if isinstance(node, yaml.Sequence):
+    if isinstance(node, YamlList):
         children = node.values
     else:
-        children = list(node.values.values()) if isinstance(node, yaml.Mapping) else []
+        children = list(node.values.values()) if isinstance(node, YamlMap) else []
     for child in children:
         _put_at(child, number)
-    for key in node.keys.values() if isinstance(node, yaml.Mapping) else ():
+    for key in node.keys.values() if isinstance(node, YamlMap) else ():
         _put_at(key, number)
 
 

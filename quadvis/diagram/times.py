@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from quadvis.document import Mapping, Node, Scalar
+from quadvis.document import YamlMap, YamlNode, YamlScalar
 from quadvis.errors import Faults, Place
 from quadvis.units import Unit, format_quantity, split_quantity
 
@@ -23,9 +23,9 @@ class Rate:
     place: Place = field(default=Place(""), compare=False)
 
 
-def read_rate(node: Node) -> Rate:
+def read_rate(node: YamlNode) -> Rate:
     """Read ``20 Hz``, ``50 ms`` or ``{rate: 10 Hz, offset: 70 ms}``."""
-    if not isinstance(node, Mapping):
+    if not isinstance(node, YamlMap):
         return Rate(read_period(node), place=node.place)
     faults = Faults()
     node = node.fields(RATE_KEYS[:1], RATE_KEYS[1:], faults)
@@ -36,7 +36,7 @@ def read_rate(node: Node) -> Rate:
     return Rate(period, offset or Fraction(0), node.place)
 
 
-def read_period(node: Node) -> Fraction:
+def read_period(node: YamlNode) -> Fraction:
     """Read a rate or a period; a number without unit is asked for one."""
     period = node.period()
     if not SHORTEST <= period <= LONGEST:
@@ -45,9 +45,9 @@ def read_period(node: Node) -> Fraction:
     return period
 
 
-def read_duration(node: Node) -> Fraction:
+def read_duration(node: YamlNode) -> Fraction:
     """Read a time that is not negative."""
-    number, unit = split_quantity(node.value) if isinstance(node, Scalar) else ("", "")
+    number, unit = split_quantity(node.value) if isinstance(node, YamlScalar) else ("", "")
     if not number and not unit:
         raise node.wrong("a time such as '20 s'")
     if not unit and number.strip("0.+-"):
@@ -60,9 +60,9 @@ def read_duration(node: Node) -> Fraction:
     return value
 
 
-def read_step(node: Node) -> Fraction:
+def read_step(node: YamlNode) -> Fraction:
     """Read the step of a solver, mostly written as a time."""
-    if isinstance(node, Scalar) and not split_quantity(node.value)[1]:
+    if isinstance(node, YamlScalar) and not split_quantity(node.value)[1]:
         read_duration(node)
     return read_period(node)
 

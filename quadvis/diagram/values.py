@@ -9,9 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from quadvis import document as yaml
 from quadvis.block import Param, SignalType
-from quadvis.document import Node, Scalar, measure
+from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar, measure
 from quadvis.document.number_lists import Numbers
 from quadvis.errors import Faults, quoted, suggestion
 from quadvis.units import Unit, parse_quantity, split_quantity
@@ -28,7 +27,7 @@ BARE = Bare()
 OpenUnits = tuple[Unit | Bare | None, ...]  # of the elements; None is a 0 without unit, which fits any
 
 
-def read_constant(node: Node, faults: Faults) -> Node | None:
+def read_constant(node: YamlNode, faults: Faults) -> YamlNode | None:
     """Return a value with each unit at its number: ``{value: [1, 2], unit: m}`` becomes ``[1 m, 2 m]``.
 
     None if it is wrong, which is told; ``$name`` has no place in it.
@@ -36,19 +35,21 @@ def read_constant(node: Node, faults: Faults) -> Node | None:
     return substitute(node, None, faults)
 
 
-def substitute(node: Node, params: Mapping[str, Node | None] | None, faults: Faults) -> Node | None:
+def substitute(
+    node: YamlNode, params: Mapping[str, YamlNode | None] | None, faults: Faults
+) -> YamlNode | None:
     """Do the same, with every ``$name`` and ``$name[i]`` replaced by the parameter that it names."""
-    if isinstance(node, Scalar):
+    if isinstance(node, YamlScalar):
         return _parameter(node, params, faults) if node.value.startswith("$") else node
     if isinstance(node, Numbers):
         return node
-    if isinstance(node, yaml.Sequence):
+    if isinstance(node, YamlList):
         found = [substitute(child, params, faults) for child in node]
         whole = [child for child in found if child is not None]
         if len(whole) < len(found):
             return None
-        return yaml.Sequence(whole, node.file, node.line, node.column, node.key)
-    assert isinstance(node, yaml.Mapping)
+        return YamlList(whole, node.file, node.line, node.column, node.key)
+    assert isinstance(node, YamlMap)
     if not any(key in node for key in QUANTITY_KEYS):
         return node  # no value at all: whoever reads it will say so
     node = node.fields(QUANTITY_KEYS[:1], QUANTITY_KEYS[1:], faults)
@@ -56,7 +57,9 @@ def substitute(node: Node, params: Mapping[str, Node | None] | None, faults: Fau
     return None if value is None else faults.collect(_spread, value, node.get("unit"), node.key)
 
 
-def _parameter(node: Scalar, params: Mapping[str, Node | None] | None, faults: Faults) -> Node | None:
+def _parameter(
+    node: YamlScalar, params: Mapping[str, YamlNode | None] | None, faults: Faults
+) -> YamlNode | None:
     if params is None:
         faults.add(node.place, f"{quoted(node.value)} stands where a value must", "write the value itself")
         return None
@@ -70,23 +73,23 @@ def _parameter(node: Scalar, params: Mapping[str, Node | None] | None, faults: F
     if found is None or match["element"] is None:
         return found
     element = int(match["element"])
-    if isinstance(found, yaml.Sequence) and element < len(found):
+    if isinstance(found, YamlList) and element < len(found):
         return found[element]
-    count = f"has {len(found)} elements" if isinstance(found, yaml.Sequence) else "is one value"
+    count = f"has {len(found)} elements" if isinstance(found, YamlList) else "is one value"
     faults.add(node.place, f"parameter '{match['name']}' {count}, there is no [{element}]", "count from 0")
     return None
 
 
-def named_parameters(node: Node) -> set[str]:
+def named_parameters(node: YamlNode) -> set[str]:
     """Return the names that a value takes from ``params``: ``$name`` and ``$name[i]``."""
-    if isinstance(node, Scalar):
+    if isinstance(node, YamlScalar):
         match = _PARAMETER.fullmatch(node.value)
         return {match["name"]} if match else set()
-    children = node.values.values() if isinstance(node, yaml.Mapping) else node.items()
+    children = node.values.values() if isinstance(node, YamlMap) else node.items()
     return {name for child in children for name in named_parameters(child)}
 
 
-def _spread(value: Node, unit: Node | None, key: str) -> Node:
+def _spread(value: YamlNode, unit: YamlNode | None, key: str) -> YamlNode:
     """Put a unit, or one for each element of the last axis, behind numbers without one; call it ``key``."""
     units = unit.units() if unit is not None else (Unit(),)
     if unit is not None:
@@ -100,19 +103,19 @@ def _spread(value: Node, unit: Node | None, key: str) -> Node:
     return _with_units(value, itertools.cycle(units), key)
 
 
-def _with_units(node: Node, units: Iterator[Unit], key: str) -> Node:
-    if isinstance(node, yaml.Sequence):
+def _with_units(node: YamlNode, units: Iterator[Unit], key: str) -> YamlNode:
+    if isinstance(node, YamlList):
         values = [_with_units(child, units, f"{key}[{index}]") for index, child in enumerate(node)]
-        return yaml.Sequence(values, node.file, node.line, node.column, key)
+        return YamlList(values, node.file, node.line, node.column, key)
     unit = next(units)
-    if not isinstance(node, Scalar):
+    if not isinstance(node, YamlScalar):
         return node
     number, written = split_quantity(node.value)
     text = f"{number} {unit}" if number and not written and unit.symbols else node.value
-    return Scalar(text, node.plain, node.file, node.line, node.column, key)
+    return YamlScalar(text, node.plain, node.file, node.line, node.column, key)
 
 
-def read_parameter(param: Param, node: Node) -> tuple[Any, OpenUnits]:
+def read_parameter(param: Param, node: YamlNode) -> tuple[Any, OpenUnits]:
     """Return a parameter's value as the block takes it, and its units where the declaration leaves them open.
 
     DiagramError if the value is of another kind, shape or unit.
@@ -128,7 +131,7 @@ def read_parameter(param: Param, node: Node) -> tuple[Any, OpenUnits]:
     return read_value(param.signal, param.units, node)
 
 
-def read_value(signal: SignalType, units: Sequence[Unit], node: Node) -> tuple[Any, OpenUnits]:
+def read_value(signal: SignalType, units: Sequence[Unit], node: YamlNode) -> tuple[Any, OpenUnits]:
     """Return a number, truth value or nested list in the declared unit, and the units if they are open.
 
     Numbers without a unit are refused where the declaration has one, except 0. All faults of the elements are
@@ -169,7 +172,9 @@ def _read_whole(declared: Unit, node: Numbers) -> tuple[Any, OpenUnits]:
     if not declared.variables:
         return _floats(node.numbers), ()
     # All numbers but 0 are alike: what holds for one of them holds for the others.
-    unit = _element("float64", declared, Scalar("1", True, node.file, node.line, node.column, node.key))[1]
+    unit = _element("float64", declared, YamlScalar("1", True, node.file, node.line, node.column, node.key))[
+        1
+    ]
     return _floats(node.numbers), tuple([unit if number else None for number in node.flat()])
 
 
@@ -186,14 +191,14 @@ def shape_text(shape: Sequence[int | str]) -> str:
     return f"{' x '.join(map(str, shape))} values" if shape else "one value"
 
 
-def _element(scalar: str, declared: Unit, node: Node) -> tuple[Any, Unit | Bare | None]:
+def _element(scalar: str, declared: Unit, node: YamlNode) -> tuple[Any, Unit | Bare | None]:
     if scalar == "bool":
         return node.boolean(), None
     if scalar == "int64":
         return node.integer(), None
     if not declared.variables:
         return node.quantity(declared, bare=False), declared
-    if not isinstance(node, Scalar) or not node.value:
+    if not isinstance(node, YamlScalar) or not node.value:
         raise node.wrong("a number or a quantity")
     value, unit = node.read(parse_quantity)
     if unit.variables:
@@ -211,9 +216,9 @@ def si(unit: Unit) -> Unit:
     return Unit.parse("*".join(f"{name}^({power})" for name, power in sorted(unit.dimension)) or "1")
 
 
-def _leaves(node: Node) -> list[Node]:
-    return [leaf for child in node for leaf in _leaves(child)] if isinstance(node, yaml.Sequence) else [node]
+def _leaves(node: YamlNode) -> list[YamlNode]:
+    return [leaf for child in node for leaf in _leaves(child)] if isinstance(node, YamlList) else [node]
 
 
-def _plain(node: Node, values: Iterator[Any]) -> Any:
-    return [_plain(child, values) for child in node] if isinstance(node, yaml.Sequence) else next(values)
+def _plain(node: YamlNode, values: Iterator[Any]) -> Any:
+    return [_plain(child, values) for child in node] if isinstance(node, YamlList) else next(values)

@@ -10,9 +10,8 @@ import numpy as np
 from quadvis.diagram.expand import Scope
 from quadvis.diagram.values import si
 from quadvis.diagram.wiring import Wiring
-from quadvis.document import Node, Scalar, Sequence
-from quadvis.engine.graph import Graph
-from quadvis.engine.graph import Node as Block
+from quadvis.document import YamlList, YamlNode, YamlScalar
+from quadvis.engine.graph import Graph, Node
 from quadvis.errors import DiagramError, suggestion
 from quadvis.units import Unit, UnitError, parse_quantity
 
@@ -38,7 +37,7 @@ class Variable:
         return f"{self.parameter}={text}"
 
 
-def find_variable(wiring: Wiring, graph: Graph, node: Node) -> Variable:
+def find_variable(wiring: Wiring, graph: Graph, node: YamlNode) -> Variable:
     """Return the parameter that a text names; DiagramError if there is none, or if it is no real number."""
     text = node.text()
     match = NAME.fullmatch(text)
@@ -59,7 +58,7 @@ def find_variable(wiring: Wiring, graph: Graph, node: Node) -> Variable:
 
 
 def _values(
-    wiring: Wiring, graph: Graph, node: Node, path: str, name: str
+    wiring: Wiring, graph: Graph, node: YamlNode, path: str, name: str
 ) -> tuple[list[Unit], tuple[str, ...]]:
     """Return the units and the texts of a parameter's elements."""
     scope: Scope | None = wiring.expansion.root
@@ -76,25 +75,27 @@ def _values(
     return _given(node, paths[path], name)
 
 
-def _written(wiring: Wiring, node: Node, name: str, value: Node | None) -> tuple[list[Unit], tuple[str, ...]]:
-    leaves = list(value) if isinstance(value, Sequence) else [value] if value is not None else []
+def _written(
+    wiring: Wiring, node: YamlNode, name: str, value: YamlNode | None
+) -> tuple[list[Unit], tuple[str, ...]]:
+    leaves = list(value) if isinstance(value, YamlList) else [value] if value is not None else []
     wrong = {fault.place for fault in wiring.faults}
     if value is None or any(leaf.place in wrong for leaf in leaves):
         raise DiagramError(())  # what is wrong with it has been reported
     units, texts = [], []
     for leaf in leaves:
         try:
-            unit = parse_quantity(leaf.value)[1] if isinstance(leaf, Scalar) else None
+            unit = parse_quantity(leaf.value)[1] if isinstance(leaf, YamlScalar) else None
         except UnitError:
             unit = None
-        if unit is None or not isinstance(leaf, Scalar):
+        if unit is None or not isinstance(leaf, YamlScalar):
             raise node.fault(f"parameter '{name}' is not a number", "vary one that is")
         units.append(si(unit))
         texts.append(leaf.value)
     return units, tuple(texts)
 
 
-def _given(node: Node, block: Block, name: str) -> tuple[list[Unit], tuple[str, ...]]:
+def _given(node: YamlNode, block: Node, name: str) -> tuple[list[Unit], tuple[str, ...]]:
     params = block.block.interface.params
     if name not in params:
         raise node.fault(f"block '{block.path}' has no parameter '{name}'", suggestion(name, params))

@@ -11,7 +11,7 @@ from quadvis.diagram.loader import INSIDE, InputSpec
 from quadvis.diagram.reference import Reference
 from quadvis.diagram.slots import Refused
 from quadvis.diagram.values import substitute
-from quadvis.document import Node, Sequence
+from quadvis.document import YamlList, YamlNode
 from quadvis.engine.graph import Index, Wire
 from quadvis.errors import Faults, Place, suggestion
 
@@ -23,7 +23,7 @@ class Source:
     """What an input is given; None where the fault has been told."""
 
     place: Place
-    source: Wire | Node | None
+    source: Wire | YamlNode | None
     across: Place | None = None
 
 
@@ -111,7 +111,7 @@ class Wiring:
     def _source(self, scope: Scope, given: InputSpec) -> Source:
         if given.source is None:
             return Source(given.place, None)
-        if isinstance(given.source, Node):
+        if isinstance(given.source, YamlNode):
             return Source(given.place, substitute(given.source, scope.params, self.faults))
         found = self.find(scope, given.source)
         if isinstance(found.source, Wire) and given.across is not None:
@@ -174,7 +174,7 @@ class Wiring:
         if not reference.index or found.source is None:
             return found
         place = reference.place
-        if isinstance(found.source, Node):
+        if isinstance(found.source, YamlNode):
             part = _element(found.source, reference.index)
             if part is None:
                 self.faults.add(place, "the constant has no such element", "count from 0")
@@ -194,16 +194,16 @@ def _owner(scope: Scope, name: str) -> tuple[Scope, str]:
     return scope, name
 
 
-def _element(node: Node, index: Index) -> Node | None:
+def _element(node: YamlNode, index: Index) -> YamlNode | None:
     """Return a part of a constant; None if there is no such part."""
     for part in index:
-        if not isinstance(node, Sequence):
+        if not isinstance(node, YamlList):
             return None
         if isinstance(part, slice):
             values = node.values[part]
             if len(index) > 1 or not values or (part.stop or 0) > len(node):
                 return None
-            return Sequence(values, node.file, node.line, node.column, node.key)
+            return YamlList(values, node.file, node.line, node.column, node.key)
         if part >= len(node):
             return None
         node = node[part]

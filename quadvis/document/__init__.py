@@ -1,8 +1,16 @@
 """YAML files that may be wrong or hostile: read within limits, as untyped nodes with their places."""
 
-from quadvis.document.nodes import Mapping, Node, Scalar, Sequence, measure
+from quadvis.document.nodes import YamlList, YamlMap, YamlNode, YamlScalar, measure
 from quadvis.document.reader import MAX_BYTES, dump_yaml, parse_yaml, read_yaml
 
 __all__ = [
-    "MAX_BYTES", "Mapping", "Node", "Scalar", "Sequence", "dump_yaml", "measure", "parse_yaml", "read_yaml",
+    "MAX_BYTES",
+    "YamlList",
+    "YamlMap",
+    "YamlNode",
+    "YamlScalar",
+    "dump_yaml",
+    "measure",
+    "parse_yaml",
+    "read_yaml",
 ]  # fmt: skip

@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from quadvis.document.damage import ORIGINALS
-from quadvis.document.nodes import Mapping, Node, Scalar, Sequence
+from quadvis.document.nodes import YamlList, YamlMap, YamlNode, YamlScalar
 from quadvis.document.number_lists import MARK, NumberList, Numbers, numbers_in
 from quadvis.errors import DiagramError, Fault, Faults, Odd, Place, quoted
 from quadvis.errors.characters import (
@@ -69,10 +69,10 @@ class Position:
 class _Level:
     """A list or map that is not complete: the key that waits for its value, and keys that are there twice."""
 
-    node: Sequence | Mapping
+    node: YamlList | YamlMap
     is_flow: bool
-    key: Scalar | None = None
-    doubles: list[tuple[Scalar, Node]] = field(default_factory=list)
+    key: YamlScalar | None = None
+    doubles: list[tuple[YamlScalar, YamlNode]] = field(default_factory=list)
     in_key: bool = False  # it stands in place of a key, which has been reported
 
 
@@ -92,29 +92,31 @@ class Composer:
         self.is_ascii = text.isascii() and "\t" not in text and not lists
         self.lists = {at: (found, source) for at, found, source in numbers_in(lists or [], text)}
         self.stack: list[_Level] = []
-        self.root: Node | None = None
+        self.root: YamlNode | None = None
         self.documents = self.nodes = 0
 
-    def compose(self, events: Iterator[Any]) -> Node:
+    def compose(self, events: Iterator[Any]) -> YamlNode:
         """Return the root; raise if there is none."""
         for event in events:
             kind = type(event)
             if kind is yaml.ScalarEvent:
                 self._add(self._scalar(event), event)
             elif kind is yaml.MappingStartEvent:
-                self._open(Mapping({}, {}, *self._position(event)), event)
+                self._open(YamlMap({}, {}, *self._position(event)), event)
             elif kind is yaml.SequenceStartEvent:
-                self._open(Sequence([], *self._position(event)), event)
+                self._open(YamlList([], *self._position(event)), event)
             elif kind is yaml.MappingEndEvent or kind is yaml.SequenceEndEvent:
                 self._close()
             elif kind is yaml.AliasEvent:
                 self._refuse(event, f"the alias {quoted('*' + event.anchor)} is not allowed", "write it out")
-                self._add(Scalar("", True, *self._position(event)), event)
+                self._add(YamlScalar("", True, *self._position(event)), event)
             elif kind is yaml.DocumentStartEvent:
                 self.documents += 1
                 if self.documents > 1:
                     raise self._fatal(event, "a second document begins here", "keep one document in a file")
-        if self.root is None or (isinstance(self.root, Scalar) and self.root.plain and not self.root.value):
+        if self.root is None or (
+            isinstance(self.root, YamlScalar) and self.root.plain and not self.root.value
+        ):
             raise DiagramError(
                 [*self.faults, Fault(Place(self.position.name, 1, 1), "", "the file is empty")]
             )
@@ -124,10 +126,10 @@ class Composer:
         mark = event.start_mark
         return self.position.of(mark.line, mark.column)
 
-    def _scalar(self, event: Any) -> Scalar | Numbers:
+    def _scalar(self, event: Any) -> YamlScalar | Numbers:
         value, plain = event.value, not event.style
         if self.is_ascii:
-            return Scalar(value, plain, *self._position(event))
+            return YamlScalar(value, plain, *self._position(event))
         if self.lists and MARK in value:
             mark = event.start_mark
             if value != MARK or not plain or (mark.line, mark.column) not in self.lists:
@@ -138,10 +140,10 @@ class Composer:
                 raise MisreadError  # read it again, to say at which element it is too much
             return Numbers(found, source, *self._position(event))
         if value.isascii() and "\t" not in value:
-            return Scalar(value, plain, *self._position(event))
+            return YamlScalar(value, plain, *self._position(event))
         if self.repaired:
             value = value.translate(ORIGINALS)
-        return Scalar(value, plain, *self._position(event), odd=self._odd(event))
+        return YamlScalar(value, plain, *self._position(event), odd=self._odd(event))
 
     def _odd(self, event: Any) -> Odd | None:
         """Return the first character of a text that was taken for an ASCII one, with its place."""
@@ -167,7 +169,7 @@ class Composer:
     def _fatal(self, event: Any, problem: str, remedy: str) -> DiagramError:
         return DiagramError([*self.faults, Fault(Place(*self._position(event)), "", problem, remedy)])
 
-    def _open(self, node: Sequence | Mapping, event: Any) -> None:
+    def _open(self, node: YamlList | YamlMap, event: Any) -> None:
         self._add(node, event)
         if len(self.stack) >= MAX_DEPTH:
             raise self._fatal(event, f"this is nested deeper than {MAX_DEPTH} levels", "write it flatter")
@@ -178,10 +180,10 @@ class Composer:
     def _close(self) -> None:
         level = self.stack.pop()
         if level.doubles:
-            assert isinstance(level.node, Mapping)
+            assert isinstance(level.node, YamlMap)
             self._refuse_doubles(level.node, level.doubles)
 
-    def _add(self, node: Node, event: Any) -> None:
+    def _add(self, node: YamlNode, event: Any) -> None:
         """Put a node where it belongs: below the waiting key, at the end of the list, or as a key itself."""
         self.nodes += 1
         if self.nodes > MAX_NODES:
@@ -192,7 +194,7 @@ class Composer:
             return
         level = self.stack[-1]
         parent = level.node
-        if isinstance(parent, Sequence):
+        if isinstance(parent, YamlList):
             node.key = f"{parent.key}[{len(parent.values)}]"
             parent.values.append(node)
         elif level.key is None:
@@ -202,9 +204,9 @@ class Composer:
             if key is not _NO_KEY:
                 self._put(level, parent, key, node)
 
-    def _put(self, level: _Level, parent: Mapping, key: Scalar, node: Node) -> None:
+    def _put(self, level: _Level, parent: YamlMap, key: YamlScalar, node: YamlNode) -> None:
         """Put a value under its key; a key without one in ``{}`` may be a slip with ':' or ','."""
-        if level.is_flow and key.plain and isinstance(node, Scalar) and node.plain and not node.value:
+        if level.is_flow and key.plain and isinstance(node, YamlScalar) and node.plain and not node.value:
             if self._is_fraction(parent, key):
                 return
             key, node = self._split(key, node)
@@ -214,11 +216,11 @@ class Composer:
         else:
             parent.keys[key.value], parent.values[key.value] = key, node
 
-    def _is_fraction(self, parent: Mapping, key: Scalar) -> bool:
+    def _is_fraction(self, parent: YamlMap, key: YamlScalar) -> bool:
         """Refuse the second half of ``0,5 m``, which stands as a key behind the value 0."""
         before = next(reversed(parent.values.values()), None)
         if (
-            not isinstance(before, Scalar)
+            not isinstance(before, YamlScalar)
             or not before.plain
             or (before.line, before.column + len(before.value) + 1) != (key.line, key.column)
             or not _WHOLE.fullmatch(before.value)
@@ -230,7 +232,7 @@ class Composer:
         before.value = right
         return True
 
-    def _split(self, key: Scalar, node: Scalar) -> tuple[Scalar, Scalar]:
+    def _split(self, key: YamlScalar, node: YamlScalar) -> tuple[YamlScalar, YamlScalar]:
         """Return the two halves of ``c:10 Hz``, which is refused."""
         match = _NO_BLANK.fullmatch(key.value)
         if match is None:
@@ -249,13 +251,13 @@ class Composer:
             self.faults.add(Place(key.file, key.line, column + 1), problem, replacement(rest[0]))
         odd = key.odd if first_odd(value) else None
         column += 1 + len(rest) - len(value)
-        return Scalar(name, True, key.file, key.line, key.column), Scalar(
+        return YamlScalar(name, True, key.file, key.line, key.column), YamlScalar(
             value, True, key.file, key.line, column, odd=odd
         )
 
-    def _refuse_doubles(self, parent: Mapping, doubles: list[tuple[Scalar, Node]]) -> None:
+    def _refuse_doubles(self, parent: YamlMap, doubles: list[tuple[YamlScalar, YamlNode]]) -> None:
         """Refuse keys that were there before, each once; what else stands below them is read, too."""
-        again: dict[str, list[Scalar]] = {}
+        again: dict[str, list[YamlScalar]] = {}
         for key, node in doubles:
             again.setdefault(key.value, []).append(key)
             _merge(parent.values[key.value], node)
@@ -281,12 +283,12 @@ class Composer:
             tag = event.tag.replace("tag:yaml.org,2002:", "!!")
             self._refuse(event, f"the tag {quoted(tag)} is not allowed", remedy)
 
-    def _key(self, node: Node, event: Any) -> Scalar:
+    def _key(self, node: YamlNode, event: Any) -> YamlScalar:
         """Return the key to put the next value under, `_NO_KEY` if it is refused."""
         if type(event) is yaml.AliasEvent:
             return _NO_KEY
         problem, remedy = _wrong_key(node)
-        if isinstance(node, Scalar) and not problem:
+        if isinstance(node, YamlScalar) and not problem:
             if node.plain and ":" in node.value and not self.stack[-1].is_flow:
                 self._check_run_on(node, event)
             return node
@@ -294,7 +296,7 @@ class Composer:
             self._refuse(event, problem, remedy)
         return _NO_KEY
 
-    def _check_run_on(self, key: Scalar, event: Any) -> None:
+    def _check_run_on(self, key: YamlScalar, event: Any) -> None:
         match = _RUN_ON.match(key.value)
         if match is not None:
             mark = event.start_mark
@@ -309,13 +311,13 @@ def forbidden(found: re.Match[str]) -> tuple[str, str]:
     return f"the control character U+{ord(char):04X} is not allowed", remedy
 
 
-def _where(node: Node) -> tuple[str, int, int]:
+def _where(node: YamlNode) -> tuple[str, int, int]:
     return node.file, node.line, node.column
 
 
-def _merge(first: Node, second: Node) -> None:
+def _merge(first: YamlNode, second: YamlNode) -> None:
     """Add what stands under a key the second time, unless that describes another thing of the same name."""
-    if not isinstance(first, Mapping) or not isinstance(second, Mapping) or not _agree(first, second):
+    if not isinstance(first, YamlMap) or not isinstance(second, YamlMap) or not _agree(first, second):
         return
     for key, node in second.pairs():
         if key.value in first:
@@ -324,20 +326,20 @@ def _merge(first: Node, second: Node) -> None:
             first.keys[key.value], first.values[key.value] = key, node
 
 
-def _agree(first: Mapping, second: Mapping) -> bool:
+def _agree(first: YamlMap, second: YamlMap) -> bool:
     """Say whether the texts under common keys are the same."""
     pairs = [(first[key], second[key]) for key in second if key in first]
     return all(
         one.value == other.value
-        if isinstance(one, Scalar) and isinstance(other, Scalar)
-        else isinstance(one, Mapping) and isinstance(other, Mapping)
+        if isinstance(one, YamlScalar) and isinstance(other, YamlScalar)
+        else isinstance(one, YamlMap) and isinstance(other, YamlMap)
         for one, other in pairs
     )
 
 
-def _wrong_key(node: Node) -> tuple[str, str]:
+def _wrong_key(node: YamlNode) -> tuple[str, str]:
     """Return what is wrong with a key, and what would be right; nothing if it will do."""
-    if not isinstance(node, Scalar):
+    if not isinstance(node, YamlScalar):
         return "a key must be a text", "put a text that begins with '{' or '[' in quotes"
     if not node.value:
         return "a key is missing before ':'", "write 'key: value'"
@@ -348,4 +350,4 @@ def _wrong_key(node: Node) -> tuple[str, str]:
     return "", ""
 
 
-_NO_KEY = Scalar("", True, "", 0, 0)
+_NO_KEY = YamlScalar("", True, "", 0, 0)

@@ -9,8 +9,7 @@ the place; to go on and report everything at once, read through `Faults.collect`
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator
-from collections.abc import Sequence as Items
+from collections.abc import Callable, Collection, Iterator, Sequence
 from fractions import Fraction
 from typing import Any, TypeVar
 
@@ -33,7 +32,7 @@ _TRUTH_ELSEWHERE = {
 }
 
 
-class Node:
+class YamlNode:
     """A value in a file; `key` is the name it stands under ("rate", "value[2]"), for messages."""
 
     __slots__ = ("column", "file", "key", "line")
@@ -69,7 +68,7 @@ class Node:
     def text(self) -> str:
         """Return a text; only one in quotes may be empty."""
         value = self._scalar("a text")
-        if not value and isinstance(self, Scalar) and self.plain:
+        if not value and isinstance(self, YamlScalar) and self.plain:
             raise self.wrong("a text", "write one, or leave the key out")
         return value
 
@@ -159,7 +158,7 @@ class Node:
                 problem, remedy = f"{quoted(text)} is not a number", f"write {quoted(text.replace(',', '.'))}"
             raise self.fault(label + problem, remedy) from None
 
-    def array(self, shape: Items[int | None] | None = None, unit: Unit | Items[Unit] = ONE) -> Any:
+    def array(self, shape: Sequence[int | None] | None = None, unit: Unit | Sequence[Unit] = ONE) -> Any:
         """Return nested lists of floats, each in its unit, all faults of the elements raised together.
 
         In `shape`, None stands for any size; without a shape any regular one is taken. Several units belong
@@ -173,21 +172,21 @@ class Node:
         faults.check()
         return result
 
-    def items(self) -> list[Node]:
+    def items(self) -> list[YamlNode]:
         """Return the values of a list."""
-        if isinstance(self, Sequence):
+        if isinstance(self, YamlList):
             return self.values
         raise self.wrong("a list")
 
-    def mapping(self) -> Mapping:
+    def mapping(self) -> YamlMap:
         """Return the map of names to values."""
-        if isinstance(self, Mapping):
+        if isinstance(self, YamlMap):
             return self
         raise self.wrong("a map", _map_remedy(self))
 
     def fields(
         self, required: Collection[str] = (), optional: Collection[str] = (), faults: Faults | None = None
-    ) -> Mapping:
+    ) -> YamlMap:
         """Return a map of which the keys are known: missing and unknown ones are faults.
 
         With `faults` those of the keys are kept there, and the map is returned with what it has; the value
@@ -201,7 +200,7 @@ class Node:
         return result
 
 
-class Scalar(Node):
+class YamlScalar(YamlNode):
     """A text; `plain` says that it stands without quotes."""
 
     __slots__ = ("odd", "plain", "value")
@@ -235,23 +234,23 @@ class Scalar(Node):
         return self.value
 
 
-class Sequence(Node):
+class YamlList(YamlNode):
     """A list of nodes."""
 
     __slots__ = ("_values",)
 
-    def __init__(self, values: list[Node], file: str, line: int, column: int, key: str = "") -> None:
+    def __init__(self, values: list[YamlNode], file: str, line: int, column: int, key: str = "") -> None:
         self.file, self.line, self.column, self.key = file, line, column, key
-        self._values: list[Node] | None = values
+        self._values: list[YamlNode] | None = values
 
     @property
-    def values(self) -> list[Node]:
+    def values(self) -> list[YamlNode]:
         """The nodes of the elements."""
         if self._values is None:
             self._values = self._make()
         return self._values
 
-    def _make(self) -> list[Node]:
+    def _make(self) -> list[YamlNode]:
         """Return the nodes of a list that was read as a whole."""
         raise NotImplementedError
 
@@ -270,22 +269,22 @@ class Sequence(Node):
     def __len__(self) -> int:
         return len(self.values)
 
-    def __getitem__(self, index: int) -> Node:
+    def __getitem__(self, index: int) -> YamlNode:
         return self.values[index]
 
-    def __iter__(self) -> Iterator[Node]:
+    def __iter__(self) -> Iterator[YamlNode]:
         return iter(self.values)
 
 
-class Mapping(Node):
+class YamlMap(YamlNode):
     """Nodes by name, in the order of the file; `keys` holds the names as nodes, for their places."""
 
     __slots__ = ("keys", "values")
 
     def __init__(
         self,
-        keys: dict[str, Scalar],
-        values: dict[str, Node],
+        keys: dict[str, YamlScalar],
+        values: dict[str, YamlNode],
         file: str,
         line: int,
         column: int,
@@ -301,24 +300,24 @@ class Mapping(Node):
     def _described(self) -> str:
         return "a map"
 
-    def get(self, key: str) -> Node | None:
+    def get(self, key: str) -> YamlNode | None:
         """Return the value under a key, or None."""
         return self.values.get(key)
 
-    def pairs(self) -> list[tuple[Scalar, Node]]:
+    def pairs(self) -> list[tuple[YamlScalar, YamlNode]]:
         """Return the keys, as nodes with a place, and their values."""
         return list(zip(self.keys.values(), self.values.values(), strict=True))
 
-    def renamed(self, key: str, name: str) -> Mapping:
+    def renamed(self, key: str, name: str) -> YamlMap:
         """Return a map in which a value is found under another key; the place of the key stays."""
         keys = {name if old == key else old: node for old, node in self.keys.items()}
         values = {name if old == key else old: node for old, node in self.values.items()}
-        return Mapping(keys, values, self.file, self.line, self.column, self.key)
+        return YamlMap(keys, values, self.file, self.line, self.column, self.key)
 
     def __contains__(self, key: str) -> bool:
         return key in self.values
 
-    def __getitem__(self, key: str) -> Node:
+    def __getitem__(self, key: str) -> YamlNode:
         return self.values[key]
 
     def __iter__(self) -> Iterator[str]:
@@ -328,9 +327,9 @@ class Mapping(Node):
         return len(self.values)
 
 
-def _map_remedy(node: Node) -> str:
+def _map_remedy(node: YamlNode) -> str:
     """Return what to write where a text stands in place of a map: "name:value" lacks a blank."""
-    match = _NO_BLANK.match(node.value) if isinstance(node, Scalar) and node.plain else None
+    match = _NO_BLANK.match(node.value) if isinstance(node, YamlScalar) and node.plain else None
     return f"write a blank behind {quoted(match.group())}" if match else "write 'name: value' lines below it"
 
 
@@ -349,8 +348,8 @@ def plain_value(text: str) -> Any:
 
 
 def _check_keys(
-    found: Mapping, required: Collection[str], optional: Collection[str], faults: Faults
-) -> Mapping:
+    found: YamlMap, required: Collection[str], optional: Collection[str], faults: Faults
+) -> YamlMap:
     """Keep a fault for each unknown key and each missing one; return the map with misspelt keys as meant."""
     known = list(dict.fromkeys((*required, *optional)))
     free = [name for name in known if name not in found]
@@ -370,9 +369,9 @@ def _check_keys(
     return result
 
 
-def measure(node: Node) -> tuple[int, ...]:
+def measure(node: YamlNode) -> tuple[int, ...]:
     """Return the shape of nested lists, () for anything else; all elements of a list must have the same."""
-    if not isinstance(node, Sequence):
+    if not isinstance(node, YamlList):
         return ()
     if node.shape is not None:
         return node.shape
@@ -383,12 +382,12 @@ def measure(node: Node) -> tuple[int, ...]:
     return (len(shapes), *(shapes[0] if shapes else ()))
 
 
-def _fits(found: Items[int], shape: Items[int | None]) -> bool:
+def _fits(found: Sequence[int], shape: Sequence[int | None]) -> bool:
     pairs = zip(found, shape, strict=False)
     return len(found) == len(shape) and all(wanted is None or size == wanted for size, wanted in pairs)
 
 
-def _sized(shape: Items[int | None]) -> str:
+def _sized(shape: Sequence[int | None]) -> str:
     """Return a shape in words: "a number", "a list of 3 numbers", "a 2 x 3 list of numbers"."""
     if not shape:
         return "a number"
@@ -398,8 +397,8 @@ def _sized(shape: Items[int | None]) -> str:
     return f"a {' x '.join('any' if size is None else str(size) for size in shape)} list of numbers"
 
 
-def _array(node: Node, each: tuple[Unit, ...], index: int, faults: Faults) -> Any:
-    if isinstance(node, Sequence):
+def _array(node: YamlNode, each: tuple[Unit, ...], index: int, faults: Faults) -> Any:
+    if isinstance(node, YamlList):
         return [_array(child, each, i, faults) for i, child in enumerate(node.values)]
     value = faults.collect(node.quantity, each[index] if len(each) > 1 and index < len(each) else each[0])
     return 0.0 if value is None else value

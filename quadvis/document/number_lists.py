@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from quadvis.document.nodes import Node, Scalar, Sequence
+from quadvis.document.nodes import YamlList, YamlNode, YamlScalar
 from quadvis.units import Unit
 
 MARK = "\ue000"
@@ -80,7 +80,7 @@ def hide_lists(text: str, lists: list[NumberList]) -> str:
     return "".join([*pieces, text[last:]])
 
 
-class Numbers(Sequence):
+class Numbers(YamlList):
     """A regular list of numbers, with a unit for all of them or for each along the last axis.
 
     ``element_units`` is empty where the text has none; ``numbers`` are nested lists of int and float.
@@ -127,9 +127,9 @@ class Numbers(Sequence):
         """Return the list of plain values."""
         return self.numbers if not self.element_units else super().to_python()
 
-    def _make(self) -> list[Node]:
+    def _make(self) -> list[YamlNode]:
         """Make the nodes of all elements, with their places."""
-        stack: list[tuple[Sequence, list[Node]]] = []
+        stack: list[tuple[YamlList, list[YamlNode]]] = []
         line, start = self.line, -(self.column - 1)  # where the line begins in the text of the list
         written = 0
         for match in _ELEMENT.finditer(self.source):
@@ -142,11 +142,11 @@ class Numbers(Sequence):
                 if not stack:
                     return values
                 continue
-            outer, siblings = stack[-1] if stack else (self, list[Node]())
+            outer, siblings = stack[-1] if stack else (self, list[YamlNode]())
             key = f"{outer.key}[{len(siblings)}]" if stack else self.key
             if token == "[":
                 values = []
-                inner = Sequence(values, self.file, line, column, key) if stack else self
+                inner = YamlList(values, self.file, line, column, key) if stack else self
                 siblings.append(inner)
                 stack.append((inner, values))
                 continue
@@ -154,7 +154,7 @@ class Numbers(Sequence):
                 unit = self.element_units[written % len(self.element_units)]
                 token = f"{token} {unit}" if unit.symbols else token
             written += 1
-            siblings.append(Scalar(token, True, self.file, line, column, key))
+            siblings.append(YamlScalar(token, True, self.file, line, column, key))
         raise AssertionError("a list ends with its bracket")
 
 

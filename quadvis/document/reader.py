@@ -24,7 +24,7 @@ from quadvis.document.composer import (
     forbidden,
 )
 from quadvis.document.damage import STAND_INS, Trouble, explain, run_on
-from quadvis.document.nodes import Node, plain_value
+from quadvis.document.nodes import YamlNode, plain_value
 from quadvis.document.number_lists import find_lists, hide_lists
 from quadvis.errors import DiagramError, Fault, Faults, Place, QuadvisError
 from quadvis.machine.inputs import note_input
@@ -42,7 +42,7 @@ _DIRECTIVE = re.compile("(?:^|[\r\n])%")
 _MOST_REPAIRS, _MOST_READ = 50, 3 * MAX_BYTES
 
 
-def read_yaml(path: str | os.PathLike[str], faults: Faults | None = None) -> Node:
+def read_yaml(path: str | os.PathLike[str], faults: Faults | None = None) -> YamlNode:
     """Read a YAML file of at most 1 MB; see `parse_yaml`. Everything that is wrong raises `DiagramError`."""
     name = os.fspath(path)
     try:
@@ -66,7 +66,7 @@ def read_yaml(path: str | os.PathLike[str], faults: Faults | None = None) -> Nod
     return parse_yaml(text, name, faults)
 
 
-def parse_yaml(text: str, name: str = "<text>", faults: Faults | None = None) -> Node:
+def parse_yaml(text: str, name: str = "<text>", faults: Faults | None = None) -> YamlNode:
     """Return the root node of one YAML document.
 
     Aliases, anchors, merge keys, tags, duplicate keys, keys that are no texts, and all that exceeds the
@@ -92,7 +92,7 @@ def parse_yaml(text: str, name: str = "<text>", faults: Faults | None = None) ->
     return root
 
 
-def _read_on(text: str, name: str) -> tuple[Faults, Node]:
+def _read_on(text: str, name: str) -> tuple[Faults, YamlNode]:
     """Return the root and what was wrong on the way; what stops the parser is repaired where it can be."""
     kept: list[Fault] = []
     blanks: list[tuple[int, int]] = []
@@ -133,7 +133,7 @@ def _offset(text: str, line: int, column: int) -> int:
     return min(starts[line] + column, len(text)) if line < len(starts) else len(text)
 
 
-def _compose(text: str, position: Position, faults: Faults) -> Node:
+def _compose(text: str, position: Position, faults: Faults) -> YamlNode:
     """Return the root; long lists of numbers are kept from the parser, unless it stumbles over that."""
     repaired = bool(faults)
     lists = find_lists(text)

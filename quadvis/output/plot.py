@@ -112,7 +112,7 @@ def plot_log(log: Log, output: Path | None = None) -> list[Path]:
 
     faults = Faults()
     root = parse_yaml(log.diagram, f"{log.path}: diagram") if log.diagram.strip() else None
-    declared = root.get("figures") if isinstance(root, nodes.Mapping) else None
+    declared = root.get("figures") if isinstance(root, nodes.YamlMap) else None
     figures = read_figures(declared, faults) if declared else []
     faults.check()
     folder = output or log.path.with_name(f"{log.path.stem}-figures")
@@ -170,13 +170,13 @@ def block_figures(recorded: Recorded) -> list[Figure]:
     return [Figure(block, tuple(panels)) for block, panels in blocks.items()]
 
 
-def read_figures(node: nodes.Node, faults: Faults) -> list[Figure]:
+def read_figures(node: nodes.YamlNode, faults: Faults) -> list[Figure]:
     """Return what stands under `figures:`; what is wrong there is added to the faults."""
     figures = (faults.collect(_read_figure, entry, faults) for entry in faults.collect(node.items) or [])
     return [figure for figure in figures if figure]
 
 
-def _read_figure(node: nodes.Node, faults: Faults) -> Figure:
+def _read_figure(node: nodes.YamlNode, faults: Faults) -> Figure:
     single = "panels" not in node.mapping()
     keys = [key for key in PANEL_KEYS if key != "title"] if single else ["panels"]
     entry = node.fields(("title", keys[0]), (*STRETCH_KEYS, *keys[1:]), faults)
@@ -191,25 +191,25 @@ def _read_figure(node: nodes.Node, faults: Faults) -> Figure:
     return Figure(name or "figure", tuple(panel for panel in read if panel), start, stop)
 
 
-def _read_seconds(node: nodes.Node | None, absent: float, faults: Faults) -> float:
+def _read_seconds(node: nodes.YamlNode | None, absent: float, faults: Faults) -> float:
     """Return a time as the rows of a log have it: rounded down to a nanosecond, so that its own row is in."""
     if node is None or faults.collect(node.quantity, Unit.parse("s"), bare=False) is None:
         return absent
     return stamp(node.exact(Unit.parse("s"))) / NANOSECONDS
 
 
-def _some(node: nodes.Node) -> list[nodes.Node]:
+def _some(node: nodes.YamlNode) -> list[nodes.YamlNode]:
     """Return the entries of a list that must not be empty."""
     if not node.items():
         raise node.fault("the list is empty", "write its entries, or leave the key out")
     return node.items()
 
 
-def _read_panel(node: nodes.Node, faults: Faults, single: bool) -> Panel:
+def _read_panel(node: nodes.YamlNode, faults: Faults, single: bool) -> Panel:
     """Read a panel; in a figure of one panel the keys and the title are the figure's."""
     entry = node.mapping() if single else node.fields(PANEL_KEYS[:1], PANEL_KEYS[1:], faults)
     title, signals, unit, reference = map(entry.get, ("title", "signals", "unit", "reference"))
-    entries = _some(signals) if isinstance(signals, nodes.Sequence) else [signals] if signals else []
+    entries = _some(signals) if isinstance(signals, nodes.YamlList) else [signals] if signals else []
     traces = [faults.collect(_read_trace, trace) for trace in entries]
     shown = faults.collect(_read_unit, unit) if unit else None
     level = faults.collect(reference.quantity, shown or Unit()) if reference else None
@@ -217,16 +217,16 @@ def _read_panel(node: nodes.Node, faults: Faults, single: bool) -> Panel:
     return Panel(tuple(trace for trace in traces if trace), name or "", str(shown) if shown else "", level)
 
 
-def _read_unit(node: nodes.Node) -> Unit:
+def _read_unit(node: nodes.YamlNode) -> Unit:
     try:
         return Unit.parse(node.text())
     except UnitError as error:
         raise node.fault(error.problem, error.remedy) from None
 
 
-def _read_trace(node: nodes.Node) -> Trace:
+def _read_trace(node: nodes.YamlNode) -> Trace:
     label = None
-    if isinstance(node, nodes.Mapping):
+    if isinstance(node, nodes.YamlMap):
         entry = node.fields(TRACE_KEYS[:1], TRACE_KEYS[1:])
         node, label = entry["signal"], entry.get("label")
     try:

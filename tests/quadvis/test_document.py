@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadvis import document
-from quadvis.document import Mapping, Node, Scalar, Sequence, dump_yaml, parse_yaml, read_yaml
+from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar, dump_yaml, parse_yaml, read_yaml
 from quadvis.errors import DiagramError, Faults, Place, QuadvisError
 from quadvis.units import Unit, parse_units
 
@@ -35,7 +35,7 @@ blocks:
 """
 
 
-def value(text: str) -> Node:
+def value(text: str) -> YamlNode:
     """Return the node under the key `x`."""
     return parse_yaml(f"x: {text}\n", "d.yaml").mapping()["x"]
 
@@ -75,7 +75,7 @@ def test_nothing_is_typed_before_it_is_asked_for():
 
 def test_maps_lists_and_texts_are_told_apart():
     root = parse_yaml("a: {b: 1}\nc: [1]\nd: e", "d.yaml").mapping()
-    assert [type(root[key]) for key in root] == [Mapping, Sequence, Scalar]
+    assert [type(root[key]) for key in root] == [YamlMap, YamlList, YamlScalar]
     assert ("a" in root, "z" in root, root.get("z"), len(root)) == (True, False, None, 3)
     assert [(key.value, node.place.line) for key, node in root.pairs()] == [("a", 1), ("c", 2), ("d", 3)]
 
@@ -335,7 +335,7 @@ TYPED = {
 
 @pytest.mark.parametrize("text", TYPED)
 def test_hostile_values_are_refused_when_they_are_typed(text):
-    node = Scalar(text, True, "d.yaml", 3, 7, "x")
+    node = YamlScalar(text, True, "d.yaml", 3, 7, "x")
     with pytest.raises(DiagramError, match=r"^d\.yaml:3:7: "):
         getattr(node, TYPED[text])()
 
@@ -363,7 +363,7 @@ def test_bombs_cost_little_time_and_memory(tmp_path):
     assert done.stdout.split() == ["refused"] * len(names)
 
 
-def read_all(node: Node) -> None:
+def read_all(node: YamlNode) -> None:
     """Try every reading on every node; only faults with a place may come out."""
     readings = [
         node.text, node.name, node.boolean, node.integer, node.number, node.period, node.unit, node.units,
@@ -376,10 +376,10 @@ def read_all(node: Node) -> None:
             reading()
         except DiagramError as error:
             assert all(fault.place.line > 0 for fault in error.faults)
-    if isinstance(node, Sequence):
+    if isinstance(node, YamlList):
         children = node.values
     else:
-        children = list(node.values.values()) if isinstance(node, Mapping) else []
+        children = list(node.values.values()) if isinstance(node, YamlMap) else []
     for child in children:
         read_all(child)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from quadvis.diagram.diagram import check, load_text
-from quadvis.document import MAX_BYTES, Node, number_lists, parse_yaml
+from quadvis.document import MAX_BYTES, YamlNode, number_lists, parse_yaml
 from quadvis.document.number_lists import Numbers, find_lists, hide_lists
 from quadvis.errors import DiagramError
 
@@ -44,7 +44,7 @@ def outcome(text: str) -> object:
         return [str(fault) for fault in error.faults]
 
 
-def seen(node: Node) -> object:
+def seen(node: YamlNode) -> object:
     children: list[object] = []
     if hasattr(node, "values"):
         values = node.values if isinstance(node.values, list) else list(node.values.values())

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from quadvis.document import Node, dump_yaml
+from quadvis.document import YamlNode, dump_yaml
 from quadvis.errors import DiagramError, Fault
 from quadvis.machine.files import Kind, write_output
 from quadvis_vision.camera import lens as lens_model
@@ -137,7 +137,7 @@ def _determinant(matrices: Array) -> Array:
     return np.asarray(matrices[:, 0, 0] * matrices[:, 1, 1] - matrices[:, 0, 1] * matrices[:, 1, 0])
 
 
-def _size(node: Node) -> tuple[int, int]:
+def _size(node: YamlNode) -> tuple[int, int]:
     sides = node.items()
     if len(sides) != 2:
         raise node.wrong("a list of width and height", found=f"a list of {len(sides)}")

@@ -17,10 +17,10 @@ from quadvis.machine.inputs import read_input
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from quadvis.document import Mapping
+    from quadvis.document import YamlMap
 
 
-def read_fields(path: str | Path, kind: str, required: Collection[str], optional: Collection[str]) -> Mapping:
+def read_fields(path: str | Path, kind: str, required: Collection[str], optional: Collection[str]) -> YamlMap:
     """Return the nodes of a file's keys; `DiagramError` as `quadvis.document.read_yaml` and `Node.fields`.
 
     `kind` is what the file should be, such as "a camera calibration". One that does not look like it is

@@ -19,7 +19,7 @@ from quadvis.errors import QuadvisError, quoted, sentence
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from quadvis.document import Node
+    from quadvis.document import YamlNode
 
     Floats = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ class Evidence:
         )
 
     @classmethod
-    def read(cls, fields: Mapping[str, Node] | Any) -> Evidence:
+    def read(cls, fields: Mapping[str, YamlNode] | Any) -> Evidence:
         """Return what a file says under the `KEYS`; `DiagramError` with its place if that cannot be read."""
         return cls(
             rms=fields["rms"].number() if "rms" in fields else None,

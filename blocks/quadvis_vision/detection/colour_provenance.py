@@ -17,7 +17,7 @@ from quadvis_vision.camera.provenance import CalibrationError, check_date, known
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from quadvis.document import Node
+    from quadvis.document import YamlNode
 
     Floats = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ class ColourEvidence:
         )
 
     @classmethod
-    def read(cls, fields: Mapping[str, Node] | Any) -> ColourEvidence:
+    def read(cls, fields: Mapping[str, YamlNode] | Any) -> ColourEvidence:
         """Return what a file says under the `KEYS`; `DiagramError` with its place if that cannot be read."""
         return cls(
             date=fields["date"].text() if "date" in fields else None,

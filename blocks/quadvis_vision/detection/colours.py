@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.document import Node, dump_yaml
+from quadvis.document import YamlNode, dump_yaml
 from quadvis.errors import DiagramError, Fault, Faults, QuadvisError, sentence
 from quadvis.machine.files import Kind, write_output
 from quadvis_vision.camera.calibration_file import read_fields
@@ -81,7 +81,7 @@ class ColourCalibration:
         names = tuple(circle["colour"].text() for circle in maps)
         prototypes = np.array([circle["ratio"].array((3,)) for circle in maps], dtype=np.float64)
         threshold = fields["threshold"].number()
-        places: list[Node] = [*(circle["ratio"] for circle in maps), fields["threshold"]]
+        places: list[YamlNode] = [*(circle["ratio"] for circle in maps), fields["threshold"]]
         faults = Faults()
         for index, problem, remedy in _problems(prototypes, threshold, names):
             faults.add(places[index].place, problem, remedy, subject="colours")
