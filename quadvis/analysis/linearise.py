@@ -18,12 +18,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.analysis.cut import with_breaks
-from quadvis.analysis.probe import STEP, AnalysisError, Channel, Probe, Vector, blocks_on_loops, silence
+from quadvis.analysis.probe import (
+    STEP,
+    AnalysisError,
+    Channel,
+    Positions,
+    Probe,
+    Vector,
+    blocks_on_loops,
+    silence,
+)
 from quadvis.analysis.progress import tell
 from quadvis.diagram.questions import Cut
 from quadvis.engine.engine import Engine
 from quadvis.engine.graph import Graph
-from quadvis.engine.plan import Positions
 
 Matrix = NDArray[np.float64]
 Columns = dict[int, tuple[Vector, Vector]]  # by slot: derivatives of the memory afterwards, of the channels

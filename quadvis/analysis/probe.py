@@ -16,11 +16,12 @@ from quadvis.block import Random
 from quadvis.diagram.questions import Cut
 from quadvis.engine.engine import Engine
 from quadvis.engine.graph import Graph, Task
+from quadvis.engine.layout import TIME, Placed
 from quadvis.engine.memory import Slot
-from quadvis.engine.plan import TIME, Bound, Positions
 from quadvis.errors import QuadvisError
 
 Vector = NDArray[np.float64]
+Positions = NDArray[np.intp]  # of slots
 STEP = 1e-5  # of a central difference, relative to values above 1: errors near 1e-10
 LONGEST = 20_000  # ticks of a hyperperiod
 
@@ -46,10 +47,10 @@ class Channel:
 
 def silence(engine: Engine) -> None:
     """Take the noise away: a random stream of zeros stays zero and gives 2e-5 sigma at every draw."""
-    for bound in engine.plan.steps:
-        for name, state in bound.node.block.interface.states.items():
+    for node in engine.graph.nodes:
+        for name, state in node.block.interface.states.items():
             if isinstance(state, Random):
-                engine.plan.memory.write(bound.field(name), 0)
+                engine.write(node.path, name, 0)
 
 
 def hyperperiod(graph: Graph, tasks: Iterable[Task]) -> int:
@@ -70,7 +71,7 @@ class Probe:
 
     def __init__(self, engine: Engine, cuts: Sequence[Cut], at: float) -> None:
         self.engine, self.graph = engine, engine.graph
-        self.plan, self.floats = engine.plan, engine.plan.memory.floats
+        self.program, self.floats = engine.program, engine.memory.floats
         self.loop = blocks_on_loops(self.graph) or {node.path for node in self.graph.nodes}
         self.tasks = {node.task for node in self.graph.nodes if node.path in self.loop}
         self.span = hyperperiod(self.graph, self.tasks)
@@ -78,7 +79,7 @@ class Probe:
         self.positions: Positions = np.array(sorted(self.names), np.intp)
         self.continuous = self._continuous()
         self.signals: Positions = np.array(
-            [place for bound in self.plan.steps for place in self._signals(bound)], np.intp
+            [place for block in self.program.blocks for place in self._signals(block)], np.intp
         )
         self.channels = [channel for cut in cuts for channel in self._channels(cut)]
         self._read = np.array([channel.read for channel in self.channels], np.intp)
@@ -135,13 +136,13 @@ class Probe:
         self.floats[TIME.position] = self.engine.time
         self.floats[places] += deltas
         self._disturb(added, 0)
-        for step in self.plan.steps:
-            if step.output is not None:
-                step.output()
-        for derive in self.plan.derivatives:
-            derive()
+        for method in ("output", "deriv"):
+            for block in self.program.blocks:
+                call = self.engine.call(block.path, method)
+                if call is not None:
+                    call()
         rates = np.zeros(self.floats.size)
-        rates[self.plan.continuous] = self.floats[self.plan.slopes]
+        rates[list(self.program.states)] = self.floats[list(self.program.slopes)]
         return rates, self.floats[self._read]
 
     def shaken(self) -> Vector:
@@ -171,8 +172,8 @@ class Probe:
         for signal in cut.signals:
             task = self.graph[signal.block].task
             every, offset = self.graph.ticks(task.period), self.graph.ticks(task.offset)
-            read = self.plan[signal.block].outputs[signal.port].position
-            added = self.plan[break_path(signal.block, signal.port)].inputs["added"].position
+            read = self.program[signal.block].outputs[signal.port].position
+            added = self.program[break_path(signal.block, signal.port)].inputs["added"].position
             for element in signal.elements:
                 for tick in range(offset % every, self.span, every):
                     time = float(tick * self.graph.tick)
@@ -183,29 +184,29 @@ class Probe:
 
         Signals in seconds are instants and ages. They follow the clock, so they are no part of the state.
         """
-        for bound in self.plan.steps:
-            if bound.node.path not in self.loop:
+        for node, block in zip(self.graph.nodes, self.program.blocks, strict=True):
+            if node.path not in self.loop:
                 continue
-            interface, path = bound.node.block.interface, bound.node.path
-            for port, slot in bound.outputs.items():
+            interface, path = node.block.interface, node.path
+            for port, slot in block.outputs.items():
                 if slot.scalar == "float64" and not _is_time(interface.outputs[port].units):
                     yield from _elements(slot, f"{path}.{port}")
             for name, state in interface.states.items():
                 if state.signal.scalar == "float64":
-                    yield from _elements(bound.field(name), f"{path}.{name}")
-            for port, wire in bound.node.wires():
-                if wire.crossing == "delay" and bound.inputs[port].scalar == "float64":
-                    yield from _elements(bound.inputs[port], f"{path}.{port}")
+                    yield from _elements(block.field(name), f"{path}.{name}")
+            for port, wire in node.wires():
+                if wire.crossing == "delay" and block.inputs[port].scalar == "float64":
+                    yield from _elements(block.inputs[port], f"{path}.{port}")
 
     def _continuous(self) -> Positions:
         """Return where the continuous states of the loop are."""
         return np.array(
             [
                 position
-                for bound in self.plan.steps
-                if bound.node.path in self.loop
-                for state in bound.node.block.interface.continuous
-                for position, _ in _elements(bound.field(state.name), "")
+                for block in self.program.blocks
+                if block.path in self.loop
+                for state in block.slopes
+                for position, _ in _elements(block.field(state), "")
             ],
             np.intp,
         )
@@ -213,8 +214,8 @@ class Probe:
     def _shake(self) -> None:
         """Have every signal of the loop disturbed at each tick, when it is asked for."""
         by_task: dict[str, list[int]] = {}
-        for bound in self.plan.steps:
-            by_task.setdefault(bound.node.task.name, []).extend(self._signals(bound))
+        for block in self.program.blocks:
+            by_task.setdefault(block.task, []).extend(self._signals(block))
         for task, found in by_task.items():
             places = np.array(found, np.intp)
             random = np.random.default_rng(1)
@@ -226,10 +227,10 @@ class Probe:
 
             self.engine.observe(task, disturb)
 
-    def _signals(self, bound: Bound) -> list[int]:
+    def _signals(self, block: Placed) -> list[int]:
         return [
             position
-            for slot in bound.outputs.values()
+            for slot in block.outputs.values()
             if slot.scalar == "float64"
             for position, _ in _elements(slot, "")
             if position in self.names

@@ -51,7 +51,7 @@ class Compiler:
         places = [slot.position * SLOT for slot in slots]
 
         def call(memory: Memory, position: int) -> None:
-            base = ctypes.addressof(ctypes.c_char.from_buffer(memory.bytes))
+            base = ctypes.addressof(ctypes.c_char.from_buffer(memory.raw))
             native(base + position * SLOT, *[base + place for place in places])
 
         call.__dict__["function"] = function  # keeps the machine code alive

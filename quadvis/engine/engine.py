@@ -1,9 +1,9 @@
-"""The engine, Python tier: runs a plan tick by tick, deterministic to the bit.
+"""The engine: the life of a run, from opened blocks over ticks to closed blocks, deterministic to the bit.
 
-The life of one tick, at time t = tick * base period: delayed copies, outputs of the blocks that are due,
-observers (log), updates of the same blocks, continuous states to t + base period. Blocks that are due at one
-tick run in one dependency order, whatever their rates. Between ticks a signal is what it was at its
-block's last one.
+The life of one tick, at time t = tick * base period: copies for wires that delay, outputs of the blocks that
+are due, taps (log, scopes), updates of the same blocks, continuous states to t + base period. Blocks that are
+due at one tick run in one dependency order, whatever their rates. Between ticks a signal is what it was at
+its block's last one.
 """
 
 from __future__ import annotations
@@ -11,23 +11,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import chain
-from math import isnan
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from quadvis.block import ParameterError
-from quadvis.engine.graph import Graph
-from quadvis.engine.plan import TIME, Bound, Call, Plan, make_plan
-from quadvis.engine.solver import Solver, Vector
-from quadvis.errors import QuadvisError, RunError, sentence
-from quadvis.machine.failures import MEMORY, arithmetic, is_short_of_memory, surroundings
-
-SHOWN = 4  # numbers in a message
-SMALLER_STEP = "a smaller solver step may help"
-Observer = Callable[[int], None]  # takes the tick, after the outputs of a step
+from quadvis.engine.clock import Clock, Unpaced
+from quadvis.engine.graph import Constant, Graph
+from quadvis.engine.interpreter import Call, Executor, Interpreter
+from quadvis.engine.memory import Memory, Slot
+from quadvis.engine.program import Program, make_program
+from quadvis.engine.stops import cannot, explained
+from quadvis.engine.taps import Observer, Tap
+from quadvis.engine.tuning import Tuning
 
 
 @dataclass(frozen=True)
@@ -39,48 +34,33 @@ class Snapshot:
     frames: tuple[Any, ...]
 
 
-@dataclass(frozen=True)
-class _Rhythm:
-    """Something that happens every so many ticks from an offset on: a task, or the observation of one."""
-
-    task: str
-    every: int
-    offset: int
-
-
-@dataclass
-class _Step:
-    """What one combination of due rhythms does at a tick."""
-
-    delays: list[Call]
-    outputs: list[Call]
-    updates: list[Call]
-    finite: NDArray[np.intp]
-    zeros: NDArray[np.float64]
-    observers: list[Observer]
-    blocks: list[Bound]
-
-
 class Engine:
     """Runs one checked graph. Use as a context manager: blocks are opened on entry and always closed.
 
-    A NaN where none belongs or an exception in a block raises RunError with block, port and time.
+    A NaN where none belongs or an exception in a block raises RunError with block, port and time. The program
+    and its memory are public: ``program`` says where everything lies, ``memory`` holds it.
     """
 
-    def __init__(self, graph: Graph, seed: int = 0) -> None:
+    def __init__(self, graph: Graph, seed: int = 0, clock: Clock | None = None, buffer: Any = None) -> None:
         self.graph = graph
-        self.plan: Plan = make_plan(graph, seed)
-        self.tick = 0
-        self.period: Fraction = graph.tick
-        self._tasks = {
-            task.name: _Rhythm(task.name, graph.ticks(task.period), graph.ticks(task.offset))
-            for task in graph.tasks
-        }
-        self._observers: list[tuple[_Rhythm, Observer]] = []
-        self._rhythms = list(self._tasks.values())
-        self._steps: dict[tuple[bool, ...], _Step] = {}
-        self._opened: list[Bound] = []
-        self._solver = Solver(graph.solver, float(self.period))
+        self.program: Program = make_program(graph, seed)
+        self.period: Fraction = self.program.period
+        self.clock = clock or Unpaced()
+        self._interpreter = Interpreter(self.program, [node.block for node in graph.nodes], buffer)
+        self._executor: Executor = self._interpreter
+        self._selves = self._interpreter.selves
+        self.memory: Memory = self._interpreter.memory
+        self.tuning = Tuning(self.program, [node.block for node in graph.nodes], self.memory)
+        self._opened: list[int] = []
+        for node, block in zip(graph.nodes, self.program.blocks, strict=True):
+            for port, source in node.inputs.items():
+                if isinstance(source, Constant) and block.inputs[port].scalar == "frame":
+                    self.memory.write(block.inputs[port], source.value)
+
+    @property
+    def tick(self) -> int:
+        """The next tick."""
+        return self._executor.tick
 
     @property
     def time(self) -> float:
@@ -89,16 +69,17 @@ class Engine:
 
     @np.errstate(all="ignore")  # as in a run
     def __enter__(self) -> Self:
+        numbers = range(len(self._selves))
         try:
-            for bound in self.plan.steps:
-                self._guarded(bound, "verify_files")
-                self._guarded(bound, "check_period")
-            for bound in self.plan.steps:
-                self._opened.append(bound)
-                self._guarded(bound, "open")
-            for bound in self.plan.steps:
-                if "start" in bound.node.block.interface.arguments:
-                    self._guarded(bound, "start")
+            for number in numbers:
+                self._guarded(number, "verify_files")
+                self._guarded(number, "check_period")
+            for number in numbers:
+                self._opened.append(number)
+                self._guarded(number, "open")
+            for number in numbers:
+                if "start" in self._selves[number].interface.arguments:
+                    self._guarded(number, "start")
         except BaseException as error:
             self._close(error)
             raise
@@ -121,181 +102,68 @@ class Engine:
         if worst is not None and worst is not cause:
             raise worst
 
-    def _guarded(self, bound: Bound, method: str) -> None:
+    def _guarded(self, number: int, method: str) -> None:
         try:
-            getattr(bound.self, method)()
+            getattr(self._selves[number], method)()
         except Exception as error:
-            raise self._failure(bound, error, method) from error
+            raise cannot(method, self.program.blocks[number].path, error, self.time) from error
 
-    def observe(self, task: str, observer: Observer, every: int = 1) -> None:
-        """Call ``observer(tick)`` at a task's first and then every so many of its ticks.
+    def attach(self, tap: Tap) -> None:
+        """Have a block's rows taken from now on."""
+        self._executor.attach(tap)
 
-        It is called when the outputs are there and before the updates. A restored run is observed at the same
-        ticks as the first one.
+    def observe(self, task: str, call: Callable[[int], None], every: int = 1) -> None:
+        """Call ``call(tick)`` at a task's first and then every so many of its ticks.
+
+        It is called when the outputs are there and before the updates, as taps are.
         """
-        own = self._tasks[task]
-        rhythm = _Rhythm(task, own.every * every, own.offset)
-        self._observers.append((rhythm, observer))
-        if rhythm not in self._rhythms:
-            self._rhythms.append(rhythm)
-        self._steps.clear()
+        self._executor.attach(Observer(task, every, call))
 
-    @np.errstate(all="ignore")  # what is not finite is found here, and told with its block
+    @np.errstate(all="ignore")  # what is not finite is found here, and reported with its block
     def run(self, ticks: int) -> None:
         """Run that many ticks."""
         end = self.tick + ticks
-        floats = self.plan.memory.floats
-        clock = self.plan.memory.raw.cast("d")  # one element costs a third of a numpy array's
-        rhythms = [(rhythm.every, rhythm.offset) for rhythm in self._rhythms]
-        period, denominator = self.period.as_integer_ratio()
-        continuous = self.plan.continuous.size > 0
         while self.tick < end:
-            tick = self.tick
-            due = tuple([(tick - offset) % every == 0 and tick >= offset for every, offset in rhythms])
-            step = self._steps.get(due) or self._prepare(due)
-            # An exact product, so that time has no drift; the quotient of integers is rounded once.
-            clock[TIME.position] = tick * period / denominator
-            self._perform(step.delays)
-            self._perform(step.outputs)
-            if isnan(floats.take(step.finite).dot(step.zeros)):
-                raise self._not_finite(step)
-            for observe in step.observers:
-                observe(tick)
-            self._perform(step.updates)
-            if continuous:
-                self._integrate(clock[TIME.position])
-            self.tick = tick + 1
-
-    def _perform(self, calls: list[Call]) -> None:
-        call = None
-        try:
-            for call in calls:
-                call()
-        except Exception as error:
-            assert call is not None
-            raise self._failure(self.plan.owner(call), error) from error
-
-    def _prepare(self, due: tuple[bool, ...]) -> _Step:
-        rhythms = [rhythm for rhythm, flag in zip(self._rhythms, due, strict=True) if flag]
-        names = [name for name, rhythm in self._tasks.items() if rhythm in rhythms]
-        blocks = [bound for bound in self.plan.steps if bound.node.task.name in names]
-        finite = self.plan.finite(blocks)
-        made = _Step(
-            list(chain.from_iterable(self.plan.delays.get(name, []) for name in names)),
-            [bound.output for bound in blocks if bound.output],
-            [bound.update for bound in blocks if bound.update],
-            finite,
-            np.zeros(finite.size),
-            [observe for rhythm, observe in self._observers if rhythm in rhythms],
-            blocks,
-        )
-        self._steps[due] = made
-        return made
-
-    def _integrate(self, time: float) -> None:
-        plan = self.plan
-        raw, floats = plan.memory.raw, plan.memory.floats
-        # Minor steps write over time and signals, but delays and readers want those of the tick.
-        held = bytes(raw[plan.held])
-        self._perform(plan.derivatives)
-        state = self._solver.advance(self._rates, time, floats[plan.continuous], floats[plan.slopes])
-        raw[plan.held] = held
-        floats[plan.continuous] = state
-        if not np.isfinite(state).all():
-            raise self._not_finite_state()
-
-    def _rates(self, time: float, state: Vector) -> Vector:
-        """Return the derivative at a minor step."""
-        plan = self.plan
-        floats = plan.memory.floats
-        floats[TIME.position] = time
-        floats[plan.continuous] = state
-        self._perform(plan.minor)
-        self._perform(plan.derivatives)
-        return floats[plan.slopes]
-
-    def _failure(self, bound: Bound, error: Exception, method: str = "") -> QuadvisError:
-        """Return an error that says in which block and when another one happened."""
-        path = bound.node.path
-        if isinstance(error, RunError) and error.block:
-            return error
-        if isinstance(error, ParameterError):
-            return ParameterError(error.parameter, f"block '{path}': {error}")
-        if method:
-            return RunError(f"cannot {method}: {self._reason(error)}", block=path, time=self.time)
-        if not arithmetic(error):
-            return RunError(self._reason(error), block=path, time=self.time)
-        outputs = list(bound.node.block.interface.outputs)
-        reason = sentence(f"{arithmetic(error)}{self._inputs(bound)}", self._remedy(bound))
-        return RunError(reason, block=path, port=outputs[0] if len(outputs) == 1 else "", time=self.time)
-
-    @staticmethod
-    def _reason(error: Exception) -> str:
-        """Return what went wrong in a block."""
-        if isinstance(error, QuadvisError):
-            return str(error)
-        if problem := arithmetic(error):
-            return problem
-        if is_short_of_memory(error):
-            return MEMORY
-        if isinstance(error, RecursionError):
-            return surroundings(error)
-        return f"{type(error).__name__}: {error}"
-
-    def _inputs(self, bound: Bound) -> str:
-        """Return the single numbers that a block reads now, a few of them."""
-        slots = {port: slot for port, slot in bound.inputs.items() if slot.scalar != "frame"}
-        found = [
-            f"{port} = {self.plan.memory.read(slot):g}" for port, slot in slots.items() if not slot.shape
-        ]
-        return f" ({', '.join(found[:SHOWN])}{', ...' * (len(found) > SHOWN)})" if found else ""
-
-    def _remedy(self, bound: Bound) -> str:
-        """Return that a smaller step may help if the solver integrates a state that has its share in it."""
-        waiting, seen = [bound], {bound.node.path}
-        while waiting:
-            step = waiting.pop()
-            if step.node.block.interface.continuous:
-                return SMALLER_STEP
-            for _, wire in step.node.wires():
-                if wire.block not in seen:
-                    seen.add(wire.block)
-                    waiting.append(self.plan[wire.block])
-        return ""
-
-    def _not_finite(self, step: _Step) -> RunError:
-        """Name the first port, in execution order, that is not finite."""
-        for bound in step.blocks:
-            for port, slot in bound.outputs.items():
-                if not bound.node.block.interface.outputs[port].nan and slot.scalar == "float64":
-                    value = self.plan.memory.read(slot)
-                    if not np.isfinite(value).all():
-                        text = np.array2string(np.asarray(value), precision=4)
-                        problem = sentence(f"the output became {text}", self._remedy(bound))
-                        return RunError(problem, block=bound.node.path, port=port, time=self.time)
-        raise AssertionError("a value that is not finite belongs to a port")
-
-    def _not_finite_state(self) -> RunError:
-        for bound in self.plan.steps:
-            for state in bound.node.block.interface.continuous:
-                if not np.isfinite(self.plan.memory.view(bound.field(state.name))).all():
-                    problem = sentence(f"state '{state.name}' left the finite numbers", SMALLER_STEP)
-                    return RunError(problem, block=bound.node.path, time=self.time)
-        raise AssertionError("a state that is not finite belongs to a block")
+            until = self.clock.wait(self.tick, end)
+            self.tuning.apply(self.tick)
+            stop = self._executor.run(until)
+            if stop is not None:
+                raise explained(stop, self.graph, self.program, self.memory) from stop.error
 
     def snapshot(self) -> Snapshot:
         """Return the whole state between two ticks."""
-        return Snapshot(self.tick, bytes(self.plan.memory.raw), tuple(self.plan.memory.frames))
+        return Snapshot(self.tick, bytes(self.memory.raw), tuple(self.memory.frames))
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot of the same graph; the run from there repeats to the bit."""
-        memory = self.plan.memory
+        memory = self.memory
         if (len(snapshot.memory), len(snapshot.frames)) != (len(memory.raw), len(memory.frames)):
             raise ValueError("the snapshot is of another graph")
         memory.raw[:] = snapshot.memory
         memory.frames[:] = snapshot.frames
-        self.tick = snapshot.tick
+        self._executor.tick = snapshot.tick
 
-    def read(self, path: str, port: str) -> Any:
-        """Return what an output holds now."""
-        return self.plan.memory.read(self.plan[path].outputs[port])
+    def slot(self, path: str, name: str) -> Slot:
+        """Return the slot of a block's output, parameter, state or input; KeyError if there is none."""
+        block = self.program[path]
+        for slots in (block.outputs, block.inputs):
+            if name in slots:
+                return slots[name]
+        return block.field(name)
+
+    def read(self, path: str, name: str) -> Any:
+        """Return what a block's output, parameter, state or input holds now."""
+        return self.memory.read(self.slot(path, name))
+
+    def write(self, path: str, name: str, value: Any) -> None:
+        """Store a value in a block's output, parameter, state or input; nothing checks it, see ``tuning``."""
+        self.memory.write(self.slot(path, name), value)
+
+    def call(self, path: str, method: str) -> Call | None:
+        """Return what calls a block's method from slots to slots; None if the block has no such method."""
+        op = self.program.op(path, method)
+        return None if op is None else self._interpreter.call(op)
+
+    def bound(self, path: str) -> Any:
+        """Return a block as its methods see it, bound to memory."""
+        return self._selves[self.program.number(path)]

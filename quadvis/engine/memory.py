@@ -11,14 +11,14 @@ import ctypes
 import functools
 import math
 import types
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.block import NO_FRAME, SCALARS, Block, Shape, Sizes
+from quadvis.block import Block, Shape, Sizes
 
 SLOT = 8
 C_TYPES = {"float64": ctypes.c_double, "int64": ctypes.c_int64, "bool": ctypes.c_bool}
@@ -97,18 +97,23 @@ class Record:
 
 
 class Memory:
-    """A run's signals, states and parameters: ``size`` slots that start at zero, and a list of frames."""
+    """A run's signals, states and parameters: slots in one buffer, and a list of frames.
 
-    def __init__(self, size: int, frames: Sequence[Any] = ()) -> None:
-        self.bytes = bytearray(size * SLOT)
-        self.raw = memoryview(self.bytes)
-        self.floats: NDArray[np.float64] = np.frombuffer(self.bytes, np.float64)
+    ``size`` slots start at zero, or hold what a program's ``image`` has. ``buffer``, if given, is where they
+    live, such as memory that processes share; it must be writable and have room for them.
+    """
+
+    def __init__(self, size: int, frames: Sequence[Any] = (), image: bytes = b"", buffer: Any = None) -> None:
+        self.buffer = bytearray(size * SLOT) if buffer is None else buffer
+        self.raw = memoryview(self.buffer).cast("B")[: size * SLOT]
+        self.raw[:] = image or bytes(size * SLOT)
+        self.floats: NDArray[np.float64] = np.frombuffer(self.raw, np.float64)
         self.frames = list(frames)
         self._scalars = {scalar: self.raw.cast(code) for scalar, code in VIEWS.items()}  # type: ignore[call-overload]
 
     def view(self, slot: Slot) -> NDArray[Any]:
         """Return an array over a slot's bytes; writing to it writes to memory."""
-        return np.ndarray(slot.shape, slot.scalar, self.bytes, slot.position * SLOT, slot.strides)
+        return np.ndarray(slot.shape, slot.scalar, self.raw, slot.position * SLOT, slot.strides)
 
     def read(self, slot: Slot) -> Any:
         """Return what a slot holds now: a Python scalar, a copy of an array, or a frame."""
@@ -156,28 +161,35 @@ class Memory:
 
         return copy
 
-    def bind(self, block: Block, record: Record, position: int, period: float) -> Block:
-        """Return the block as its methods see it: its fields are the bytes from ``position`` on."""
+    def fill(self, block: Block, record: Record, position: int, period: float) -> None:
+        """Write a block's period, parameters and the initial values of its states from ``position`` on."""
+        interface = block.interface
+        for item in record.fields:
+            if item.name in interface.params:
+                value = getattr(block, item.name)
+            elif item.name in interface.states:
+                value = interface.states[item.name].init
+            else:
+                value = period
+            self.write(Slot(item.scalar, item.shape, position + item.offset), value)
+
+    def bind(self, block: Block, record: Record, position: int, frames: Mapping[str, Slot]) -> Block:
+        """Return the block as its methods see it: its fields are the bytes from ``position`` on.
+
+        ``frames`` are the places of those of its states that hold frames.
+        """
         kind: Any = _bound_class(type(block), record)  # type: ignore[arg-type]  # mypy: a class has no hash
-        bound: Block = kind.from_buffer(self.bytes, position * SLOT)
+        bound: Block = kind.from_buffer(self.raw, position * SLOT)
         for item in record.fields:
             if item.shape:
                 view = self.view(Slot(item.scalar, item.shape, position + item.offset))
                 bound.__dict__[_array_key(item.name)] = view
-        bound.period = period
         bound.__dict__.update(_kept=block._kept, _digests=block._digests)
         for name, param in block.interface.params.items():
-            value = getattr(block, name)
             if param.is_text:
-                bound.__dict__[name] = value
-            else:
-                setattr(bound, name, value)
-        for state in block.interface.states.values():
-            if state.signal.scalar == "frame":
-                bound.__dict__[_array_key(state.name)] = (self.frames, len(self.frames))
-                self.frames.append(NO_FRAME)
-            else:
-                setattr(bound, state.name, SCALARS[state.signal.scalar](state.init))
+                bound.__dict__[name] = getattr(block, name)
+        for name, slot in frames.items():
+            bound.__dict__[_array_key(name)] = (self.frames, slot.position)
         return bound
 
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,12 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.engine.engine import Engine
-from quadvis.engine.plan import Bound
+from quadvis.engine.graph import Node
 from quadvis.output.kept import ALL, RowJudge, RunSignals
 from quadvis.output.log import PORTS, LogWriter
 from quadvis.output.recording import Channel, Field, Recording
 from quadvis.output.stretch import NANOSECONDS
 from quadvis.output.verdict import Outcome, finite
+from quadvis.version import __version__
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
@@ -135,8 +137,8 @@ def run(
     the diagram expects, and its summary, needs no rows. A log that the disk refuses does not stop the run.
     """
     engine = Engine(diagram.graph, diagram.seed)
-    logged = [bound for bound in engine.plan.steps if diagram.logs(bound.node.path) and _fields(bound)]
-    channels = [Channel(f"/{bound.node.path}", _fields(bound), bound.node.task.name) for bound in logged]
+    logged = [node for node in diagram.graph.nodes if diagram.logs(node.path) and _fields(node)]
+    channels = [Channel(f"/{node.path}", _fields(node), node.task.name) for node in logged]
     patterns = ((ALL,) if log is None else ()) if keep is None else tuple(keep)
     signals = RunSignals(channels, diagram.ports, patterns)
     judging = diagram.judging()
@@ -145,11 +147,11 @@ def run(
         stack.enter_context(diagram.guarded(log))
         writer = stack.enter_context(LogWriter(log, channels, metadata(diagram))) if log is not None else None
         judges = []
-        for index, bound in enumerate(logged):
+        for index, node in enumerate(logged):
             judge = RowJudge(channels[index], judging)
             takers = _takers(index, signals, writer, judge)
             if takers:
-                _observe(engine, bound, diagram.decimation(bound.node.path), takers)
+                engine.attach(_RowTap(node.path, diagram.decimation(node.path), engine.period, takers))
                 judges.append(judge)
         stack.enter_context(engine)
         _advance(engine, diagram.ticks, progress)
@@ -189,31 +191,32 @@ def _advance(engine: Engine, ticks: int, progress: Progress | None) -> None:
             progress(engine.time, time.perf_counter() - began)
 
 
-def _observe(engine: Engine, bound: Bound, every: int, takers: Sequence[Taker]) -> None:
-    raw, row = engine.plan.memory.raw, bound.row
-    numerator, denominator = (engine.period * NANOSECONDS).as_integer_ratio()
+class _RowTap:
+    """Hands the rows of a block to all who want them, with the stamp (ns)."""
 
-    def observe(tick: int) -> None:
-        data = bytes(raw[row])
-        stamp = tick * numerator // denominator
-        for take in takers:
+    def __init__(self, block: str, every: int, period: Fraction, takers: Sequence[Taker]) -> None:
+        self.block, self.every = block, every
+        self._takers = tuple(takers)
+        self._numerator, self._denominator = (period * NANOSECONDS).as_integer_ratio()
+
+    def take(self, tick: int, row: memoryview) -> None:
+        """Copy the row once for all."""
+        data, stamp = bytes(row), tick * self._numerator // self._denominator
+        for take in self._takers:
             take(stamp, data)
 
-    engine.observe(bound.node.task.name, observe, every)
 
-
-def _fields(bound: Bound) -> tuple[Field, ...]:
+def _fields(node: Node) -> tuple[Field, ...]:
+    outputs = node.block.interface.outputs
     return tuple(
-        Field(name, slot.scalar, slot.shape, bound.node.unit(name))
-        for name, slot in bound.outputs.items()
-        if slot.scalar != "frame"
+        Field(name, port.signal.scalar, node.shape(name), node.unit(name))
+        for name, port in outputs.items()
+        if port.signal.scalar != "frame"
     )
 
 
 def metadata(diagram: Diagram) -> dict[str, str]:
     """Return what a log says of its run, in words: see ``quadvis.output.log``."""
-    from quadvis import __version__
-
     return {
         "quadvis": __version__,
         "name": diagram.name,

@@ -12,6 +12,8 @@ from quadvis.block import Block, Sizes
 from quadvis.engine.engine import Engine
 from quadvis.engine.graph import Constant, Graph, Node, Task
 
+ALONE = "block"  # the path of the block
+
 
 def alone(
     block: Block,
@@ -24,7 +26,7 @@ def alone(
     """Return an engine that runs one block; its inputs hold what ``inputs`` has until they are written to."""
     task = Task("alone", period, continuous=bool(block.interface.continuous))
     constants = {name: Constant(value) for name, value in inputs.items()}
-    node = Node("block", type(block).__name__, block, task, dict(constants), sizes)
+    node = Node(ALONE, type(block).__name__, block, task, dict(constants), sizes)
     return Engine(Graph("alone", [node], solver, period if task.continuous else None), seed)
 
 

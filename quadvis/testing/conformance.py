@@ -23,8 +23,8 @@ import numpy as np
 from quadvis.block import METHODS, Block, Frame, Param, ParameterError
 from quadvis.engine.compiled import Compiled, Compiler
 from quadvis.engine.engine import Snapshot
+from quadvis.engine.layout import TIME, Placed
 from quadvis.engine.memory import Slot
-from quadvis.engine.plan import TIME, Bound
 from quadvis.errors import QuadvisError
 from quadvis.testing.rig import PERIOD, STEPS, Rig, Subject, extreme_rigs, rigs
 
@@ -174,14 +174,14 @@ def starts_the_same(subject: Subject) -> None:
             rig.run(range(STEPS))
             rig.engine.restore(initial)
             if "start" in subject.block.interface.arguments:
-                getattr(rig.bound.self, "start")()  # noqa: B009 - not every block has one
+                rig.block.start()
             assert rig.record() == started, "start after a run gives other states; keep nothing in attributes"
 
 
 def output_changes_nothing(subject: Subject) -> None:
     """Check that ``output`` called twice gives the same, and leaves parameters and states alone."""
     for rig in rigs(subject):
-        output = rig.bound.output
+        output = rig.call("output")
         if output is None:
             continue
         with rig.engine:
@@ -200,14 +200,14 @@ def inputs_not_asked_for_do_not_matter(subject: Subject) -> None:
     """Check that what ``output`` gives depends on the inputs that it asks for alone."""
     others = set(subject.block.interface.inputs) - subject.block.interface.feedthrough
     for rig in rigs(subject):
-        output, memory = rig.bound.output, rig.engine.plan.memory
+        output, memory = rig.call("output"), rig.memory
         if output is None or not others:
             continue
         with rig.engine:
             for step in range(1, STEPS):
                 rig.feed(step)
                 for name in others:
-                    memory.write(rig.bound.inputs[name], rig.series[step - 1][name])
+                    memory.write(rig.placed.inputs[name], rig.series[step - 1][name])
                 output()
                 rig.feed(step)
                 first = rig.contents()
@@ -276,7 +276,7 @@ def _told(hostile: float) -> str:
 def _stamped(rig: Rig, names: Sequence[str], stamp: float) -> list[dict[str, Any]]:
     """Run a block on good stamps but one; return its floats and flags at each step."""
     found = []
-    memory, outputs = rig.engine.plan.memory, rig.bound.outputs
+    memory, outputs = rig.memory, rig.placed.outputs
     slots = {name: slot for name, slot in outputs.items() if slot.scalar in ("float64", "bool")}
     with rig.engine:
         for step in range(STEPS):
@@ -290,24 +290,24 @@ def _stamped(rig: Rig, names: Sequence[str], stamp: float) -> list[dict[str, Any
 def returns_what_it_declares(subject: Subject) -> None:
     """Check that the methods return the declared number of values, of the declared kind and shape."""
     for rig in rigs(subject):
-        bound, memory = rig.bound, rig.engine.plan.memory
+        placed, memory = rig.placed, rig.memory
         with rig.engine:
             for step in range(STEPS):
                 rig.feed(step)
                 for method, names in subject.block.interface.arguments.items():
-                    slots = _targets(bound, method)
+                    slots = _targets(placed, method)
                     if slots:
-                        arguments = [memory.read(slot) for slot in _sources(bound, names)]
-                        _declared(method, getattr(bound.self, method)(*arguments), slots)
+                        arguments = [memory.read(slot) for slot in _sources(placed, names)]
+                        _declared(method, getattr(rig.block, method)(*arguments), slots)
                 rig.engine.run(1)
 
 
-def _sources(bound: Bound, names: Sequence[str]) -> list[Slot]:
-    return [TIME if name == "time" else bound.inputs[name] for name in names]
+def _sources(placed: Placed, names: Sequence[str]) -> list[Slot]:
+    return [TIME if name == "time" else placed.inputs[name] for name in names]
 
 
-def _targets(bound: Bound, method: str) -> Mapping[str, Slot]:
-    return {"output": bound.outputs, "deriv": bound.slopes}.get(method, {})
+def _targets(placed: Placed, method: str) -> Mapping[str, Slot]:
+    return {"output": placed.outputs, "deriv": placed.slopes}.get(method, {})
 
 
 def _declared(method: str, returned: Any, slots: Mapping[str, Slot]) -> None:
@@ -336,33 +336,30 @@ def compiles(subject: Subject) -> None:
         return
     known: dict[Any, dict[str, Compiled]] = {}
     for rig in rigs(subject, missing=True):
-        bound = rig.bound
-        shapes = tuple(slot.shape for slot in (*bound.inputs.values(), *bound.outputs.values()))
-        compiled = known.get((bound.record, shapes)) or _compile(bound)
-        known[bound.record, shapes] = compiled
+        placed = rig.placed
+        shapes = tuple(slot.shape for slot in (*placed.inputs.values(), *placed.outputs.values()))
+        compiled = known.get((placed.record, shapes)) or _compile(subject.block, placed)
+        known[placed.record, shapes] = compiled
         with rig.engine:
             for step in range(STEPS):
                 rig.feed(step)
                 _agree(rig, compiled, step)
 
 
-def _compile(bound: Bound) -> dict[str, Compiled]:
-    compiler = Compiler(type(bound.node.block), bound.record)
-    arguments = bound.node.block.interface.arguments
+def _compile(block: type[Block], placed: Placed) -> dict[str, Compiled]:
+    compiler = Compiler(block, placed.record)
     return {
-        method: compiler.compile(method, _sources(bound, names), list(_targets(bound, method).values()))
-        for method, names in arguments.items()
+        method: compiler.compile(method, _sources(placed, names), list(_targets(placed, method).values()))
+        for method, names in block.interface.arguments.items()
     }
 
 
 def _agree(rig: Rig, compiled: Mapping[str, Compiled], step: int) -> None:
     """Call every method both ways; then take an Euler step, to reach another state."""
-    bound, plan = rig.bound, rig.engine.plan
-    start = getattr(bound.self, "start", None)
-    calls = {"start": start, "output": bound.output, "update": bound.update, "deriv": bound.deriv}
-    plan.memory.write(TIME, float(step * PERIOD))
+    program, memory = rig.engine.program, rig.memory
+    memory.write(TIME, float(step * PERIOD))
     for method in METHODS:
-        call = calls[method]
+        call = getattr(rig.block, "start", None) if method == "start" else rig.call(method)
         if call is None or (method == "start" and step > 0):
             continue
         before = rig.engine.snapshot()
@@ -374,15 +371,15 @@ def _agree(rig: Rig, compiled: Mapping[str, Compiled], step: int) -> None:
             continue
         interpreted = rig.engine.snapshot()
         rig.engine.restore(before)
-        compiled[method](plan.memory, bound.position)
+        compiled[method](memory, rig.placed.position)
         _same(rig, interpreted, f"{method} at step {step}")
-    plan.memory.floats[plan.continuous] += float(PERIOD) * plan.memory.floats[plan.slopes]
+    memory.floats[list(program.states)] += float(PERIOD) * memory.floats[list(program.slopes)]
 
 
 def _same(rig: Rig, interpreted: Snapshot, where: str) -> None:
-    bound, memory = rig.bound, rig.engine.plan.memory
-    slots = {item.name: bound.field(item.name) for item in bound.record.fields}
-    slots |= bound.outputs | {f"the derivative of {name}": slot for name, slot in bound.slopes.items()}
+    placed, memory = rig.placed, rig.memory
+    slots = {item.name: placed.field(item.name) for item in placed.record.fields}
+    slots |= placed.outputs | {f"the derivative of {name}": slot for name, slot in placed.slopes.items()}
     compiled = {name: memory.read(slot) for name, slot in slots.items()}
     rig.engine.restore(interpreted)
     for name, slot in slots.items():

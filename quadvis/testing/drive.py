@@ -10,7 +10,7 @@ import numpy as np
 from quadvis.block import Block
 from quadvis.engine.engine import Engine
 from quadvis.engine.memory import Slot
-from quadvis.testing.alone import alone, parameter_sizes
+from quadvis.testing.alone import ALONE, alone, parameter_sizes
 from quadvis.units import parse_period
 
 
@@ -30,8 +30,7 @@ class Driven:
 
     def state(self, name: str) -> Any:
         """Return a state, or a parameter, as it is after the last step."""
-        (bound,) = self.engine.plan.steps
-        return self.engine.plan.memory.read(bound.field(name))
+        return self.engine.read(ALONE, name)
 
 
 def drive(
@@ -90,22 +89,17 @@ def _series(name: str, signal: Any, value: Any, sizes: dict[str, Any], steps: in
 
 
 def _drive(engine: Engine, series: dict[str, tuple[Any, bool]], count: int) -> Driven:
-    (bound,) = engine.plan.steps
-    rows: dict[str, list[Any]] = {name: [] for name in bound.outputs}
-    memory = engine.plan.memory
-
-    def record(_: int) -> None:
-        for name, slot in bound.outputs.items():
-            rows[name].append(memory.read(slot))
-
-    engine.observe(bound.node.task.name, record)
+    memory, block = engine.memory, engine.program[ALONE]
+    rows: dict[str, list[Any]] = {name: [] for name in block.outputs}
     with engine:
         for k in range(count):
             for name, (values, constant) in series.items():
-                memory.write(bound.inputs[name], values[0 if constant else k])
+                memory.write(block.inputs[name], values[0 if constant else k])
             engine.run(1)
+            for name, slot in block.outputs.items():
+                rows[name].append(memory.read(slot))
     time = np.array([float(k * engine.period) for k in range(count)])
-    signals = {name: _array(rows[name], slot) for name, slot in bound.outputs.items()}
+    signals = {name: _array(rows[name], slot) for name, slot in block.outputs.items()}
     return Driven(time, signals, engine)
 
 

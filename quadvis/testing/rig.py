@@ -12,9 +12,10 @@ import numpy as np
 
 from quadvis.block import Block, Frame, In, Param, ParameterError, Shape, Sizes
 from quadvis.engine.engine import Engine
-from quadvis.engine.memory import SLOT
-from quadvis.engine.plan import Bound
-from quadvis.testing.alone import alone, parameter_sizes
+from quadvis.engine.interpreter import Call
+from quadvis.engine.layout import Placed
+from quadvis.engine.memory import SLOT, Memory
+from quadvis.testing.alone import ALONE, alone, parameter_sizes
 
 STEPS = 16
 PERIOD = Fraction(1, 10)
@@ -55,23 +56,37 @@ class Rig:
     series: list[dict[str, Any]]
 
     @property
-    def bound(self) -> Bound:
-        """The block in its place."""
-        return self.engine.plan.steps[0]
+    def memory(self) -> Memory:
+        """The memory of the engine."""
+        return self.engine.memory
+
+    @property
+    def placed(self) -> Placed:
+        """The block's place in memory."""
+        return self.engine.program[ALONE]
+
+    @property
+    def block(self) -> Any:
+        """The block as its methods see it."""
+        return self.engine.bound(ALONE)
+
+    def call(self, method: str) -> Call | None:
+        """Return what calls a method from slots to slots; None if the block has no such method."""
+        return self.engine.call(ALONE, method)
 
     def feed(self, step: int) -> None:
         """Write the inputs of a step."""
         for name, value in self.series[step].items():
-            self.engine.plan.memory.write(self.bound.inputs[name], value)
+            self.memory.write(self.placed.inputs[name], value)
 
     def record(self) -> bytes:
         """Return the bytes of the block's parameters and states."""
-        start = self.bound.position * SLOT
-        return bytes(self.engine.plan.memory.raw[start : start + self.bound.record.size * SLOT])
+        start = self.placed.position * SLOT
+        return bytes(self.memory.raw[start : start + self.placed.record.size * SLOT])
 
     def contents(self) -> tuple[Any, ...]:
         """Return all of memory and all pictures, fit to be compared."""
-        memory = self.engine.plan.memory
+        memory = self.memory
         frames = [(frame.pixels.shape, frame.pixels.tobytes()) for frame in memory.frames]
         return bytes(memory.raw), frames, [(repr(frame.stamp), frame.sequence) for frame in memory.frames]
 

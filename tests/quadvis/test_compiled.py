@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from quadvis.block import Block, In, Out, Param, Random, State
+from quadvis.engine.layout import TIME, Placed
 from quadvis.engine.memory import Memory, Record, Slot
 from quadvis.testing.alone import alone, parameter_sizes
 
@@ -62,10 +63,10 @@ class Everything(Block):
             self.stream[0] = self.stream[0] * 3 % 1000003
 
 
-def slots(bound: Any, method: str) -> tuple[list[Slot], list[Slot]]:
-    names = bound.node.block.interface.arguments[method]
-    arguments = [Slot("float64", (), 0) if name == "time" else bound.inputs[name] for name in names]
-    return arguments, list(bound.outputs.values()) if method == "output" else []
+def slots(block: Block, placed: Placed, method: str) -> tuple[list[Slot], list[Slot]]:
+    names = block.interface.arguments[method]
+    arguments = [TIME if name == "time" else placed.inputs[name] for name in names]
+    return arguments, list(placed.outputs.values()) if method == "output" else []
 
 
 @pytest.mark.parametrize("shape", [(), (3,), (2, 2)])
@@ -78,14 +79,15 @@ def test_a_compiled_method_does_to_memory_what_the_interpreted_one_does(
     u = np.arange(1.0, 1.0 + math.prod(shape)).reshape(shape)
     inputs = {"u": u, "flag": True, "flags": [False, True]}
     engine = alone(block, inputs, {"*": shape}, Fraction(1, 10), seed=4)
-    bound, memory = engine.plan.steps[0], engine.plan.memory
+    placed, memory = engine.program["block"], engine.memory
     memory.write(Slot("float64", (), 0), 1.25)
     before = engine.snapshot()
-    {"start": bound.self.start, "output": bound.output, "update": bound.update}[method]()
+    (engine.bound("block").start if method == "start" else engine.call("block", method))()
     interpreted = engine.snapshot().memory
     assert interpreted != before.memory
     engine.restore(before)
-    Compiler(Everything, bound.record).compile(method, *slots(bound, method))(memory, bound.position)
+    call = Compiler(Everything, placed.record).compile(method, *slots(block, placed, method))
+    call(memory, placed.position)
     assert engine.snapshot().memory == interpreted
 
 
@@ -101,7 +103,7 @@ def test_one_compiled_method_serves_every_block_of_its_type() -> None:
     record = Record.of(Gain(), {})
     memory = Memory(2 + 2 * record.size)
     for place, factor in ((2, 3.0), (2 + record.size, 5.0)):
-        memory.bind(Gain(factor=factor), record, place, 1.0)
+        memory.fill(Gain(factor=factor), record, place, 1.0)
     source, target = Slot("float64", (), 0), Slot("float64", (), 1)
     memory.write(source, 7.0)
     call = Compiler(Gain, record).compile("output", [source], [target])
@@ -119,10 +121,9 @@ def test_dividing_by_zero_gives_infinity_as_in_numpy() -> None:
             return 1.0 / u
 
     engine = alone(Inverse(), {"u": 0.0}, {}, Fraction(1))
-    bound = engine.plan.steps[0]
-    Compiler(Inverse, bound.record).compile("output", *slots(bound, "output"))(
-        engine.plan.memory, bound.position
-    )
+    placed = engine.program["block"]
+    call = Compiler(Inverse, placed.record).compile("output", *slots(engine.bound("block"), placed, "output"))
+    call(engine.memory, placed.position)
     assert engine.read("block", "y") == math.inf
 
 
@@ -140,7 +141,7 @@ def test_what_numba_cannot_compile_is_told_with_its_line() -> None:
             CALLS.append(f"{u}")
 
     engine = alone(Words(), {"u": [0.0, 0.0]}, parameter_sizes(Words()), Fraction(1))
-    bound = engine.plan.steps[0]
+    placed = engine.program["block"]
     line = Words.update.__code__.co_firstlineno + 2
     with pytest.raises(numba.core.errors.NumbaError, match=rf"test_compiled\.py.*\(?{line}\)?"):
-        Compiler(Words, bound.record).compile("update", *slots(bound, "update"))
+        Compiler(Words, placed.record).compile("update", *slots(engine.bound("block"), placed, "update"))

@@ -226,8 +226,7 @@ def test_a_picture_that_changes_during_the_run_is_a_frame_without_pixels(tmp_pat
         shapes = []
         for _ in range(2):
             engine.run(1)
-            (bound,) = engine.plan.steps
-            shapes.append(engine.plan.memory.read(bound.outputs["frame"]).pixels.shape)
+            shapes.append(engine.read("block", "frame").pixels.shape)
     assert shapes == [(0, 0, 3), (6, 8, 3)]
 
 

@@ -31,7 +31,14 @@ class Mixed(Block):
 def bound(sizes: dict, position: int = 3) -> tuple[Memory, Record, Block]:
     record = Record.of(Mixed(), sizes)
     memory = Memory(position + record.size + 2)
-    return memory, record, memory.bind(Mixed(), record, position, 0.25)
+    return memory, record, placed(memory, Mixed(), record, position, 0.25)
+
+
+def placed(
+    memory: Memory, block: Block, record: Record, position: int, period: float, **frames: Slot
+) -> Block:
+    memory.fill(block, record, position, period)
+    return memory.bind(block, record, position, frames)
 
 
 def slot(record: Record, name: str, position: int = 3) -> Slot:
@@ -94,7 +101,7 @@ def test_a_number_given_to_an_array_state_fills_it() -> None:
 def test_the_numpy_record_has_the_same_layout() -> None:
     memory, record, block = bound({"*": (2,)})
     block.last, block.places, block.hits, block.open_ = [8.0, 9.0], [1, 2], 3, True
-    view = np.frombuffer(memory.bytes, record.dtype, 1, 3 * SLOT)[0]
+    view = np.frombuffer(memory.raw, record.dtype, 1, 3 * SLOT)[0]
     assert view["last"].tolist() == [8.0, 9.0] and view["places"].tolist() == [1, 2]
     assert (view["hits"], view["open_"], view["gain"], view["period"]) == (3, True, 2.5, 0.25)
     assert view["flags"].tolist() == [1, 0, 1]
@@ -106,14 +113,14 @@ def test_a_truth_value_fills_its_slot_with_zero_or_one() -> None:
     for name in ("open_", "on", "flags"):
         field = record[name]
         start = (3 + field.offset) * SLOT
-        whole = np.frombuffer(memory.bytes, np.int64, int(np.prod(field.shape)), start)
+        whole = np.frombuffer(memory.raw, np.int64, int(np.prod(field.shape)), start)
         assert np.array_equal(whole, np.ravel(getattr(block, name)).astype(int))
 
 
 def test_blocks_side_by_side_do_not_touch_each_other() -> None:
     record = Record.of(Mixed(), {"*": (2,)})
     memory = Memory(2 * record.size)
-    first, second = (memory.bind(Mixed(), record, k * record.size, 1.0) for k in range(2))
+    first, second = (placed(memory, Mixed(), record, k * record.size, 1.0) for k in range(2))
     before = bytes(memory.raw[record.size * SLOT :])
     first.last, first.hits, first.level = [7.0, 7.0], 7, 7.0
     assert bytes(memory.raw[record.size * SLOT :]) == before and second.hits == 0
@@ -131,7 +138,7 @@ def test_an_attribute_of_the_author_never_hides_a_state() -> None:
 
     record = Record.of(Cached(), {})
     memory = Memory(record.size)
-    block = memory.bind(Cached(), record, 0, 1.0)
+    block = placed(memory, Cached(), record, 0, 1.0)
     block.update()
     assert block.last.tolist() == [1.0, 2.0] and block._last == "cache"
 
@@ -229,8 +236,11 @@ class Keeper(Block, numeric=False):
 def test_a_frame_that_is_a_state_lives_in_memory_beside_the_frames_of_ports() -> None:
     block = Keeper()
     record = Record.of(block, {})
-    memory = Memory(record.size, [Frame.none()])
-    first, second = (memory.bind(block, record, 0, 0.1) for _ in range(2))
+    memory = Memory(record.size, [Frame.none()] * 5)
+    places = [
+        {name: Slot("frame", (), first + k) for k, name in enumerate(("one", "two"))} for first in (1, 3)
+    ]
+    first, second = (placed(memory, block, record, 0, 0.1, **each) for each in places)
     frame = Frame(np.zeros((2, 2, 3), np.uint8), 0.0, 1)
     assert [field.name for field in record.fields] == ["period"] and len(memory.frames) == 5
     assert first.one.sequence == 0
@@ -250,10 +260,10 @@ def test_a_frame_that_is_a_state_comes_back_with_a_snapshot() -> None:
     ]
     engine = drive(Keeper(), frame=frames, rate="10 Hz").engine
     snapshot = engine.snapshot()
-    (bound,) = engine.plan.steps
-    bound.self.two = frames[0]
+    block = engine.bound("block")
+    block.two = frames[0]
     engine.restore(snapshot)
-    assert bound.self.two is frames[4] and bound.self.one is frames[5]
+    assert block.two is frames[4] and block.one is frames[5]
 
 
 def test_a_numeric_block_may_not_keep_a_frame() -> None:

@@ -40,7 +40,7 @@ class Table(Block):
 
 
 def parameters(rig: Rig) -> tuple:
-    block = rig.bound.self
+    block = rig.block
     return float(block.share), int(block.mode), bool(block.on)
 
 
@@ -49,7 +49,7 @@ def test_a_block_runs_alone_on_the_inputs_that_are_written() -> None:
     with engine:
         engine.run(1)
         assert engine.read("block", "y") == 2.0
-        engine.plan.memory.write(engine.plan["block"].inputs["u"], 6.0)
+        engine.write("block", "u", 6.0)
         engine.run(1)
         assert engine.read("block", "y") == 3.0 and engine.time == 0.2
 
@@ -60,7 +60,7 @@ def test_parameters_fix_the_sizes_that_they_share_with_ports() -> None:
 
 def test_there_is_a_rig_for_each_shape_choice_and_switch_and_one_with_other_numbers() -> None:
     found = list(rigs(Subject(Blend)))
-    assert [rig.bound.inputs["u"].shape for rig in found] == [()] * 4 + [(VECTOR,)] * 4
+    assert [rig.placed.inputs["u"].shape for rig in found] == [()] * 4 + [(VECTOR,)] * 4
     plain, other, off, shaken = map(parameters, found[:4])
     assert (plain, other, off) == ((0.5, 0, True), (0.5, 1, True), (0.5, 0, False))
     assert shaken[0] != 0.5 and 0.4 <= shaken[0] <= 0.6
@@ -74,7 +74,7 @@ def test_what_is_given_stays_as_it_is() -> None:
 
 def test_sizes_that_nothing_fixes_are_those_of_a_short_vector() -> None:
     (rig,) = rigs(Subject(Table, given={"values": [[1.0, 2.0]]}))
-    assert rig.bound.inputs["x"].shape == (VECTOR,) and rig.bound.outputs["y"].shape == (2,)
+    assert rig.placed.inputs["x"].shape == (VECTOR,) and rig.placed.outputs["y"].shape == (2,)
 
 
 def test_the_same_subject_has_the_same_inputs_every_time() -> None:

@@ -106,8 +106,7 @@ def test_a_picture_that_vanishes_during_the_run_does_not_stop_it(tmp_path: Path)
         engine.run(1)
         (tmp_path / "b.png").unlink()
         engine.run(1)
-        (bound,) = engine.plan.steps
-        assert engine.plan.memory.read(bound.outputs["frame"]).pixels.shape == (0, 0, 3)
+        assert engine.read("block", "frame").pixels.shape == (0, 0, 3)
 
 
 def test_a_restored_run_shows_the_same_pictures(tmp_path: Path) -> None:
@@ -115,11 +114,10 @@ def test_a_restored_run_shows_the_same_pictures(tmp_path: Path) -> None:
     graph = play(tmp_path, 1).engine.graph
 
     def run(engine: Engine) -> list[tuple[int, int, float]]:
-        (bound,) = engine.plan.steps
         seen = []
         for _ in range(4):
             engine.run(1)
-            frame = engine.plan.memory.read(bound.outputs["frame"])
+            frame = engine.read("block", "frame")
             seen.append((int(frame.pixels[0, 0, 0]), frame.sequence, frame.stamp))
         return seen
 

@@ -362,8 +362,7 @@ def test_a_restored_run_repeats_to_the_bit() -> None:
 
 def _run_one(engine: Engine) -> Frame:
     engine.run(1)
-    (bound,) = engine.plan.steps
-    frame: Frame = engine.plan.memory.read(bound.outputs["frame"])
+    frame: Frame = engine.read("block", "frame")
     return frame
 
 

@@ -65,11 +65,10 @@ def test_a_restored_run_shows_the_same_frames(tmp_path: Path, loop: bool) -> Non
     graph = play(write(tmp_path / "a.mp4", "mp4v"), 1, loop=loop).engine.graph
 
     def run(engine: Engine) -> list[Any]:
-        (bound,) = engine.plan.steps
         frames = []
         for _ in range(10):
             engine.run(1)
-            frames.append(engine.plan.memory.read(bound.outputs["frame"]))
+            frames.append(engine.read("block", "frame"))
         return frames
 
     for before in (4, FRAMES - 5, FRAMES + 2):

@@ -1,0 +1,221 @@
+"""The interpreter: the executor that runs a program with blocks in plain Python, at once and anywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import isnan
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.block import NO_FRAME, Block
+from quadvis.engine.layout import TIME
+from quadvis.engine.memory import SLOT, Memory
+from quadvis.engine.program import COPY, Op, Program
+from quadvis.engine.solver import Solver, Vector
+from quadvis.engine.taps import Observer, Tap
+
+Call = Callable[[], None]
+NOT_FINITE_OUTPUT = "output"
+NOT_FINITE_STATE = "state"
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Why an executor stopped at a tick: the exception of a block's method, or numbers that are not finite.
+
+    ``blocks`` are the numbers of the blocks that ran, or that alone which failed.
+    """
+
+    tick: int
+    blocks: tuple[int, ...]
+    error: Exception | None = None
+    found: str = ""  # NOT_FINITE_OUTPUT, NOT_FINITE_STATE
+
+
+class Executor(Protocol):
+    """Runs a program's ticks over a memory."""
+
+    memory: Memory
+    tick: int  # the next to run
+
+    def run(self, until: int) -> Stop | None:
+        """Run all ticks before ``until``; None if nothing failed."""
+
+    def attach(self, observer: Tap | Observer) -> None:
+        """Have rows taken from now on, or something done at the ticks of a task."""
+
+
+@dataclass
+class _Moment:
+    """What one combination of due tasks does at a tick, as flat lists."""
+
+    enter: list[Call]
+    outputs: list[Call]
+    updates: list[Call]
+    finite: NDArray[np.intp]
+    zeros: NDArray[np.float64]
+    observers: list[Callable[[int], None]]
+    taps: list[tuple[Callable[[int, memoryview], None], slice]]
+    blocks: tuple[int, ...]
+
+
+class Interpreter:
+    """Runs a program with the blocks bound to its memory.
+
+    ``blocks`` are the objects that belong to ``program.blocks``; ``selves`` are the same, bound.
+    """
+
+    def __init__(self, program: Program, blocks: Sequence[Block], buffer: Any = None) -> None:
+        self.program = program
+        frames = [NO_FRAME] * program.frames
+        self.memory = Memory(len(program.image) // SLOT, frames, program.image, buffer)
+        self.selves = [
+            self.memory.bind(block, placed.record, placed.position, placed.frames)
+            for block, placed in zip(blocks, program.blocks, strict=True)
+        ]
+        self.tick = 0
+        self._calls: dict[Op, Call] = {}
+        self._owners: dict[int, int] = {}  # the block of a call, by the call's identity
+        self._derivatives = [self.call(op) for op in program.derivatives]
+        self._minor = [self.call(op) for op in program.minor]
+        self._states = np.array(program.states, np.intp)
+        self._slopes = np.array(program.slopes, np.intp)
+        self._held = slice(0, program.held * SLOT)
+        self._solver = Solver(program.solver, float(program.period))
+        self._observers: list[Tap | Observer] = []
+        self._rhythms = [(task.every, task.offset) for task in program.tasks]
+        self._moments: dict[tuple[bool, ...], _Moment] = {}
+
+    def call(self, op: Op) -> Call:
+        """Return what runs an operation: one call over the memory."""
+        if op not in self._calls:
+            if op.method == COPY:
+                made = self.memory.copy(op.sources[0], op.targets[0])
+            else:
+                made = self.memory.call(getattr(self.selves[op.block], op.method), op.sources, op.targets)
+            self._calls[op] = made
+            self._owners[id(made)] = op.block
+        return self._calls[op]
+
+    def attach(self, observer: Tap | Observer) -> None:
+        """Have rows taken from now on, or something done at the ticks of a task."""
+        self._observers.append(observer)
+        rhythm = self._rhythm(observer)
+        if rhythm not in self._rhythms:
+            self._rhythms.append(rhythm)
+        self._moments.clear()
+
+    def _rhythm(self, observer: Tap | Observer) -> tuple[int, int]:
+        name = observer.task if isinstance(observer, Observer) else self.program[observer.block].task
+        task = self.program.task(name)
+        return task.every * observer.every, task.offset
+
+    def run(self, until: int) -> Stop | None:
+        """Run all ticks before ``until``; None if nothing failed."""
+        floats, raw = self.memory.floats, self.memory.raw
+        clock = raw.cast("d")  # one element costs a third of a numpy array's
+        rhythms = self._rhythms
+        period, denominator = self.program.period.as_integer_ratio()
+        continuous = self._states.size > 0
+        while self.tick < until:
+            tick = self.tick
+            due = tuple([(tick - offset) % every == 0 and tick >= offset for every, offset in rhythms])
+            moment = self._moments.get(due) or self._prepare(due)
+            # An exact product, so that time has no drift; the quotient of integers is rounded once.
+            clock[TIME.position] = tick * period / denominator
+            call = None
+            try:
+                for call in moment.enter:
+                    call()
+                for call in moment.outputs:
+                    call()
+            except Exception as error:
+                return self._stop(call, error)
+            if isnan(floats.take(moment.finite).dot(moment.zeros)):
+                return Stop(tick, moment.blocks, found=NOT_FINITE_OUTPUT)
+            for observe in moment.observers:
+                observe(tick)
+            for take, row in moment.taps:
+                take(tick, raw[row])
+            try:
+                for call in moment.updates:
+                    call()
+            except Exception as error:
+                return self._stop(call, error)
+            if continuous:
+                stop = self._integrate(clock[TIME.position])
+                if stop is not None:
+                    return stop
+            self.tick = tick + 1
+        return None
+
+    def _stop(self, call: Call | None, error: Exception) -> Stop:
+        return Stop(self.tick, (self._owners[id(call)],), error)
+
+    def _prepare(self, due: tuple[bool, ...]) -> _Moment:
+        rhythms = {rhythm for rhythm, flag in zip(self._rhythms, due, strict=True) if flag}
+        tasks = [task for task in self.program.tasks if (task.every, task.offset) in rhythms]
+        outputs = sorted((op for task in tasks for op in task.outputs), key=lambda op: op.block)
+        updates = sorted((op for task in tasks for op in task.updates), key=lambda op: op.block)
+        finite = np.array([position for task in tasks for position in task.finite], np.intp)
+        names = {task.name for task in tasks}
+        attached = [observer for observer in self._observers if self._rhythm(observer) in rhythms]
+        made = _Moment(
+            [self.call(op) for task in tasks for op in task.enter],
+            [self.call(op) for op in outputs],
+            [self.call(op) for op in updates],
+            finite,
+            np.zeros(finite.size),
+            [observer.call for observer in attached if isinstance(observer, Observer)],
+            [(tap.take, self.program[tap.block].row) for tap in attached if not isinstance(tap, Observer)],
+            tuple(number for number, block in enumerate(self.program.blocks) if block.task in names),
+        )
+        self._moments[due] = made
+        return made
+
+    def _integrate(self, time: float) -> Stop | None:
+        raw, floats = self.memory.raw, self.memory.floats
+        # Minor steps write over time and signals, but delays and readers want those of the tick.
+        held = bytes(raw[self._held])
+        call = None
+        try:
+            for call in self._derivatives:
+                call()
+            state = self._solver.advance(self._rates, time, floats[self._states], floats[self._slopes])
+        except _MinorError as failure:
+            return self._stop(failure.call, failure.error)
+        except Exception as error:
+            return self._stop(call, error)
+        raw[self._held] = held
+        floats[self._states] = state
+        return None if np.isfinite(state).all() else Stop(self.tick, (), found=NOT_FINITE_STATE)
+
+    def _rates(self, time: float, state: Vector) -> Vector:
+        """Return the derivative at a minor step."""
+        floats = self.memory.floats
+        floats[TIME.position] = time
+        floats[self._states] = state
+        call: Call = _nothing
+        try:
+            for call in self._minor:
+                call()
+            for call in self._derivatives:
+                call()
+        except Exception as error:
+            raise _MinorError(call, error) from error
+        return floats[self._slopes]
+
+
+class _MinorError(Exception):
+    """A block failed at a minor step."""
+
+    def __init__(self, call: Call, error: Exception) -> None:
+        super().__init__(str(error))
+        self.call, self.error = call, error
+
+
+def _nothing() -> None:
+    """Do nothing."""

@@ -1,0 +1,176 @@
+"""Where everything lies: every signal, constant, delayed value and block in one run of 8-byte slots.
+
+In slots: time | signals, task by task (the continuous one first), block by block | constants | delayed
+signals | slopes | one record per block. A block's outputs lie side by side: a row of the log is one slice.
+Frames lie in a list beside it, and so do frames that a block keeps as states.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from quadvis.block import Block, Shape
+from quadvis.engine.graph import Constant, Graph, Node, Wire, selected
+from quadvis.engine.memory import SLOT, Record, Slot
+
+TIME = Slot("float64", (), 0)
+
+
+class Slots(Mapping[str, Slot]):
+    """Slots by name, in order. It never changes, so that whatever holds it can be hashed."""
+
+    def __init__(self, items: Mapping[str, Slot]) -> None:
+        self._items = dict(items)
+
+    def __getitem__(self, name: str) -> Slot:
+        return self._items[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._items)
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def __or__(self, other: Mapping[str, Slot]) -> dict[str, Slot]:
+        return self._items | dict(other)
+
+    def __hash__(self) -> int:
+        return hash(tuple(self._items.items()))
+
+    def __repr__(self) -> str:
+        return repr(self._items)
+
+
+@dataclass(frozen=True)
+class Placed:
+    """One block of a program: its kind, its task, and the slots of its ports, slopes, and record.
+
+    ``record`` begins at ``position``; ``frames`` are the places of the states that hold frames; ``nan`` are
+    the outputs in which NaN says "missing".
+    """
+
+    path: str
+    kind: str
+    task: str
+    inputs: Slots
+    outputs: Slots
+    slopes: Slots  # derivatives of its continuous states
+    frames: Slots
+    record: Record
+    position: int
+    nan: tuple[str, ...] = ()
+
+    def field(self, name: str) -> Slot:
+        """Return the slot of a parameter or state; KeyError if there is none of that name."""
+        if name in self.frames:
+            return self.frames[name]
+        item = self.record[name]
+        return Slot(item.scalar, item.shape, self.position + item.offset)
+
+    @cached_property
+    def row(self) -> slice:
+        """The bytes of its outputs that are numbers, side by side."""
+        slots = [slot for slot in self.outputs.values() if slot.scalar != "frame"]
+        if not slots:
+            return slice(0, 0)
+        return slice(slots[0].position * SLOT, (slots[-1].position + slots[-1].size) * SLOT)
+
+
+class Layout:
+    """Gives every block of a graph its places, in the order of execution: ``blocks``.
+
+    ``copies`` are the delayed values: from an output to where its readers find it, with the producer's task.
+    """
+
+    def __init__(self, graph: Graph) -> None:
+        self._graph = graph
+        self.size, self.frames = 1, 0
+        self.continuous = 1  # the slot at which the continuous task's signals end
+        self._outputs = self._signals()
+        self._constants = {
+            (node.path, port): self._take(node, port)
+            for node in graph.nodes
+            for port, source in node.inputs.items()
+            if isinstance(source, Constant)
+        }
+        self._delayed: dict[tuple[str, str], Slot] = {}
+        for node in graph.nodes:
+            for _, wire in node.wires():
+                key = (wire.block, wire.port)
+                if wire.crossing == "delay" and key not in self._delayed:
+                    self._delayed[key] = self._take(graph[wire.block], wire.port)
+        slopes = {node.path: self._slopes(node) for node in graph.nodes}
+        self.blocks = tuple(self._place(node, slopes[node.path]) for node in graph.nodes)
+
+    def copies(self) -> Iterator[tuple[str, Slot, Slot]]:
+        """Yield the task of the producer, its output, and the slot that holds the output's delayed value."""
+        for (path, port), slot in self._delayed.items():
+            yield self._graph[path].task.name, self._outputs[path][port], slot
+
+    def _signals(self) -> dict[str, Slots]:
+        found = {}
+        for task in self._graph.tasks:
+            for node in self._graph.nodes:
+                if node.task == task:
+                    ports = node.block.interface.outputs
+                    found[node.path] = Slots({port: self._take(node, port) for port in ports})
+            if task.continuous:
+                self.continuous = self.size
+        return found
+
+    def _slopes(self, node: Node) -> Slots:
+        states = node.block.interface.continuous
+        return Slots({state.name: self._room("float64", node.shape(state.name)) for state in states})
+
+    def _place(self, node: Node, slopes: Slots) -> Placed:
+        record, position = Record.of(node.block, node.sizes), self.size
+        self.size += record.size
+        ports = node.block.interface.outputs
+        return Placed(
+            node.path,
+            node.kind,
+            node.task.name,
+            Slots({port: self._source(node, port) for port in node.inputs}),
+            self._outputs[node.path],
+            slopes,
+            self._frames(node.block),
+            record,
+            position,
+            tuple(port for port in ports if ports[port].nan),
+        )
+
+    def _frames(self, block: Block) -> Slots:
+        states = [name for name, state in block.interface.states.items() if state.signal.scalar == "frame"]
+        first = self.frames
+        self.frames += len(states)
+        return Slots({name: Slot("frame", (), first + index) for index, name in enumerate(states)})
+
+    def _take(self, node: Node, port: str) -> Slot:
+        interface = node.block.interface
+        scalar = (interface.inputs.get(port) or interface.outputs[port]).signal.scalar
+        if scalar == "frame":
+            self.frames += 1
+            return Slot("frame", (), self.frames - 1)
+        return self._room(scalar, node.shape(port))
+
+    def _room(self, scalar: str, shape: Shape) -> Slot:
+        slot = Slot(scalar, shape, self.size)
+        self.size += slot.size
+        return slot
+
+    def _source(self, node: Node, port: str) -> Slot:
+        """Return the slot that an input reads."""
+        source = node.inputs[port]
+        if not isinstance(source, Wire):
+            return self._constants[node.path, port]
+        delayed = source.crossing == "delay"
+        slot = (
+            self._delayed[source.block, source.port] if delayed else self._outputs[source.block][source.port]
+        )
+        if not source.index:
+            return slot
+        part = selected(slot.shape, source.index)
+        assert part is not None, "the checker refuses parts that are not in one piece"
+        return Slot(slot.scalar, part[1], slot.position + part[0])

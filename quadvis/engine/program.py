@@ -1,0 +1,253 @@
+"""The program: all that a loop needs to run a graph, as pure data.
+
+A program can be pickled, hashed, compared and printed. It knows no block object and no memory: an
+executor binds it to both. The interpreter, the compiled loop, a process on a target, replay and scopes
+run one program.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+from quadvis.block import Random
+from quadvis.engine.graph import Constant, Graph, Node
+from quadvis.engine.layout import TIME, Layout, Placed
+from quadvis.engine.memory import Memory, Slot
+
+COPY = "copy"
+NO_BLOCK = -1
+STREAM_MODULUS = 4294944443  # the smaller of the two moduli of MRG32k3a: every seed below it is valid
+
+
+@dataclass(frozen=True)
+class Op:
+    """One call of a block's method, from slots to slots; or the copy of one slot to another.
+
+    ``block`` is the block's number in the program, the order of execution; a copy has ``NO_BLOCK``.
+    """
+
+    block: int
+    method: str
+    sources: tuple[Slot, ...]
+    targets: tuple[Slot, ...]
+
+
+@dataclass(frozen=True)
+class TaskProgram:
+    """What the blocks of one rate do at each of their ticks, in four phases.
+
+    The task is due at tick ``offset`` and then at every ``every`` ticks. ``enter``: copies for wires that
+    cross into other tasks or delay. ``outputs`` and ``updates``: the calls of the blocks. ``finite``: the
+    slots that must hold finite numbers after the outputs.
+    """
+
+    name: str
+    period: Fraction  # s
+    every: int
+    offset: int
+    continuous: bool
+    enter: tuple[Op, ...]
+    outputs: tuple[Op, ...]
+    updates: tuple[Op, ...]
+    finite: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Tunable:
+    """A parameter that may change between two ticks of a run."""
+
+    block: int
+    path: str
+    name: str
+    unit: str
+    slot: Slot
+
+
+@dataclass(frozen=True)
+class Program:
+    """The program of one graph and one seed.
+
+    ``blocks`` are in the order of execution, ``tasks`` fastest first. ``image`` is the memory at the
+    beginning: parameters, initial states, constants, random streams. ``held`` is the number of slots that
+    minor steps write over: time and the signals of the continuous task. ``states`` are the slots of the
+    continuous states, ``slopes`` those of their derivatives, in one order. ``derivatives`` are the calls that
+    give them; ``minor`` are the outputs on which they depend and which move between two ticks.
+    """
+
+    name: str
+    period: Fraction  # of the base tick (s)
+    solver: str
+    tasks: tuple[TaskProgram, ...]
+    blocks: tuple[Placed, ...]
+    image: bytes
+    frames: int
+    held: int
+    states: tuple[int, ...]
+    slopes: tuple[int, ...]
+    derivatives: tuple[Op, ...]
+    minor: tuple[Op, ...]
+    tunables: tuple[Tunable, ...]
+
+    @cached_property
+    def _numbers(self) -> dict[str, int]:
+        return {block.path: number for number, block in enumerate(self.blocks)}
+
+    def number(self, path: str) -> int:
+        """Return the number of a block; KeyError if there is none of that path."""
+        return self._numbers[path]
+
+    def __getitem__(self, path: str) -> Placed:
+        return self.blocks[self._numbers[path]]
+
+    def op(self, path: str, method: str) -> Op | None:
+        """Return the call of a block's ``output``, ``update`` or ``deriv``; None if it has no such method."""
+        number = self.number(path)
+        task = self.task(self.blocks[number].task)
+        ops = {"output": task.outputs, "update": task.updates, "deriv": self.derivatives}[method]
+        return next((op for op in ops if op.block == number), None)
+
+    def task(self, name: str) -> TaskProgram:
+        """Return a task by its name."""
+        return next(task for task in self.tasks if task.name == name)
+
+    @cached_property
+    def hash(self) -> str:
+        """The SHA-256 of everything in the program."""
+        return hashlib.sha256(repr(self).encode()).hexdigest()
+
+
+def make_program(graph: Graph, seed: int) -> Program:
+    """Lay out memory and list the calls of every task; states hold their initial values, seeded."""
+    layout = Layout(graph)
+    blocks = layout.blocks
+    copies: dict[str, list[Op]] = {}
+    for producer, source, target in layout.copies():
+        copies.setdefault(producer, []).append(Op(NO_BLOCK, COPY, (source,), (target,)))
+    calls = {method: _calls(graph, blocks, method) for method in ("output", "update", "deriv")}
+    tasks = []
+    for task in graph.tasks:
+        mine = [number for number, block in enumerate(blocks) if block.task == task.name]
+        tasks.append(
+            TaskProgram(
+                task.name,
+                task.period,
+                graph.ticks(task.period),
+                graph.ticks(task.offset),
+                task.continuous,
+                tuple(copies.get(task.name, ())),
+                tuple(calls["output"][number] for number in mine if number in calls["output"]),
+                tuple(calls["update"][number] for number in mine if number in calls["update"]),
+                tuple(position for number in mine for position in _finite(blocks[number])),
+            )
+        )
+    states = [(block.field(name), slope) for block in blocks for name, slope in block.slopes.items()]
+    return Program(
+        graph.name,
+        graph.tick,
+        graph.solver,
+        tuple(tasks),
+        blocks,
+        _image(graph, layout, seed),
+        layout.frames,
+        layout.continuous,
+        tuple(_elements(state for state, _ in states)),
+        tuple(_elements(slope for _, slope in states)),
+        tuple(calls["deriv"].values()),
+        tuple(calls["output"][number] for number in _minor(graph.nodes) if number in calls["output"]),
+        tuple(_tunables(graph, blocks)),
+    )
+
+
+def _calls(graph: Graph, blocks: Sequence[Placed], method: str) -> dict[int, Op]:
+    """Return the calls of one method by the number of the block."""
+    found = {}
+    for number, (node, block) in enumerate(zip(graph.nodes, blocks, strict=True)):
+        names = node.block.interface.arguments.get(method)
+        if names is not None:
+            targets = {"output": block.outputs, "update": {}, "deriv": block.slopes}[method]
+            sources = (TIME if name == "time" else block.inputs[name] for name in names)
+            found[number] = Op(number, method, tuple(sources), tuple(targets.values()))
+    return found
+
+
+def _finite(block: Placed) -> Iterator[int]:
+    """Yield the slots that must hold finite numbers once a block has run."""
+    for name, slot in block.outputs.items():
+        if slot.scalar == "float64" and name not in block.nan:
+            yield from range(slot.position, slot.position + slot.size)
+
+
+def _elements(slots: Iterable[Slot]) -> Iterator[int]:
+    """Yield the position of every element."""
+    for slot in slots:
+        yield from range(slot.position, slot.position + slot.size)
+
+
+def _image(graph: Graph, layout: Layout, seed: int) -> bytes:
+    """Return the memory at the beginning of a run."""
+    memory = Memory(layout.size)
+    for node, block in zip(graph.nodes, layout.blocks, strict=True):
+        memory.fill(node.block, block.record, block.position, float(node.task.period))
+        for port, source in node.inputs.items():
+            if isinstance(source, Constant) and block.inputs[port].scalar != "frame":
+                memory.write(block.inputs[port], source.value)
+        for name, state in node.block.interface.states.items():
+            if isinstance(state, Random):
+                memory.write(block.field(name), _stream(seed, node.path, name))
+    return bytes(memory.raw)
+
+
+def _stream(seed: int, path: str, state: str) -> list[int]:
+    """Return the start of a random stream: a hash, so that streams do not depend on other blocks."""
+    digest = hashlib.sha256(f"{seed}/{path}.{state}".encode()).digest()
+    return [1 + int.from_bytes(digest[4 * i : 4 * i + 4], "little") % (STREAM_MODULUS - 1) for i in range(6)]
+
+
+def _tunables(graph: Graph, blocks: Sequence[Placed]) -> Iterator[Tunable]:
+    for number, (node, block) in enumerate(zip(graph.nodes, blocks, strict=True)):
+        for name, param in node.block.interface.params.items():
+            if param.tune and not param.is_text:
+                yield Tunable(number, node.path, name, param.unit, block.field(name))
+
+
+def _minor(nodes: Sequence[Node]) -> list[int]:
+    """Return the blocks that minor steps must compute again, in the order of execution."""
+    needed: set[str] = set()
+    for node in nodes:
+        needed.update(_sources(node, node.block.interface.arguments.get("deriv", ())))
+    moving = _moving(nodes)
+    found: list[int] = []
+    for number, node in reversed(list(enumerate(nodes))):
+        if node.path in needed & moving:
+            found.insert(0, number)
+            needed.update(_sources(node, node.block.interface.feedthrough))
+    return found
+
+
+def _moving(nodes: Sequence[Node]) -> set[str]:
+    """Return the blocks whose outputs move between two ticks.
+
+    They are in the continuous task, and have continuous states, or follow time or another moving block. A
+    block that has an ``update`` and passes its input on is a sampled one: its output stands still until the
+    next tick. So does that of a block which is not numeric, since it may reach outside.
+    """
+    found: set[str] = set()
+    for node in nodes:
+        interface = node.block.interface
+        if not node.task.continuous:
+            continue
+        follows = "time" in interface.arguments.get("output", ())
+        if "update" not in interface.arguments:
+            follows |= not found.isdisjoint(_sources(node, interface.feedthrough))
+        if interface.continuous or (node.block.numeric and follows):
+            found.add(node.path)
+    return found
+
+
+def _sources(node: Node, ports: Iterable[str]) -> Iterator[str]:
+    """Yield the blocks whose present outputs some inputs of a block read."""
+    return (wire.block for _, wire in node.wires(ports) if wire.crossing != "delay")

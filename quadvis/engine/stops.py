@@ -1,0 +1,106 @@
+"""Why a run stopped, in a sentence: which block, port and time, what happened, and what may help."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import ParameterError
+from quadvis.engine.graph import Graph
+from quadvis.engine.interpreter import NOT_FINITE_OUTPUT, Stop
+from quadvis.engine.layout import Placed
+from quadvis.engine.memory import Memory
+from quadvis.engine.program import Program
+from quadvis.errors import QuadvisError, RunError, sentence
+from quadvis.machine.failures import MEMORY, arithmetic, is_short_of_memory, surroundings
+
+SHOWN = 4  # numbers in a message
+SMALLER_STEP = "a smaller solver step may help"
+
+
+def explained(stop: Stop, graph: Graph, program: Program, memory: Memory) -> QuadvisError:
+    """Return the error that a stop means, to be raised."""
+    time = float(stop.tick * program.period)
+    if stop.error is not None:
+        return _failed(stop.error, program.blocks[stop.blocks[0]], graph, memory, time)
+    if stop.found == NOT_FINITE_OUTPUT:
+        return _not_finite(stop, graph, program, memory, time)
+    for block in program.blocks:
+        for name in block.slopes:
+            if not np.isfinite(memory.view(block.field(name))).all():
+                problem = sentence(f"state '{name}' left the finite numbers", SMALLER_STEP)
+                return RunError(problem, block=block.path, time=time)
+    raise AssertionError("a state that is not finite belongs to a block")
+
+
+def cannot(method: str, path: str, error: Exception, time: float) -> QuadvisError:
+    """Return the error of a method around the run, such as ``open``."""
+    return _own(error, path) or RunError(f"cannot {method}: {_reason(error)}", block=path, time=time)
+
+
+def _own(error: Exception, path: str) -> QuadvisError | None:
+    """Return an error that names its place by itself; None for others."""
+    if isinstance(error, RunError) and error.block:
+        return error
+    if isinstance(error, ParameterError):
+        return ParameterError(error.parameter, f"block '{path}': {error}")
+    return None
+
+
+def _failed(error: Exception, block: Placed, graph: Graph, memory: Memory, time: float) -> QuadvisError:
+    own = _own(error, block.path)
+    if own is not None:
+        return own
+    if not arithmetic(error):
+        return RunError(_reason(error), block=block.path, time=time)
+    outputs = list(block.outputs)
+    reason = sentence(f"{arithmetic(error)}{_inputs(block, memory)}", _remedy(graph, block.path))
+    return RunError(reason, block=block.path, port=outputs[0] if len(outputs) == 1 else "", time=time)
+
+
+def _reason(error: Exception) -> str:
+    """Return what went wrong in a block."""
+    if isinstance(error, QuadvisError):
+        return str(error)
+    if problem := arithmetic(error):
+        return problem
+    if is_short_of_memory(error):
+        return MEMORY
+    if isinstance(error, RecursionError):
+        return surroundings(error)
+    return f"{type(error).__name__}: {error}"
+
+
+def _inputs(block: Placed, memory: Memory) -> str:
+    """Return the single numbers that a block reads now, a few of them."""
+    slots = {port: slot for port, slot in block.inputs.items() if slot.scalar != "frame"}
+    found = [f"{port} = {memory.read(slot):g}" for port, slot in slots.items() if not slot.shape]
+    return f" ({', '.join(found[:SHOWN])}{', ...' if len(found) > SHOWN else ''})" if found else ""
+
+
+def _remedy(graph: Graph, path: str) -> str:
+    """Return that a smaller step may help if the solver integrates a state that has its share in a block."""
+    waiting, seen = [path], {path}
+    while waiting:
+        node = graph[waiting.pop()]
+        if node.block.interface.continuous:
+            return SMALLER_STEP
+        for _, wire in node.wires():
+            if wire.block not in seen:
+                seen.add(wire.block)
+                waiting.append(wire.block)
+    return ""
+
+
+def _not_finite(stop: Stop, graph: Graph, program: Program, memory: Memory, time: float) -> RunError:
+    """Name the first port, in execution order, that is not finite."""
+    for block in (program.blocks[number] for number in stop.blocks):
+        for port, slot in block.outputs.items():
+            if port not in block.nan and slot.scalar == "float64":
+                value: Any = memory.read(slot)
+                if not np.isfinite(value).all():
+                    text = np.array2string(np.asarray(value), precision=4)
+                    problem = sentence(f"the output became {text}", _remedy(graph, block.path))
+                    return RunError(problem, block=block.path, port=port, time=time)
+    raise AssertionError("a value that is not finite belongs to a port")
