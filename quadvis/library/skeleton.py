@@ -62,8 +62,7 @@ OWN_HEAD = """from pathlib import Path
 import pytest
 from quadvis.block import ParameterError
 from quadvis.library.catalogue import Catalogue
-from quadvis.testing.conformance import check_block
-from quadvis.testing import drive
+from quadvis.testing import check_block, drive
 
 BLOCKS = Catalogue(Path(__file__).parents[{up}])
 {name} = BLOCKS.find("{path}")

@@ -16,8 +16,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from quadvis import document
-from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar, dump_yaml, parse_yaml, read_yaml
+from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar, dump_yaml, parse_yaml, read_yaml, reader
 from quadvis.errors import DiagramError, Faults, Place, QuadvisError
 from quadvis.units import Unit, parse_units
 
@@ -250,7 +249,7 @@ def test_yaml_errors_are_located_and_in_plain_words(text, message):
 
 @pytest.mark.parametrize("text", [text for text, _ in SYNTAX])
 def test_the_parser_in_python_serves_where_libyaml_is_missing(text, monkeypatch):
-    monkeypatch.setattr(document, "_Loader", yaml.SafeLoader)
+    monkeypatch.setattr(reader, "_Loader", yaml.SafeLoader)
     assert re.match(r"d\.yaml:\d+:\d+: ", faults_of(text)[0])
     assert parse_yaml(DIAGRAM).mapping()["quadvis"].integer() == 1
 

@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 import yaml
 
-from quadvis import document
-from quadvis.document import parse_yaml
+from quadvis.document import parse_yaml, reader
 from quadvis.document.composer import MAX_DEPTH
 from quadvis.errors import DiagramError, Faults
 
@@ -82,7 +81,7 @@ def said(text: str) -> list[str]:
 
 @pytest.fixture(params=LOADERS, ids=lambda loader: loader.__name__)
 def loader(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Any:
-    monkeypatch.setattr(document, "_Loader", request.param)
+    monkeypatch.setattr(reader, "_Loader", request.param)
     return request.param
 
 
