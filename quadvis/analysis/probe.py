@@ -15,7 +15,7 @@ from quadvis.analysis.cut import break_path
 from quadvis.block import Random
 from quadvis.diagram.questions import Cut
 from quadvis.engine.engine import Engine
-from quadvis.engine.graph import Graph, Task
+from quadvis.engine.graph import Graph, Node, Task
 from quadvis.engine.layout import TIME, Placed
 from quadvis.engine.memory import Slot
 from quadvis.errors import QuadvisError
@@ -212,12 +212,13 @@ class Probe:
         )
 
     def _shake(self) -> None:
-        """Have every signal of the loop disturbed at each tick, when it is asked for."""
+        """Have every signal and all Work of the loop disturbed at each tick, when it is asked for."""
         by_task: dict[str, list[int]] = {}
-        for block in self.program.blocks:
-            by_task.setdefault(block.task, []).extend(self._signals(block))
-        for task, found in by_task.items():
-            places = np.array(found, np.intp)
+        for node, block in zip(self.graph.nodes, self.program.blocks, strict=True):
+            found = by_task.setdefault(block.task, [])
+            found += [*self._signals(block), *self._work(node, block)]
+        for task, mine in by_task.items():
+            places = np.array(mine, np.intp)
             random = np.random.default_rng(1)
 
             def disturb(_: int, places: Positions = places, random: Any = random) -> None:
@@ -234,6 +235,17 @@ class Probe:
             if slot.scalar == "float64"
             for position, _ in _elements(slot, "")
             if position in self.names
+        ]
+
+    def _work(self, node: Node, block: Placed) -> list[int]:
+        """Return the slots in which outputs of the loop hand real numbers to updates."""
+        if block.path not in self.loop:
+            return []
+        return [
+            position
+            for name, work in node.block.interface.work.items()
+            if work.signal.scalar == "float64" and not _is_time(work.units)
+            for position, _ in _elements(block.field(name), "")
         ]
 
 

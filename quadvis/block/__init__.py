@@ -1,10 +1,10 @@
 """The contract that blocks are written against: the names that an author imports."""
 
 from quadvis.block.block import METHODS, Block, Interface, units_of
-from quadvis.block.declare import Declared, In, Out, Param, ParameterError, Random, State
+from quadvis.block.declare import Declared, In, Out, Param, ParameterError, Random, State, Work
 from quadvis.block.signals import NO_FRAME, SCALARS, Frame, Shape, SignalType, Sizes
 
 __all__ = [
     "METHODS", "NO_FRAME", "SCALARS", "Block", "Declared", "Frame", "In", "Interface", "Out", "Param",
-    "ParameterError", "Random", "Shape", "SignalType", "Sizes", "State", "units_of",
+    "ParameterError", "Random", "Shape", "SignalType", "Sizes", "State", "Work", "units_of",
 ]  # fmt: skip

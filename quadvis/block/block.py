@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
-from quadvis.block.declare import Declared, In, Out, Param, ParameterError, State
+from quadvis.block.declare import Declared, In, Out, Param, ParameterError, State, Work
 from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.machine.inputs import file_digest
 from quadvis.units import Unit
@@ -34,6 +34,7 @@ class Interface:
     outputs: Mapping[str, Out]
     params: Mapping[str, Param]
     states: Mapping[str, State]
+    work: Mapping[str, Work]
     arguments: Mapping[str, tuple[str, ...]]  # method -> the names it asks for
 
     @property
@@ -162,11 +163,16 @@ def _interface(cls: type[Block]) -> Interface:
     if cls.numeric and any(state.signal.scalar == "frame" for state in states.values()):
         problem = f"{cls.__name__} keeps a frame as a state, which no compiled method can"
         raise TypeError(sentence(problem, "say numeric=False"))
+    if any(item.signal.scalar == "frame" for item in of(Work).values()):
+        problem = f"{cls.__name__} declares a frame as Work, which holds numbers"
+        raise TypeError(sentence(problem, "keep it in an attribute that output sets and update reads"))
+    if of(Work) and not {"output", "update"} <= arguments.keys():
+        raise TypeError(f"{cls.__name__} declares Work, which goes from output to update, and has not both")
     if any(state.continuous for state in states.values()) != ("deriv" in arguments):
         raise TypeError(f"{cls.__name__}: continuous states and a deriv method go together")
     if outputs and "output" not in arguments:
         raise TypeError(f"{cls.__name__} declares outputs but has no output method")
-    return Interface(inputs, outputs, of(Param), states, arguments)
+    return Interface(inputs, outputs, of(Param), states, of(Work), arguments)
 
 
 def units_of(declared: Declared, count: int) -> tuple[Unit, ...]:

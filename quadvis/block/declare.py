@@ -76,6 +76,18 @@ class State(Declared):
     continuous: bool = field(default=False, kw_only=True)
 
 
+@dataclass(eq=False)
+class Work(Declared):
+    """Scratch of one tick: ``output`` writes what it has computed, ``update`` of the same tick reads it.
+
+    So nothing is computed twice. It is no state: nothing reads what an earlier tick left in it, ``deriv``
+    never reads it, and a snapshot holds zeros in its place.
+    """
+
+    type: str = "float64"
+    unit: str = field(default="1", kw_only=True)
+
+
 class Random(State):
     """A random stream (MRG32k3a), seeded by the engine from the run's seed and the block's path."""
 

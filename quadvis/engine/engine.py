@@ -132,7 +132,7 @@ class Engine:
 
     def snapshot(self) -> Snapshot:
         """Return the whole state between two ticks."""
-        return Snapshot(self.tick, bytes(self.memory.raw), tuple(self.memory.frames))
+        return Snapshot(self.tick, self.memory.content(), tuple(self.memory.frames))
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot of the same graph; the run from there repeats to the bit."""

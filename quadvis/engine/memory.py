@@ -61,22 +61,29 @@ class Field:
 
 @dataclass(frozen=True)
 class Record:
-    """The layout of a block's ``self``: the period first, then parameters, then states."""
+    """The layout of a block's ``self``: the period first, then parameters, then states, then Work.
+
+    ``kept`` slots come before the Work, which is scratch of one tick and no part of a snapshot.
+    """
 
     fields: tuple[Field, ...]
     size: int
+    kept: int
 
     @staticmethod
     def of(block: Block, sizes: Sizes) -> Record:
         """Lay out a block whose symbolic sizes are known; texts and frames stay outside."""
-        fields, offset = [Field("period", "float64", (), 0)], 1
-        for declared in (*block.interface.params.values(), *block.interface.states.values()):
-            if declared.signal.scalar in ("str", "frame"):
-                continue
-            shape = declared.signal.resolve(sizes)
-            fields.append(Field(declared.name, declared.signal.scalar, shape, offset))
-            offset += math.prod(shape)
-        return Record(tuple(fields), offset)
+        interface = block.interface
+        fields, offset, kept = [Field("period", "float64", (), 0)], 1, 1
+        for group in (interface.params, interface.states, interface.work):
+            kept = offset
+            for name, declared in group.items():
+                if declared.signal.scalar in ("str", "frame"):
+                    continue
+                shape = declared.signal.resolve(sizes)
+                fields.append(Field(name, declared.signal.scalar, shape, offset))
+                offset += math.prod(shape)
+        return Record(tuple(fields), offset, kept)
 
     @property
     def dtype(self) -> np.dtype[Any]:
@@ -109,6 +116,7 @@ class Memory:
         self.raw[:] = image or bytes(size * SLOT)
         self.floats: NDArray[np.float64] = np.frombuffer(self.raw, np.float64)
         self.frames = list(frames)
+        self._work: list[slice] = []  # the bytes of all blocks' Work
         self._scalars = {scalar: self.raw.cast(code) for scalar, code in VIEWS.items()}  # type: ignore[call-overload]
 
     def view(self, slot: Slot) -> NDArray[Any]:
@@ -128,6 +136,13 @@ class Memory:
             self.frames[slot.position] = value
         else:
             self.view(slot)[...] = value
+
+    def content(self) -> bytes:
+        """Return the bytes for a snapshot, with zeros for Work, which no tick hands to the next."""
+        found = bytearray(self.raw)
+        for scratch in self._work:
+            found[scratch] = bytes(scratch.stop - scratch.start)
+        return bytes(found)
 
     def call(
         self, method: Callable[..., Any], arguments: Sequence[Slot], targets: Sequence[Slot]
@@ -170,7 +185,7 @@ class Memory:
             elif item.name in interface.states:
                 value = interface.states[item.name].init
             else:
-                value = period
+                value = 0 if item.name in interface.work else period
             self.write(Slot(item.scalar, item.shape, position + item.offset), value)
 
     def bind(self, block: Block, record: Record, position: int, frames: Mapping[str, Slot]) -> Block:
@@ -178,6 +193,8 @@ class Memory:
 
         ``frames`` are the places of those of its states that hold frames.
         """
+        if record.kept < record.size:
+            self._work.append(slice((position + record.kept) * SLOT, (position + record.size) * SLOT))
         kind: Any = _bound_class(type(block), record)  # type: ignore[arg-type]  # mypy: a class has no hash
         bound: Block = kind.from_buffer(self.raw, position * SLOT)
         for item in record.fields:

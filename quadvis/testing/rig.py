@@ -13,14 +13,16 @@ import numpy as np
 from quadvis.block import Block, Frame, In, Param, ParameterError, Shape, Sizes
 from quadvis.engine.engine import Engine
 from quadvis.engine.interpreter import Call
-from quadvis.engine.layout import Placed
-from quadvis.engine.memory import SLOT, Memory
+from quadvis.engine.layout import TIME, Placed
+from quadvis.engine.memory import SLOT, Memory, Slot
 from quadvis.testing.alone import ALONE, alone, parameter_sizes
 
 STEPS = 16
 PERIOD = Fraction(1, 10)
 VECTOR = 3  # length of what may have any
 BOOL = In("bool").signal
+GARBAGE = {"float64": np.nan, "int64": -(2**40)}
+Whole = tuple[bytes, tuple[Any, ...]]
 
 
 @dataclass(frozen=True)
@@ -82,13 +84,28 @@ class Rig:
     def record(self) -> bytes:
         """Return the bytes of the block's parameters and states."""
         start = self.placed.position * SLOT
-        return bytes(self.memory.raw[start : start + self.placed.record.size * SLOT])
+        return bytes(self.memory.raw[start : start + self.placed.record.kept * SLOT])
+
+    def whole(self) -> Whole:
+        """Return all of memory, Work included, and all pictures; to be put back in the middle of a tick."""
+        return bytes(self.memory.raw), tuple(self.memory.frames)
+
+    def put_back(self, whole: Whole) -> None:
+        """Make memory and pictures what they were."""
+        self.memory.raw[:], self.memory.frames[:] = whole
+
+    def spoil_work(self) -> None:
+        """Write into the block's Work what no method can want: no numbers, and the other truth values."""
+        memory = self.memory
+        for name, work in self.engine.graph[ALONE].block.interface.work.items():
+            slot, scalar = self.placed.field(name), work.signal.scalar
+            memory.write(slot, ~memory.view(slot) if scalar == "bool" else GARBAGE[scalar])
 
     def contents(self) -> tuple[Any, ...]:
-        """Return all of memory and all pictures, fit to be compared."""
+        """Return all of memory but Work, and all pictures, fit to be compared."""
         memory = self.memory
         frames = [(frame.pixels.shape, frame.pixels.tobytes()) for frame in memory.frames]
-        return bytes(memory.raw), frames, [(repr(frame.stamp), frame.sequence) for frame in memory.frames]
+        return memory.content(), frames, [(repr(frame.stamp), frame.sequence) for frame in memory.frames]
 
     def run(self, steps: range) -> list[tuple[Any, ...]]:
         """Return the contents after each step."""
@@ -98,6 +115,16 @@ class Rig:
             self.engine.run(1)
             found.append(self.contents())
         return found
+
+
+def sources(placed: Placed, names: Sequence[str]) -> list[Slot]:
+    """Return the slots of a method's arguments."""
+    return [TIME if name == "time" else placed.inputs[name] for name in names]
+
+
+def targets(placed: Placed, method: str) -> Mapping[str, Slot]:
+    """Return the slots of what a method returns, by their names."""
+    return {"output": placed.outputs, "deriv": placed.slopes}.get(method, {})
 
 
 def rigs(subject: Subject, *, missing: bool = False) -> Iterator[Rig]:
@@ -150,7 +177,8 @@ def _rig(subject: Subject, block: Block, sizes: Sizes, missing: bool) -> Rig:
     sizes |= parameter_sizes(block)
     for name, values in subject.inputs.items():
         interface.inputs[name].signal.unify(np.shape(values[0]), sizes)
-    for item in (*interface.inputs.values(), *interface.outputs.values(), *interface.states.values()):
+    groups = (interface.inputs, interface.outputs, interface.states, interface.work)
+    for item in (item for group in groups for item in group.values()):
         for size in item.signal.shape:
             if isinstance(size, str) and size != "*":
                 sizes.setdefault(size, VECTOR)

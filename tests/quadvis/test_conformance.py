@@ -75,6 +75,50 @@ def test_a_module_has_one_public_block(tmp_path: Path) -> None:
         CHECKS["one_block_in_its_module"](Subject(found))
 
 
+WORKING = (
+    GOOD.replace("Random, State\n", "Random, State, Work\n")
+    .replace(
+        "    stream = Random()",
+        '    stream = Random()\n    gain = Work("float64[*]")\n    told = Work("bool")',
+    )
+    .replace(
+        "        if not enable:",
+        "        self.gain = 2.0 * self.now\n        self.told = enable\n        if not enable:",
+    )
+    .replace("share * (command - self.now)", "share * (command - 0.5 * self.gain * self.told)")
+)
+
+
+def test_a_block_whose_update_uses_what_output_has_computed_passes(tmp_path: Path) -> None:
+    check_block(block(tmp_path, WORKING), test=tmp_path / "blocks" / "wind" / "fan.py")
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("        self.told = enable\n", ""),
+        ("        self.told = enable", "        self.told = enable or self.told"),
+        ("        self.gain = 2.0 * self.now\n        self.told = enable\n        if not enable:\n",
+         "        if not enable:\n"),
+    ],
+)  # fmt: skip
+def test_work_that_outlasts_its_tick_is_reported(before: str, after: str, tmp_path: Path) -> None:
+    assert WORKING.count(before) == 1
+    with pytest.raises(
+        AssertionError, match="it read Work before output wrote it; keep in states what lasts"
+    ):
+        CHECKS["work_is_of_one_tick"](Subject(block(tmp_path, WORKING.replace(before, after))))
+
+
+def test_a_derivative_that_reads_work_is_reported(tmp_path: Path) -> None:
+    text = WORKING.replace(
+        'count = State("int64")', 'count = State("int64")\n    angle = State(continuous=True)'
+    )
+    text += "\n    def deriv(self):\n        return self.told + 0.0 * self.angle\n"
+    with pytest.raises(AssertionError, match="deriv reads Work at step 0; only update may"):
+        CHECKS["work_is_of_one_tick"](Subject(block(tmp_path, text)))
+
+
 COUNT = "        self.count += self.blades"
 BLIND = """    def __init__(self, **given):
         self.__dict__.update(lag=0.5, blades=3, offset=(0.0, 1.0), model=0)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from quadvis.block import Block, Frame, In, Out, Param, State
+from quadvis.block import Block, Frame, In, Out, Param, State, Work
 from quadvis.engine.memory import SLOT, Memory, Record, Slot
 from quadvis.testing import drive
 
@@ -269,3 +269,44 @@ def test_a_frame_that_is_a_state_comes_back_with_a_snapshot() -> None:
 def test_a_numeric_block_may_not_keep_a_frame() -> None:
     with pytest.raises(TypeError, match="Wrong keeps a frame as a state"):
         type("Wrong", (Block,), {"one": State("frame")})
+
+
+class Twice(Block):
+    u = In("float64[2]")
+    y = Out("float64[2]")
+    last = State("float64[2]")
+    sum = Work("float64[2]")
+    hit = Work("bool")
+
+    def output(self, u):
+        self.sum = self.last + u
+        self.hit = u[0] > 1.0
+        return self.sum
+
+    def update(self):
+        if self.hit:
+            self.last = self.sum
+
+
+def test_work_goes_from_output_to_update_of_a_tick_and_is_no_part_of_a_snapshot() -> None:
+    driven = drive(Twice(), u=[[2.0, 1.0], [0.5, 0.0], [3.0, 1.0]], rate="10 Hz")
+    assert driven.y.tolist() == [[2.0, 1.0], [2.5, 1.0], [5.0, 2.0]]
+    engine = driven.engine
+    record = engine.program["block"].record
+    assert record.size - record.kept == 3 and record["sum"].offset == record.kept
+    assert engine.read("block", "sum").tolist() == [5.0, 2.0] and engine.bound("block").hit
+    engine.restore(engine.snapshot())
+    left = {name: np.asarray(engine.read("block", name)).tolist() for name in ("last", "sum", "hit")}
+    assert left == {"last": [5.0, 2.0], "sum": [0.0, 0.0], "hit": False}
+
+
+@pytest.mark.parametrize(
+    ("members", "sentence"),
+    [
+        ({"held": Work("frame")}, "keep it in an attribute"),
+        ({"held": Work(), "update": lambda self: None}, "goes from output to update, and has not both"),
+    ],
+)  # fmt: skip
+def test_work_that_cannot_be_is_refused(members: dict[str, object], sentence: str) -> None:
+    with pytest.raises(TypeError, match=sentence):
+        type("Wrong", (Block,), members)

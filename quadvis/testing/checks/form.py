@@ -1,0 +1,62 @@
+"""How a block is written: its file, its words, and that all it declares has a use."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+import types
+from collections.abc import Iterator
+from pathlib import Path
+
+from quadvis.block import Block
+from quadvis.testing.rig import Subject
+
+
+def one_block_in_its_module(subject: Subject) -> None:
+    """Check that the module defines no other public block, and that its file is called as the class is."""
+    module = sys.modules[subject.block.__module__]
+    kinds = [kind for kind in vars(module).values() if isinstance(kind, type) and issubclass(kind, Block)]
+    own = {kind.__name__ for kind in kinds if kind.__module__ == module.__name__}
+    public = sorted(name for name in own if not name.startswith("_"))
+    assert public == [subject.block.__name__], f"the module defines {', '.join(public)}; move the others"
+    file = Path(str(module.__file__)).stem
+    wanted = "".join(part.capitalize() for part in file.split("_"))
+    assert subject.block.__name__ == wanted, f"the class in {file}.py must be called {wanted}"
+
+
+def documented(subject: Subject) -> None:
+    """Check that the docstring begins with a sentence, and that every port and parameter says what it is."""
+    first, _, rest = inspect.cleandoc(vars(subject.block).get("__doc__") or "").partition("\n")
+    assert first.endswith("."), "the docstring's first line must be a sentence that ends in a full stop"
+    assert not rest or rest.startswith("\n"), "the docstring's second line must be empty"
+    interface = subject.block.interface
+    declared = (*interface.inputs.values(), *interface.outputs.values(), *interface.params.values())
+    bare = [item.name for item in declared if not item.doc]
+    assert not bare, f"these need a doc: {', '.join(bare)}"
+
+
+def tested(subject: Subject) -> None:
+    """Check that there is a test file where one should be."""
+    assert subject.test is None or subject.test.is_file(), f"there is no test at {subject.test}; write one"
+
+
+def all_declarations_used(subject: Subject) -> None:
+    """Check that every input is asked for, and every parameter, state and Work named, by some method."""
+    interface = subject.block.interface
+    asked = {name for names in interface.arguments.values() for name in names}
+    idle = [name for name in interface.inputs if name not in asked]
+    assert not idle, f"no method asks for {', '.join(idle)}; take it away"
+    classes = [kind for kind in subject.block.__mro__ if kind not in Block.__mro__]
+    functions = [value for kind in classes for value in vars(kind).values() if inspect.isfunction(value)]
+    names = {name for function in functions for name in _names(inspect.unwrap(function).__code__)}
+    idle = [name for name in (*interface.params, *interface.states, *interface.work) if name not in names]
+    assert not idle, f"no method uses {', '.join(idle)}; take it away"
+
+
+def _names(code: types.CodeType) -> Iterator[str]:
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            yield from _names(constant)
+        elif isinstance(constant, str) and "read_file" in code.co_names:  # read_file("calibration", ...)
+            yield constant
