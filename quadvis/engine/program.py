@@ -14,13 +14,13 @@ from fractions import Fraction
 from functools import cached_property
 
 from quadvis.block import Random
+from quadvis.block.random import stream_start
 from quadvis.engine.graph import Constant, Graph, Node
 from quadvis.engine.layout import TIME, Layout, Placed
 from quadvis.engine.memory import Memory, Slot
 
 COPY = "copy"
 NO_BLOCK = -1
-STREAM_MODULUS = 4294944443  # the smaller of the two moduli of MRG32k3a: every seed below it is valid
 
 
 @dataclass(frozen=True)
@@ -197,14 +197,8 @@ def _image(graph: Graph, layout: Layout, seed: int) -> bytes:
                 memory.write(block.inputs[port], source.value)
         for name, state in node.block.interface.states.items():
             if isinstance(state, Random):
-                memory.write(block.field(name), _stream(seed, node.path, name))
+                memory.write(block.field(name), stream_start(seed, f"{node.path}.{name}"))
     return bytes(memory.raw)
-
-
-def _stream(seed: int, path: str, state: str) -> list[int]:
-    """Return the start of a random stream: a hash, so that streams do not depend on other blocks."""
-    digest = hashlib.sha256(f"{seed}/{path}.{state}".encode()).digest()
-    return [1 + int.from_bytes(digest[4 * i : 4 * i + 4], "little") % (STREAM_MODULUS - 1) for i in range(6)]
 
 
 def _tunables(graph: Graph, blocks: Sequence[Placed]) -> Iterator[Tunable]:

@@ -12,7 +12,6 @@ from quadvis.testing.conformance import CHECKS, Subject, check_block
 GOOD = '''"""A fan."""
 
 from quadvis.block import Block, Frame, In, Out, Param, ParameterError, Random, State
-from quadvis_blocks._random import uniform
 
 class Fan(Block):
     """A fan that spins up towards its command."""

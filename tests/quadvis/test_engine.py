@@ -10,11 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadvis.block import Block, Frame, In, Out, Param, ParameterError, Random, State
+from quadvis.block import Block, Frame, In, Out, Param, ParameterError, Random, State, uniform
 from quadvis.engine.engine import Engine
 from quadvis.engine.graph import Constant, Graph, Node, Task, Wire, execution_order
 from quadvis.errors import QuadvisError, RunError
-from quadvis_blocks._random import uniform
 
 STEP = Fraction(1, 100)
 CONTINUOUS = Task("continuous", STEP, continuous=True)

@@ -3,9 +3,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from quadvis.block import Block, Frame, In, Out, Param, Random, State
+from quadvis.block import Block, Frame, In, Out, Param, Random, State, uniform
 from quadvis.testing import drive
-from quadvis_blocks._random import uniform
 
 
 class Sum(Block):

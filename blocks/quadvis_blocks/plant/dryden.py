@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, Out, Param, Random, State
-from quadvis_blocks._random import fill_normal
+from quadvis.block import Block, Out, Param, Random, State, fill_normal
 
 FOOT = 0.3048  # m
 ROOT_3 = math.sqrt(3.0)

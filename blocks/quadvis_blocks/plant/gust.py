@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, Out, Param, Random, State
-from quadvis_blocks._random import fill_normal
+from quadvis.block import Block, Out, Param, Random, State, fill_normal
 
 
 class Gust(Block):

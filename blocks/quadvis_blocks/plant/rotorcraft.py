@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, ParameterError, Random, State
+from quadvis.block import Block, In, Out, Param, ParameterError, Random, State, random_signs
 from quadvis_blocks._angles import wrapped
 from quadvis_blocks._craft import ARM, GRAVITY, INERTIA, MASS, MOTOR_LAG, THRUST_MAX, TORQUE_RATIO
-from quadvis_blocks._random import random_signs
 
 PAPER, RIGID_BODY = range(2)
 GIVEN, RANDOM = range(2)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, Random, State
-from quadvis_blocks._random import fill_normal, random_signs
+from quadvis.block import Block, In, Out, Param, Random, State, fill_normal, random_signs
 
 DEGREE = math.pi / 180.0
 GIVEN, RANDOM = range(2)

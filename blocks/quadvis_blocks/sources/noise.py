@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from quadvis.block import Block, Out, Param, Random, State
-from quadvis_blocks._random import normal_like
+from quadvis.block import Block, Out, Param, Random, State, normal_like
 
 
 class Noise(Block):

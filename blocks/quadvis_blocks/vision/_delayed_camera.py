@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.block import Block, Param, ParameterError, Random, State
-from quadvis_blocks._random import uniform
+from quadvis.block import Block, Param, ParameterError, Random, State, uniform
 from quadvis_blocks._stamps import INSTANT
 
 QUEUE = 16  # frames that can be on their way at once

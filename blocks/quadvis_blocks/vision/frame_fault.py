@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from quadvis.block import Block, Frame, In, Out, Param, Random, State
-from quadvis_blocks._random import uniform
+from quadvis.block import Block, Frame, In, Out, Param, Random, State, uniform
 from quadvis_blocks.vision._fault_timing import NO_FAULT, TIMING, comes, is_on, shows, stamped
 from quadvis_vision.simulation.picture_faults import PICTURES
 

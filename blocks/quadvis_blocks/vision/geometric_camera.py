@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import In, Out, Param, Random, State
-from quadvis_blocks._random import fill_normal
+from quadvis.block import In, Out, Param, Random, State, fill_normal
 from quadvis_blocks.vision._delayed_camera import CONTENT, QUEUE, SEQUENCE, STAMP, DeliveringCamera, Row
 from quadvis_vision.camera.calibration import CameraCalibration
 from quadvis_vision.camera.projection import (

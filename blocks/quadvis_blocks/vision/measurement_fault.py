@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, Random, State
-from quadvis_blocks._random import fill_normal
+from quadvis.block import Block, In, Out, Param, Random, State, fill_normal
 from quadvis_blocks.vision._fault_timing import LATE, NO_FAULT, TIMING, comes, is_on, shows, stamped
 
 SHAPES = ("no_target", "turned", "mirrored", "shifted", "noise", "other_colours", "half_gone", "two_left")

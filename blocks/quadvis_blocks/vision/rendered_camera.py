@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Frame, In, Out, Param, ParameterError, Random, State
-from quadvis_blocks._random import uniform
+from quadvis.block import Frame, In, Out, Param, ParameterError, Random, State, uniform
 from quadvis_blocks.vision._delayed_camera import CONTENT, QUEUE, SEQUENCE, STAMP, DeliveringCamera, Row
 from quadvis_vision.camera.calibration import CameraCalibration
 from quadvis_vision.camera.projection import RADIUS, SIDE

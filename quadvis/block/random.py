@@ -1,5 +1,7 @@
 """Random numbers that are the same interpreted and compiled: L'Ecuyer's MRG32k3a.
 
+A block draws from its `Random()` states, in ``start`` and ``update`` only.
+
 A stream is its state, int64[6]: three numbers below ``M1`` (not all zero), then three below ``M2`` (not all
 zero). All products stay below 2**53, so int64 arithmetic is exact everywhere.
 Source: P. L'Ecuyer, Good parameters and implementations for combined multiple recursive random number
@@ -8,6 +10,7 @@ generators, Operations Research 47(1), 1999, figure I. Period about 2**191.
 
 from __future__ import annotations
 
+import hashlib
 import math
 from typing import Any
 
@@ -19,6 +22,13 @@ Stream = NDArray[np.int64]
 M1 = 4294967087
 M2 = 4294944443
 SCALE = 1.0 / (M1 + 1)
+
+
+def stream_start(seed: int, name: str) -> list[int]:
+    """Return the start of a stream: a hash of seed and name, so no stream depends on others."""
+    digest = hashlib.sha256(f"{seed}/{name}".encode()).digest()
+    count = min(M1, M2) - 1  # of numbers that are valid in both halves of a stream, from 1 on
+    return [1 + int.from_bytes(digest[4 * i : 4 * i + 4], "little") % count for i in range(6)]
 
 
 def uniform(stream: Stream) -> float:

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from quadvis_blocks._random import M1, M2, fill_normal, normal, normal_like, random_signs, uniform
+from quadvis.block.random import M1, M2, fill_normal, normal, normal_like, random_signs, uniform
 
 
 def stream(*state: int) -> np.ndarray:
