@@ -1,12 +1,12 @@
 """The contract that blocks are written against: the names that an author imports."""
 
-from quadvis.block.block import METHODS, Block, Interface, units_of
-from quadvis.block.declare import Declared, In, Out, Param, ParameterError, Random, State, Work
+from quadvis.block.block import METHODS, OUTSIDE, Block, Interface, units_of
+from quadvis.block.declare import Declared, In, Out, Param, ParameterError, Random, Safe, State, Work
 from quadvis.block.random import fill_normal, normal, normal_like, random_signs, uniform
 from quadvis.block.signals import NO_FRAME, SCALARS, Frame, Shape, SignalType, Sizes
 
 __all__ = [
-    "METHODS", "NO_FRAME", "SCALARS", "Block", "Declared", "Frame", "In", "Interface", "Out", "Param",
-    "ParameterError", "Random", "Shape", "SignalType", "Sizes", "State", "Work", "fill_normal", "normal",
-    "normal_like", "random_signs", "uniform", "units_of",
+    "METHODS", "NO_FRAME", "OUTSIDE", "SCALARS", "Block", "Declared", "Frame", "In", "Interface", "Out",
+    "Param", "ParameterError", "Random", "Safe", "Shape", "SignalType", "Sizes", "State", "Work",
+    "fill_normal", "normal", "normal_like", "random_signs", "uniform", "units_of",
 ]  # fmt: skip

@@ -9,19 +9,24 @@ from __future__ import annotations
 
 import inspect
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
-from quadvis.block.declare import Declared, In, Out, Param, ParameterError, State, Work
+from quadvis.block.declare import Declared, In, Out, Param, ParameterError, Safe, State, Work
 from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.machine.inputs import file_digest
 from quadvis.units import Unit
 
-METHODS = ("start", "output", "update", "deriv")
+METHODS = ("start", "read", "output", "write", "update", "deriv")
+OUTSIDE = ("read", "write")
 CHECKS = ("check", "check_period", "doubts")
 FILES = ("reads", "read_file", "verify_files")
-RESERVED = {"self", "time", "period", "interface", "numeric", *CHECKS, *FILES, "open", "close", *METHODS}
+TAGS = ("not_replayable", "not_restorable", "harmless")
+RESERVED = {
+    "self", "time", "period", "interface", "numeric", "open", "close", "write_safe",
+    *CHECKS, *FILES, *METHODS, *TAGS,
+}  # fmt: skip
 
 _Read = TypeVar("_Read")
 
@@ -35,6 +40,7 @@ class Interface:
     params: Mapping[str, Param]
     states: Mapping[str, State]
     work: Mapping[str, Work]
+    safe: Mapping[str, Safe]  # by the input that each stands for
     arguments: Mapping[str, tuple[str, ...]]  # method -> the names it asks for
 
     @property
@@ -57,6 +63,9 @@ class Block:
 
     interface: ClassVar[Interface]
     numeric: ClassVar[bool] = True
+    not_replayable: ClassVar[str] = ""  # why a second run may differ from the first: "it reads a camera"
+    not_restorable: ClassVar[str] = ""  # why it cannot go back to a snapshot: "the model has no way back"
+    harmless: ClassVar[str] = ""  # why what it writes needs no safe value: "a file moves nothing"
     period: float
 
     def __init_subclass__(cls, *, numeric: bool | None = None, bound: bool = False) -> None:
@@ -132,8 +141,16 @@ class Block:
     def open(self) -> None:
         """Acquire what the block needs outside the engine: a file, a port, a device."""
 
+    def write_safe(self, time: float) -> None:
+        """Write the safe values outside: at every end of a run, before ``close``, if ``open`` succeeded."""
+        write: Callable[..., None] | None = getattr(self, "write", None)
+        if write is None or self.harmless:
+            return
+        safe, names = self.interface.safe, self.interface.arguments["write"]
+        write(*(time if name == "time" else getattr(self, safe[name].name) for name in names))
+
     def close(self) -> None:
-        """Release it, hardware outputs at their safe value first; called even if ``open`` failed halfway."""
+        """Release it; called even if ``open`` failed halfway."""
 
 
 def _interface(cls: type[Block]) -> Interface:
@@ -154,12 +171,15 @@ def _interface(cls: type[Block]) -> Interface:
         if function is None:
             continue
         names = tuple(inspect.signature(function).parameters)[1:]
-        allowed = () if method == "start" else (*inputs, "time")
+        allowed = {"start": (), "read": ("time",)}.get(method, (*inputs, "time"))
         for name in names:
             if name not in allowed:
                 problem = f"{cls.__name__}.{method} asks for '{name}', which is not one of its inputs"
                 raise TypeError(sentence(problem, suggestion(name, allowed)))
         arguments[method] = names
+    if cls.numeric and not arguments.keys().isdisjoint(OUTSIDE):
+        problem = f"{cls.__name__} reads or writes outside, which no compiled method can"
+        raise TypeError(sentence(problem, "say numeric=False"))
     if cls.numeric and any(state.signal.scalar == "frame" for state in states.values()):
         problem = f"{cls.__name__} keeps a frame as a state, which no compiled method can"
         raise TypeError(sentence(problem, "say numeric=False"))
@@ -172,7 +192,26 @@ def _interface(cls: type[Block]) -> Interface:
         raise TypeError(f"{cls.__name__}: continuous states and a deriv method go together")
     if outputs and "output" not in arguments:
         raise TypeError(f"{cls.__name__} declares outputs but has no output method")
-    return Interface(inputs, outputs, of(Param), states, of(Work), arguments)
+    safe = _safe(cls, of(Safe).values(), inputs, arguments.get("write", ()))
+    return Interface(inputs, outputs, of(Param), states, of(Work), safe, arguments)
+
+
+def _safe(
+    cls: type[Block], declared: Iterable[Safe], inputs: Mapping[str, In], written: Sequence[str]
+) -> dict[str, Safe]:
+    """Return the safe values by input; TypeError if one is missing or stands for no input of ``write``."""
+    safe = {item.input: item for item in declared}
+    for name, item in safe.items():
+        if name not in written or name not in inputs:
+            problem = f"{cls.__name__}.{item.name} stands for '{name}', which is no input of its write method"
+            raise TypeError(sentence(problem, suggestion(name, written)))
+        item.stand_for(inputs[name])
+    for name in written:
+        if name in inputs and name not in safe and not cls.harmless:
+            problem = f"{cls.__name__}.write has no safe value for '{name}'"
+            remedy = f"declare safe_{name} = Safe('{name}'), or say in 'harmless' why it needs none"
+            raise TypeError(sentence(problem, remedy))
+    return safe
 
 
 def units_of(declared: Declared, count: int) -> tuple[Unit, ...]:

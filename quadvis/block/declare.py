@@ -180,6 +180,21 @@ class Param(Declared):
         return f"{_shape_text(self.signal.shape)}, {many}{unit}" if self.signal.shape else f"{one}{unit}"
 
 
+class Safe(Param):
+    """What a block that writes outside leaves there at every end of a run, in place of one of its inputs.
+
+    It has type and unit of that input, and no default: whoever wires a device says what is safe for it.
+    """
+
+    def __init__(self, input: str, *, doc: str = "") -> None:
+        super().__init__(doc=doc)
+        self.input = input
+
+    def stand_for(self, port: In) -> None:
+        """Take type and unit of the input."""
+        self.type, self.unit, self.signal, self.units = port.type, port.unit, port.signal, port.units
+
+
 _WORDS = {
     "float64": ("a number", "numbers"),
     "int64": ("a whole number", "whole numbers"),

@@ -1,7 +1,8 @@
 """The engine: the life of a run, from opened blocks over ticks to closed blocks, deterministic to the bit.
 
-The life of one tick, at time t = tick * base period: copies for wires that delay, outputs of the blocks that
-are due, taps (log, scopes), updates of the same blocks, continuous states to t + base period. Blocks that are
+The life of one tick, at time t = tick * base period: copies for wires that delay, reads from outside, outputs
+of the blocks that are due, writes to outside, taps (log, scopes), updates of the same blocks, continuous
+states to t + base period. Blocks that are
 due at one tick run in one dependency order, whatever their rates. Between ticks a signal is what it was at
 its block's last one.
 """
@@ -52,6 +53,7 @@ class Engine:
         self.memory: Memory = self._interpreter.memory
         self.tuning = Tuning(self.program, [node.block for node in graph.nodes], self.memory)
         self._opened: list[int] = []
+        self._ready: list[int] = []  # those whose ``open`` succeeded: their outputs must end at safe values
         for node, block in zip(graph.nodes, self.program.blocks, strict=True):
             for port, source in node.inputs.items():
                 if isinstance(source, Constant) and block.inputs[port].scalar == "frame":
@@ -77,6 +79,7 @@ class Engine:
             for number in numbers:
                 self._opened.append(number)
                 self._guarded(number, "open")
+                self._ready.append(number)
             for number in numbers:
                 if "start" in self._selves[number].interface.arguments:
                     self._guarded(number, "start")
@@ -89,11 +92,18 @@ class Engine:
         self._close(error)
 
     def _close(self, cause: BaseException | None) -> None:
-        """Close every block that was opened; what goes wrong then must not hide what went wrong before."""
+        """Write all safe values, then close every block that was opened, the last one first.
+
+        What goes wrong then must not hide what went wrong before, nor keep another block from its end.
+        """
         worst = cause
-        while self._opened:
+        ends = [(number, "write_safe") for number in reversed(self._ready)]
+        ends += [(number, "close") for number in reversed(self._opened)]
+        self._ready.clear()
+        self._opened.clear()
+        for number, method in ends:
             try:
-                self._guarded(self._opened.pop(), "close")
+                self._guarded(number, method)
             except BaseException as error:
                 if worst is None:
                     worst = error
@@ -104,7 +114,8 @@ class Engine:
 
     def _guarded(self, number: int, method: str) -> None:
         try:
-            getattr(self._selves[number], method)()
+            given = (self.time,) if method == "write_safe" else ()
+            getattr(self._selves[number], method)(*given)
         except Exception as error:
             raise cannot(method, self.program.blocks[number].path, error, self.time) from error
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from quadvis.block import NO_FRAME, Block
 from quadvis.engine.layout import TIME
 from quadvis.engine.memory import SLOT, Memory
-from quadvis.engine.program import COPY, Op, Program
+from quadvis.engine.program import COPY, PHASES, Op, Program
 from quadvis.engine.solver import Solver, Vector
 from quadvis.engine.taps import Observer, Tap
 
@@ -52,8 +52,8 @@ class Executor(Protocol):
 class _Moment:
     """What one combination of due tasks does at a tick, as flat lists."""
 
-    enter: list[Call]
-    outputs: list[Call]
+    before: list[Call]  # copies, reads, outputs
+    writes: list[Call]
     updates: list[Call]
     finite: NDArray[np.intp]
     zeros: NDArray[np.float64]
@@ -128,14 +128,17 @@ class Interpreter:
             clock[TIME.position] = tick * period / denominator
             call = None
             try:
-                for call in moment.enter:
-                    call()
-                for call in moment.outputs:
+                for call in moment.before:
                     call()
             except Exception as error:
                 return self._stop(call, error)
             if isnan(floats.take(moment.finite).dot(moment.zeros)):
                 return Stop(tick, moment.blocks, found=NOT_FINITE_OUTPUT)
+            try:
+                for call in moment.writes:
+                    call()
+            except Exception as error:
+                return self._stop(call, error)
             for observe in moment.observers:
                 observe(tick)
             for take, row in moment.taps:
@@ -158,15 +161,18 @@ class Interpreter:
     def _prepare(self, due: tuple[bool, ...]) -> _Moment:
         rhythms = {rhythm for rhythm, flag in zip(self._rhythms, due, strict=True) if flag}
         tasks = [task for task in self.program.tasks if (task.every, task.offset) in rhythms]
-        outputs = sorted((op for task in tasks for op in task.outputs), key=lambda op: op.block)
-        updates = sorted((op for task in tasks for op in task.updates), key=lambda op: op.block)
+        ops = {
+            phase: sorted((op for task in tasks for op in task.phases[phase]), key=lambda op: op.block)
+            for phase in PHASES
+        }
+        enter = [op for task in tasks for op in task.enter]
         finite = np.array([position for task in tasks for position in task.finite], np.intp)
         names = {task.name for task in tasks}
         attached = [observer for observer in self._observers if self._rhythm(observer) in rhythms]
         made = _Moment(
-            [self.call(op) for task in tasks for op in task.enter],
-            [self.call(op) for op in outputs],
-            [self.call(op) for op in updates],
+            [self.call(op) for op in (*enter, *ops["read"], *ops["output"])],
+            [self.call(op) for op in ops["write"]],
+            [self.call(op) for op in ops["update"]],
             finite,
             np.zeros(finite.size),
             [observer.call for observer in attached if isinstance(observer, Observer)],

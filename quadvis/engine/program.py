@@ -8,7 +8,7 @@ run one program.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -21,6 +21,7 @@ from quadvis.engine.memory import Memory, Slot
 
 COPY = "copy"
 NO_BLOCK = -1
+PHASES = ("read", "output", "write", "update")
 
 
 @dataclass(frozen=True)
@@ -38,11 +39,12 @@ class Op:
 
 @dataclass(frozen=True)
 class TaskProgram:
-    """What the blocks of one rate do at each of their ticks, in four phases.
+    """What the blocks of one rate do at each of their ticks, phase by phase.
 
     The task is due at tick ``offset`` and then at every ``every`` ticks. ``enter``: copies for wires that
-    cross into other tasks or delay. ``outputs`` and ``updates``: the calls of the blocks. ``finite``: the
-    slots that must hold finite numbers after the outputs.
+    delay or cross into other tasks. ``reads``: blocks fetch what the world outside offers. ``outputs``: the
+    blocks compute. ``finite``: the slots that must hold finite numbers then. ``writes``: blocks hand their
+    inputs to the world outside. ``updates``: the blocks change their states.
     """
 
     name: str
@@ -51,9 +53,16 @@ class TaskProgram:
     offset: int
     continuous: bool
     enter: tuple[Op, ...]
+    reads: tuple[Op, ...]
     outputs: tuple[Op, ...]
+    writes: tuple[Op, ...]
     updates: tuple[Op, ...]
     finite: tuple[int, ...]
+
+    @property
+    def phases(self) -> dict[str, tuple[Op, ...]]:
+        """The calls of the blocks by their method, in the order of the phases."""
+        return {"read": self.reads, "output": self.outputs, "write": self.writes, "update": self.updates}
 
 
 @dataclass(frozen=True)
@@ -104,10 +113,10 @@ class Program:
         return self.blocks[self._numbers[path]]
 
     def op(self, path: str, method: str) -> Op | None:
-        """Return the call of a block's ``output``, ``update`` or ``deriv``; None if it has no such method."""
+        """Return the call of a block's method, such as ``output``; None if it has no such method."""
         number = self.number(path)
         task = self.task(self.blocks[number].task)
-        ops = {"output": task.outputs, "update": task.updates, "deriv": self.derivatives}[method]
+        ops = {"deriv": self.derivatives, **task.phases}[method]
         return next((op for op in ops if op.block == number), None)
 
     def task(self, name: str) -> TaskProgram:
@@ -127,10 +136,13 @@ def make_program(graph: Graph, seed: int) -> Program:
     copies: dict[str, list[Op]] = {}
     for producer, source, target in layout.copies():
         copies.setdefault(producer, []).append(Op(NO_BLOCK, COPY, (source,), (target,)))
-    calls = {method: _calls(graph, blocks, method) for method in ("output", "update", "deriv")}
+    calls = {method: _calls(graph, blocks, method) for method in (*PHASES, "deriv")}
     tasks = []
     for task in graph.tasks:
         mine = [number for number, block in enumerate(blocks) if block.task == task.name]
+        read, output, write, update = (
+            tuple(calls[phase][number] for number in mine if number in calls[phase]) for phase in PHASES
+        )
         tasks.append(
             TaskProgram(
                 task.name,
@@ -139,8 +151,10 @@ def make_program(graph: Graph, seed: int) -> Program:
                 graph.ticks(task.offset),
                 task.continuous,
                 tuple(copies.get(task.name, ())),
-                tuple(calls["output"][number] for number in mine if number in calls["output"]),
-                tuple(calls["update"][number] for number in mine if number in calls["update"]),
+                read,
+                output,
+                write,
+                update,
                 tuple(position for number in mine for position in _finite(blocks[number])),
             )
         )
@@ -168,7 +182,7 @@ def _calls(graph: Graph, blocks: Sequence[Placed], method: str) -> dict[int, Op]
     for number, (node, block) in enumerate(zip(graph.nodes, blocks, strict=True)):
         names = node.block.interface.arguments.get(method)
         if names is not None:
-            targets = {"output": block.outputs, "update": {}, "deriv": block.slopes}[method]
+            targets: Mapping[str, Slot] = {"output": block.outputs, "deriv": block.slopes}.get(method, {})
             sources = (TIME if name == "time" else block.inputs[name] for name in names)
             found[number] = Op(number, method, tuple(sources), tuple(targets.values()))
     return found

@@ -31,7 +31,7 @@ def program_lines(program: Program) -> list[str]:
         often = "every tick" if task.every == 1 else f"every {task.every} ticks"
         offset = f" from tick {task.offset} on" if task.offset else ""
         rows.append((f"task {task.name}", f"{often}{offset}, {_time(float(task.period))}", "", "", ""))
-        for phase, ops in (("enter", task.enter), ("output", task.outputs), ("update", task.updates)):
+        for phase, ops in (("enter", task.enter), *task.phases.items()):
             rows += _phase(phase, ops, names)
     for title, ops in (("derivatives", program.derivatives), ("minor steps", program.minor)):
         if ops:

@@ -9,6 +9,7 @@ def test_fan(name):
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -23,13 +24,14 @@ from quadvis.testing.checks.stamps import outlives_hostile_stamps
 from quadvis.testing.checks.states import (
     inputs_not_asked_for_do_not_matter,
     output_changes_nothing,
+    outside_changes_nothing,
     repeats_after_restore,
     starts_the_same,
     work_is_of_one_tick,
 )
 from quadvis.testing.rig import Subject
 
-__all__ = ["CHECKS", "Subject", "check_block"]
+__all__ = ["CHECKS", "Subject", "check_block", "excuse"]
 
 
 def check_block(
@@ -46,7 +48,7 @@ def check_block(
     subject = Subject(block, given or {}, inputs or {}, test)
     problems = []
     for name, check in CHECKS.items():
-        if check is compiles and find_spec("numba") is None:
+        if name == "compiles" and find_spec("numba") is None:
             continue
         try:
             check(subject)
@@ -58,8 +60,33 @@ def check_block(
         raise AssertionError("\n".join(problems))
 
 
+# Checks that a tag of the block's class switches off: it says why they cannot hold.
+CANNOT_HOLD = {
+    "not_replayable": {
+        "starts_the_same", "inputs_not_asked_for_do_not_matter", "work_is_of_one_tick",
+        "repeats_after_restore", "outlives_hostile_stamps",
+    },
+    "not_restorable": {"starts_the_same", "repeats_after_restore"},
+}  # fmt: skip
+
+
+def excuse(check: str, block: type[Block]) -> str:
+    """Return why a check cannot hold for a block, by the tags of its class; "" if it must hold."""
+    reasons = (str(getattr(block, tag)) for tag, checks in CANNOT_HOLD.items() if check in checks)
+    return next(filter(None, reasons), "")
+
+
+def _unless_excused(check: Callable[[Subject], None]) -> Callable[[Subject], None]:
+    @functools.wraps(check)
+    def run(subject: Subject) -> None:
+        if not excuse(check.__name__, subject.block):
+            check(subject)
+
+    return run
+
+
 CHECKS: dict[str, Callable[[Subject], None]] = {
-    check.__name__: check
+    check.__name__: _unless_excused(check)
     for check in (
         one_block_in_its_module,
         documented,
@@ -69,6 +96,7 @@ CHECKS: dict[str, Callable[[Subject], None]] = {
         refuses_before_a_run,
         starts_the_same,
         output_changes_nothing,
+        outside_changes_nothing,
         inputs_not_asked_for_do_not_matter,
         work_is_of_one_tick,
         repeats_after_restore,

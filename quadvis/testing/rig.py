@@ -77,9 +77,12 @@ class Rig:
         return self.engine.call(ALONE, method)
 
     def feed(self, step: int) -> None:
-        """Write the inputs of a step."""
+        """Write the inputs of a step, and let the block read outside, as at the begin of a tick."""
         for name, value in self.series[step].items():
             self.memory.write(self.placed.inputs[name], value)
+        read = self.call("read")
+        if read is not None:
+            read()
 
     def record(self) -> bytes:
         """Return the bytes of the block's parameters and states."""

@@ -5,7 +5,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadvis.block import Block, Frame, In, Out, Param, ParameterError, Random, SignalType, State, units_of
+from quadvis.block import (
+    Block,
+    Frame,
+    In,
+    Out,
+    Param,
+    ParameterError,
+    Random,
+    Safe,
+    SignalType,
+    State,
+    units_of,
+)
 
 
 class Filter(Block):
@@ -265,3 +277,44 @@ def test_the_frame_that_is_none_has_no_pixels_and_number_zero() -> None:
 def test_one_unit_holds_for_all_elements() -> None:
     assert [str(unit) for unit in units_of(In("float64[3]", unit="m"), 3)] == ["m"] * 3
     assert [str(unit) for unit in units_of(In("float64[2]", unit="m rad"), 2)] == ["m", "rad"]
+
+
+def test_a_safe_value_takes_type_and_unit_of_the_input_that_it_stands_for() -> None:
+    written: list[object] = []
+
+    class Rotors(Block, numeric=False):
+        thrust = In("float64[2]", unit="N")
+        idle = Safe("thrust", doc="thrust when the run ends")
+
+        def write(self, thrust, time):
+            written.append((thrust, time))
+
+    assert Rotors.interface.safe == {"thrust": Rotors.idle} and Rotors.interface.params["idle"].required
+    with pytest.raises(ParameterError, match="idle must be 2 values, numbers in N, got one value"):
+        Rotors(idle=0.0)
+    Rotors(idle=[0.1, 0.2]).write_safe(4.5)
+    ((values, time),) = written
+    assert values.tolist() == [0.1, 0.2] and time == 4.5
+
+
+def test_what_writes_needs_safe_values_unless_it_is_harmless() -> None:
+    def write(self, u):
+        raise AssertionError("nothing is safe to write")
+
+    with pytest.raises(
+        TypeError, match=r"write has no safe value for 'u'; declare safe_u = Safe\('u'\), or say in"
+    ):
+        type("Wrong", (Block,), {"u": In(), "write": write, "numeric": False})
+    with pytest.raises(TypeError, match="rest stands for 'v', which is no input of its write method"):
+        type("Wrong", (Block,), {"u": In(), "v": In(), "rest": Safe("v"), "write": write, "numeric": False})
+    members = {"u": In("frame"), "write": write, "numeric": False, "harmless": "a file moves nothing"}
+    type("Right", (Block,), members)().write_safe(0.0)
+
+
+def test_what_reads_or_writes_outside_is_not_numeric_and_reads_before_there_are_inputs() -> None:
+    with pytest.raises(
+        TypeError, match="reads or writes outside, which no compiled method can; say numeric=False"
+    ):
+        type("Wrong", (Block,), {"read": lambda self: None})
+    with pytest.raises(TypeError, match="read asks for 'u', which is not one of its inputs"):
+        type("Wrong", (Block,), {"u": In(), "read": lambda self, u: None, "numeric": False})

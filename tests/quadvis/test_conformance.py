@@ -7,11 +7,11 @@ import pytest
 
 from quadvis.block import Block
 from quadvis.library.catalogue import Catalogue
-from quadvis.testing.conformance import CHECKS, Subject, check_block
+from quadvis.testing.conformance import CHECKS, Subject, check_block, excuse
 
 GOOD = '''"""A fan."""
 
-from quadvis.block import Block, Frame, In, Out, Param, ParameterError, Random, State
+from quadvis.block import Block, Frame, In, Out, Param, ParameterError, Random, State, uniform
 
 class Fan(Block):
     """A fan that spins up towards its command."""
@@ -75,7 +75,7 @@ def test_a_module_has_one_public_block(tmp_path: Path) -> None:
 
 
 WORKING = (
-    GOOD.replace("Random, State\n", "Random, State, Work\n")
+    GOOD.replace("State, uniform\n", "State, Work, uniform\n")
     .replace(
         "    stream = Random()",
         '    stream = Random()\n    gain = Work("float64[*]")\n    told = Work("bool")',
@@ -116,6 +116,70 @@ def test_a_derivative_that_reads_work_is_reported(tmp_path: Path) -> None:
     text += "\n    def deriv(self):\n        return self.told + 0.0 * self.angle\n"
     with pytest.raises(AssertionError, match="deriv reads Work at step 0; only update may"):
         CHECKS["work_is_of_one_tick"](Subject(block(tmp_path, text)))
+
+
+DEVICE = '''"""A fan that is there."""
+
+from quadvis.block import Block, In, Out, Safe, State, Work
+
+class Fan(Block, numeric=False):
+    """A fan on a wire."""
+
+    not_replayable = "it reads the speed of a fan"
+    wires = []
+    command = In("float64[2]", unit="rad/s", doc="speed wanted")
+    rest = Safe("command", doc="speed when the run ends")
+    speed = Out(unit="rad/s", doc="speed")
+    turns = State("float64")
+    now = Work(unit="rad/s")
+
+    def open(self):
+        self.rounds = 0
+
+    def read(self, time):
+        self.rounds += 1
+        self.now = time + self.rounds
+
+    def output(self):
+        return self.now
+
+    def write(self, command, time):
+        self.wires.append((list(command), time))
+
+    def update(self):
+        self.turns += self.period * self.now
+'''
+
+
+def test_a_block_that_reads_and_writes_outside_is_excused_from_repeating_itself(tmp_path: Path) -> None:
+    found = block(tmp_path, DEVICE)
+    check_block(found, given={"rest": [0.25, 0.5]}, test=tmp_path / "blocks" / "wind" / "fan.py")
+    (*_, last) = found.wires  # type: ignore[attr-defined]
+    assert last[0] == [0.25, 0.5]
+    assert excuse("repeats_after_restore", found) == "it reads the speed of a fan"
+    assert excuse("returns_what_it_declares", found) == ""
+
+
+def test_without_the_tag_it_must_repeat_itself(tmp_path: Path) -> None:
+    found = block(tmp_path, DEVICE.replace("not_replayable =", "reason ="))
+    with pytest.raises(AssertionError, match="repeats_after_restore: restored in the same engine"):
+        check_block(found, given={"rest": [0.25, 0.5]})
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "sentence"),
+    [
+        ("self.rounds += 1", "self.rounds += 1\n        self.turns = 1.0", "read changed a state at step 0"),
+        ("self.wires.append(", "self.turns += 1.0\n        self.wires.append(", "write changed a state"),
+        ("self.wires.append(", "return self.wires.append(1) or (", "write must return nothing"),
+    ],
+)  # fmt: skip
+def test_what_reads_and_writes_outside_may_not_touch_states(
+    before: str, after: str, sentence: str, tmp_path: Path
+) -> None:
+    text = DEVICE.replace(before, after)
+    with pytest.raises(AssertionError, match=sentence):
+        CHECKS["outside_changes_nothing"](Subject(block(tmp_path, text), {"rest": [0.0, 0.0]}))
 
 
 COUNT = "        self.count += self.blades"

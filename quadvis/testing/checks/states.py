@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from quadvis.block import OUTSIDE
 from quadvis.engine.engine import Snapshot
-from quadvis.testing.rig import STEPS, Rig, Subject, rigs
+from quadvis.testing.rig import STEPS, Rig, Subject, rigs, sources
 
 
 def starts_the_same(subject: Subject) -> None:
@@ -60,6 +61,30 @@ def work_is_of_one_tick(subject: Subject) -> None:
                 other.engine.run(1)
                 same = rig.contents() == other.contents()
                 assert same, f"at step {step} it read Work before output wrote it; keep in states what lasts"
+
+
+def outside_changes_nothing(subject: Subject) -> None:
+    """Check that ``read`` and ``write`` return nothing and leave parameters and states alone.
+
+    ``write`` takes the safe values as well.
+    """
+    arguments = subject.block.interface.arguments
+    for rig in rigs(subject) if not arguments.keys().isdisjoint(OUTSIDE) else ():
+        memory = rig.memory
+        with rig.engine:
+            for step in range(STEPS):
+                before = rig.record()
+                rig.feed(step)
+                for method in ("read", "output", "write"):
+                    if method in arguments:
+                        values = [memory.read(slot) for slot in sources(rig.placed, arguments[method])]
+                        returned = getattr(rig.block, method)(*values)
+                        assert method == "output" or returned is None, f"{method} must return nothing"
+                        assert rig.record() == before, (
+                            f"{method} changed a state at step {step}; only update may"
+                        )
+                rig.engine.run(1)
+            rig.block.write_safe(rig.engine.time)
 
 
 def inputs_not_asked_for_do_not_matter(subject: Subject) -> None:
