@@ -21,9 +21,9 @@ One stamp that fits the time again without that shift, and is newer, ends it. A 
 taken, whatever it does.
 
 Until the first finite stamp NaN means that there is no clock: what comes is of now, at each tick. A block
-keeps a clock (`SIZE`,) as one of its states; `begin` in ``start``, `judge` in ``output``, `note` in
-``update``. Age counts from the instant that `judge` gives, which is never after the arrival: of age by stamp
-and age by arrival that is the larger one.
+keeps a clock (`SIZE`,) as one of its states; `begin` in ``start``, `judge` in ``output``, `keep` in
+``update``, or `note` there if ``output`` does not judge. Age counts from the instant that `judge` gives,
+which is never after the arrival: of age by stamp and age by arrival that is the larger one.
 """
 
 from __future__ import annotations
@@ -79,10 +79,16 @@ def judge(clock: Any, stamp: float, time: float, restart: float) -> tuple[int, f
 
 
 def note(clock: Any, stamp: float, time: float, restart: float) -> tuple[int, float]:
-    """Keep a stamp, and return what `judge` does."""
+    """Keep a stamp that was not judged before, and return what `judge` does."""
     verdict, made = judge(clock, stamp, time, restart)
+    keep(clock, stamp, time, restart, verdict, made)
+    return verdict, made
+
+
+def keep(clock: Any, stamp: float, time: float, restart: float, verdict: int, made: float) -> None:
+    """Keep a stamp, and what `judge` has said of it at this time."""
     if not math.isfinite(stamp):
-        return verdict, made
+        return
     if verdict == NEWS:
         clock[SHIFT] = made - stamp if abs(made - stamp) > INSTANT else 0.0
         clock[MADE] = made
@@ -96,7 +102,6 @@ def note(clock: Any, stamp: float, time: float, restart: float) -> tuple[int, fl
             clock[ROW_AGE] = time - stamp
         clock[ROW_LAST] = stamp
     clock[SEEN] = stamp
-    return verdict, made
 
 
 def _instant(clock: Any, stamp: float, time: float) -> float:

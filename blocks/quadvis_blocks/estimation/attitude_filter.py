@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State
+from quadvis.block import Block, In, Out, Param, State, Work
 from quadvis_blocks._angles import wrapped
-from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, note
+from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, keep
 
 CAPACITY = 128
 DEGREE = math.pi / 180.0
@@ -80,6 +80,10 @@ class AttitudeFilter(Block):
     past = State(f"float64[{CAPACITY}]")  # angles, not wrapped, after the measurements; the newest first
     kept = State("int64")
     stamps = State(f"float64[{SIZE}]")
+    verdict = Work("int64")  # on the stamp of now
+    moment = Work(unit="s")  # the instant that it stands for
+    mean_now = Work("float64[4]")  # with the measurements of this tick
+    spread_now = Work("float64[4,4]")
 
     def start(self) -> None:
         """Begin with zeros, as uncertain as the parameter says."""
@@ -91,22 +95,21 @@ class AttitudeFilter(Block):
         self, angle: float, gyro: float, stamp: float, valid: bool, time: float
     ) -> tuple[float, float, float, float, Any]:
         """Return the estimate with the measurements of now."""
-        mean, spread = self.mean.copy(), self.spread.copy()
-        verdict, made = judge(self.stamps, stamp, time, self.restart)
-        new, late = valid and verdict == NEWS, time - made
+        self.mean_now = self.mean
+        self.spread_now = self.spread
+        mean, spread = self.mean_now, self.spread_now
+        self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)
+        new, late = valid and self.verdict == NEWS, time - self.moment
         off = _off(angle, late, self.past, self.kept, float(mean[0]), self.period) if new else math.nan
         _measure(mean, spread, off, gyro, self.angle_noise, self.rate_noise, self.gate)
         return wrapped(float(mean[0])), float(mean[1]), float(mean[2]), float(mean[3]), spread
 
-    def update(
-        self, angle: float, gyro: float, torque: float, stamp: float, valid: bool, time: float
-    ) -> None:
-        """Take the measurements into account, and carry the estimate to the next tick."""
+    def update(self, torque: float, stamp: float, time: float) -> None:
+        """Carry the estimate to the next tick."""
+        keep(self.stamps, stamp, time, self.restart, self.verdict, self.moment)
+        self.mean = self.mean_now
+        self.spread = self.spread_now
         mean, spread = self.mean, self.spread
-        verdict, made = note(self.stamps, stamp, time, self.restart)
-        new, late = valid and verdict == NEWS, time - made
-        off = _off(angle, late, self.past, self.kept, float(mean[0]), self.period) if new else math.nan
-        _measure(mean, spread, off, gyro, self.angle_noise, self.rate_noise, self.gate)
         self.past[1:] = self.past[:-1].copy()
         self.past[0] = mean[0]
         self.kept = min(self.kept + 1, CAPACITY)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, State
+from quadvis.block import Block, In, Out, Param, State, Work
 
 SLIP = 0.01  # m/s; slower than this the friction is viscous
 
@@ -40,15 +40,19 @@ class Ground(Block):
     impact = Out(unit="m/s", doc="greatest speed at which the craft came down on it so far")
     touching = State("bool")
     hardest = State(unit="m/s")
+    touching_now = Work("bool")
+    hardest_now = Work(unit="m/s")
 
     def output(self, position: Any, velocity: Any, attitude: Any, rates: Any) -> tuple[Any, Any, bool, float]:
         """Return force and torque, whether there is contact, and how hard it was."""
         depth, climb = self.height - float(position[2]), float(velocity[2])
-        if depth + self.feet <= 0.0:
-            return np.zeros(3), np.zeros(3), False, self.hardest
         nose, side, upright = _tilt(attitude)
         span, spring, damper = self.feet, 0.25 * self.stiffness, 0.25 * self.damping
-        if depth + span * max(abs(nose), abs(side)) <= 0.0:
+        lean = max(abs(nose), abs(side))
+        self.touching_now = float(position[2]) - span * lean < self.height
+        touched = self.touching_now and not self.touching
+        self.hardest_now = max(self.hardest, -climb) if touched else self.hardest
+        if depth + span * lean <= 0.0:
             return np.zeros(3), np.zeros(3), False, self.hardest
         impact = self.hardest if self.touching else max(self.hardest, -climb)
         arm = span * upright
@@ -68,14 +72,9 @@ class Ground(Block):
             impact,
         )
 
-    def update(self, position: Any, velocity: Any, attitude: Any) -> None:
+    def update(self) -> None:
         """Keep the speed of a touch-down."""
-        nose, side, _ = _tilt(attitude)
-        lowest = float(position[2]) - self.feet * max(abs(nose), abs(side))
-        touching = lowest < self.height
-        if touching and not self.touching:
-            self.hardest = max(self.hardest, -float(velocity[2]))
-        self.touching = touching
+        self.touching, self.hardest = self.touching_now, self.hardest_now
 
 
 def _tilt(attitude: Any) -> tuple[float, float, float]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State
-from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, note
+from quadvis.block import Block, In, Out, Param, State, Work
+from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, keep
 from quadvis_blocks.signal._elements import all_finite
 
 
@@ -44,6 +44,11 @@ class Derivative(Block):
     measured = State(unit="s")
     arrived = State(unit="s")
     stamps = State(f"float64[{SIZE}]")
+    verdict = Work("int64")  # on the stamp of now
+    moment = Work(unit="s")  # the instant that it stands for
+    good = Work("bool")  # whether this sample counts
+    rate_now = Work("float64[*]")
+    ok_now = Work("bool")
 
     def start(self) -> None:
         """Forget all samples."""
@@ -55,24 +60,23 @@ class Derivative(Block):
         """Return the rate, and whether it means anything."""
         longest = max(self.gap_reset, 1.5 * self.period) + INSTANT
         in_time = time - self.arrived <= longest
-        verdict, made = judge(self.stamps, stamp, time, self.restart)
-        elapsed = made - self.measured
-        if valid and verdict == NEWS and elapsed > 0.0 and all_finite(u):
-            if in_time and elapsed <= longest:
-                return (u - self.last) / elapsed, True
-            return 0.0 * u, False
+        self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)
+        elapsed = self.moment - self.measured
+        self.good = valid and self.verdict == NEWS and elapsed > 0.0 and all_finite(u)
+        if self.good:
+            self.ok_now = in_time and elapsed <= longest
+            self.rate_now = (u - self.last) / elapsed if self.ok_now else 0.0 * u
+            return 1.0 * self.rate_now, self.ok_now
         if in_time:
             return 1.0 * self.last_rate, self.last_ok
         return 0.0 * self.last_rate, False
 
-    def update(self, u: Any, stamp: float, valid: bool, time: float) -> None:
+    def update(self, u: Any, stamp: float, time: float) -> None:
         """Keep this sample if it is new and good."""
-        longest = max(self.gap_reset, 1.5 * self.period) + INSTANT
-        verdict, made = note(self.stamps, stamp, time, self.restart)
-        elapsed = made - self.measured
-        if valid and verdict == NEWS and elapsed > 0.0 and all_finite(u):
-            self.last_ok = time - self.arrived <= longest and elapsed <= longest
-            self.last_rate = (u - self.last) / elapsed if self.last_ok else 0.0 * u
+        keep(self.stamps, stamp, time, self.restart, self.verdict, self.moment)
+        if self.good:
+            self.last_ok = self.ok_now
+            self.last_rate = self.rate_now
             self.last = u
-            self.measured = made
+            self.measured = self.moment
             self.arrived = time

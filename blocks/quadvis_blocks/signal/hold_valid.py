@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State
-from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, note
+from quadvis.block import Block, In, Out, Param, State, Work
+from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, keep
 from quadvis_blocks.signal._elements import all_finite
 
 
@@ -39,6 +39,9 @@ class HoldValid(Block):
     measured = State(unit="s")
     seen = State("bool")
     stamps = State(f"float64[{SIZE}]")
+    verdict = Work("int64")  # on the stamp of now
+    moment = Work(unit="s")  # the instant that it stands for
+    good = Work("bool")  # whether the value of now counts
 
     def start(self) -> None:
         """Know no value yet."""
@@ -48,9 +51,10 @@ class HoldValid(Block):
         self, value: Any, valid: bool, stamp: float, initial: Any, time: float
     ) -> tuple[Any, float, bool]:
         """Return the value if it is valid, else the last one that was."""
-        verdict, made = judge(self.stamps, stamp, time, self.restart)
-        if verdict == NEWS and _is_good(value, valid, made, self.seen, self.measured):
-            held, measured, seen = 1.0 * value, made, True
+        self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)
+        self.good = self.verdict == NEWS and _is_good(value, valid, self.moment, self.seen, self.measured)
+        if self.good:
+            held, measured, seen = 1.0 * value, self.moment, True
         elif self.seen:
             held, measured, seen = 1.0 * self.last, self.measured, True
         else:
@@ -58,12 +62,12 @@ class HoldValid(Block):
         age = time - measured
         return held, age, seen and age <= self.max_age + INSTANT
 
-    def update(self, value: Any, valid: bool, stamp: float, time: float) -> None:
+    def update(self, value: Any, stamp: float, time: float) -> None:
         """Keep the value if it is valid."""
-        verdict, made = note(self.stamps, stamp, time, self.restart)
-        if verdict == NEWS and _is_good(value, valid, made, self.seen, self.measured):
+        keep(self.stamps, stamp, time, self.restart, self.verdict, self.moment)
+        if self.good:
             self.last = value
-            self.measured = made
+            self.measured = self.moment
             self.seen = True
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, ParameterError, State
+from quadvis.block import Block, In, Out, Param, ParameterError, State, Work
 from quadvis_blocks._stamps import INSTANT
 
 
@@ -22,6 +22,7 @@ class Outage(Block):
     y = Out("float64[*]", unit="a", nan=True, doc="the signal, or its last value from before the outage")
     ok = Out("bool", doc="whether it is good, and there is no outage")
     last = State("float64[*]")
+    out = Work("bool")  # whether there is an outage now
 
     def check(self) -> None:
         """Refuse outages that end before they begin."""
@@ -32,13 +33,14 @@ class Outage(Block):
 
     def output(self, u: Any, valid: bool, time: float) -> tuple[Any, bool]:
         """Return the signal or what is left of it."""
-        if _inside(self.during, time + INSTANT):
+        self.out = _inside(self.during, time + INSTANT)
+        if self.out:
             return 1.0 * self.last, False
         return 1.0 * u, valid
 
-    def update(self, u: Any, time: float) -> None:
+    def update(self, u: Any) -> None:
         """Keep the last value."""
-        if not _inside(self.during, time + INSTANT):
+        if not self.out:
             self.last = u
 
 

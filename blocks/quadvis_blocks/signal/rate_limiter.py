@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State
+from quadvis.block import Block, In, Out, Param, State, Work
 from quadvis_blocks.signal._elements import clip
 
 
@@ -20,6 +20,7 @@ class RateLimiter(Block):
     u = In("float64[*]", unit="a", doc="any signal")
     y = Out("float64[*]", unit="a", doc="the limited signal")
     last = State("float64[*]")
+    given = Work("float64[*]")
 
     def start(self) -> None:
         """Begin with the initial value."""
@@ -27,8 +28,9 @@ class RateLimiter(Block):
 
     def output(self, u: Any) -> Any:
         """Return the input, or as near to it as the limits allow."""
-        return self.last + clip(u - self.last, -self.falling * self.period, self.rising * self.period)
+        self.given = self.last + clip(u - self.last, -self.falling * self.period, self.rising * self.period)
+        return self.given
 
-    def update(self, u: Any) -> None:
+    def update(self) -> None:
         """Keep what was given out."""
-        self.last = self.last + clip(u - self.last, -self.falling * self.period, self.rising * self.period)
+        self.last = self.given

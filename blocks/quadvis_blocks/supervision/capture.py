@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, State
+from quadvis.block import Block, In, Out, Param, State, Work
 from quadvis_blocks._angles import wrapped
 
 COLLECTIVE, ROLL, PITCH, YAW = range(4)
@@ -39,6 +39,9 @@ class Capture(Block):
     captured = Out("bool", doc="whether x and y are taken at this tick")
     shift = State("float64[3]")
     turn = State()
+    shift_now = Work("float64[3]")
+    turn_now = Work()
+    away = Work(unit="m")  # length of the shift
 
     def output(
         self, position_reference: Any, velocity_reference: Any, heading_reference: float, position: Any,
@@ -47,22 +50,18 @@ class Capture(Block):
         """Return the shifted reference, and whether x and y are taken from the craft now."""
         shift, taken = _shifted(self.shift, position - position_reference, engaged, rearmed, self.distance)
         away = _length(shift)
+        self.shift_now = shift
+        self.away = away
         speed = min(self.return_speed, away / self.period)
         velocity = velocity_reference - shift * (speed / away) if away > 0.0 else 1.0 * velocity_reference
-        turn = heading - heading_reference if engaged[YAW] else self.turn
-        return position_reference + shift, velocity, wrapped(heading_reference + turn), taken
+        self.turn_now = heading - heading_reference if engaged[YAW] else self.turn
+        return position_reference + shift, velocity, wrapped(heading_reference + self.turn_now), taken
 
-    def update(
-        self, position_reference: Any, heading_reference: float, position: Any, heading: float, engaged: Any,
-        rearmed: bool,
-    ) -> None:  # fmt: skip
+    def update(self) -> None:
         """Keep the shift, a little smaller if it shrinks."""
-        shift, _ = _shifted(self.shift, position - position_reference, engaged, rearmed, self.distance)
-        away = _length(shift)
-        step = min(self.return_speed * self.period, away)
-        self.shift = shift * (1.0 - step / away) if away > 0.0 else shift
-        if engaged[YAW]:
-            self.turn = heading - heading_reference
+        step = min(self.return_speed * self.period, self.away)
+        self.shift = self.shift_now * (1.0 - step / self.away if self.away > 0.0 else 1.0)
+        self.turn = self.turn_now
 
 
 def _shifted(shift: Any, error: Any, engaged: Any, rearmed: bool, distance: float) -> tuple[Any, bool]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State
+from quadvis.block import Block, In, Out, Param, State, Work
 from quadvis_blocks.supervision._vision import COAST, FRESH, LEVEL, REARMING
 from quadvis_blocks.supervision._vision import LAND as LOST
 
@@ -71,6 +71,11 @@ class Failsafe(Block):
     cause = State("int64")
     given_up = State("bool")
     weight = State(init=1.0)
+    had_now = Work("bool[4]")
+    landing_now = Work("bool")
+    cause_now = Work("int64")
+    given_up_now = Work("bool")
+    weight_now = Work()
 
     def output(
         self, automatic: Any, overridden: Any, vision: int, vision_reason: int, vision_stale: bool,
@@ -91,6 +96,9 @@ class Failsafe(Block):
             allowed.any() or given_up, automatic.all(), overridden.any(), vision_reason, imu_stale,
             sticks_stale, limited.any(),
         )  # fmt: skip
+        self.had_now = allowed
+        self.landing_now, self.cause_now = descend, cause
+        self.given_up_now, self.weight_now = given_up, weight
         return (
             allowed,
             neutral,
@@ -104,24 +112,11 @@ class Failsafe(Block):
             cause if descend else reason,
         )
 
-    def update(
-        self,
-        automatic: Any,
-        vision: int,
-        vision_reason: int,
-        imu_stale: bool,
-        sticks_stale: bool,
-        land: float,
-    ) -> None:
+    def update(self) -> None:
         """Keep the decisions that last."""
-        self.given_up = _given_up(self.given_up, self.on_loss, vision, sticks_stale, automatic)
-        self.had = automatic & (not self.given_up)
-        self.landing, self.cause = _landing(
-            self.landing, self.cause, self.had[0], vision, vision_reason, land
-        )
-        if imu_stale:
-            self.had[ROLL], self.had[PITCH] = False, False
-        self.weight = _weight(self.weight, vision, self.period / self.blend)
+        self.had = self.had_now
+        self.landing, self.cause = self.landing_now, self.cause_now
+        self.given_up, self.weight = self.given_up_now, self.weight_now
         self.begun = True
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, State
+from quadvis.block import Block, In, Out, Param, State, Work
 from quadvis_blocks._stamps import INSTANT
 
 TOUCH = 1e-9  # m; a height no further from another one is the same
@@ -52,43 +52,40 @@ class Landing(Block):
     rest = State(unit="m")  # height from which the craft has not moved
     since = State(unit="s")  # when it came there
     down = State("bool")
+    place = Work("float64[3]", unit="m")  # the reference of now
+    slow = Work("bool")  # whether it is near the ground
+    stands = Work("bool")  # whether the craft stands there now
 
     def output(
         self, position_reference: Any, velocity_reference: Any, descend: bool, recapture: bool, current: Any,
         blind: bool, time: float,
     ) -> tuple[Any, Any, bool]:  # fmt: skip
         """Return the reference, and whether the craft has landed."""
+        seen_again = self.was_blind and not blind
+        spot = _spot(self.active, self.spot, position_reference, recapture, seen_again, current, self.gap)
+        height = float(current[2])
+        lowest = spot[2] <= self.ground - self.margin + TOUCH
+        rests = self.active and abs(height - self.rest) <= self.band and height - spot[2] > self.gap
+        self.place = spot
+        self.slow = spot[2] <= self.ground + self.flare
+        self.stands = lowest if blind else rests and time - self.since >= self.settle - INSTANT
         if not descend:
             return 1.0 * position_reference, 1.0 * velocity_reference, False
-        seen_again = self.was_blind and not blind
-        spot = _spot(self.active, self.spot, position_reference, recapture, seen_again, current, self.gap)
-        height = float(current[2])
-        lowest = spot[2] <= self.ground - self.margin + TOUCH
-        rests = self.active and abs(height - self.rest) <= self.band and height - spot[2] > self.gap
-        landed = lowest if blind else rests and time - self.since >= self.settle - INSTANT
-        slow = spot[2] <= self.ground + self.flare
         speed = 0.0 if lowest else self.speed
-        pace = np.array((0.0, 0.0, -min(speed, self.touch_speed) if slow else -speed))
-        return spot, pace, self.down or landed
+        pace = np.array((0.0, 0.0, -min(speed, self.touch_speed) if self.slow else -speed))
+        return spot, pace, self.down or self.stands
 
-    def update(
-        self, position_reference: Any, descend: bool, recapture: bool, current: Any, blind: bool, time: float
-    ) -> None:
+    def update(self, descend: bool, current: Any, blind: bool, time: float) -> None:
         """Go down by one period."""
-        seen_again = self.was_blind and not blind
-        spot = _spot(self.active, self.spot, position_reference, recapture, seen_again, current, self.gap)
         height = float(current[2])
-        lowest = spot[2] <= self.ground - self.margin + TOUCH
-        rests = self.active and abs(height - self.rest) <= self.band and height - spot[2] > self.gap
-        landed = lowest if blind else rests and time - self.since >= self.settle - INSTANT
         if blind or not self.active or abs(height - self.rest) > self.band:
             self.rest = height
             self.since = time
-        slow = spot[2] <= self.ground + self.flare
-        step = (min(self.speed, self.touch_speed) if slow else self.speed) * self.period
-        spot[2] = max(spot[2] - step, min(spot[2], self.ground - self.margin))
-        self.spot = spot
-        self.down = descend and (self.down or landed)
+        step = (min(self.speed, self.touch_speed) if self.slow else self.speed) * self.period
+        here = self.place[2]
+        self.spot = self.place
+        self.spot[2] = max(here - step, min(here, self.ground - self.margin))
+        self.down = descend and (self.down or self.stands)
         self.active = descend
         self.was_blind = descend and blind
 

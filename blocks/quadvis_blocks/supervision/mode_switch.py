@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, State
+from quadvis.block import Block, In, Out, Param, State, Work
 from quadvis_blocks._craft import GRAVITY, MASS
 
 CHANNELS = 4
@@ -64,6 +64,9 @@ class ModeSwitch(Block):
     offset = State("float64[4]")
     owner = State("int64[4]")
     begun = State("bool")
+    given = Work("float64[4]")
+    apart = Work("float64[4]")  # what is given less what its owner wants
+    owner_now = Work("int64[4]")
 
     def output(
         self,
@@ -79,40 +82,26 @@ class ModeSwitch(Block):
     ) -> tuple[Any, Any, float]:
         """Return the controls, their sources and the time."""
         law = np.array((collective, roll, pitch, yaw))
-        controls, source = np.empty(CHANNELS), np.empty(CHANNELS, np.int64)
+        given, apart, owners = self.given, self.apart, self.owner_now
         for channel in range(CHANNELS):
             owner = _owner(automatic[channel], neutral[channel], idle)
             value = _value(owner, channel, manual, law, self.weight, self.idle_thrust)
             smooth = self.begun and _time_constant(owner, self.to_automatic, self.to_manual) > 0.0
             changed = owner != self.owner[channel]
-            controls[channel] = _handed(value, smooth, changed, self.last[channel], self.offset[channel])[0]
-            source[channel] = owner
-        return controls, source, time
-
-    def update(
-        self,
-        manual: Any,
-        collective: float,
-        roll: float,
-        pitch: float,
-        yaw: float,
-        automatic: Any,
-        neutral: Any,
-        idle: bool,
-    ) -> None:
-        """Take the difference at a change of hands into the offset, and let it decay."""
-        law = np.array((collective, roll, pitch, yaw))
-        for channel in range(CHANNELS):
-            owner = _owner(automatic[channel], neutral[channel], idle)
-            value = _value(owner, channel, manual, law, self.weight, self.idle_thrust)
-            constant = _time_constant(owner, self.to_automatic, self.to_manual)
-            changed = owner != self.owner[channel]
-            control, offset = _handed(
-                value, self.begun and constant > 0.0, changed, self.last[channel], self.offset[channel]
+            given[channel], apart[channel] = _handed(
+                value, smooth, changed, self.last[channel], self.offset[channel]
             )
-            self.last[channel] = control
-            self.offset[channel] = offset * math.exp(-self.period / constant) if constant > 0.0 else 0.0
-            self.owner[channel] = owner
+            owners[channel] = owner
+        return given, owners, time
+
+    def update(self) -> None:
+        """Take the difference at a change of hands into the offset, and let it decay."""
+        for channel in range(CHANNELS):
+            constant = _time_constant(self.owner_now[channel], self.to_automatic, self.to_manual)
+            fading = math.exp(-self.period / constant) if constant > 0.0 else 0.0
+            self.offset[channel] = self.apart[channel] * fading
+        self.last = self.given
+        self.owner = self.owner_now
         self.begun = True
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State
-from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, note
+from quadvis.block import Block, In, Out, Param, State, Work
+from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, keep
 from quadvis_blocks.signal._elements import all_finite
 
 
@@ -36,6 +36,9 @@ class OutputHold(Block):
     last = State("float64[*]")
     made = State(unit="s")
     stamps = State(f"float64[{SIZE}]")
+    verdict = Work("int64")  # on the stamp of now
+    moment = Work(unit="s")  # the instant that it stands for
+    good = Work("bool")  # whether the command of now counts
 
     def start(self) -> None:
         """Know no command yet."""
@@ -44,17 +47,17 @@ class OutputHold(Block):
 
     def output(self, u: Any, valid: bool, stamp: float, time: float) -> tuple[Any, bool]:
         """Return the command that counts, and whether it is the safe one."""
-        verdict, made = judge(self.stamps, stamp, time, self.restart)
-        good = verdict == NEWS and valid and all_finite(u) and made > self.made
-        if time - (made if good else self.made) > self.max_age + INSTANT:
+        self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)
+        self.good = self.verdict == NEWS and valid and all_finite(u) and self.moment > self.made
+        if time - (self.moment if self.good else self.made) > self.max_age + INSTANT:
             return 0.0 * self.last + self.safe, True
-        if good:
+        if self.good:
             return 1.0 * u, False
         return 1.0 * self.last, False
 
-    def update(self, u: Any, valid: bool, stamp: float, time: float) -> None:
+    def update(self, u: Any, stamp: float, time: float) -> None:
         """Keep a good command."""
-        verdict, made = note(self.stamps, stamp, time, self.restart)
-        if verdict == NEWS and valid and all_finite(u) and made > self.made:
+        keep(self.stamps, stamp, time, self.restart, self.verdict, self.moment)
+        if self.good:
             self.last = u
-            self.made = made
+            self.made = self.moment

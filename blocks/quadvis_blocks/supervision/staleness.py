@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State
-from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, note
+from quadvis.block import Block, In, Out, Param, State, Work
+from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, keep
 
 
 class Staleness(Block):
@@ -41,6 +41,9 @@ class Staleness(Block):
     last_sequence = State("int64")
     last_value = State("float64[*]")
     stamps = State(f"float64[{SIZE}]")
+    verdict = Work("int64")  # on the stamp of now
+    moment = Work(unit="s")  # the instant that it stands for
+    newest = Work(unit="s")  # when the last news came
 
     def start(self) -> None:
         """Know nothing yet."""
@@ -48,22 +51,20 @@ class Staleness(Block):
 
     def output(self, stamp: float, sequence: int, value: Any, time: float) -> tuple[float, bool]:
         """Return the age, and whether it is too great."""
-        verdict, made = judge(self.stamps, stamp, time, self.restart)
-        if verdict == NEWS and not math.isnan(stamp):
-            age = time - made
+        self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)
+        if self.verdict == NEWS and not math.isnan(stamp):
+            self.newest = self.moment
         elif sequence != self.last_sequence or _differs(value, self.last_value):
-            age = 0.0
+            self.newest = time
         else:
-            age = time - self.news
+            self.newest = self.news
+        age = time - self.newest
         return max(0.0, age), age > self.max_age + INSTANT
 
     def update(self, stamp: float, sequence: int, value: Any, time: float) -> None:
         """Keep what came."""
-        verdict, made = note(self.stamps, stamp, time, self.restart)
-        if verdict == NEWS and not math.isnan(stamp):
-            self.news = made
-        elif sequence != self.last_sequence or _differs(value, self.last_value):
-            self.news = time
+        keep(self.stamps, stamp, time, self.restart, self.verdict, self.moment)
+        self.news = self.newest
         self.last_sequence = sequence
         self.last_value = value
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, ParameterError, State
+from quadvis.block import Block, In, Out, Param, ParameterError, State, Work
 
 CHANNELS = 4
 ENGAGEMENT, NEUTRAL = range(2)
@@ -38,6 +38,9 @@ class StickOverride(Block):
     on = State("bool[4]")
     taken = State("bool[4]")
     origins = State("float64[4]")
+    on_now = Work("bool[4]")
+    taken_now = Work("bool[4]")
+    origins_now = Work("float64[4]")
 
     def check(self) -> None:
         """Refuse a release beyond the threshold."""
@@ -47,21 +50,20 @@ class StickOverride(Block):
 
     def output(self, sticks: Any, switches: Any, stale: bool) -> tuple[Any, Any]:
         """Return the channels that are automatic, and those that a stick took back."""
-        on, taken, _ = _decided(
-            sticks, switches, stale, self.on, self.taken, self.origins,
-            self.origin, self.threshold, self.release, self.together,
-        )  # fmt: skip
-        return on & ~taken, taken
-
-    def update(self, sticks: Any, switches: Any, stale: bool) -> None:
-        """Keep the decisions."""
         on, taken, origins = _decided(
             sticks, switches, stale, self.on, self.taken, self.origins,
             self.origin, self.threshold, self.release, self.together,
         )  # fmt: skip
-        self.on = on
-        self.taken = taken
-        self.origins = origins
+        self.on_now = on
+        self.taken_now = taken
+        self.origins_now = origins
+        return on & ~taken, taken
+
+    def update(self) -> None:
+        """Keep the decisions."""
+        self.on = self.on_now
+        self.taken = self.taken_now
+        self.origins = self.origins_now
 
 
 def _decided(

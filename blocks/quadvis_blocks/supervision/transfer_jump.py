@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, State
+from quadvis.block import Block, In, Out, State, Work
 
 
 class TransferJump(Block):
@@ -27,15 +27,17 @@ class TransferJump(Block):
     owner = State("int64[4]")
     begun = State("bool")
     counted = State("int64")
+    counted_now = Work("int64")
 
     def output(self, controls: Any, source: Any) -> tuple[Any, int]:
         """Return the changes, and how many there have been."""
         changed = (source != self.owner) & self.begun
-        return np.where(changed, controls - self.last, 0.0), self.counted + int(changed.sum())
+        self.counted_now = self.counted + int(changed.sum())
+        return np.where(changed, controls - self.last, 0.0), self.counted_now
 
     def update(self, controls: Any, source: Any) -> None:
         """Keep what is there now."""
-        self.counted += int(((source != self.owner) & self.begun).sum())
+        self.counted = self.counted_now
         self.last = controls
         self.owner = source
         self.begun = True

@@ -61,6 +61,7 @@ class DeliveringCamera(Block, numeric=False):
     pending = State(f"float64[{QUEUE},{CONTENT}]")  # rows on their way, oldest first; cameras widen it
     waiting = State("int64")  # how many of them there are
     shown = State(f"float64[{CONTENT}]")  # the row on the wire; sequence 0 before the first
+    _arrivals: tuple[Row, list[Row]]  # the rows on the wire and on their way, from output to update
 
     def check_period(self) -> None:
         """Refuse a latency that the queue cannot hold; ParameterError."""
@@ -120,9 +121,14 @@ class DeliveringCamera(Block, numeric=False):
         last = max(due, key=lambda row: (row[ARRIVAL], row[SEQUENCE]))
         return last, [row for row in queue if row[ARRIVAL] > now]
 
-    def _advance(self, fresh: Row | None, time: float) -> None:
-        """Keep what is on the wire and on its way, and go on to the next tick."""
-        shown, rest = self._arrived(fresh, time)
+    def _deliver(self, fresh: Row | None, time: float) -> Row:
+        """Return the row on the wire at this time; for ``output``, which hands it to `_advance`."""
+        self._arrivals = self._arrived(fresh, time)
+        return self._arrivals[0]
+
+    def _advance(self) -> None:
+        """Keep what is on the wire and on its way, and go on to the next tick; for ``update``."""
+        shown, rest = self._arrivals
         self.shown[:] = shown
         if rest:
             self.pending[: len(rest)] = rest

@@ -111,54 +111,42 @@ class CircleDetector(Block, numeric=False):
         """Read the files."""
         self._picture = self._size()
         self._target = Target(self._load(), self.radius / self.side, self.radius_min, self.radius_max)
-        self._key: tuple[Any, ...] = ()
+        # What output has found, for update of the same tick.
+        self._new = self._frozen = False
         self._seen = nothing(STALE)
-        self._summed: tuple[Frame, int] = (Frame.none(), 0)
+        self._sum = 0
 
     def output(self, frame: Frame) -> tuple[Any, ...]:
         """Return the circles of a new picture, or the last result again."""
-        new, frozen = self._news(frame)
-        if not new:
+        self._look(frame)
+        if not self._new:
             centres, quality, status = self.last_centres, self.last_quality, self.last_status
             last = self.last_stamp, self.last_sequence
-            return centres, quality, status, status == 0, False, *last, False, frozen
-        centres, quality, status, _ = self._look(frame)
+            return centres, quality, status, status == 0, False, *last, False, self._frozen
+        centres, quality, status, _ = self._seen
         lost = status > TWO_CIRCLES
         return centres, quality, status, status == 0, lost, frame.stamp, frame.sequence, True, False
 
     def update(self, frame: Frame) -> None:
         """Keep the result of a new picture."""
-        new, self.stuck = self._news(frame)
+        self.stuck = self._frozen
         self.newest = frame.sequence
-        if new:
-            seen = self._look(frame)
-            self.last_centres, self.last_quality, self.last_status, self.places = seen
+        if self._new:
+            self.last_centres, self.last_quality, self.last_status, self.places = self._seen
             self.last_stamp, self.last_sequence = frame.stamp, frame.sequence
-            self.last_picture = self._checksum(frame)
+            self.last_picture = self._sum
 
-    def _news(self, frame: Frame) -> tuple[bool, bool]:
-        """Return whether there is a new picture, and whether the camera is frozen."""
+    def _look(self, frame: Frame) -> None:
+        """Find out whether there is a new picture, what it shows, and whether the camera is frozen."""
+        self._new, self._frozen = False, self.stuck
         if frame.sequence in (0, self.newest):
-            return False, self.stuck
+            return
+        self._sum = checksum(frame)
         known = self.last_sequence != 0 and self.repeats == STALE_PICTURE and usable(frame.pixels)
-        frozen = known and self._checksum(frame) == self.last_picture
-        return not frozen, frozen
-
-    def _checksum(self, frame: Frame) -> int:
-        """Return a number that tells the pixels of one picture from those of another; 0 for no picture."""
-        if not usable(frame.pixels):
-            return 0
-        if self._summed[0] is not frame:
-            pixels = np.ascontiguousarray(frame.pixels)
-            self._summed = (frame, zlib.crc32(pixels.data, zlib.crc32(repr(pixels.shape).encode())))
-        return self._summed[1]
-
-    def _look(self, frame: Frame) -> Detection:
-        """Return what the picture shows. `output` and `update` need it both, so the last one is kept."""
-        key = (frame, self.last_status, self.last_stamp, self.places.tobytes())
-        if key != self._key:
-            self._key, self._seen = key, self._detect(frame)
-        return self._seen
+        self._frozen = known and self._sum == self.last_picture
+        self._new = not self._frozen
+        if self._new:
+            self._seen = self._detect(frame)
 
     def _detect(self, frame: Frame) -> Detection:
         if not usable(frame.pixels, self._picture):
@@ -167,3 +155,11 @@ class CircleDetector(Block, numeric=False):
         if self.last_status <= TWO_CIRCLES and 0 < frame.stamp - self.last_stamp <= FOLLOW_MAX:
             return follow(pixels, self._target, self.places, self.fewest)
         return search(pixels, self._target, self.fewest)
+
+
+def checksum(frame: Frame) -> int:
+    """Return a number that tells the pixels of one picture from those of another; 0 for no picture."""
+    if not usable(frame.pixels):
+        return 0
+    pixels = np.ascontiguousarray(frame.pixels)
+    return zlib.crc32(pixels.data, zlib.crc32(repr(pixels.shape).encode()))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from quadvis.block import Block, Frame, In, Out, Param, Random, State, uniform
+from quadvis.block import Block, Frame, In, Out, Param, Random, State, Work, uniform
 from quadvis_blocks.vision._fault_timing import NO_FAULT, TIMING, comes, is_on, shows, stamped
 from quadvis_vision.simulation.picture_faults import PICTURES
 
@@ -34,11 +34,8 @@ class FrameFault(Block, numeric=False):
     one = State("frame")  # that came a tick ago
     two = State("frame")
     three = State("frame")
-
-    def open(self) -> None:
-        """Keep no picture yet."""
-        self._key: object = None
-        self._made = Frame.none()
+    on = Work("bool")
+    _given: Frame  # by output, for update of the same tick
 
     def start(self) -> None:
         """Draw what the first picture needs."""
@@ -46,24 +43,18 @@ class FrameFault(Block, numeric=False):
 
     def output(self, frame: Frame, time: float) -> tuple[Frame, bool]:
         """Return the frame or what is left of it, and whether there is a fault."""
-        return self._faulty(frame, time), is_on(time, self.begin, self.duration)
-
-    def update(self, frame: Frame, time: float) -> None:
-        """Keep what came and what was shown."""
-        self.shown = self._faulty(frame, time)
-        self.one, self.two, self.three = frame, self.one, self.two
-        self.ticks = self.ticks + 1 if is_on(time, self.begin, self.duration) else 0
-        self.drawn = uniform(self.chance)
-
-    def _faulty(self, frame: Frame, time: float) -> Frame:
-        """Return what comes of a frame. `output` and `update` need it both, so the last one is kept."""
+        self.on = is_on(time, self.begin, self.duration)
         kind = KINDS[self.kind]
-        if kind == NO_FAULT or frame.sequence == 0 or not is_on(time, self.begin, self.duration):
-            return frame
-        key = (frame, time, self.shown, self.drawn)
-        if self._key != key:
-            self._key, self._made = key, self._broken(kind, frame)
-        return self._made
+        whole = kind == NO_FAULT or frame.sequence == 0 or not self.on
+        self._given = frame if whole else self._broken(kind, frame)
+        return self._given, self.on
+
+    def update(self, frame: Frame) -> None:
+        """Keep what came and what was shown."""
+        self.shown = self._given
+        self.one, self.two, self.three = frame, self.one, self.two
+        self.ticks = self.ticks + 1 if self.on else 0
+        self.drawn = uniform(self.chance)
 
     def _broken(self, kind: str, frame: Frame) -> Frame:
         shown: Frame = self.shown

@@ -84,8 +84,7 @@ class GeometricCamera(DeliveringCamera, numeric=False):
 
     def output(self, position: Any, attitude: Any, time: float) -> tuple[Any, ...]:
         """Return the measurement that arrived last."""
-        prompt = self._arrival(time) <= self._now(time)  # else what is measured now does not matter yet
-        row = self._arrived(self._taken(position, attitude, time) if prompt else None, time)[0]
+        row = self._deliver(self._taken(position, attitude, time), time)
         sequence = int(row[SEQUENCE])
         fresh = sequence != self.last_sequence
         if sequence == 0:
@@ -99,14 +98,11 @@ class GeometricCamera(DeliveringCamera, numeric=False):
         lost = fresh and status > TWO_CIRCLES
         return centres, quality, status, status == 0, lost, row[STAMP], sequence, fresh, False
 
-    def update(self, position: Any, attitude: Any, time: float) -> None:
+    def update(self) -> None:
         """Keep what was measured at this tick, and what has arrived."""
         if self._is_captured():
-            taken = self._taken(position, attitude, time)
             fill_normal(self.stream, self.drawn)
-        else:
-            taken = None
-        self._advance(taken, time)
+        self._advance()
         self.last_sequence = int(self.shown[SEQUENCE])
 
     def _taken(self, position: Any, attitude: Any, time: float) -> Row | None:

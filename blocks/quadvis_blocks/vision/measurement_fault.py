@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, Random, State, fill_normal
+from quadvis.block import Block, In, Out, Param, Random, State, Work, fill_normal
 from quadvis_blocks.vision._fault_timing import LATE, NO_FAULT, TIMING, comes, is_on, shows, stamped
 
 SHAPES = ("no_target", "turned", "mirrored", "shifted", "noise", "other_colours", "half_gone", "two_left")
@@ -37,6 +37,8 @@ class MeasurementFault(Block, numeric=False):
     drawn = State("float64[8]")  # for the measurement of the coming tick
     ticks = State("int64")  # of the fault so far
     kept = State(f"float64[{SHOWN + 1},{WIDTH}]", math.nan)  # of this tick and before, and the one shown
+    row = Work(f"float64[{WIDTH}]")  # that is shown now
+    on = Work("bool")
 
     def start(self) -> None:
         """Draw what the first measurement needs."""
@@ -44,22 +46,23 @@ class MeasurementFault(Block, numeric=False):
 
     def output(self, centres: Any, instant: float, time: float) -> tuple[Any, float, bool]:
         """Return the measurement or what is left of it, and whether there is a fault."""
-        row = self._faulty(centres, instant, time)
-        return row[CENTRES:].reshape(4, 2), row[STAMP], is_on(time, self.begin, self.duration)
+        self.on = is_on(time, self.begin, self.duration)
+        row = self._faulty(centres, instant)
+        self.row = row
+        return row[CENTRES:].reshape(4, 2), row[STAMP], self.on
 
-    def update(self, centres: Any, instant: float, time: float) -> None:
+    def update(self, centres: Any, instant: float) -> None:
         """Keep what came and what was shown."""
-        shown = self._faulty(centres, instant, time)
         self.kept[1:SHOWN] = self.kept[: SHOWN - 1].copy()
         self.kept[0] = _row(centres, instant)
-        self.kept[SHOWN] = shown
-        self.ticks = self.ticks + 1 if is_on(time, self.begin, self.duration) else 0
+        self.kept[SHOWN] = self.row
+        self.ticks = self.ticks + 1 if self.on else 0
         fill_normal(self.chance, self.drawn)
 
-    def _faulty(self, centres: Any, stamp: float, time: float) -> Any:
+    def _faulty(self, centres: Any, stamp: float) -> Any:
         """Return stamp and centres (9,) as they come of a measurement."""
         row, kind = _row(centres, stamp), KINDS[self.kind]
-        if kind == NO_FAULT or math.isnan(stamp) or not is_on(time, self.begin, self.duration):
+        if kind == NO_FAULT or math.isnan(stamp) or not self.on:
             return row
         past = (row, *self.kept[:LATE])
         which = comes(kind, self.ticks)

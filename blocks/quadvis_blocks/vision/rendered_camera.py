@@ -120,14 +120,13 @@ class RenderedCamera(DeliveringCamera, numeric=False):
 
     def output(self, position: Any, attitude: Any, time: float) -> Frame:
         """Return the frame that arrived last."""
-        return self._picture(self._arrived(self._capture(position, attitude, time), time)[0])
+        return self._picture(self._deliver(self._capture(position, attitude, time), time))
 
-    def update(self, position: Any, attitude: Any, time: float) -> None:
+    def update(self, position: Any, attitude: Any) -> None:
         """Keep what was captured at this tick, and what is on the wire."""
-        fresh = self._capture(position, attitude, time)
         if self._is_captured():
             self.grain = uniform(self.stream)
-        self._advance(fresh, time)
+        self._advance()
         self.previous[:] = (*position, *attitude)
 
     def _capture(self, position: Any, attitude: Any, time: float) -> Row | None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.block import Block, Frame, Out, Param, ParameterError, State
+from quadvis.block import Block, Frame, Out, Param, ParameterError, State, Work
 from quadvis.errors import QuadvisError
 from quadvis_vision.pictures.drawing import is_picture
 from quadvis_vision.pictures.reader import not_a_video, open_video
@@ -35,6 +35,7 @@ class VideoFile(Block, numeric=False):
 
     played = State("int64", 0)  # frames that were on the wire
     stamp = State("float64")  # of the last one
+    finished_now = Work("bool")
 
     def check(self) -> None:
         """Refuse a file that is missing or not a video."""
@@ -62,7 +63,7 @@ class VideoFile(Block, numeric=False):
     def output(self, time: float) -> tuple[Frame, bool]:
         """Return the frame of this tick and whether the file is at its end."""
         pixels = self._video.frame(self.played, self.loop)
-        finished = pixels is None
+        self.finished_now = finished = pixels is None
         sequence, stamp = (self.played, self.stamp) if finished else (self.played + 1, time)
         if pixels is None:
             pixels = self._video.frame(self.played - 1)
@@ -73,7 +74,7 @@ class VideoFile(Block, numeric=False):
 
     def update(self, time: float) -> None:
         """Count the frame that was on the wire."""
-        if self._video.frame(self.played, self.loop) is not None:
+        if not self.finished_now:
             self.played += 1
             self.stamp = time
 
