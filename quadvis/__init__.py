@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 from quadvis.version import __version__
 
 if TYPE_CHECKING:
-    from quadvis.diagram.diagram import Diagram, load
+    from quadvis.api import Diagram, load
     from quadvis.output.log_reader import Log, read_log
     from quadvis.sweeps.sweep import sweep
 
 __all__ = ["Diagram", "Log", "__version__", "load", "read_log", "sweep"]
 
 _HOMES = {
-    "Diagram": "diagram.diagram",
-    "load": "diagram.diagram",
+    "Diagram": "api",
+    "load": "api",
     "Log": "output.log_reader",
     "read_log": "output.log_reader",
     "sweep": "sweeps.sweep",

@@ -17,10 +17,10 @@ from quadvis.analysis.margins import Loop, rates
 from quadvis.analysis.probe import AnalysisError
 from quadvis.analysis.systems import closed_loop
 from quadvis.analysis.vary import STABLE, Limits
-from quadvis.diagram.questions import Cut
+from quadvis.diagram.sections.analyse import Cut
 from quadvis.engine.graph import Graph
 from quadvis.errors import DiagramError
-from quadvis.output.verdict import finite
+from quadvis.output.statistics import finite
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
@@ -140,7 +140,7 @@ def _seen(graph: Graph) -> str | None:
 
 
 def _way_out(diagram: Diagram) -> str:
-    from quadvis.diagram.diagram import load
+    from quadvis.diagram.load import load
 
     for variant in diagram.variants:
         params = [file.path for file in diagram.parameter_files]

@@ -29,7 +29,7 @@ from quadvis.analysis.probe import (
     silence,
 )
 from quadvis.analysis.progress import tell
-from quadvis.diagram.questions import Cut
+from quadvis.diagram.sections.analyse import Cut
 from quadvis.engine.engine import Engine
 from quadvis.engine.graph import Graph
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from quadvis.analysis.cut import break_path
 from quadvis.block import Random
-from quadvis.diagram.questions import Cut
+from quadvis.diagram.sections.analyse import Cut
 from quadvis.engine.engine import Engine
 from quadvis.engine.graph import Graph, Node, Task
 from quadvis.engine.layout import TIME, Placed

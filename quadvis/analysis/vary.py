@@ -16,7 +16,8 @@ from quadvis.analysis.margins import growth
 from quadvis.analysis.probe import AnalysisError
 from quadvis.analysis.progress import task
 from quadvis.analysis.systems import library
-from quadvis.diagram.questions import Limit
+from quadvis.diagram.load import varied
+from quadvis.diagram.sections.analyse import Limit
 from quadvis.errors import RunError
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ def tolerance(diagram: Diagram, limit: Limit, at: float) -> Tolerance:
 def _growth_at(diagram: Diagram, limit: Limit, at: float, value: float) -> float:
     words = f"at {shown(limit, value)}, from {shown(limit, limit.start)} to {shown(limit, limit.end)}"
     with task(words):
-        return growth(linearised(diagram.varied(limit.variable.setting(value)).graph, (), at))
+        return growth(linearised(varied(diagram, limit.variable.setting(value)).graph, (), at))
 
 
 def shown(limit: Limit, value: float) -> str:

@@ -21,7 +21,7 @@ FAILED = 1
 
 
 def _load(options: argparse.Namespace, **more: Any) -> Any:
-    from quadvis.diagram.diagram import load
+    from quadvis.diagram.load import load
 
     given = {"variant": options.variant, "settings": options.set, "params": options.params}
     return load(options.file, **given, **more, own_blocks=_own_blocks(options))
@@ -130,7 +130,7 @@ def _runs_folder(what: str, option: str) -> Path:
 
 def check(options: argparse.Namespace) -> int:
     """Tell all faults of a diagram; 2 if there are some."""
-    from quadvis.diagram.diagram import check as check_diagram
+    from quadvis.diagram.load import check as check_diagram
     from quadvis.errors import DiagramError
 
     try:
@@ -211,6 +211,7 @@ def describe(options: argparse.Namespace) -> int:
 
 def analyse(options: argparse.Namespace) -> int:
     """Print poles, margins and limits of a diagram's loop; 1 if it is not stable."""
+    from quadvis.analysis.analyse import analyse as analyse_loop
     from quadvis.analysis.progress import watched
     from quadvis.analysis.questions import read_cuts, read_limits, read_time
     from quadvis.analysis.report import analysis_lines, save_bode_plots
@@ -219,7 +220,7 @@ def analyse(options: argparse.Namespace) -> int:
     diagram = _load(options)
     cuts, limits, at = read_cuts(options.cut), read_limits(options.vary), read_time(options.at)
     with AnalysisLine() as progress, watched(progress):
-        analysis = diagram.analyse(cuts=cuts, limits=limits, at=at)
+        analysis = analyse_loop(diagram, cuts, limits, at)
         if options.json:
             facts = analysis.facts()
         else:
@@ -236,20 +237,24 @@ def analyse(options: argparse.Namespace) -> int:
 
 def draw(options: argparse.Namespace) -> int:
     """Write a diagram as SVG."""
+    from quadvis.diagram.picture import draw_diagram
+
     diagram = _load(options)
     output = options.output or f"{_default_name(options, options.variant)}.svg"
-    return _write(diagram.draw(), output, SVG, diagram.inputs)
+    return _write(draw_diagram(diagram), output, SVG, diagram.inputs)
 
 
 def plot(options: argparse.Namespace) -> int:
     """Draw the figures of a log."""
+    from quadvis.diagram.sections.figures import read_figures
     from quadvis.output.log_reader import read_log
     from quadvis.output.plot import plot_log
 
     log = read_log(options.log)
     if log.damage:
         print(log.damage, file=sys.stderr)
-    for path in plot_log(log, Path(options.output) if options.output else None):
+    figures = read_figures(log.diagram, f"{log.path}: diagram")
+    for path in plot_log(log, figures, Path(options.output) if options.output else None):
         print(path)
     return 0
 

@@ -10,12 +10,14 @@ from typing import Any
 from quadvis.block import Block, Param, ParameterError
 from quadvis.diagram.expand import Expansion, FlatBlock
 from quadvis.diagram.flow import Connection, Draft
-from quadvis.diagram.loader import CONTINUOUS, FileSpec
 from quadvis.diagram.names import absent, remedy_for
+from quadvis.diagram.sections.rates import RATES
+from quadvis.diagram.sections.solver import SOLVER
+from quadvis.diagram.spec import FileSpec
 from quadvis.diagram.times import time_text
 from quadvis.diagram.values import OpenUnits, read_parameter, read_value
 from quadvis.diagram.wiring import Wiring
-from quadvis.engine.graph import Constant, Task, Wire, common_divisor
+from quadvis.engine.graph import CONTINUOUS, Constant, Task, Wire, common_divisor
 from quadvis.errors import DiagramError, Fault, Faults, Place, QuadvisError, suggestion
 
 # By path, class, parameters and period: variants share most.
@@ -32,7 +34,7 @@ class Builder:
         self.spec, self.expansion, self.wiring, self.made, self.faults = spec, expansion, wiring, made, faults
         self.tasks = {
             name: Task(name, rate.period, rate.offset)
-            for name, rate in spec.rates.items()
+            for name, rate in spec[RATES].items()
             if rate is not None
         }
         self.step = self._choose_step()
@@ -67,9 +69,9 @@ class Builder:
         first = next(filter(_is_continuous, self.expansion.blocks.values()), None)
         if first is None:
             return None
-        step = self.spec.step
+        step = self.spec[SOLVER].step
         if step is None:
-            if not self.spec.step_told:
+            if not self.spec[SOLVER].told:
                 problem = f"block '{first.path}' is continuous and the solver has no step"
                 self.faults.add(first.spec.place, problem, "add 'solver: {method: ode4, step: 5 ms}'")
             return NO_STEP
@@ -86,7 +88,7 @@ class Builder:
             fitting /= math.ceil(fitting / step)
             problem = f"a step of {time_text(step)} is not commensurate with {' and '.join(unfit)}"
             remedy = f"choose one that divides them all, such as '{time_text(fitting)}'"
-            self.faults.add(self.spec.step_place or self.spec.place, problem, remedy)
+            self.faults.add(self.spec[SOLVER].place or self.spec.place, problem, remedy)
         return step
 
     def _task(self, flat: FlatBlock, kind: type[Block]) -> Task | None:
@@ -98,7 +100,7 @@ class Builder:
                 problem = f"{flat.spec.kind} has continuous states, rate '{own[0]}' cannot hold it"
                 self.faults.add(own[1], problem, "leave 'rate' out, or write 'continuous'")
             return continuous
-        names = [*self.spec.rates, CONTINUOUS]
+        names = [*self.spec[RATES], CONTINUOUS]
         if flat.rate is None:
             entries = list(flat.around)
             if not any("rate" in entry.told for entry in entries):
@@ -108,8 +110,8 @@ class Builder:
         name, place = flat.rate
         if name == CONTINUOUS:
             return continuous
-        if name not in self.spec.rates:
-            remedy = suggestion(name, names) if self.spec.rates else ""
+        if name not in self.spec[RATES]:
+            remedy = suggestion(name, names) if self.spec[RATES] else ""
             self.faults.add(place, f"there is no rate '{name}'", remedy or "declare it under 'rates'")
         return self.tasks.get(name)
 

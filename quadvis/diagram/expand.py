@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from quadvis.block import Block
-from quadvis.diagram.loader import BlockSpec, FileSpec, read_file
 from quadvis.diagram.names import absent, remedy_for
+from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec
+from quadvis.diagram.sections.params import PARAMS
+from quadvis.diagram.sections.ports import PORTS
 from quadvis.diagram.settings import Settings
+from quadvis.diagram.spec import FileSpec
 from quadvis.diagram.values import substitute
 from quadvis.document import YamlNode, YamlScalar
 from quadvis.errors import DiagramError, Faults, Place, quoted, suggestion
@@ -78,10 +81,10 @@ def _is_unit(text: str) -> bool:
 
 
 class Parts:
-    """The files of parts, each read once; its faults are told then."""
+    """The files of parts, each read once; its faults are reported then."""
 
-    def __init__(self, faults: Faults) -> None:
-        self.faults = faults
+    def __init__(self, read: Callable[[Path, Faults], FileSpec | None], faults: Faults) -> None:
+        self._read, self.faults = read, faults
         self._specs: dict[str, FileSpec | None] = {}
 
     @property
@@ -103,7 +106,7 @@ class Parts:
         real = os.path.realpath(file)
         if real not in self._specs:
             with self.faults.about(""):
-                self._specs[real] = read_file(file, self.faults, part=True)
+                self._specs[real] = self._read(file, self.faults)
         return self._specs[real]
 
 
@@ -119,7 +122,7 @@ class Expansion:
         self.broken: set[str] = set()  # blocks of which a parameter is wrong
         self._count = 0
         self._used: set[tuple[str, str]] = set()
-        params = {name: self._chosen("", name, node) for name, node in spec.params.items()}
+        params = {name: self._chosen("", name, node) for name, node in spec[PARAMS].items()}
         self.root = Scope("", spec, params)
         self._expand(self.root, (os.path.realpath(spec.path),))
         self._tell_unused()
@@ -159,14 +162,17 @@ class Expansion:
                     remedy = f"did you mean '{inner[0]}'?" if inner else suggestion(path, self.blocks)
                     self.faults.add(setting.place, f"there is no block '{path}'", remedy)
                 else:
-                    remedy = suggestion(name, self.root.spec.params)
+                    remedy = suggestion(name, self.root.spec[PARAMS])
                     remedy = remedy or "a parameter of a block is set by 'block.parameter=value'"
                     self.faults.add(setting.place, f"the diagram has no parameter '{name}'", remedy)
 
     def _expand(self, scope: Scope, files: tuple[str, ...]) -> None:
-        scope.broken |= scope.spec.broken
-        self.unknown |= {scope.prefix + name for name in scope.spec.broken}
-        for block in scope.spec.blocks.values():
+        broken = {name for name, block in scope.spec[BLOCKS].items() if block is None}
+        scope.broken |= broken
+        self.unknown |= {scope.prefix + name for name in broken}
+        for block in scope.spec[BLOCKS].values():
+            if block is None:
+                continue
             path = scope.prefix + block.name
             with self.faults.about(f"block '{path}'"):
                 self._count += 1
@@ -229,19 +235,19 @@ class Expansion:
             return
         places = self._places(block, scope.prefix + block.name)
         for name in values:
-            if name not in spec.params:
+            if name not in spec[PARAMS]:
                 problem = f"part '{block.kind}' has no parameter '{name}'"
-                remedy = remedy_for(name, values, spec.params, replaces=name not in block.parameters)
+                remedy = remedy_for(name, values, spec[PARAMS], replaces=name not in block.parameters)
                 self.faults.add(places[name], problem, remedy)
-        inputs = block.inputs or {}
+        inputs, declared = block.inputs or {}, spec[PORTS].inputs
         for name, given in inputs.items():
-            if name not in spec.inputs:
+            if name not in declared:
                 problem = f"part '{block.kind}' has no input '{name}'"
-                self.faults.add(given.place, problem, remedy_for(name, inputs, spec.inputs))
-        for name in absent(spec.inputs, inputs, spec.inputs) if "in" not in block.told else ():
+                self.faults.add(given.place, problem, remedy_for(name, inputs, declared))
+        for name in absent(declared, inputs, declared) if "in" not in block.told else ():
             remedy = f"add '{name}: block.port' under 'in', or a constant"
             self.faults.add(block.place, f"input '{name}' is not connected", remedy)
-        child = Scope(f"{scope.prefix}{block.name}/", spec, spec.params | values, scope, block)
+        child = Scope(f"{scope.prefix}{block.name}/", spec, spec[PARAMS] | values, scope, block)
         scope.children[block.name] = child
         self._expand(child, (*files, os.path.realpath(file)))
 

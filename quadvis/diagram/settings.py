@@ -19,7 +19,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from quadvis.diagram.loader import is_version
+from quadvis.diagram.sections.forms import TEXT, Schema, map_of, ref
+from quadvis.diagram.sections.header import is_version
 from quadvis.diagram.values import read_constant
 from quadvis.document import YamlList, YamlMap, YamlNode, parse_yaml, read_yaml
 from quadvis.errors import DiagramError, Faults, Odd, Place
@@ -31,6 +32,7 @@ ARGUMENT = "settings"  # of the functions for those who work in Python
 PARAMETERS_REQUIRED = ("quadvis", "name", "set")
 PARAMETERS_KEYS = ("doc", "base")
 MAX_DEPTH = 30  # of files that build on files
+SETTING: Schema = {"pattern": r"^([A-Za-z_][A-Za-z0-9_/]*\.)?[A-Za-z_][A-Za-z0-9_]*$"}
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,15 @@ def read_settings(given: Given, params: Files, faults: Faults) -> tuple[Settings
     for path_and_name, setting in _from_texts(setting_texts(given), origin, faults):
         _put(found, path_and_name, setting)
     return found, tuple(files)
+
+
+def parameters_schema() -> dict[str, Schema]:
+    """Return the schema of the keys that only parameter files have."""
+    words = "values of parameters, by block.parameter or by the diagram's names"
+    return {
+        "set": {**map_of(ref("value"), words), "propertyNames": SETTING},
+        "base": {**TEXT, "description": "parameter file that this one builds on, relative to this file"},
+    }
 
 
 def setting_texts(given: Given) -> tuple[str, ...]:

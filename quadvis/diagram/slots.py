@@ -6,58 +6,66 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from quadvis.block import Out
-from quadvis.diagram.loader import BlockSpec, FileSpec
+from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec
+from quadvis.diagram.sections.variants import VARIANTS, Variants
+from quadvis.diagram.spec import FileSpec
 from quadvis.errors import Faults, suggestion
 
 Outputs = Mapping[str, Mapping[str, Out]]  # by slot and port
+Pair = tuple[BlockSpec, BlockSpec]  # what stands in a slot, and what a variant puts there
 Refused = set[tuple[str, str]]  # slots and ports that another block should have, which is told
 
 
 def fill_slots(spec: FileSpec, variant: str | None, faults: Faults) -> FileSpec:
-    """Return the diagram with a variant's blocks in their slots; faults of all variants are told."""
-    if variant is not None and variant not in spec.variants:
-        remedy = suggestion(variant, spec.variants) or "the diagram has no variants"
+    """Return the diagram with a variant's blocks in their slots; faults of all variants are reported."""
+    variants = spec[VARIANTS]
+    if variant is not None and variant not in variants:
+        remedy = suggestion(variant, variants) or "the diagram has no variants"
         faults.add(spec.place, f"there is no variant '{variant}'", remedy)
-    lineages = {name: _lineage(spec, name, faults) for name in spec.variants}
-    blocks = dict(spec.blocks)
-    fitting = {name: dict(_fitting(spec, name, faults)) for name in spec.variants}
+    lineages = {name: _lineage(variants, name, faults) for name in variants}
+    blocks = dict(spec[BLOCKS])
+    fitting = {name: dict(_fitting(spec, name, faults)) for name in variants}
     for name in reversed(lineages.get(variant or "", [])):
-        for slot, block in fitting[name].items():
-            blocks[slot] = _in_slot(spec.blocks[slot], block)
-    return replace(spec, blocks=blocks)
+        for slot, (base, block) in fitting[name].items():
+            blocks[slot] = _in_slot(base, block)
+    return replace(spec, values=spec.values.replaced(BLOCKS, blocks))
 
 
-def _lineage(spec: FileSpec, variant: str, faults: Faults) -> list[str]:
-    """Return a variant, the one on which it builds, and so on; what is wrong with its own base is told."""
+def _lineage(variants: Variants, variant: str, faults: Faults) -> list[str]:
+    """Return a variant, the one on which it builds, and so on; faults of its own base are reported."""
     names = [variant]
-    while names[-1] in spec.bases:
-        base, place = spec.bases[names[-1]]
-        own = len(names) == 1
-        if base not in spec.variants:
-            if own:
-                remedy = suggestion(base, [name for name in spec.variants if name != variant])
+    own = variants[variant].base
+    while (named := variants[names[-1]].base) is not None:
+        base, place = named
+        is_first = len(names) == 1
+        if base not in variants:
+            if is_first:
+                remedy = suggestion(base, [name for name in variants if name != variant])
                 faults.add(place, f"variant '{variant}' builds on '{base}', which is none", remedy)
             return names
         if base in names:
-            if base == variant:
-                faults.add(place if own else spec.bases[variant][1], f"variant '{variant}' builds on itself")
+            if base == variant and own is not None:
+                faults.add(own[1], f"variant '{variant}' builds on itself")
             return names
         names.append(base)
     return names
 
 
-def _fitting(spec: FileSpec, variant: str, faults: Faults) -> Iterator[tuple[str, BlockSpec]]:
-    """Yield what a variant puts into slots that are there; the others are told."""
-    for slot, block in spec.variants[variant].items():
-        if block is None or slot in spec.broken:
+def _fitting(
+    spec: FileSpec, variant: str, faults: Faults
+) -> Iterator[tuple[str, tuple[BlockSpec, BlockSpec]]]:
+    """Yield by slot the diagram's block and the variant's; what fits no slot is reported."""
+    known = spec[BLOCKS]
+    for slot, block in spec[VARIANTS][variant].slots.items():
+        if block is None or (slot in known and known[slot] is None):
             continue
-        base = spec.blocks.get(slot)
+        base = known.get(slot)
         if base is None:
-            remedy = suggestion(slot, [known for known, block in spec.blocks.items() if block.slot])
+            remedy = suggestion(slot, [name for name, other in known.items() if other and other.slot])
             problem = f"variant '{variant}' fills '{slot}', which is not in the diagram"
             faults.add(block.place, problem, remedy)
         elif base.slot is not None:
-            yield slot, block
+            yield slot, (base, block)
         elif "slot" not in base.told:
             problem = f"variant '{variant}' fills '{slot}', which is not a slot"
             faults.add(block.place, problem, f"write 'slot: true' in block '{slot}'")
@@ -75,7 +83,8 @@ def check_slots(
     """Tell the outputs that a block in a slot lacks, or has of another kind, and return them."""
     refused = set()
     for slot, outputs in given.items():
-        before, now = spec.blocks[slot], filled.blocks[slot]
+        before, now = spec[BLOCKS][slot], filled[BLOCKS][slot]
+        assert before is not None and now is not None
         for port, wanted in promised[slot].items():
             offered = outputs.get(port)
             problem = ""

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from quadvis.diagram.check import NO_TASK, rate_text
-from quadvis.diagram.loader import FileSpec
+from quadvis.diagram.sections.rates import RATES
+from quadvis.diagram.sections.solver import SOLVER
+from quadvis.diagram.spec import FileSpec
 from quadvis.diagram.times import time_text
 from quadvis.engine.graph import Graph, Task, common_divisor
 from quadvis.errors import Faults, Place
@@ -22,7 +24,7 @@ def check_ticks(spec: FileSpec, graph: Graph, stop: Fraction, faults: Faults) ->
     run = f"a run of {time_text(stop)}"
     if graph.step is not None:
         problem = f"with a step of {time_text(graph.step)} {run} {_count(stop / graph.tick)}"
-        place = spec.step_place or spec.place
+        place = spec[SOLVER].place or spec.place
         faults.add(place, problem, "choose a larger step or a shorter stop time", subject="")
         return
     guilty = _guilty(tasks, stop)
@@ -67,5 +69,5 @@ def _rate(task: Task) -> str:
 
 
 def _place(spec: FileSpec, task: Task) -> Place:
-    rate = spec.rates.get(task.name)
+    rate = spec[RATES].get(task.name)
     return rate.place if rate is not None else spec.place

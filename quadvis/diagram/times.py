@@ -2,38 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from fractions import Fraction
 
-from quadvis.document import YamlMap, YamlNode, YamlScalar
-from quadvis.errors import Faults, Place
+from quadvis.document import YamlNode, YamlScalar
 from quadvis.units import Unit, format_quantity, split_quantity
 
 SECOND = Unit.parse("s")
 SHORTEST, LONGEST = Fraction(1, 10**9), Fraction(10**9)  # s: the log counts nanoseconds
-RATE_KEYS = ("rate", "offset")
-
-
-@dataclass(frozen=True)
-class Rate:
-    """When blocks run: period and offset (s), and where that is written."""
-
-    period: Fraction
-    offset: Fraction = Fraction(0)
-    place: Place = field(default=Place(""), compare=False)
-
-
-def read_rate(node: YamlNode) -> Rate:
-    """Read ``20 Hz``, ``50 ms`` or ``{rate: 10 Hz, offset: 70 ms}``."""
-    if not isinstance(node, YamlMap):
-        return Rate(read_period(node), place=node.place)
-    faults = Faults()
-    node = node.fields(RATE_KEYS[:1], RATE_KEYS[1:], faults)
-    period = faults.collect(read_period, node["rate"]) if "rate" in node else None
-    offset = faults.collect(read_duration, node["offset"]) if "offset" in node else None
-    faults.check()
-    assert period is not None
-    return Rate(period, offset or Fraction(0), node.place)
 
 
 def read_period(node: YamlNode) -> Fraction:

@@ -12,10 +12,11 @@ from quadvis.diagram.values import si
 from quadvis.diagram.wiring import Wiring
 from quadvis.document import YamlList, YamlNode, YamlScalar
 from quadvis.engine.graph import Graph, Node
+from quadvis.engine.names import PATH, PORT
 from quadvis.errors import DiagramError, suggestion
 from quadvis.units import Unit, UnitError, parse_quantity
 
-NAME = re.compile(r"(?:(?P<block>[\w/]+)\.)?(?P<parameter>\w+)(?:\[(?P<element>\d{1,6})\])?", re.ASCII)
+NAME = re.compile(rf"(?:(?P<block>{PATH})\.)?(?P<parameter>{PORT})(?:\[(?P<element>\d{{1,6}})\])?", re.ASCII)
 
 
 @dataclass(frozen=True)

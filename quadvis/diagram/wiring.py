@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 from quadvis.block import Out
 from quadvis.diagram.expand import Expansion, FlatBlock, Scope
-from quadvis.diagram.loader import INSIDE, InputSpec
 from quadvis.diagram.reference import Reference
+from quadvis.diagram.sections.blocks import BLOCKS, INSIDE, InputSpec
+from quadvis.diagram.sections.ports import PORTS
 from quadvis.diagram.slots import Refused
 from quadvis.diagram.values import substitute
 from quadvis.document import YamlList, YamlNode
@@ -40,9 +41,9 @@ class Wiring:
     def check_ports(self, scope: Scope) -> None:
         """Look at what goes in and out of every part, used or not."""
         for child in scope.children.values():
-            for port in child.spec.inputs:
+            for port in child.spec[PORTS].inputs:
                 self._entry(child, port)
-            for port in child.spec.outputs:
+            for port in child.spec[PORTS].outputs:
                 self._export(child, port)
             self.check_ports(child)
 
@@ -50,7 +51,7 @@ class Wiring:
         """Yield what goes out of every part, by its full name such as "control/heading.right"."""
         scope = scope or self.expansion.root
         for child in scope.children.values():
-            for port in child.spec.outputs:
+            for port in child.spec[PORTS].outputs:
                 source = self._export(child, port).source
                 if isinstance(source, Wire):
                     yield f"{child.prefix.removesuffix('/')}.{port}", source
@@ -68,7 +69,7 @@ class Wiring:
             kind = blocks[name].kind if name in blocks else None
             return kind.interface.outputs if kind is not None else {}
         found = {}
-        for port in child.spec.outputs:
+        for port in child.spec[PORTS].outputs:
             source = self._export(child, port).source
             kind = blocks[source.block].kind if isinstance(source, Wire) else None
             if isinstance(source, Wire) and kind is not None:
@@ -83,9 +84,10 @@ class Wiring:
         path = owner.prefix + name
         if name.partition("/")[0] in owner.broken or name in owner.broken:
             return Source(reference.place, None)
-        if name not in owner.spec.blocks:
+        if name not in owner.spec[BLOCKS]:
             way = reference.block.removesuffix(name)
-            known = [way + other for other in owner.spec.blocks] + [INSIDE] * bool(owner.spec.inputs)
+            known = [way + other for other, block in owner.spec[BLOCKS].items() if block is not None]
+            known += [INSIDE] if owner.spec[PORTS].inputs else []
             remedy = suggestion(reference.block, known)
             self.faults.add(reference.place, f"there is no block '{reference.block}'", remedy)
             return Source(reference.place, None)
@@ -95,7 +97,7 @@ class Wiring:
             if kind is None or not self._offers(path, reference, kind.interface.outputs):
                 return Source(reference.place, None)
             return Source(reference.place, Wire(path, reference.port, reference.index))
-        if not self._offers(path, reference, child.spec.outputs):
+        if not self._offers(path, reference, child.spec[PORTS].outputs):
             return Source(reference.place, None)
         return self._indexed(replace(self._export(child, reference.port), place=reference.place), reference)
 
@@ -122,8 +124,11 @@ class Wiring:
         if scope.parent is None:
             problem = "'in' names the inputs of a part, and a diagram has none"
             self.faults.add(reference.place, problem, "name a block")
-        elif reference.port not in scope.spec.inputs:
-            remedy = suggestion(reference.port, scope.spec.inputs) or "declare it under 'ports: {in: [...]}'"
+        elif reference.port not in scope.spec[PORTS].inputs:
+            remedy = (
+                suggestion(reference.port, scope.spec[PORTS].inputs)
+                or "declare it under 'ports: {in: [...]}'"
+            )
             self.faults.add(reference.place, f"this part has no input '{reference.port}'", remedy)
         else:
             return self._entry(scope, reference.port)
@@ -136,7 +141,7 @@ class Wiring:
         if given is None:
             return Source(scope.instance.place, None)
         key = (f"{scope.prefix}{INSIDE}", port)
-        if self._begin(key, scope, scope.spec.inputs[port]):
+        if self._begin(key, scope, scope.spec[PORTS].inputs[port]):
             with self.faults.about(scope.subject):
                 self._found[key] = self._source(scope.parent, given)
             self._sought.discard(key)
@@ -144,7 +149,7 @@ class Wiring:
 
     def _export(self, scope: Scope, port: str) -> Source:
         """Return what goes out of a part by a port."""
-        reference = scope.spec.outputs[port]
+        reference = scope.spec[PORTS].outputs[port]
         if reference is None:
             return Source(scope.spec.place, None)
         key = (scope.prefix, port)
@@ -189,7 +194,7 @@ class Wiring:
 def _owner(scope: Scope, name: str) -> tuple[Scope, str]:
     """Return the scope in which a block is named, and its name there: names may reach into parts."""
     head, slash, rest = name.partition("/")
-    if slash and name not in scope.spec.blocks and head in scope.children:
+    if slash and name not in scope.spec[BLOCKS] and head in scope.children:
         return _owner(scope.children[head], rest)
     return scope, name
 

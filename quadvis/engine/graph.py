@@ -21,6 +21,7 @@ CROSSINGS = {
     "newest": "whatever the producer gave last, for rates that do not fit into each other",
 }
 TOLD = "told"  # in place of a crossing that cannot be read
+CONTINUOUS = "continuous"  # the rate of what the solver integrates; all others are sampled
 SOLVERS = ("ode1", "ode2", "ode3", "ode4")
 
 Index = tuple[Any, ...]  # integers, then slices, as numpy takes them

@@ -1,4 +1,7 @@
-"""Names of signals as texts: ``pose.position``, ``eyes/camera.centres[2,1]``, ``a.y[:2]``."""
+"""Names of signals as texts: ``pose.position``, ``eyes/camera.centres[2,1]``, ``a.y[:2]``.
+
+The grammar stands here alone: diagrams, logs, figures and the JSON schema read names by it.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +9,20 @@ import re
 
 from quadvis.engine.graph import Index, Wire
 
-_NAME = re.compile(r"(?P<block>[A-Za-z_][\w/]*)\.(?P<port>[A-Za-z_]\w*)(?:\[(?P<index>[^\]]*)\])?", re.ASCII)
+PATH, PORT = r"[A-Za-z_][\w/]*", r"[A-Za-z_]\w*"
+PATTERN = rf"({PATH})\.({PORT})(\[([\d:,\s]*)\])?"  # block, port, index in brackets, index
+_NAME = re.compile(PATTERN, re.ASCII)
 _BOUNDS = re.compile(r"\s*(?P<first>\d{1,6})?\s*(?P<slice>:\s*(?P<last>\d{1,6})?\s*)?", re.ASCII)
 
 
 def read_name(text: str) -> Wire | None:
     """Return what a name names, as the source of a wire; None if it is no name of a signal."""
     match = _NAME.fullmatch(text)
-    index = read_index(match["index"]) if match and match["index"] is not None else ()
-    if match is None or index is None:
+    if match is None:
         return None
-    return Wire(match["block"], match["port"], index)
+    block, port, brackets, inside = match.groups()
+    index = read_index(inside) if brackets else ()
+    return None if index is None else Wire(block, port, index)
 
 
 def read_index(text: str) -> Index | None:

@@ -14,13 +14,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+from quadvis.engine.graph import CONTINUOUS
 from quadvis.errors import QuadvisError
 from quadvis.output import elkjs as engine
 from quadvis.output import layers, svg
 from quadvis.output.elkjs import LayoutError
 
-CONTINUOUS = "continuous"
-"""The task name of the blocks that the solver integrates."""
 MOST_BLOCKS, MOST_WIRES = 250, 750
 """The engine takes half a minute for so many."""
 

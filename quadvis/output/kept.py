@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +14,26 @@ from numpy.typing import NDArray
 from quadvis.errors import QuadvisError, quoted
 from quadvis.output.log_reader import read_log
 from quadvis.output.recording import Channel, Recording, Slots
-from quadvis.output.verdict import Judging
 
 ALL = "*"
 PIECE = 1 << 16  # bytes of rows that are judged at a time
 
 
+class Judge(Protocol):
+    """What judges a run while it goes on."""
+
+    @property
+    def names(self) -> Iterable[str]:
+        """The signals that it looks at."""
+
+    def take(self, name: str, number: int, rows: NDArray[Any]) -> None:
+        """Take rows of a signal; ``number`` counts those before, from the first row of the run."""
+
+
 class RowJudge:
     """Hands the rows of a block to what judges them, some at a time."""
 
-    def __init__(self, channel: Channel, judging: Judging) -> None:
+    def __init__(self, channel: Channel, judging: Judge) -> None:
         self._channel, self._judging = channel, judging
         self._waiting = bytearray()
         self._first = self._count = 0  # number of the first row that waits, and how many do

@@ -7,7 +7,7 @@ from array import array
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,26 @@ SLOT_TYPES = {"float64": "<f8", "int64": "<i8", "bool": "<i8"}
 
 Buffer = bytes | bytearray | memoryview
 Slots = NDArray[np.int64]
+
+
+class Recorded(Protocol):
+    """Recorded signals by name, of a run or of a log: arrays with a leading time axis."""
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """The unit of every signal."""
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """Return the rows of a signal."""
+
+    def times(self, name: str) -> NDArray[np.float64]:
+        """Return the times (s) of its rows."""
+
+    def rate(self, name: str) -> str:
+        """Return the name of the rate at which its block works; "" if that is not known."""
+
+    def stamps(self, name: str) -> NDArray[np.int64]:
+        """Return the stamps (ns) of its rows."""
 
 
 @dataclass(frozen=True)

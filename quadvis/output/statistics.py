@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -171,3 +171,10 @@ STATISTICS: Mapping[str, Callable[[int, int], Statistic]] = {
     FINAL: lambda count, elements: Final(elements),
     COUNT: lambda count, elements: Count(),
 }
+
+
+def finite(value: Value) -> Any:
+    """Return a value as JSON can hold it: None in place of a number that is infinite or none."""
+    if isinstance(value, tuple):
+        return [finite(each) for each in value]
+    return value if math.isfinite(value) else None

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from quadvis.diagram.requirements import Entry
 from quadvis.output.columns import table
-from quadvis.output.verdict import Entry, Outcome, Verdict
 from quadvis.run.session import Result
+from quadvis.run.verdict import Outcome, Verdict
 
 
 def summary_lines(result: Result) -> list[str]:

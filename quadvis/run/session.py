@@ -22,8 +22,9 @@ from quadvis.engine.graph import Node
 from quadvis.output.kept import ALL, RowJudge, RunSignals
 from quadvis.output.log import PORTS, LogWriter
 from quadvis.output.recording import Channel, Field, Recording
+from quadvis.output.statistics import finite
 from quadvis.output.stretch import NANOSECONDS
-from quadvis.output.verdict import Outcome, finite
+from quadvis.run.verdict import Judging, Outcome
 from quadvis.version import __version__
 
 if TYPE_CHECKING:
@@ -141,7 +142,7 @@ def run(
     channels = [Channel(f"/{node.path}", _fields(node), node.task.name) for node in logged]
     patterns = ((ALL,) if log is None else ()) if keep is None else tuple(keep)
     signals = RunSignals(channels, diagram.ports, patterns)
-    judging = diagram.judging()
+    judging = Judging(diagram.summary, diagram.expectations)
     wall, cpu = time.perf_counter(), time.process_time()
     with ExitStack() as stack:
         stack.enter_context(diagram.guarded(log))

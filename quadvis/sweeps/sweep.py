@@ -20,6 +20,7 @@ from quadvis.library.catalogue import OwnBlocks
 from quadvis.machine.files import PLOT, Claim, check_output
 from quadvis.sweeps.axes import SEED, VARIANT, Axis, Over, points, read_axes
 from quadvis.sweeps.grid import Plan
+from quadvis.sweeps.picture import draw
 from quadvis.sweeps.pool import perform_all, processors
 from quadvis.sweeps.table import FAILURE, HASH, PASSED, WALL, Table, read_rows, table_kind
 from quadvis.sweeps.worker import Configuration, Job, Quantity, Row, diagram_of, quantities
@@ -91,7 +92,7 @@ def sweep(
             raise
     table = collection.table()
     if plot is not None:
-        table.plot(plot, plan.inputs)
+        draw(table, Path(plot), plan.inputs)
     return table
 
 

@@ -86,12 +86,6 @@ class Table(Mapping[str, NDArray[Any]]):
         columns = self.columns | ({WALL: self.wall} if timings else {})
         return _csv(columns, head) if suffix == ".csv" else _parquet(columns)
 
-    def plot(self, path: str | Path, inputs: Iterable[Path] = ()) -> None:
-        """Draw the quantities of the summary over the axes, as PNG; QuadvisError as ``save``."""
-        from quadvis.sweeps.picture import draw
-
-        draw(self, Path(path), inputs)
-
 
 def table_kind(path: Path) -> Kind:
     """Return what such a file holds; QuadvisError if no table can be written to it."""

@@ -15,8 +15,9 @@ from quadvis.output.statistics import COUNT, FINAL
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
+    from quadvis.diagram.requirements import Part
     from quadvis.library.catalogue import OwnBlocks
-    from quadvis.output.verdict import Outcome, Part
+    from quadvis.run.verdict import Outcome
 
 # Where runs share the processors, threads inside a run only take turns.
 ONE_THREAD = dict.fromkeys(
@@ -45,7 +46,7 @@ class Configuration:
 
     def load(self, own_blocks: OwnBlocks = True) -> Diagram:
         """Return the diagram; DiagramError tells its faults. ``own_blocks`` may be told what is run."""
-        from quadvis.diagram.diagram import load
+        from quadvis.diagram.load import load
 
         return load(
             self.file,
@@ -113,7 +114,7 @@ def quantities(diagram: Diagram) -> list[Quantity]:
         for name in entry.show
         for element in (entry.part.elements if name == FINAL else ("",))
     ]
-    for expectation in diagram.observation.expectations:
+    for expectation in diagram.expectations:
         part, name = expectation.part, expectation.statistic
         limit = expectation.limit * _scale(part, name)
         found.append(Quantity(str(expectation), _unit(part, name), limit, summary=False))
@@ -143,7 +144,7 @@ def _scale(part: Part, statistic: str) -> float:
 
 def _limit(diagram: Diagram, part: Part, statistic: str) -> float | None:
     """Return what is expected of a number of the summary, if an expectation is about the same."""
-    for expectation in diagram.observation.expectations:
+    for expectation in diagram.expectations:
         same = replace(expectation.part, shown=part.shown, text=part.text) == part
         if same and expectation.statistic == statistic:
             return expectation.limit * _scale(part, statistic)

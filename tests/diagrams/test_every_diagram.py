@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 import quadvis
-from quadvis.diagram.diagram import Diagram
+from quadvis.api import Diagram
 from quadvis.engine.engine import Engine, Snapshot
 
 DIAGRAMS = Path(__file__).parents[2] / "diagrams"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import quadvis
-from quadvis.diagram.diagram import Diagram
+from quadvis.api import Diagram
 
 DIAGRAMS = Path(__file__).parents[2] / "diagrams"
 HOVER = DIAGRAMS / "hover.yaml"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from quadvis.diagram.diagram import check, load, load_text
+from quadvis.api import check, load, load_text
 from quadvis.errors import DiagramError, Fault
 
 DIAGRAMS = Path(__file__).parents[2] / "diagrams"

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
+from quadvis.api import load_text
 from quadvis.block import Block, In, Out, Param, State
-from quadvis.diagram.diagram import load_text
 from quadvis.document import parse_yaml
 from quadvis.errors import DiagramError
 from quadvis.library.catalogue import Catalogue

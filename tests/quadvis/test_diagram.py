@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import quadvis
-from quadvis.diagram.diagram import check, load, load_text
+from quadvis.api import check, load, load_text
 from quadvis.engine.graph import Constant, Wire
 from quadvis.errors import DiagramError, Faults
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from quadvis.api import check, load
 from quadvis.cli import main
-from quadvis.diagram.diagram import check, load
 
 DIAGRAMS = Path(__file__).parents[2] / "diagrams"
 CASE = """\

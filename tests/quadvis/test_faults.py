@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from quadvis.diagram.diagram import check, load
+from quadvis.api import check, load
 from quadvis.errors import DiagramError, Fault
 
 from .corpus import Case, all_cases

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import quadvis
+from quadvis.api import Diagram, load_text
 from quadvis.block import Block, Frame, Out, Param, ParameterError
-from quadvis.diagram.diagram import Diagram, load_text
 from quadvis.errors import QuadvisError
 from quadvis.machine.inputs import file_digest, note_digest, note_input, noted_inputs, open_input, read_input
 from quadvis.output.log_reader import read_log

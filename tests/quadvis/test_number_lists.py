@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from quadvis.diagram.diagram import check, load_text
+from quadvis.api import check, load_text
 from quadvis.document import MAX_BYTES, YamlNode, number_lists, parse_yaml
 from quadvis.document.number_lists import Numbers, find_lists, hide_lists
 from quadvis.errors import DiagramError

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from quadvis.diagram.diagram import load_text
+from quadvis.api import load_text
 from quadvis.document import parse_yaml
 from quadvis.errors import DiagramError, Fault
 from quadvis.errors.characters import advice, cleaned, meant, odd_characters

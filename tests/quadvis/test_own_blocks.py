@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 import quadvis
+from quadvis.api import check, load_text
 from quadvis.cli import main
-from quadvis.diagram.diagram import check, load_text
 from quadvis.errors import DiagramError
 
 MARK = "import pathlib\npathlib.Path('ran').touch()\n"

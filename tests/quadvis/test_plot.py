@@ -18,20 +18,16 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from quadvis import load
+from quadvis.diagram.sections.figures import FigureReader, read_figures
+from quadvis.engine.graph import Wire
+from quadvis.engine.names import read_name
 from quadvis.errors import DiagramError, Faults, QuadvisError
+from quadvis.output.figures import Figure, Panel, Trace, block_figures
 from quadvis.output.log import LogWriter
 from quadvis.output.log_reader import read_log
-from quadvis.output.plot import (
-    Figure,
-    Panel,
-    Trace,
-    block_figures,
-    plot_figures,
-    plot_log,
-    read_figures,
-    split_signal,
-)
+from quadvis.output.plot import plot_figures, plot_log
 from quadvis.output.recording import Channel, Field
+from quadvis.units import Unit
 
 Sheets = list[Any]
 
@@ -60,6 +56,22 @@ figures:
       - {title: yaw, signals: yaw.torque}
       - {title: pitch, signals: pitch.torque}
 """
+
+
+CENTIMETRE = Unit.parse("cm")
+
+
+def trace(text: str, label: str = "") -> Trace:
+    """Return the trace of a signal by its name."""
+    wire = read_name(text)
+    assert wire is not None
+    return Trace(wire, label)
+
+
+def plotted_log(path: Path, output: Path | None = None) -> list[Path]:
+    """Draw a log as `quadvis plot` does."""
+    log = read_log(path)
+    return plot_log(log, read_figures(log.diagram, f"{log.path}: diagram"), output)
 
 
 class Run:
@@ -144,7 +156,7 @@ def legend(axes: Any) -> list[str]:
 
 def test_a_log_is_drawn_as_its_diagram_declares(run: Run, sheets: Sheets, tmp_path: Path) -> None:
     run.write(tmp_path / "flight.mcap", HOVER)
-    paths = plot_log(read_log(tmp_path / "flight.mcap"), tmp_path / "out")
+    paths = plotted_log(tmp_path / "flight.mcap", tmp_path / "out")
     assert [path.name for path in paths] == [
         "1-position-estimate.png",
         "2-yaw-angle.png",
@@ -171,8 +183,8 @@ def test_a_log_is_drawn_as_its_diagram_declares(run: Run, sheets: Sheets, tmp_pa
 def test_pictures_are_png_files_of_a_readable_size(run: Run, tmp_path: Path) -> None:
     cv2 = pytest.importorskip("cv2")
     figures = [
-        Figure("One", (Panel((Trace("plant.yaw"),)),)),
-        Figure("Three", (Panel((Trace("plant.yaw"),)),) * 3),
+        Figure("One", (Panel((trace("plant.yaw"),)),)),
+        Figure("Three", (Panel((trace("plant.yaw"),)),) * 3),
     ]
     one, three = (cv2.imread(str(path)) for path in plot_figures(run, figures, tmp_path))
     assert one.shape[1] >= 900
@@ -183,14 +195,14 @@ def test_pictures_are_png_files_of_a_readable_size(run: Run, tmp_path: Path) -> 
 
 def test_without_a_folder_pictures_lie_beside_the_log(run: Run, tmp_path: Path) -> None:
     run.write(tmp_path / "flight.mcap", HOVER)
-    paths = plot_log(read_log(tmp_path / "flight.mcap"))
+    paths = plotted_log(tmp_path / "flight.mcap")
     assert {path.parent for path in paths} == {tmp_path / "flight-figures"}
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)
 
 
 def test_without_declared_figures_every_block_is_drawn(run: Run, sheets: Sheets, tmp_path: Path) -> None:
     run.write(tmp_path / "flight.mcap", "quadvis: 1\nname: hover\n")
-    paths = plot_log(read_log(tmp_path / "flight.mcap"))
+    paths = plotted_log(tmp_path / "flight.mcap")
     names = [path.name for path in paths]
     assert names == [
         "1-plant.png",
@@ -213,26 +225,26 @@ def test_without_declared_figures_every_block_is_drawn(run: Run, sheets: Sheets,
 
 
 def test_truth_values_are_steps_without_an_rms(run: Run, sheets: Sheets, tmp_path: Path) -> None:
-    plot_figures(run, [Figure("Found", (Panel((Trace("vision/detector.found"),)),))], tmp_path)
+    plot_figures(run, [Figure("Found", (Panel((trace("vision/detector.found"),)),))], tmp_path)
     (line,) = sheets[0].axes[0].get_lines()
     assert line.get_drawstyle() == "steps-post"
     assert legend(sheets[0].axes[0]) == ["vision/detector.found"]
 
 
 def test_the_rms_counts_from_the_reference(run: Run, sheets: Sheets, tmp_path: Path) -> None:
-    panel = Panel((Trace("plant.position[2]", "height"),), unit="cm", reference=147.0)
+    panel = Panel((trace("plant.position[2]", "height"),), unit=CENTIMETRE, reference=147.0)
     plot_figures(run, [Figure("Height", (panel,))], tmp_path)
     assert legend(sheets[0].axes[0]) == ["height   RMS 3 cm"]
     assert sheets[0].axes[0].get_lines()[1].get_ydata() == [147.0, 147.0]
 
 
 def test_without_a_reference_there_is_no_rms(run: Run, sheets: Sheets, tmp_path: Path) -> None:
-    plot_figures(run, [Figure("Height", (Panel((Trace("plant.position[2]"),)),))], tmp_path)
+    plot_figures(run, [Figure("Height", (Panel((trace("plant.position[2]"),)),))], tmp_path)
     assert legend(sheets[0].axes[0]) == ["plant.position[2]"]
 
 
 def test_a_stretch_of_elements_gives_a_curve_each(run: Run, sheets: Sheets, tmp_path: Path) -> None:
-    traces = (Trace("vision/detector.centres[1:3,1]"), Trace("vision/detector.centres[0,0]", "first"))
+    traces = (trace("vision/detector.centres[1:3,1]"), trace("vision/detector.centres[0,0]", "first"))
     plot_figures(run, [Figure("Centres", (Panel(traces),))], tmp_path)
     lines = sheets[0].axes[0].get_lines()
     assert [line.get_ydata()[0] for line in lines] == [3, 5, 0]
@@ -244,7 +256,7 @@ def test_a_stretch_of_elements_gives_a_curve_each(run: Run, sheets: Sheets, tmp_
 
 
 def test_a_run_that_ended_early_gives_an_empty_picture(run: Run, sheets: Sheets, tmp_path: Path) -> None:
-    plot_figures(run, [Figure("Late", (Panel((Trace("plant.yaw"),)),), start=200.0, stop=300.0)], tmp_path)
+    plot_figures(run, [Figure("Late", (Panel((trace("plant.yaw"),)),), start=200.0, stop=300.0)], tmp_path)
     assert [text.get_text() for text in sheets[0].axes[0].texts] == ["no samples"]
 
 
@@ -252,7 +264,7 @@ def test_missing_samples_do_not_spoil_the_rms(run: Run, sheets: Sheets, tmp_path
     holes = Run()
     times = np.arange(10.0)
     holes.signals["pose.x"] = times, np.where(times % 2 == 0, 3.0, math.nan), "m"
-    plot_figures(holes, [Figure("Holes", (Panel((Trace("pose.x"),), reference=0.0),))], tmp_path)
+    plot_figures(holes, [Figure("Holes", (Panel((trace("pose.x"),), reference=0.0),))], tmp_path)
     assert legend(sheets[0].axes[0]) == ["pose.x   RMS 3 m"]
 
 
@@ -260,20 +272,20 @@ def test_missing_samples_do_not_spoil_the_rms(run: Run, sheets: Sheets, tmp_path
     ("panel", "sentence"),
     [
         (
-            Panel((Trace("plant.positon"),)),
+            Panel((trace("plant.positon"),)),
             "there is no signal 'plant.positon'; did you mean 'plant.position'?",
         ),
         (
-            Panel((Trace("plant.position[3]"),)),
+            Panel((trace("plant.position[3]"),)),
             "'plant.position[3]' does not exist; 'plant.position' has the shape [3]",
         ),
         (
-            Panel((Trace("plant.yaw[0]"),)),
+            Panel((trace("plant.yaw[0]"),)),
             "'plant.yaw[0]' does not exist; 'plant.yaw' has one element and takes no index",
         ),
-        (Panel((Trace("plant.yaw"),), unit="cm"), "'plant.yaw' is in rad, which cannot be shown in cm"),
+        (Panel((trace("plant.yaw"),), unit=CENTIMETRE), "'plant.yaw' is in rad, which cannot be shown in cm"),
         (
-            Panel((Trace("plant.yaw"), Trace("roll.torque"))),
+            Panel((trace("plant.yaw"), trace("roll.torque"))),
             "'roll.torque' is in N*m, which cannot be shown in rad",
         ),
         (Panel(()), "panel '' has no signals; name one"),
@@ -287,7 +299,7 @@ def test_what_cannot_be_drawn_is_a_sentence(run: Run, tmp_path: Path, panel: Pan
 
 
 def test_all_unknown_signals_are_named_at_once(run: Run, tmp_path: Path) -> None:
-    wrong = Panel((Trace("nothing.here"),))
+    wrong = Panel((trace("nothing.here"),))
     with pytest.raises(QuadvisError) as caught:
         plot_figures(run, [Figure("A", (wrong, wrong)), Figure("B", (wrong,)), Figure("C", ())], tmp_path)
     lines = str(caught.value).splitlines()
@@ -306,7 +318,7 @@ def read(text: str) -> tuple[list[Figure], list[str]]:
     from quadvis.document import parse_yaml
 
     faults = Faults()
-    figures = read_figures(parse_yaml(text, "d.yaml"), faults)
+    figures = FigureReader(faults).figures(parse_yaml(text, "d.yaml"))
     return figures, [str(fault).removeprefix("d.yaml:") for fault in faults]
 
 
@@ -323,9 +335,9 @@ def test_figures_are_read_with_their_defaults() -> None:
     """
     figures, faults = read(text)
     assert not faults
-    assert figures[0] == Figure("Yaw", (Panel((Trace("plant.yaw"),)),))
-    traces = (Trace("plant.position[2]"), Trace("guide.height", "wanted"))
-    assert figures[1] == Figure("Height", (Panel(traces, "", "cm", 150.0),), stop=20.0)
+    assert figures[0] == Figure("Yaw", (Panel((trace("plant.yaw"),)),))
+    traces = (trace("plant.position[2]"), trace("guide.height", "wanted"))
+    assert figures[1] == Figure("Height", (Panel(traces, "", CENTIMETRE, 150.0),), stop=20.0)
 
 
 @pytest.mark.parametrize(
@@ -337,7 +349,7 @@ def test_figures_are_read_with_their_defaults() -> None:
         ("[{title: Yaw, panels: []}]", "1:23: the list is empty; write its entries, or leave the key out"),
         (
             "[{title: Yaw, signals: yaw}]",
-            "1:24: 'yaw' is not a signal; write 'block.port', 'block.port[0]' or",
+            "1:24: 'yaw' is not a signal; write block.port, block.port[0] or part/block.port[0:2]",
         ),
         ("[{title: Yaw, signals: ['a.b[x]']}]", "1:25: 'a.b[x]' is not a signal"),
         ("[{title: Yaw, signals: a.b, unit: dog}]", "1:35: 'dog' is not a unit; did you mean 'deg'?"),
@@ -365,7 +377,7 @@ def test_all_faults_of_the_figures_are_found_at_once() -> None:
 def test_a_log_whose_diagram_is_damaged_names_the_place(run: Run, tmp_path: Path) -> None:
     run.write(tmp_path / "flight.mcap", HOVER.replace("unit: deg", "unit: dog"))
     with pytest.raises(DiagramError, match=r"flight\.mcap: diagram:19:11: .*did you mean 'deg'"):
-        plot_log(read_log(tmp_path / "flight.mcap"))
+        plotted_log(tmp_path / "flight.mcap")
 
 
 @given(st.lists(st.one_of(st.integers(0, 99), st.tuples(st.integers(0, 99), st.integers(0, 99))), max_size=3))
@@ -373,15 +385,14 @@ def test_an_index_is_split_as_numpy_would_read_it(index: list[Any]) -> None:
     parts = [f"{part[0]}:{part[1]}" if isinstance(part, tuple) else str(part) for part in index]
     text = f"vision/detector.centres[{','.join(parts)}]" if parts else "vision/detector.centres"
     expected = tuple(slice(*part) if isinstance(part, tuple) else part for part in index)
-    assert split_signal(text) == ("vision/detector.centres", expected)
+    assert read_name(text) == Wire("vision/detector", "centres", expected)
 
 
 @pytest.mark.parametrize(
     "text", ["", "plant", "a.b[", "a.b[]", "a.b[-1]", "a.b[1]c", "a.b[1 2]", "[0]", ".b", "a."]
 )
 def test_other_texts_are_no_signals(text: str) -> None:
-    with pytest.raises(QuadvisError, match="is not a signal"):
-        split_signal(text)
+    assert read_name(text) is None
 
 
 STAIRS = """
@@ -408,7 +419,7 @@ def stairs(sheets: Sheets, tmp_path: Path) -> Sheets:
     """Draw a run of blocks at several rates."""
     (tmp_path / "stairs.yaml").write_text(STAIRS)
     load(tmp_path / "stairs.yaml").run(log=tmp_path / "stairs.mcap")
-    plot_log(read_log(tmp_path / "stairs.mcap"))
+    plotted_log(tmp_path / "stairs.mcap")
     return sheets
 
 
@@ -466,11 +477,11 @@ ANOTHER = "another/path_that_shares_nothing/of_its_beginning.with_the_other_one"
 
 
 def of(name: str, count: int, title: str = "", reference: float | None = None) -> Panel:
-    return Panel((Trace(f"{name}[0:{count}]"),), title, reference=reference)
+    return Panel((trace(f"{name}[0:{count}]"),), title, reference=reference)
 
 
 def mixed(count: int, title: str = "") -> Panel:
-    return Panel(tuple(Trace(f"{name}[{i}]") for i in range(count) for name in (LONG, ANOTHER)), title)
+    return Panel(tuple(trace(f"{name}[{i}]") for i in range(count) for name in (LONG, ANOTHER)), title)
 
 
 CROWDED = {
@@ -485,7 +496,7 @@ CROWDED = {
     "nothing shared": (mixed(6),),
     "nothing shared, two": (mixed(10, "left"), mixed(6, "right")),
     "nothing shared, three": (mixed(3), mixed(6), mixed(20)),
-    "one word": (Panel((Trace("a.y[0]", "x" * 300), Trace("a.y[1]", "_y" * 100))), of(SHORT, 1)),
+    "one word": (Panel((trace("a.y[0]", "x" * 300), trace("a.y[1]", "_y" * 100))), of(SHORT, 1)),
 }
 
 

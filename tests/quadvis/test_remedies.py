@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from quadvis.diagram.diagram import check, load, load_text
+from quadvis.api import check, load, load_text
 from quadvis.document import read_yaml
 from quadvis.errors import DiagramError, Fault, closest, suggestion
 from quadvis.machine.missing_file import file_trouble

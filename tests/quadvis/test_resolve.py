@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quadvis.diagram.diagram import Diagram, load, load_text
+from quadvis.api import Diagram, load, load_text
 from quadvis.document import parse_yaml
 from quadvis.errors import DiagramError
 from quadvis.output.log_reader import read_log

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadvis.diagram.diagram import Diagram, load, load_text
+from quadvis.api import Diagram, load, load_text
 from quadvis.errors import QuadvisError
 from quadvis.output.log_reader import read_log
 
@@ -186,7 +186,7 @@ summary:
 """
 MEASURE = """
 import sys
-from quadvis.diagram.diagram import load_text
+from quadvis.api import load_text
 text, log, seconds = sys.argv[1], sys.argv[2] or None, sys.argv[3]
 
 def resident():

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadvis.diagram.diagram import Diagram, load_text
+from quadvis.api import Diagram, load_text
 from quadvis.errors import RunError
 from quadvis.machine.status_line import ProgressLine
 from quadvis.output.log_reader import read_log

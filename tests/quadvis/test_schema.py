@@ -9,7 +9,7 @@ import pytest
 import yaml
 from jsonschema import Draft202012Validator
 
-from quadvis.diagram.diagram import load
+from quadvis.api import load
 from quadvis.diagram.schema import diagram_schema
 from quadvis.library.catalogue import Catalogue
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from quadvis.diagram.diagram import load
+from quadvis.api import load
 from quadvis.errors import QuadvisError
 from quadvis.library.skeleton import new_block, new_diagram
 

@@ -28,6 +28,7 @@ from quadvis.machine.files import Claim, Kind
 from quadvis.machine.interrupts import ENDS
 from quadvis.sweeps import sweep as sweeping
 from quadvis.sweeps.axes import points, read_axes
+from quadvis.sweeps.picture import draw
 from quadvis.sweeps.summary import SweepLine, duration_text, sweep_lines
 from quadvis.sweeps.table import read_rows
 from quadvis.sweeps.worker import Job, Row, perform
@@ -439,10 +440,10 @@ PICTURES: list[dict[str, Any]] = [
 @pytest.mark.parametrize("over", PICTURES, ids=lambda over: "-".join(over))
 def test_the_picture_is_a_png_whatever_is_swept_over(over: dict[str, Any], here: list[int]) -> None:
     table = quadvis.sweep("loop.yaml", over)
-    table.plot("x.png")
+    draw(table, Path("x.png"))
     assert Path("x.png").read_bytes().startswith(b"\x89PNG")
     with pytest.raises(QuadvisError, match="cannot write the plot"):
-        table.plot("none/x.png")
+        draw(table, Path("none/x.png"))
 
 
 def test_the_progress_is_told_to_those_who_ask(here: list[int]) -> None:
@@ -731,7 +732,7 @@ def test_the_final_value_of_a_vector_has_a_column_for_each_element(here: list[in
     again = quadvis.sweep("loop.yaml", over, output="x.csv", resume=True)
     assert here == []
     assert all(np.array_equal(again[name], table[name]) for name in finals)
-    table.plot("x.png")
+    draw(table, Path("x.png"))
     assert Path("x.png").stat().st_size > 0
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from quadvis.diagram.diagram import Diagram, load_text
+from quadvis.api import Diagram, load_text
 from quadvis.errors import DiagramError
 
 HEAD = "quadvis: 1\nname: case\nrates: {c: 10 Hz}\nsolver: {step: 100 ms}\nstop_time: 1 s\nblocks:\n"

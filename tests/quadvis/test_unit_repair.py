@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from quadvis.diagram.diagram import load_text
+from quadvis.api import load_text
 from quadvis.errors import DiagramError, Fault
 
 # A DC motor with a PI controller of its speed.

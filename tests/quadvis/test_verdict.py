@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from quadvis.output.statistics import COUNT, STATISTICS
+from quadvis.diagram.requirements import EXPECTATIONS, Entry, Expectation, Part
+from quadvis.output.statistics import COUNT, STATISTICS, finite
 from quadvis.output.stretch import Sampling, Stretch
-from quadvis.output.verdict import EXPECTATIONS, Entry, Expectation, Judging, Outcome, Part, Verdict, finite
+from quadvis.run.verdict import Judging, Outcome, Verdict
 from quadvis.units import Unit
 
 METRE, CENTIMETRE, RADIAN, DEGREE = map(Unit.parse, ("m", "cm", "rad", "deg"))

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from quadvis.diagram.diagram import Diagram, load, load_text
+from quadvis.api import Diagram, load, load_text
+from quadvis.diagram.sections.figures import read_figures
 from quadvis.output.log_reader import read_log
-from quadvis.output.plot import read_figures
-from quadvis.output.verdict import Outcome
 from quadvis.run.report import summary_lines
+from quadvis.run.verdict import Outcome
 
 ONES = """\
 quadvis: 1
@@ -165,12 +165,9 @@ def test_a_log_of_a_run_that_stopped_early_does_not_pass(end: str, tmp_path: Pat
 
 
 def test_a_figure_includes_the_rows_at_its_ends(tmp_path: Path) -> None:
-    from quadvis.document import parse_yaml
-    from quadvis.errors import Faults
-
     result = ones("30 Hz").run()
-    text = "- {title: a, from: 1/3 s, to: 2/3 s, signals: one.y}"
-    (figure,) = read_figures(parse_yaml(text, "figures"), Faults())
+    text = "figures: [{title: a, from: 1/3 s, to: 2/3 s, signals: one.y}]"
+    (figure,) = read_figures(text, "figures")
     times = result.times("one.y")
     part = times[(times >= figure.start) & (times <= figure.stop)]
     assert part.tolist() == [float(Fraction(k, 30) * 10**9 // 1) / 1e9 for k in range(10, 21)]

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import quadvis
-from quadvis.diagram.diagram import Diagram
+from quadvis.api import Diagram
 
 REPOSITORY = Path(__file__).parents[3]
 DIAGRAMS = REPOSITORY / "diagrams"

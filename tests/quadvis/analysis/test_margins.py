@@ -7,7 +7,7 @@ from pytest import approx
 
 import quadvis
 from quadvis.analysis.margins import Margins
-from quadvis.diagram.diagram import load_text
+from quadvis.api import load_text
 
 from .loops import DIAGRAMS, lifted, sampled, write
 

@@ -4,7 +4,7 @@ import pytest
 from pytest import approx
 
 import quadvis
-from quadvis.diagram.diagram import Diagram
+from quadvis.api import Diagram
 from quadvis.errors import DiagramError
 
 from .loops import DIAGRAMS, sampled, write

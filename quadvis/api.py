@@ -1,0 +1,101 @@
+"""The roof: what `import quadvis` gives of diagrams, with methods that run, judge, analyse and draw them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from quadvis.diagram import load as loading
+from quadvis.diagram.diagram import Diagram as Checked
+from quadvis.diagram.settings import Files, Given
+from quadvis.library.catalogue import OwnBlocks
+
+if TYPE_CHECKING:
+    from quadvis.analysis.analyse import Analysis
+    from quadvis.output.recording import Recorded
+    from quadvis.run.session import Progress, Result
+    from quadvis.run.verdict import Outcome
+
+# What a method needs it imports when it is called: a diagram that is only looked at costs no engine.
+
+
+class Diagram(Checked):
+    """A diagram without a fault, with what can be done with it."""
+
+    def run(
+        self,
+        *,
+        log: str | Path | None = None,
+        progress: Progress | None = None,
+        keep: Sequence[str] | None = None,
+    ) -> Result:
+        """Run to the stop time; see ``quadvis.run.session.run``."""
+        from quadvis.run.session import run
+
+        return run(self, log=log, progress=progress, keep=keep)
+
+    def judge(self, signals: Recorded) -> Outcome:
+        """Return the summary and the verdicts of a recorded run; it may have ended early."""
+        from quadvis.run.verdict import Judging
+
+        judging = Judging(self.summary, self.expectations)
+        judging.read(signals)
+        return judging.outcome()
+
+    def analyse(
+        self,
+        *,
+        cuts: Mapping[str, str | Sequence[str]] = MappingProxyType({}),
+        limits: Mapping[str, tuple[str, str, str]] = MappingProxyType({}),
+        at: float | None = None,
+    ) -> Analysis:
+        """Linearise the closed loop at its operating point; see ``quadvis.analysis.analyse.analyse``."""
+        from quadvis.analysis.analyse import analyse
+
+        return analyse(self, cuts, limits, at)
+
+    def draw(self) -> str:
+        """Return a picture of the diagram as SVG."""
+        from quadvis.diagram.picture import draw_diagram
+
+        return draw_diagram(self)
+
+
+def _with_methods(diagram: Checked) -> Diagram:
+    return Diagram(**{field.name: getattr(diagram, field.name) for field in fields(diagram)})
+
+
+def load(
+    path: str | Path,
+    *,
+    variant: str | None = None,
+    settings: Given = (),
+    params: Files = (),
+    stop_time: str | float | None = None,
+    seed: int | None = None,
+    own_blocks: OwnBlocks = True,
+) -> Diagram:
+    """Load and check a diagram; see ``quadvis.diagram.load.load``."""
+    return _with_methods(
+        loading.load(
+            path, variant=variant, settings=settings, params=params, stop_time=stop_time, seed=seed,
+            own_blocks=own_blocks,
+        )
+    )  # fmt: skip
+
+
+def load_text(
+    text: str, folder: str | Path = ".", name: str = "diagram.yaml", own_blocks: OwnBlocks = True
+) -> Diagram:
+    """Load a diagram from a text, such as that in a log; see ``quadvis.diagram.load.load_text``."""
+    return _with_methods(loading.load_text(text, folder, name, own_blocks))
+
+
+def check(
+    path: str | Path, settings: Given = (), params: Files = (), own_blocks: OwnBlocks = True
+) -> Diagram:
+    """Load a diagram, and with each of its variants in turn; see ``quadvis.diagram.load.check``."""
+    return _with_methods(loading.check(path, settings, params, own_blocks))

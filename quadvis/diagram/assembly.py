@@ -1,0 +1,127 @@
+"""From what one file says to a checked diagram: all checks in their order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from types import MappingProxyType
+
+from quadvis.diagram.build import Builder, Made
+from quadvis.diagram.check import WireCheck
+from quadvis.diagram.diagram import Diagram
+from quadvis.diagram.doubts import warn_parameters, warn_rates
+from quadvis.diagram.expand import Expansion, Parts
+from quadvis.diagram.keys import RUN_SECTIONS
+from quadvis.diagram.loader import read_part
+from quadvis.diagram.outputs import check_writers
+from quadvis.diagram.sections.blocks import BLOCKS
+from quadvis.diagram.sections.context import Context
+from quadvis.diagram.sections.files import FILES, check_files
+from quadvis.diagram.sections.seed import SEED
+from quadvis.diagram.sections.solver import SOLVER
+from quadvis.diagram.sections.stop_time import STOP_TIME
+from quadvis.diagram.sections.variants import VARIANTS
+from quadvis.diagram.settings import ParameterFile, Settings
+from quadvis.diagram.slots import Outputs, check_slots, fill_slots
+from quadvis.diagram.spec import FileSpec
+from quadvis.diagram.ticks import check_ticks
+from quadvis.diagram.times import read_duration
+from quadvis.diagram.wiring import Wiring
+from quadvis.document import YamlScalar
+from quadvis.engine.graph import Graph
+from quadvis.engine.names import wire_text
+from quadvis.errors import DiagramError, Faults, Place, quoted
+from quadvis.library.catalogue import Catalogue, OwnBlocks
+
+
+class Assembly:
+    """Puts diagrams together out of what one file says."""
+
+    def __init__(
+        self,
+        spec: FileSpec | None,
+        faults: Faults,
+        params: Sequence[ParameterFile] = (),
+        own_blocks: OwnBlocks = True,
+    ) -> None:
+        if spec is None:
+            raise DiagramError(faults)
+        self.spec, self.faults = spec, faults
+        self.catalogue = Catalogue(spec.path.parent, own_blocks)
+        self.parts = Parts(read_part, faults)
+        self.made: Made = {}
+        self._params = [path for file in params for path in (file.path, *file.bases)]
+        self._base: Wiring | None = None  # of the diagram without a variant
+
+    def diagram(
+        self,
+        variant: str | None = None,
+        settings: Settings = MappingProxyType({}),
+        stop_time: str | float | None = None,
+        seed: int | None = None,
+    ) -> Diagram:
+        """Return the diagram; it may run if there are no faults."""
+        spec, faults = self.spec, self.faults
+        filled = fill_slots(spec, variant, faults)
+        expansion = Expansion(filled, self.catalogue, settings, self.parts, faults)
+        wiring = Wiring(expansion, faults)
+        promised = self._promised(filled)
+        given = {slot: wiring.outputs(slot) for slot in promised if slot not in expansion.unknown}
+        wiring.refused = check_slots(spec, filled, promised, given, faults)
+        wiring.check_ports(expansion.root)
+        builder = Builder(spec, expansion, wiring, self.made, faults)
+        drafts = builder.drafts()
+        graph = Graph(spec.name, WireCheck(drafts, faults).run(), spec[SOLVER].method, builder.step)
+        stop = _stop_time(spec, stop_time, faults)
+        check_ticks(spec, graph, stop, faults)
+        warn_parameters(spec, self.parts, faults)
+        if not self.variants:
+            self.warn_rates()
+        written = spec[STOP_TIME]
+        context = Context(wiring, graph, stop, written is not None and stop < written, faults)
+        for section in RUN_SECTIONS:
+            with faults.about(section.key):
+                context.values[section] = section.read(spec.nodes.get(section.key), context)
+        check_files(spec[FILES], spec.path.parent, faults)
+        seed = spec[SEED] if seed is None else _seed(seed, faults)
+        listing = tuple(draft.path for draft in drafts)
+        sources = (spec.path, *self.parts.files, *self._params)
+        check_writers(drafts, sources, faults)
+        ports = {name: wire_text(source) for name, source in wiring.ports()}
+        return Diagram(
+            spec.name, spec.path, variant, graph, stop, seed, spec.values | context.values, listing,
+            self.variants, ports=MappingProxyType(ports), sources=sources,
+        )  # fmt: skip
+
+    @property
+    def variants(self) -> tuple[str, ...]:
+        """The names of the diagram's variants."""
+        return tuple(self.spec[VARIANTS])
+
+    def warn_rates(self) -> None:
+        """Warn of rates that nothing uses; each variant must have been made before, as it may use some."""
+        warn_rates(self.spec, self.parts, self.faults)
+
+    def _promised(self, filled: FileSpec) -> Outputs:
+        """Return the outputs of what stands in the slots that a variant fills."""
+        spec = self.spec
+        changed = [name for name, block in spec[BLOCKS].items() if filled[BLOCKS][name] is not block]
+        if changed and self._base is None:
+            self._base = Wiring(Expansion(spec, self.catalogue, {}, self.parts, Faults()), Faults())
+        return {slot: self._base.outputs(slot) for slot in changed if self._base is not None}
+
+
+def _stop_time(spec: FileSpec, given: str | float | None, faults: Faults) -> Fraction:
+    if given is not None:
+        text = given if isinstance(given, str) else f"{float(given)!r} s"
+        return faults.collect(read_duration, YamlScalar(text, False, "--stop-time", 0, 0)) or Fraction(0)
+    if spec[STOP_TIME] is None:
+        faults.add(spec.top, "key 'stop_time' is missing", "add 'stop_time: 10 s', or give --stop-time")
+        return Fraction(0)
+    return spec[STOP_TIME] or Fraction(0)
+
+
+def _seed(seed: int, faults: Faults) -> int:
+    if not -(2**63) <= seed < 2**63:
+        faults.add(Place("--seed"), f"the seed {quoted(seed)} does not fit 64 bits", "give a smaller one")
+    return seed

@@ -1,0 +1,34 @@
+"""The picture of a diagram: its blocks, wires and constants, handed to the drawing."""
+
+from __future__ import annotations
+
+from quadvis.diagram.check import rate_text
+from quadvis.diagram.diagram import Diagram
+from quadvis.diagram.sections.block_text import constant_text
+from quadvis.engine.graph import Constant, Node, Wire
+from quadvis.engine.names import wire_text
+from quadvis.output.draw import DrawnBlock, DrawnWire, draw
+
+
+def draw_diagram(diagram: Diagram) -> str:
+    """Return a picture of a diagram as SVG."""
+    nodes = [diagram.graph[path] for path in diagram.listing]
+    blocks, wires, constants = [], [], {}
+    for node in nodes:
+        interface = node.block.interface
+        shown = [port for port in interface.inputs if _is_drawn(node, port)]
+        drawn = DrawnBlock(node.path, node.kind, tuple(shown), tuple(interface.outputs), node.task.name)
+        blocks.append(drawn)
+        for port in shown:
+            source = node.inputs[port]
+            if isinstance(source, Wire):
+                wires.append(DrawnWire(wire_text(source), node.path, port, source.crossing))
+            else:
+                constants[node.path, port] = constant_text(node, port, source.value)
+    tasks = {task.name: rate_text(task) for task in diagram.graph.tasks}
+    return draw(diagram.name, blocks, wires, constants, tasks)
+
+
+def _is_drawn(node: Node, port: str) -> bool:
+    source = node.inputs[port]
+    return not isinstance(source, Constant) or source.value is not node.block.interface.inputs[port].default

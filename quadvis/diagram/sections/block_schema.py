@@ -1,0 +1,100 @@
+"""The JSON schema of an entry under `blocks`: common keys, and the ports and parameters of each block."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+
+from quadvis.block import Block, Declared, Param
+from quadvis.diagram.sections.forms import CONSTANT, SIGNAL, TEXT, VALUES, Schema, closed, map_of, ref
+from quadvis.engine.graph import CONTINUOUS, CROSSINGS
+from quadvis.library.describe import default_text, first_line
+
+BLOCK_KEYS = ("block", "part", "rate", "slot", "with", "in")
+WIRE_KEYS = ("from", "across")
+LIBRARY_BLOCK: Schema = {
+    "type": "string",
+    "pattern": "^[a-z][a-z0-9_]*:",
+    "description": "a block of another library",
+}
+
+
+def block_definitions(blocks: Mapping[str, type[Block]]) -> dict[str, Schema]:
+    """Return the forms of an input, of any block, and of each block by its name."""
+    wire = {"from": ref("signal"), "across": {"oneOf": [
+        {"const": name, "description": words} for name, words in CROSSINGS.items()
+    ]}}  # fmt: skip
+    return {
+        "input": {"anyOf": [SIGNAL, CONSTANT, *VALUES[1:], closed(WIRE_KEYS, wire, ["from"])]},
+        "block": _any_block(blocks),
+        **{f"block:{name}": _one_block(block) for name, block in blocks.items()},
+    }
+
+
+def _any_block(blocks: Mapping[str, type[Block]]) -> Schema:
+    """Return the schema of an entry under ``blocks``: common keys, then those of the block that it names."""
+    known: list[Schema] = [
+        {"const": name, "description": first_line(block)} for name, block in blocks.items()
+    ]
+    common: dict[str, Schema] = {
+        "block": {"anyOf": [*known, LIBRARY_BLOCK]},
+        "part": {**TEXT, "description": "file of a subsystem, relative to this one"},
+        "rate": {**TEXT, "description": f"one of the diagram's rates, or '{CONTINUOUS}'"},
+        "slot": {"type": "boolean", "description": "variants may put another block here"},
+        "with": map_of(ref("value"), "parameters"),
+        "in": map_of(ref("input"), "inputs: block.port, a constant, or {from: block.port, across: hold}"),
+    }
+    cases = [
+        {
+            "if": {"required": ["block"], "properties": {"block": {"const": name}}},
+            "then": ref(f"block:{name}"),
+        }
+        for name in blocks
+    ]
+    return {
+        **closed(BLOCK_KEYS, common),
+        "oneOf": [{"required": ["block"]}, {"required": ["part"]}],
+        "allOf": cases,
+    }
+
+
+def _one_block(block: type[Block]) -> Schema:
+    interface = block.interface
+    required = [name for name, param in interface.params.items() if param.required]
+    parameters: Schema = {
+        "additionalProperties": False,
+        "properties": {name: _parameter(param) for name, param in interface.params.items()},
+        "required": required,
+    }
+    inputs: Schema = {
+        "additionalProperties": False,
+        "properties": {
+            name: {**ref("input"), "description": _words(port)} for name, port in interface.inputs.items()
+        },
+        "required": [name for name, port in interface.inputs.items() if port.default is None],
+    }
+    return {
+        "description": inspect.getdoc(block) or "",
+        "properties": {"with": parameters, "in": inputs},
+        # What stands in a slot may take its wires from there, but brings its own parameters.
+        "required": ["with"] if required else [],
+    }
+
+
+def _parameter(param: Param) -> Schema:
+    found: Schema = {"description": _words(param)}
+    if param.choices:
+        # A parameter of the diagram may stand in for the word.
+        found["anyOf"] = [{"enum": list(param.choices)}, {"type": "string", "pattern": r"^\$"}]
+    elif param.is_text:
+        found |= TEXT
+    else:
+        found |= ref("value")
+    default = default_text(param)
+    return found if default is None else {**found, "default": default}
+
+
+def _words(item: Declared) -> str:
+    unit = "" if item.unit == "1" else f", {item.unit}"
+    kind = "choice" if isinstance(item, Param) and item.choices else item.type
+    return f"{item.doc} ({kind}{unit})"

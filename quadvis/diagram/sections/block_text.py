@@ -1,0 +1,77 @@
+"""Blocks as a resolved diagram has them: every parameter is written out, with the unit that was found.
+
+Nothing depends on the machine: paths are relative to the diagram's folder.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Param
+from quadvis.engine.graph import CONTINUOUS, Node, Wire
+from quadvis.engine.names import wire_text
+
+
+def relative(path: str, folder: Path) -> str:
+    """Return a path as a diagram in a folder writes it, wherever that folder is."""
+    return Path(os.path.relpath(path, folder)).as_posix()
+
+
+def resolved_block(node: Node, folder: Path) -> dict[str, Any]:
+    """Return a block with all its parameters and inputs; paths are relative to ``folder``."""
+    found: dict[str, Any] = {
+        "block": node.kind,
+        "rate": CONTINUOUS if node.task.continuous else node.task.name,
+    }
+    values = {
+        name: _parameter(node, param, folder)
+        for name, param in node.block.interface.params.items()
+        if param.choices
+        or param.is_text
+        or np.isfinite(getattr(node.block, name)).all()  # only defaults may not be
+    }
+    inputs: dict[str, Any] = {}
+    for port, source in node.inputs.items():
+        if isinstance(source, Wire):
+            text = wire_text(source)
+            inputs[port] = {"from": text, "across": source.crossing} if source.crossing else text
+        elif source.value is not node.block.interface.inputs[port].default:
+            inputs[port] = _quantity(node, port, source.value)
+    return found | ({"with": values} if values else {}) | ({"in": inputs} if inputs else {})
+
+
+def _parameter(node: Node, param: Param, folder: Path) -> Any:
+    value = getattr(node.block, param.name)
+    if param.choices:
+        return param.choices[value]
+    if param.is_text:
+        return relative(value, folder) if param.is_file and value else value
+    return _quantity(node, param.name, value)
+
+
+def constant_text(node: Node, port: str, value: Any) -> str:
+    """Return a constant input as a diagram writes it."""
+    found = _quantity(node, port, value)
+    return f"{found['value']} {found['unit']}" if isinstance(found, dict) else str(found)
+
+
+def _quantity(node: Node, name: str, value: Any) -> Any:
+    """Return a value in the units that the checker found for it."""
+    array = np.asarray(value)
+    texts = [str(unit) if unit.symbols else "" for unit in node.units[name]]
+    if array.dtype != float or not any(texts):
+        return array.tolist()
+    if array.ndim == 0:
+        return f"{float(array)!r} {texts[0]}"
+    if len(set(texts)) == 1:
+        return {"value": array.tolist(), "unit": texts[0]}
+    if array.ndim == 1:
+        return {"value": array.tolist(), "unit": " ".join(text or "1" for text in texts)}
+    quantities = [
+        f"{number!r} {text}".strip() for number, text in zip(array.ravel().tolist(), texts, strict=True)
+    ]
+    return np.reshape(np.array(quantities, dtype=object), array.shape).tolist()

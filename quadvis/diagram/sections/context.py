@@ -1,0 +1,89 @@
+"""What the sections that name blocks and signals are read against, and what such a section is."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+from quadvis.diagram.reference import Reference, read_reference
+from quadvis.diagram.sections.section import Said, Section, Values
+from quadvis.diagram.times import time_text
+from quadvis.diagram.wiring import Wiring
+from quadvis.document import YamlList, YamlMap, YamlNode
+from quadvis.engine.graph import Graph, Node, Wire
+from quadvis.engine.names import wire_text
+from quadvis.errors import Faults, Place
+
+
+@dataclass
+class Context:
+    """The blocks that exist, and when the run ends (s); faults are collected.
+
+    ``shortened`` says that the diagram by itself ends later. ``values`` has the sections that are read
+    already. ``nodes`` are the blocks by path; one that is missing there has been reported.
+    """
+
+    wiring: Wiring
+    graph: Graph
+    stop: Fraction
+    shortened: bool
+    faults: Faults
+    values: Values = field(default_factory=Values)
+    names: dict[Place, str] = field(default_factory=dict)  # the full name of each signal, by where it stands
+
+    @cached_property
+    def nodes(self) -> Mapping[str, Node]:
+        """The blocks by path."""
+        return {node.path: node for node in self.graph.nodes}
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all blocks are known, so that a name that fits none of them is a fault."""
+        return not self.wiring.expansion.unknown
+
+    def wire(self, node: YamlNode) -> Wire | None:
+        """Return what the name of a signal names; None if it names none, which is reported."""
+        reference = read_reference(node, self.faults)
+        return self.source(reference) if reference is not None else None
+
+    def source(self, reference: Reference) -> Wire | None:
+        """Return the output behind a name; None if there is none, which is reported."""
+        source = self.wiring.find(self.wiring.expansion.root, reference).source
+        if isinstance(source, YamlNode):
+            self.faults.add(reference.place, "this is a constant, not a signal", "name an output of a block")
+        if not isinstance(source, Wire) or source.block not in self.nodes:
+            return None
+        self.names[reference.place] = wire_text(source)
+        return source
+
+    def warn_window(
+        self, fields: YamlMap, keys: tuple[str, str], begin: Fraction | None, end: Fraction | None
+    ) -> None:
+        """Warn of a window that holds no instant of the run, or none at all; ``keys`` name its ends."""
+        if begin is not None and begin > self.stop:
+            problem = f"'{keys[0]}' is {time_text(begin)}, but the run ends at {time_text(self.stop)}"
+            remedy = "begin earlier, or choose a longer stop time"
+            self.faults.warn(fields[keys[0]].place, problem, remedy)
+        elif begin is not None and end is not None and end < begin:
+            problem = f"'{keys[1]}' is {time_text(end)}, which is before {time_text(begin)}"
+            self.faults.warn(fields[keys[1]].place, problem, f"end later than '{keys[0]}'")
+
+    def written(self, node: YamlNode | None) -> Any:
+        """Return a section as plain data, with every signal that was read by its full name."""
+        if isinstance(node, YamlList):
+            return [self.written(child) for child in node]
+        if isinstance(node, YamlMap):
+            return {key: self.written(child) for key, child in node.values.items()}
+        return (self.names.get(node.place) or node.to_python()) if node is not None else None
+
+
+class RunSection(Section[Said]):
+    """A section that names blocks and signals: what is recorded of a run, and what is made of it."""
+
+    @abstractmethod
+    def read(self, node: YamlNode | None, context: Context) -> Said:
+        """Return what the section says; ``node`` is None where the key is not written."""

@@ -1,0 +1,69 @@
+"""`files`: what blocks read, held by the SHA-256 of the contents; a resolved diagram has it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from quadvis.diagram.sections.block_text import relative
+from quadvis.diagram.sections.forms import Schema
+from quadvis.diagram.sections.section import Checked, FileSection
+from quadvis.document import YamlNode
+from quadvis.engine.graph import Graph
+from quadvis.errors import Faults
+from quadvis.machine.inputs import file_digest
+
+Files = dict[str, YamlNode]  # SHA-256 by path
+
+
+class FilesSection(FileSection[Files]):
+    """The files that blocks read, as they were when the diagram was written out."""
+
+    key = "files"
+    words = (
+        "SHA-256 of the files that blocks read, as they were read; in resolved diagrams, as a log keeps them"
+    )
+
+    def read(self, node: YamlNode | None, faults: Faults) -> Files:
+        """Return the sums as they are written."""
+        mapping = faults.collect(node.mapping) if node is not None else None
+        return dict(mapping.values) if mapping is not None else {}
+
+    def schema(self) -> Schema:
+        """Return the schema: texts by path."""
+        return {"type": "object", "description": "SHA-256 of the files that blocks read"}
+
+    def resolved(self, diagram: Checked) -> Any:
+        """Return the sums of the files that parameters name to be read."""
+        sums = {path: diagram.files[path] for path in _named(diagram.graph) if path in diagram.files}
+        folder = diagram.path.parent
+        return {relative(path, folder): digest for path, digest in sorted(sums.items())} or None
+
+
+def _named(graph: Graph) -> list[str]:
+    """Return the paths that parameters name to be read."""
+    return [
+        getattr(node.block, param.name)
+        for node in graph.nodes
+        for param in node.block.interface.params.values()
+        if param.is_file and not param.writes
+    ]
+
+
+def check_files(files: Files, folder: Path, faults: Faults) -> None:
+    """Report the files that are not what they were when the diagram was written out."""
+    for name, node in files.items():
+        wanted = faults.collect(node.text)
+        path = folder / name
+        if not os.path.isfile(path):
+            faults.add(node.place, f"there is no file '{name}'", "paths are relative to the diagram")
+        elif wanted is not None and file_digest(path) != wanted:
+            faults.add(
+                node.place,
+                f"file '{name}' is not what it was: its SHA-256 differs",
+                "bring that one back, or leave the entry out",
+            )
+
+
+FILES = FilesSection()

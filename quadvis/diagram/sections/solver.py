@@ -1,0 +1,59 @@
+"""`solver`: how continuous states are integrated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from quadvis.diagram.sections.forms import QUANTITY, Schema, closed
+from quadvis.diagram.sections.section import Checked, FileSection
+from quadvis.diagram.times import read_step
+from quadvis.document import YamlNode
+from quadvis.engine.graph import SOLVERS
+from quadvis.errors import Faults, Place
+
+SOLVER_KEYS = ("method", "step")
+
+
+@dataclass(frozen=True)
+class Solver:
+    """The method and the step (s) of the solver, and where the step is written."""
+
+    method: str = "ode4"
+    step: Fraction | None = None
+    place: Place | None = None
+    told: bool = False
+
+
+class SolverSection(FileSection[Solver]):
+    """The solver of a diagram."""
+
+    key = "solver"
+    words = "`{method: ode1 to ode4, step: 5 ms}` for continuous blocks; the step divides every period"
+
+    def read(self, node: YamlNode | None, faults: Faults) -> Solver:
+        """Return method and step."""
+        fields = faults.collect(node.fields, (), SOLVER_KEYS, faults) if node is not None else None
+        if fields is None:
+            return Solver(told=node is not None)
+        method = faults.collect(fields["method"].choice, SOLVERS) if "method" in fields else None
+        if "step" not in fields:
+            return Solver(method or Solver.method)
+        step = faults.collect(read_step, fields["step"])
+        return Solver(method or Solver.method, step, fields["step"].place, step is None)
+
+    def schema(self) -> Schema:
+        """Return the schema: method and step."""
+        return closed(SOLVER_KEYS, {
+            "method": {"enum": list(SOLVERS), "description": "fixed-step solver, named as in Simulink"},
+            "step": {**QUANTITY, "description": "such as 5 ms; it divides every period"},
+        })  # fmt: skip
+
+    def resolved(self, diagram: Checked) -> Any:
+        """Return method and step if anything is continuous."""
+        graph = diagram.graph
+        return {"method": graph.solver, "step": f"{graph.step} s"} if graph.step is not None else None
+
+
+SOLVER = SolverSection()

@@ -1,0 +1,33 @@
+"""`stop_time`: how long a run is."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from quadvis.diagram.sections.forms import QUANTITY, Schema
+from quadvis.diagram.sections.section import Checked, FileSection
+from quadvis.diagram.times import read_duration
+from quadvis.document import YamlNode
+from quadvis.errors import Faults
+
+
+class StopTime(FileSection[Fraction | None]):
+    """The length of a run (s); None where it is not written."""
+
+    key = "stop_time"
+    words = "how long a run is"
+
+    def read(self, node: YamlNode | None, faults: Faults) -> Fraction | None:
+        """Return the time; 0 s stands for one that cannot be read."""
+        return (faults.collect(read_duration, node) or Fraction(0)) if node is not None else None
+
+    def schema(self) -> Schema:
+        """Return the schema: a time."""
+        return {**QUANTITY, "description": "length of a run, such as 20 s"}
+
+    def resolved(self, diagram: Checked) -> str:
+        """Return the length of a run, also if it was replaced from outside."""
+        return f"{diagram.stop_time} s"
+
+
+STOP_TIME = StopTime()

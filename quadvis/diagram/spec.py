@@ -1,0 +1,31 @@
+"""What one file says, section by section; nothing is looked up elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from quadvis.diagram.sections.header import NAME
+from quadvis.diagram.sections.section import Section, Value, Values
+from quadvis.document import YamlNode
+from quadvis.errors import Place
+
+
+@dataclass(frozen=True)
+class FileSpec:
+    """A diagram or a part as its file has it: ``spec[RATES]`` is what stands under ``rates``."""
+
+    path: Path
+    place: Place  # of the file as a whole
+    top: Place  # where its keys begin
+    values: Values  # of the sections that the file alone explains
+    nodes: Mapping[str, YamlNode]  # of the others, which name blocks and signals
+
+    def __getitem__(self, section: Section[Value]) -> Value:
+        return self.values[section]
+
+    @property
+    def name(self) -> str:
+        """The name that it has, or that of its file."""
+        return self[NAME] or self.path.stem
