@@ -57,6 +57,10 @@ class Diagram(Checked):
 
         return analyse(self, cuts, limits, at)
 
+    def varied(self, setting: str) -> Diagram:
+        """Return the diagram, loaded again with one more parameter replaced: ``block.parameter=value``."""
+        return _with_methods(loading.varied(self, setting))
+
     def draw(self) -> str:
         """Return a picture of the diagram as SVG."""
         from quadvis.diagram.picture import draw_diagram

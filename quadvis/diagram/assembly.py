@@ -30,7 +30,7 @@ from quadvis.diagram.wiring import Wiring
 from quadvis.document import YamlScalar
 from quadvis.engine.graph import Graph
 from quadvis.engine.names import wire_text
-from quadvis.errors import DiagramError, Faults, Place, quoted
+from quadvis.errors import UNKNOWN, DiagramError, Faults, Place, Unknown, known, quoted
 from quadvis.library.catalogue import Catalogue, OwnBlocks
 
 
@@ -39,12 +39,12 @@ class Assembly:
 
     def __init__(
         self,
-        spec: FileSpec | None,
+        spec: FileSpec | Unknown,
         faults: Faults,
         params: Sequence[ParameterFile] = (),
         own_blocks: OwnBlocks = True,
     ) -> None:
-        if spec is None:
+        if spec is UNKNOWN:
             raise DiagramError(faults)
         self.spec, self.faults = spec, faults
         self.catalogue = Catalogue(spec.path.parent, own_blocks)
@@ -66,19 +66,24 @@ class Assembly:
         expansion = Expansion(filled, self.catalogue, settings, self.parts, faults)
         wiring = Wiring(expansion, faults)
         promised = self._promised(filled)
-        given = {slot: wiring.outputs(slot) for slot in promised if slot not in expansion.unknown}
-        wiring.refused = check_slots(spec, filled, promised, given, faults)
+        given = {slot: wiring.outputs(slot) for slot in promised if expansion.knows(slot)}
+        wiring.unknown = check_slots(spec, filled, promised, given, faults)
         wiring.check_ports(expansion.root)
         builder = Builder(spec, expansion, wiring, self.made, faults)
         drafts = builder.drafts()
-        graph = Graph(spec.name, WireCheck(drafts, faults).run(), spec[SOLVER].method, builder.step)
+        step = builder.step if known(builder.step) else None
+        graph = Graph(spec.name, WireCheck(drafts, faults).run(), spec[SOLVER].method, step)
         stop = _stop_time(spec, stop_time, faults)
-        check_ticks(spec, graph, stop, faults)
+        if known(builder.step):
+            tasks = {draft.task for draft in drafts if known(draft.task)}
+            check_ticks(spec, tasks, builder.step, stop, faults)
         warn_parameters(spec, self.parts, faults)
         if not self.variants:
             self.warn_rates()
         written = spec[STOP_TIME]
-        context = Context(wiring, graph, stop, written is not None and stop < written, faults)
+        context = Context(
+            wiring, graph, stop, written is not None and known(written) and stop < written, faults
+        )
         for section in RUN_SECTIONS:
             with faults.about(section.key):
                 context.values[section] = section.read(spec.nodes.get(section.key), context)
@@ -115,10 +120,11 @@ def _stop_time(spec: FileSpec, given: str | float | None, faults: Faults) -> Fra
     if given is not None:
         text = given if isinstance(given, str) else f"{float(given)!r} s"
         return faults.collect(read_duration, YamlScalar(text, False, "--stop-time", 0, 0)) or Fraction(0)
-    if spec[STOP_TIME] is None:
+    written = spec[STOP_TIME]
+    if written is None:
         faults.add(spec.top, "key 'stop_time' is missing", "add 'stop_time: 10 s', or give --stop-time")
         return Fraction(0)
-    return spec[STOP_TIME] or Fraction(0)
+    return written if known(written) else Fraction(0)
 
 
 def _seed(seed: int, faults: Faults) -> int:

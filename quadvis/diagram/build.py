@@ -17,65 +17,75 @@ from quadvis.diagram.spec import FileSpec
 from quadvis.diagram.times import time_text
 from quadvis.diagram.values import OpenUnits, read_parameter, read_value
 from quadvis.diagram.wiring import Wiring
+from quadvis.document import YamlNode
 from quadvis.engine.graph import CONTINUOUS, Constant, Task, Wire, common_divisor
-from quadvis.errors import DiagramError, Fault, Faults, Place, QuadvisError, suggestion
+from quadvis.errors import (
+    UNKNOWN,
+    DiagramError,
+    Fault,
+    Faults,
+    Place,
+    QuadvisError,
+    Unknown,
+    known,
+    suggestion,
+)
 
 # By path, class, parameters and period: variants share most.
 Made = dict[tuple[str, type[Block], str, Fraction | None], Block]
-NO_STEP = Fraction(1, 100)  # stands in for a solver step whose absence has been told
+_ANY_STEP = Fraction(1, 100)  # the continuous task needs one; no check looks at it
 
 
 class Builder:
-    """Makes the blocks and tells what is wrong with them. ``step`` is the solver's, if one is needed."""
+    """Makes the blocks and reports what is wrong with them. ``step`` is the solver's, if one is needed."""
 
     def __init__(
         self, spec: FileSpec, expansion: Expansion, wiring: Wiring, made: Made, faults: Faults
     ) -> None:
         self.spec, self.expansion, self.wiring, self.made, self.faults = spec, expansion, wiring, made, faults
         self.tasks = {
-            name: Task(name, rate.period, rate.offset)
-            for name, rate in spec[RATES].items()
-            if rate is not None
+            name: Task(name, rate.period, rate.offset) for name, rate in spec[RATES].items() if known(rate)
         }
         self.step = self._choose_step()
 
     def drafts(self) -> list[Draft]:
-        """Return the blocks whose own entries are right."""
+        """Return the blocks whose class is known."""
         found = []
         for flat in self.expansion.blocks.values():
             with self.faults.about(f"block '{flat.path}'"):
                 draft = self._draft(flat)
-            if draft is not None:
+            if known(draft):
                 found.append(draft)
         return found
 
-    def _draft(self, flat: FlatBlock) -> Draft | None:
-        if flat.kind is None:
-            # The wires of a block that is not there may still be looked at.
-            list(self.wiring.inputs(flat))
-            return None
+    def _draft(self, flat: FlatBlock) -> Draft | Unknown:
+        if flat.kind is UNKNOWN:
+            list(self.wiring.inputs(flat))  # its wires are looked at all the same
+            return UNKNOWN
         task = self._task(flat, flat.kind)
         block, units = self._build(flat, flat.kind, task)
         connections = dict(self._connections(flat, flat.kind))
         places = {name: flat.place(name) for name in flat.parameters}
-        origins = {name: node.place for name, node in flat.parameters.items()}
-        told = "in" in flat.spec.told
+        origins = {name: node.place for name, node in flat.parameters.items() if known(node)}
         return Draft(
-            flat.path, flat.spec.place, flat.spec.kind, block, task, connections, places, units, origins, told
-        )
+            flat.path, flat.spec.place, flat.spec.kind, flat.kind, block, task, connections, places, units,
+            origins,
+        )  # fmt: skip
 
-    def _choose_step(self) -> Fraction | None:
+    def _choose_step(self) -> Fraction | Unknown | None:
         """Take the solver's step if anything is continuous; every period must be a whole number of steps."""
         first = next(filter(_is_continuous, self.expansion.blocks.values()), None)
         if first is None:
             return None
         step = self.spec[SOLVER].step
         if step is None:
-            if not self.spec[SOLVER].told:
-                problem = f"block '{first.path}' is continuous and the solver has no step"
-                self.faults.add(first.spec.place, problem, "add 'solver: {method: ode4, step: 5 ms}'")
-            return NO_STEP
-        used = {flat.rate[0] for flat in self.expansion.blocks.values() if flat.rate is not None}
+            problem = f"block '{first.path}' is continuous and the solver has no step"
+            self.faults.add(first.spec.place, problem, "add 'solver: {method: ode4, step: 5 ms}'")
+            return UNKNOWN
+        if step is UNKNOWN:
+            return UNKNOWN
+        rates = [flat.rate for flat in self.expansion.blocks.values()]
+        used = {rate[0] for rate in rates if rate is not None and known(rate)}
         times = {
             f"the {what} of '{task.name}' ({time_text(time)})": time
             for task in self.tasks.values()
@@ -91,46 +101,47 @@ class Builder:
             self.faults.add(self.spec[SOLVER].place or self.spec.place, problem, remedy)
         return step
 
-    def _task(self, flat: FlatBlock, kind: type[Block]) -> Task | None:
-        """Return the task of a block; None if it is told to be wrong."""
-        continuous = Task(CONTINUOUS, self.step or NO_STEP, continuous=True)
+    def _task(self, flat: FlatBlock, kind: type[Block]) -> Task | Unknown:
+        """Return the task of a block."""
+        step = self.step if self.step is not None and known(self.step) else _ANY_STEP
+        continuous = Task(CONTINUOUS, step, continuous=True)
         own = flat.spec.rate
         if kind.interface.continuous:
-            if own is not None and own[0] != CONTINUOUS:
+            if own is not None and known(own) and own[0] != CONTINUOUS:
                 problem = f"{flat.spec.kind} has continuous states, rate '{own[0]}' cannot hold it"
                 self.faults.add(own[1], problem, "leave 'rate' out, or write 'continuous'")
             return continuous
         names = [*self.spec[RATES], CONTINUOUS]
         if flat.rate is None:
-            entries = list(flat.around)
-            if not any("rate" in entry.told for entry in entries):
-                choice = f"choose from {', '.join(names)}" if len(names) > 1 else "declare one under 'rates'"
-                self.faults.add(entries[-1].place, "key 'rate' is missing", choice)
-            return None
+            choice = f"choose from {', '.join(names)}" if len(names) > 1 else "declare one under 'rates'"
+            self.faults.add(list(flat.around)[-1].place, "key 'rate' is missing", choice)
+            return UNKNOWN
+        if flat.rate is UNKNOWN:
+            return UNKNOWN
         name, place = flat.rate
         if name == CONTINUOUS:
             return continuous
         if name not in self.spec[RATES]:
             remedy = suggestion(name, names) if self.spec[RATES] else ""
             self.faults.add(place, f"there is no rate '{name}'", remedy or "declare it under 'rates'")
-        return self.tasks.get(name)
+        return self.tasks.get(name, UNKNOWN)
 
     def _build(
-        self, flat: FlatBlock, kind: type[Block], task: Task | None
-    ) -> tuple[Block | type[Block], dict[str, OpenUnits]]:
+        self, flat: FlatBlock, kind: type[Block], task: Task | Unknown
+    ) -> tuple[Block | Unknown, dict[str, OpenUnits]]:
         declared = kind.interface.params
         values: dict[str, Any] = {}
         units: dict[str, OpenUnits] = {}
-        whole = flat.path not in self.expansion.broken
+        whole = known(flat.spec.parameters)
         for name, node in flat.parameters.items():
             if name not in declared:
-                is_setting = name not in flat.spec.parameters
+                is_setting = name not in flat.spec.parameter_places
                 remedy = remedy_for(name, flat.parameters, declared, replaces=is_setting)
                 self.faults.add(flat.place(name), f"{flat.spec.kind} has no parameter '{name}'", remedy)
                 whole = False
                 continue
-            read = self.faults.collect(read_parameter, declared[name], node)
-            if read is None or not self._accepts(declared[name], read[0], flat):
+            read = self.faults.read(read_parameter, declared[name], node) if known(node) else UNKNOWN
+            if not known(node) or not known(read) or not self._accepts(declared[name], read[0], node):
                 whole = False
                 continue
             values[name] = read[0]
@@ -138,27 +149,26 @@ class Builder:
                 units[name] = read[1]
         required = [name for name, param in declared.items() if param.required]
         whole &= all(name in flat.parameters for name in required)
-        given = flat.spec.parameters | flat.parameters
-        for name in absent(required, given, declared) if "with" not in flat.spec.told else ():
+        for name in absent(required, flat.parameters, declared) if known(flat.spec.parameters) else ():
             wanted = "a path" if declared[name].is_file else declared[name].wanted()
             self.faults.add(flat.spec.place, f"parameter '{name}' is missing", f"give {wanted} under 'with'")
-        period = task.period if task is not None and self.step is not NO_STEP else None
-        block = self._construct(flat, kind, values, period) if whole else None
-        for doubt in block.doubts() if block is not None and period is not None else ():
+        period = task.period if known(task) and known(self.step) else None
+        block = self._construct(flat, kind, values, period) if whole else UNKNOWN
+        for doubt in block.doubts() if known(block) and period is not None else ():
             self.faults.warn(self._place(flat, doubt), str(doubt))
-        return block or kind, units
+        return block, units
 
-    def _accepts(self, param: Param, value: Any, flat: FlatBlock) -> bool:
+    def _accepts(self, param: Param, value: Any, node: YamlNode) -> bool:
         try:
             param.accept(value)
         except ParameterError as error:
-            self.faults.add(flat.parameters[param.name].place, str(error))
+            self.faults.add(node.place, str(error))
             return False
         return True
 
     def _construct(
         self, flat: FlatBlock, kind: type[Block], values: Mapping[str, Any], period: Fraction | None
-    ) -> Block | None:
+    ) -> Block | Unknown:
         """Make the block, which checks its parameters against each other, its files and its period."""
         key = (flat.path, kind, repr(sorted(values.items())), period)
         try:
@@ -176,16 +186,17 @@ class Builder:
                 self.faults.append(self._from_file(fault, flat, values))
         except QuadvisError as error:
             self.faults.add(flat.spec.place, str(error))
-        return None
+        return UNKNOWN
 
     @staticmethod
     def _place(flat: FlatBlock, error: ParameterError) -> Place:
-        node = flat.parameters.get(error.parameter)
-        return node.place if node is not None else flat.spec.place
+        node = flat.parameters.get(error.parameter, UNKNOWN)
+        return node.place if known(node) else flat.spec.place
 
     def _from_file(self, fault: Fault, flat: FlatBlock, values: Mapping[str, Any]) -> Fault:
         """Return a fault of a file that a parameter names; one of the whole file is put where it is named."""
-        named = [flat.parameters[name] for name, value in values.items() if value == fault.place.file]
+        nodes = (flat.parameters[name] for name, value in values.items() if value == fault.place.file)
+        named = [node for node in nodes if known(node)]
         if named and not fault.place.line:
             problem = f"'{named[0].text()}': {fault.problem}"
             return Fault(named[0].place, self.faults.subject, problem, fault.remedy)
@@ -193,17 +204,22 @@ class Builder:
         return Fault(fault.place, subject, fault.problem, fault.remedy)
 
     def _connections(self, flat: FlatBlock, kind: type[Block]) -> Iterator[tuple[str, Connection]]:
+        if flat.spec.inputs is UNKNOWN:
+            yield from ((port, Connection(flat.spec.place, UNKNOWN)) for port in kind.interface.inputs)
         for port, source in self.wiring.inputs(flat):
             declared = kind.interface.inputs.get(port)
-            if isinstance(source.source, Wire) or source.source is None or declared is None:
-                wire = source.source if isinstance(source.source, Wire) else None
+            if isinstance(source.source, Wire) or source.source is UNKNOWN or declared is None:
+                wire = source.source if isinstance(source.source, Wire) else UNKNOWN
                 yield port, Connection(source.place, wire, across=source.across)
+                continue
+            read = self.faults.read(read_value, declared.signal, declared.units, source.source)
+            if known(read):
+                yield port, Connection(source.place, Constant(read[0]), read[1])
             else:
-                read = self.faults.collect(read_value, declared.signal, declared.units, source.source)
-                value, units = (Constant(read[0]), read[1]) if read is not None else (None, ())
-                yield port, Connection(source.place, value, units)
+                yield port, Connection(source.place, UNKNOWN)
 
 
 def _is_continuous(flat: FlatBlock) -> bool:
-    named = flat.rate is not None and flat.rate[0] == CONTINUOUS
-    return named or (flat.kind is not None and bool(flat.kind.interface.continuous))
+    rate = flat.rate
+    named = rate is not None and known(rate) and rate[0] == CONTINUOUS
+    return named or (known(flat.kind) and bool(flat.kind.interface.continuous))

@@ -1,6 +1,6 @@
 """Checks across wires: ports, kinds, shapes, units, rates and algebraic loops. All faults are collected.
 
-Each check works on what the ones before it left whole, so that one mistake is told once.
+Each check leaves out what is `UNKNOWN`, and adds what it finds wrong to that: one mistake is reported once.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from quadvis.diagram.flow import Draft, Key, Link, ShapeFlow
 from quadvis.diagram.names import absent, remedy_for
 from quadvis.diagram.unit_repair import follow_units
 from quadvis.diagram.values import shape_text
-from quadvis.engine.graph import TOLD, Constant, Node, Task, Wire, execution_order
-from quadvis.errors import Faults, Place
+from quadvis.engine.graph import Constant, Node, Task, Wire, execution_order
+from quadvis.errors import UNKNOWN, Faults, Place, known
 
-NO_TASK = Task("unknown", Fraction(1))  # of blocks whose rate has been told to be wrong
+_ANY_TASK = Task("unknown", Fraction(1))  # a node needs one; no check looks at it
 
 
 class WireCheck:
@@ -26,21 +26,24 @@ class WireCheck:
     def __init__(self, drafts: Sequence[Draft], faults: Faults) -> None:
         self.drafts = {draft.path: draft for draft in drafts}
         self.faults = faults
-        self.lost: set[Key] = set()  # inputs of which nothing is known, since their fault has been told
+        self.unknown: set[Key] = set()  # inputs of which nothing is known
         self.nodes = {draft.path: self._node(draft) for draft in drafts}
 
     def _node(self, draft: Draft) -> Node:
-        interface = draft.block.interface
+        interface = draft.interface
         inputs: dict[str, Wire | Constant] = {
             name: Constant(port.default)
             for name, port in interface.inputs.items()
             if port.default is not None
         }
         for name, connection in draft.connections.items():
-            if connection.source is not None and name in interface.inputs:
+            if connection.source is not UNKNOWN and name in interface.inputs:
                 inputs[name] = connection.source
-        node = Node(draft.path, draft.kind, cast(Block, draft.block), draft.task or NO_TASK, inputs)
-        for name, param in interface.params.items() if draft.whole else ():
+        task = draft.task if known(draft.task) else _ANY_TASK
+        # Of a block whose parameters are unknown only the declarations are looked at, which its class has.
+        block = draft.block if known(draft.block) else cast(Block, draft.type)
+        node = Node(draft.path, draft.kind, block, task, inputs)
+        for name, param in interface.params.items() if known(draft.block) else ():
             shape = getattr(getattr(draft.block, name), "shape", ())
             if param.signal.scalar != "str" and not param.signal.unify(shape, node.sizes):
                 wanted = shape_text(param.signal.resolve(node.sizes))
@@ -53,28 +56,28 @@ class WireCheck:
         links = list(self._links())
         self._check_connected()
         self._check_rates(links)
-        shapes = ShapeFlow(self.drafts, self.nodes, self._whole(links), self.lost, self.faults)
+        shapes = ShapeFlow(self.drafts, self.nodes, self._known(links), self.unknown, self.faults)
         shapes.run()
-        self.lost = shapes.lost
-        units = follow_units(self.drafts, self.nodes, self._whole(links), self.lost, self.faults)
-        for path, port in units.lost | {link.key for link in links if link.wire.crossing == TOLD}:
-            # A loop through a wire that is wrong is no news.
+        self.unknown = shapes.unknown
+        units = follow_units(self.drafts, self.nodes, self._known(links), self.unknown, self.faults)
+        for path, port in units.unknown | {link.key for link in links if link.connection.across is UNKNOWN}:
+            # A loop through such a wire would be reported twice.
             self.nodes[path].inputs.pop(port, None)
         order, loops = execution_order(list(self.nodes.values()))
         for loop in loops:
-            self._tell_loop(loop)
+            self._report_loop(loop)
         return order
 
-    def _whole(self, links: Sequence[Link]) -> list[Link]:
-        return [link for link in links if link.key not in self.lost]
+    def _known(self, links: Sequence[Link]) -> list[Link]:
+        return [link for link in links if link.key not in self.unknown]
 
     def _fault(self, draft: Draft, place: Place, problem: str, remedy: str = "") -> None:
         self.faults.add(place, problem, remedy, subject=f"block '{draft.path}'")
 
     def _links(self) -> Iterator[Link]:
-        """Yield the wires between ports that there are; the others are told, unless they were told before."""
+        """Yield the wires whose two ports exist; the others are reported."""
         for draft in self.drafts.values():
-            inputs = draft.block.interface.inputs
+            inputs = draft.interface.inputs
             for port, connection in draft.connections.items():
                 wire = connection.source
                 if port not in inputs:
@@ -85,23 +88,23 @@ class WireCheck:
                     if self._is_right_kind(link):
                         yield link
                     else:
-                        self.lost.add(link.key)
+                        self.unknown.add(link.key)
                 elif not isinstance(wire, Constant):
-                    self.lost.add((draft.path, port))
+                    self.unknown.add((draft.path, port))
 
     def _check_connected(self) -> None:
         for draft in self.drafts.values():
-            inputs = draft.block.interface.inputs
+            inputs = draft.interface.inputs
             wanted = [port for port, declared in inputs.items() if declared.default is None]
-            self.lost |= {(draft.path, port) for port in wanted if port not in draft.connections}
-            for port in absent(wanted, draft.connections, inputs) if not draft.told else ():
+            self.unknown |= {(draft.path, port) for port in wanted if port not in draft.connections}
+            for port in absent(wanted, draft.connections, inputs):
                 constant = ", or a constant" if inputs[port].signal.scalar != "frame" else ""
                 remedy = f"add '{port}: block.port' under 'in'{constant}"
                 self._fault(draft, draft.place, f"input '{port}' is not connected", remedy)
 
     def _is_right_kind(self, link: Link) -> bool:
         wire, wanted = link.wire, link.declared.signal.scalar
-        outputs = self.drafts[wire.block].block.interface.outputs
+        outputs = self.drafts[wire.block].interface.outputs
         given = outputs[wire.port].signal.scalar
         if given == wanted:
             return True
@@ -114,18 +117,19 @@ class WireCheck:
         return False
 
     def _check_rates(self, links: Sequence[Link]) -> None:
-        told: set[Place] = set()  # one wire may lead to several blocks of a part
+        reported: set[Place] = set()  # one wire may lead to several blocks of a part
         for draft, port, connection, wire, _ in links:
             source = self.drafts[wire.block].task
-            if draft.task is None or source is None or draft.task == source:
+            across = connection.across
+            if draft.task is UNKNOWN or source is UNKNOWN or across is UNKNOWN or draft.task == source:
                 continue
             problem, remedy = crossing_fault(source, draft.task, wire.crossing)
-            if problem and connection.place not in told:
-                told.add(connection.place)
+            if problem and connection.place not in reported:
+                reported.add(connection.place)
                 ends = f"'{wire.source}' ({rate_text(source)}) into '{port}' ({rate_text(draft.task)})"
-                self._fault(draft, connection.across or connection.place, f"{ends}: {problem}", remedy)
+                self._fault(draft, across or connection.place, f"{ends}: {problem}", remedy)
 
-    def _tell_loop(self, loop: list[Key]) -> None:
+    def _report_loop(self, loop: list[Key]) -> None:
         """Say the loop in the direction of the signal."""
         path, port = loop[0]
         steps = [f"{name}.{entered}" for name, entered in (loop[0], *reversed(loop))]
@@ -144,8 +148,6 @@ def crossing_fault(source: Task, target: Task, crossing: str | None) -> tuple[st
     if crossing is None:
         fitting = fitting if divides else "newest"
         return "the wire does not say how it crosses between rates", f"add 'across: {fitting}'"
-    if crossing == TOLD:
-        return "", ""
     if crossing != "newest" and not divides:
         return (
             f"the periods are in the ratio {ratio}, not commensurate for 'across: {crossing}'",

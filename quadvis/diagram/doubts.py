@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from quadvis.diagram.expand import Parts
-from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec, InputSpec
+from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec
 from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.rates import RATES
 from quadvis.diagram.sections.variants import VARIANTS
 from quadvis.diagram.spec import FileSpec
 from quadvis.diagram.values import named_parameters
 from quadvis.document import YamlNode
-from quadvis.errors import Faults
+from quadvis.errors import Faults, known
 
 
 def warn_parameters(spec: FileSpec, parts: Parts, faults: Faults) -> None:
@@ -24,30 +24,31 @@ def warn_parameters(spec: FileSpec, parts: Parts, faults: Faults) -> None:
 def _blocks(spec: FileSpec) -> Iterator[BlockSpec]:
     """Yield what stands under the blocks of a file and of its variants."""
     for blocks in (spec[BLOCKS], *(variant.slots for variant in spec[VARIANTS].values())):
-        yield from (block for block in blocks.values() if block is not None)
+        yield from (block for block in blocks.values() if known(block))
 
 
 def _warn_parameters(spec: FileSpec, faults: Faults) -> None:
     """Warn of parameters that no block of their file uses."""
     used: set[str] = set()
     for block in _blocks(spec):
-        inputs = (block.inputs or {}).values()
-        sources = (given.source for given in inputs if isinstance(given, InputSpec))
-        for node in (*block.parameters.values(), *sources):
+        inputs = block.inputs if block.inputs is not None and known(block.inputs) else {}
+        parameters = block.parameters if known(block.parameters) else {}
+        for node in (*parameters.values(), *(given.source for given in inputs.values())):
             if isinstance(node, YamlNode):
                 used |= named_parameters(node)
     for name, value in spec[PARAMS].items():
-        if name not in used and value is not None:
+        if name not in used and known(value):
             faults.warn(value.place, f"parameter '{name}' is not used", f"write '${name}' where it belongs")
 
 
 def warn_rates(spec: FileSpec, parts: Parts, faults: Faults) -> None:
     """Warn of rates at which no block of a diagram runs; `parts` has read those of all its variants."""
-    if not parts.whole:
+    if not parts.is_whole:
         return  # what could not be read may use any of them
-    used = {block.rate[0] for file in (spec, *parts.specs()) for block in _blocks(file) if block.rate}
+    rates = (block.rate for file in (spec, *parts.specs()) for block in _blocks(file))
+    used = {rate[0] for rate in rates if rate is not None and known(rate)}
     for name, rate in spec[RATES].items():
-        if rate is not None and name not in used:
+        if known(rate) and name not in used:
             faults.warn(
                 rate.place, f"no block runs at the rate '{name}'", "leave it out, or give it to a block"
             )

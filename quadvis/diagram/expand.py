@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from quadvis.block import Block
 from quadvis.diagram.names import absent, remedy_for
-from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec
+from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec, InputSpec
 from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.ports import PORTS
 from quadvis.diagram.settings import Settings
 from quadvis.diagram.spec import FileSpec
 from quadvis.diagram.values import substitute
 from quadvis.document import YamlNode, YamlScalar
-from quadvis.errors import DiagramError, Faults, Place, quoted, suggestion
+from quadvis.errors import UNKNOWN, DiagramError, Faults, Place, Unknown, known, quoted, suggestion
 from quadvis.library.catalogue import Catalogue, CatalogueError
 from quadvis.machine.missing_file import file_trouble
 from quadvis.units import Unit, UnitError, split_quantity
@@ -31,11 +31,20 @@ class Scope:
 
     prefix: str
     spec: FileSpec
-    params: Mapping[str, YamlNode | None]
+    params: Mapping[str, YamlNode | Unknown]
     parent: Scope | None = None
     instance: BlockSpec | None = None
-    children: dict[str, Scope] = field(default_factory=dict)
-    broken: set[str] = field(default_factory=set)  # blocks and parts that are there but could not be read
+    children: dict[str, Scope | Unknown] = field(default_factory=dict)
+
+    def knows(self, name: str) -> bool:
+        """Say whether nothing that a name leads to, block or part, is `UNKNOWN`."""
+        names = (name, name.partition("/")[0])
+        return all(known(found.get(each)) for found in (self.spec[BLOCKS], self.children) for each in names)
+
+    @property
+    def parts(self) -> Iterator[Scope]:
+        """The parts whose files are known."""
+        yield from (child for child in self.children.values() if known(child))
 
     @property
     def subject(self) -> str:
@@ -45,17 +54,17 @@ class Scope:
 
 @dataclass(frozen=True)
 class FlatBlock:
-    """One block of the catalogue under its full path; ``kind`` is None if there is no such block."""
+    """One block of the catalogue under its full path."""
 
     path: str
     spec: BlockSpec
     scope: Scope
-    kind: type[Block] | None
-    parameters: dict[str, YamlNode]
+    kind: type[Block] | Unknown
+    parameters: dict[str, YamlNode | Unknown]
     places: Mapping[str, Place]  # of the names of the parameters
 
     @property
-    def rate(self) -> tuple[str, Place] | None:
+    def rate(self) -> tuple[str, Place] | Unknown | None:
         """The block's rate, or that of the nearest part around it that has one."""
         return next((spec.rate for spec in self.around if spec.rate is not None), None)
 
@@ -83,9 +92,9 @@ def _is_unit(text: str) -> bool:
 class Parts:
     """The files of parts, each read once; its faults are reported then."""
 
-    def __init__(self, read: Callable[[Path, Faults], FileSpec | None], faults: Faults) -> None:
+    def __init__(self, read: Callable[[Path, Faults], FileSpec | Unknown], faults: Faults) -> None:
         self._read, self.faults = read, faults
-        self._specs: dict[str, FileSpec | None] = {}
+        self._specs: dict[str, FileSpec | Unknown] = {}
 
     @property
     def files(self) -> list[Path]:
@@ -93,16 +102,16 @@ class Parts:
         return list(map(Path, self._specs))
 
     @property
-    def whole(self) -> bool:
-        """Whether all of them could be used."""
-        return None not in self._specs.values()
+    def is_whole(self) -> bool:
+        """Whether all of them are known."""
+        return UNKNOWN not in self._specs.values()
 
     def specs(self) -> list[FileSpec]:
         """Return what has been read."""
-        return [spec for spec in self._specs.values() if spec is not None]
+        return [spec for spec in self._specs.values() if known(spec)]
 
-    def read(self, file: Path) -> FileSpec | None:
-        """Return what a file says; None if it cannot be used."""
+    def read(self, file: Path) -> FileSpec | Unknown:
+        """Return what a file says."""
         real = os.path.realpath(file)
         if real not in self._specs:
             with self.faults.about(""):
@@ -118,27 +127,32 @@ class Expansion:
     ) -> None:
         self.catalogue, self.settings, self.parts, self.faults = catalogue, settings, parts, faults
         self.blocks: dict[str, FlatBlock] = {}
-        self.unknown: set[str] = set()  # blocks and parts that are there, but nothing else is known of them
-        self.broken: set[str] = set()  # blocks of which a parameter is wrong
+        self._unknown: set[str] = set()  # paths of blocks and parts that exist, and are `UNKNOWN`
         self._count = 0
         self._used: set[tuple[str, str]] = set()
         params = {name: self._chosen("", name, node) for name, node in spec[PARAMS].items()}
         self.root = Scope("", spec, params)
         self._expand(self.root, (os.path.realpath(spec.path),))
-        self._tell_unused()
+        self._report_unused()
 
-    def _setting(self, path: str, name: str) -> YamlNode | None:
-        self._used.add((path, name))
-        setting = self.settings.get(path, {}).get(name)
-        return setting.value if setting is not None else None
+    @property
+    def is_whole(self) -> bool:
+        """Whether all blocks and parts are known."""
+        return not self._unknown
 
-    def _chosen(self, path: str, name: str, own: YamlNode | None) -> YamlNode | None:
-        """Return the value of a parameter: the setting if there is one; None if it is wrong.
+    def knows(self, path: str) -> bool:
+        """Say whether a block or part, and every part around it, is known as far as it exists."""
+        return not any(path == other or path.startswith(f"{other}/") for other in self._unknown)
+
+    def _chosen(self, path: str, name: str, own: YamlNode | Unknown) -> YamlNode | Unknown:
+        """Return the value of a parameter: the setting if there is one.
 
         A setting without a unit for a value with one is refused here, before others are blamed for it.
         """
-        value = self._setting(path, name)
-        if value is None:
+        self._used.add((path, name))
+        setting = self.settings.get(path, {}).get(name)
+        value = setting.value if setting is not None else UNKNOWN
+        if setting is None or value is UNKNOWN:
             return own
         if not isinstance(value, YamlScalar) or not isinstance(own, YamlScalar):
             return value
@@ -147,18 +161,16 @@ class Expansion:
         if not number or unit or not number.strip("+-0.") or not _is_unit(wanted):
             return value
         remedy = f"did you mean {quoted(f'{number} {wanted}')}?"
-        setting = self.settings[path][name]
         self.faults.add(setting.place, f"{quoted(name)}: {quoted(number)} has no unit", remedy)
-        return None
+        return UNKNOWN
 
-    def _tell_unused(self) -> None:
+    def _report_unused(self) -> None:
         for path, values in self.settings.items():
-            broken = any(path == other or path.startswith(f"{other}/") for other in self.unknown)
             for name, setting in values.items():
-                if (path, name) in self._used or broken or setting.value is None:
+                if (path, name) in self._used or not self.knows(path) or setting.value is UNKNOWN:
                     continue
                 if path:
-                    inner = [known for known in self.blocks if known.endswith(f"/{path}")]
+                    inner = [other for other in self.blocks if other.endswith(f"/{path}")]
                     remedy = f"did you mean '{inner[0]}'?" if inner else suggestion(path, self.blocks)
                     self.faults.add(setting.place, f"there is no block '{path}'", remedy)
                 else:
@@ -167,20 +179,18 @@ class Expansion:
                     self.faults.add(setting.place, f"the diagram has no parameter '{name}'", remedy)
 
     def _expand(self, scope: Scope, files: tuple[str, ...]) -> None:
-        broken = {name for name, block in scope.spec[BLOCKS].items() if block is None}
-        scope.broken |= broken
-        self.unknown |= {scope.prefix + name for name in broken}
-        for block in scope.spec[BLOCKS].values():
-            if block is None:
+        for name, block in scope.spec[BLOCKS].items():
+            path = scope.prefix + name
+            if block is UNKNOWN:
+                self._unknown.add(path)
                 continue
-            path = scope.prefix + block.name
             with self.faults.about(f"block '{path}'"):
                 self._count += 1
                 if self._count > MAX_BLOCKS:
                     problem = f"there are more than {MAX_BLOCKS} blocks"
                     self.faults.add(block.place, problem, "use fewer parts in parts")
                     raise DiagramError(self.faults)
-                if block.slot is not None and scope.parent is not None:
+                if block.slot is not None and known(block.slot) and scope.parent is not None:
                     self.faults.add(
                         block.slot, "a part has no slots", "make the whole part a slot of the diagram"
                     )
@@ -194,21 +204,12 @@ class Expansion:
                     places = self._places(block, path)
                     self.blocks[path] = FlatBlock(path, block, scope, kind, values, places)
 
-    def _values(self, scope: Scope, block: BlockSpec, path: str) -> dict[str, YamlNode]:
+    def _values(self, scope: Scope, block: BlockSpec, path: str) -> dict[str, YamlNode | Unknown]:
         """Return the parameters of a block or part."""
-        values: dict[str, YamlNode] = {}
-        for name, node in block.parameters.items():
-            value = substitute(node, scope.params, self.faults)
-            if value is not None:
-                values[name] = value
-            elif not block.is_part:
-                self.broken.add(path)
+        given = block.parameters if known(block.parameters) else {}
+        values = {name: substitute(node, scope.params, self.faults) for name, node in given.items()}
         for name in self.settings.get(path, {}):
-            value = self._chosen(path, name, values.get(name))
-            if value is not None:
-                values[name] = value
-            elif values.pop(name, None) is not None:
-                self.broken.add(path)
+            values[name] = self._chosen(path, name, values.get(name, UNKNOWN))
         return values
 
     def _places(self, block: BlockSpec, path: str) -> Mapping[str, Place]:
@@ -216,42 +217,47 @@ class Expansion:
         settings = self.settings.get(path, {})
         return block.parameter_places | {name: setting.place for name, setting in settings.items()}
 
-    def _find_kind(self, block: BlockSpec, path: str) -> type[Block] | None:
+    def _find_kind(self, block: BlockSpec, path: str) -> type[Block] | Unknown:
         try:
             return self.catalogue.find(block.kind)
         except CatalogueError as error:
             self.faults.add(block.kind_place, error.problem, error.remedy)
-            self.unknown.add(path)
-            return None
+            self._unknown.add(path)
+            return UNKNOWN
 
     def _expand_part(
-        self, scope: Scope, block: BlockSpec, values: dict[str, YamlNode], files: tuple[str, ...]
+        self, scope: Scope, block: BlockSpec, values: dict[str, YamlNode | Unknown], files: tuple[str, ...]
     ) -> None:
         file = Path(block.kind_place.file).parent / block.kind
         spec = self._part(block, file, files)
-        if spec is None:
-            scope.broken.add(block.name)
-            self.unknown.add(scope.prefix + block.name)
+        if spec is UNKNOWN:
+            scope.children[block.name] = UNKNOWN
+            self._unknown.add(scope.prefix + block.name)
             return
         places = self._places(block, scope.prefix + block.name)
         for name in values:
             if name not in spec[PARAMS]:
                 problem = f"part '{block.kind}' has no parameter '{name}'"
-                remedy = remedy_for(name, values, spec[PARAMS], replaces=name not in block.parameters)
+                remedy = remedy_for(name, values, spec[PARAMS], replaces=name not in block.parameter_places)
                 self.faults.add(places[name], problem, remedy)
-        inputs, declared = block.inputs or {}, spec[PORTS].inputs
-        for name, given in inputs.items():
-            if name not in declared:
-                problem = f"part '{block.kind}' has no input '{name}'"
-                self.faults.add(given.place, problem, remedy_for(name, inputs, declared))
-        for name in absent(declared, inputs, declared) if "in" not in block.told else ():
-            remedy = f"add '{name}: block.port' under 'in', or a constant"
-            self.faults.add(block.place, f"input '{name}' is not connected", remedy)
+        if block.inputs is not UNKNOWN:
+            self._check_inputs(block, block.inputs or {}, spec[PORTS].inputs)
         child = Scope(f"{scope.prefix}{block.name}/", spec, spec[PARAMS] | values, scope, block)
         scope.children[block.name] = child
         self._expand(child, (*files, os.path.realpath(file)))
 
-    def _part(self, block: BlockSpec, file: Path, files: tuple[str, ...]) -> FileSpec | None:
+    def _check_inputs(
+        self, block: BlockSpec, inputs: Mapping[str, InputSpec], declared: Collection[str]
+    ) -> None:
+        for name, given in inputs.items():
+            if name not in declared:
+                problem = f"part '{block.kind}' has no input '{name}'"
+                self.faults.add(given.place, problem, remedy_for(name, inputs, declared))
+        for name in absent(declared, inputs, declared):
+            remedy = f"add '{name}: block.port' under 'in', or a constant"
+            self.faults.add(block.place, f"input '{name}' is not connected", remedy)
+
+    def _part(self, block: BlockSpec, file: Path, files: tuple[str, ...]) -> FileSpec | Unknown:
         problem, remedy = "", ""
         if os.path.realpath(file) in files:
             problem, remedy = f"part '{block.kind}' contains itself", "use another file"
@@ -261,5 +267,5 @@ class Expansion:
             problem, remedy = file_trouble(str(file), block.kind, files)
         if problem:
             self.faults.add(block.kind_place, problem, remedy)
-            return None
+            return UNKNOWN
         return self.parts.read(file)

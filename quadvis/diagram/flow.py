@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from quadvis.block import Block, In
+from quadvis.block import Block, In, Interface
 from quadvis.diagram.values import OpenUnits, shape_text
 from quadvis.engine.graph import Constant, Node, Task, Wire, selected
 from quadvis.engine.names import index_text
-from quadvis.errors import Faults, Place
+from quadvis.errors import UNKNOWN, Faults, Place, Unknown
 from quadvis.units import Unit
 
 ONE = Unit()
@@ -24,38 +24,34 @@ class Connection:
     """One input as the diagram gives it, with the place to name in a fault."""
 
     place: Place
-    source: Wire | Constant | None  # None: there is nothing to check
+    source: Wire | Constant | Unknown
     units: OpenUnits = ()  # of a constant, where the declaration leaves them open
-    across: Place | None = None  # where the crossing is written
+    across: Place | Unknown | None = None  # where the crossing is written
 
 
 @dataclass
 class Draft:
-    """A block whose wires are not checked yet.
-
-    ``block`` is the class alone if the parameters are wrong: what depends on them is not looked at. ``task``
-    is None if the rate is.
-    """
+    """A block whose wires are not checked yet."""
 
     path: str
     place: Place
     kind: str
-    block: Block | type[Block]
-    task: Task | None
+    type: type[Block]
+    block: Block | Unknown
+    task: Task | Unknown
     connections: dict[str, Connection]
     places: Mapping[str, Place] = field(default_factory=dict)  # of the parameters that are given
     units: Mapping[str, OpenUnits] = field(default_factory=dict)  # of the parameters where they are open
     origins: Mapping[str, Place] = field(default_factory=dict)  # where their values are written
-    told: bool = False  # that its inputs cannot be read
 
     @property
-    def whole(self) -> bool:
-        """True if its parameters are known."""
-        return isinstance(self.block, Block)
+    def interface(self) -> Interface:
+        """What the block declares, which is known also where its parameters are not."""
+        return self.type.interface
 
 
 class Link(NamedTuple):
-    """A wire between two ports that there are."""
+    """A wire whose two ports exist."""
 
     draft: Draft
     port: str
@@ -65,26 +61,26 @@ class Link(NamedTuple):
 
     @property
     def key(self) -> Key:
-        """What tells it from all others."""
+        """Its identity: block and input."""
         return self.draft.path, self.port
 
 
 class Flow:
     """Lets what is known flow along the wires until all is known, each block after the blocks that feed it.
 
-    ``lost`` are inputs of which nothing is known, since their fault has been told: what depends on them is
-    not looked at. In a ring of blocks nothing comes first; there one block goes ahead with what it has. What
-    is found does not depend on the order of the blocks in the file: where a choice is left the names decide.
+    ``unknown`` are inputs of which nothing is known: what depends on them is left out. A cycle has no first
+    block: there one block goes ahead with what it has. What is found does not depend on the order of the
+    blocks in the file: where a choice is left the names decide.
     """
 
     def __init__(self, drafts: Mapping[str, Draft], nodes: Mapping[str, Node], links: Sequence[Link],
-                 lost: Collection[Key], faults: Faults) -> None:  # fmt: skip
+                 unknown: Collection[Key], faults: Faults) -> None:  # fmt: skip
         self.drafts, self.nodes, self.faults = drafts, nodes, faults
-        self.lost = set(lost)
+        self.unknown = set(unknown)
         self._waiting = {link.key: link for link in links}
         self._ready: dict[Key, Link] = {}  # those that wait only for the other inputs of their block
         self._settled: set[str] = set()
-        self._told: set[Place] = set()
+        self._reported: set[Place] = set()
         self._into: dict[str, list[Link]] = {path: [] for path in drafts}
         self._from: dict[str, list[Link]] = {path: [] for path in drafts}
         for link in sorted(links, key=self._order):
@@ -94,7 +90,7 @@ class Flow:
     @staticmethod
     def _order(link: Link) -> tuple[str, int]:
         """Return what sorts wires by the block and the port that they feed."""
-        return link.draft.path, list(link.draft.block.interface.inputs).index(link.port)
+        return link.draft.path, list(link.draft.interface.inputs).index(link.port)
 
     def run(self) -> None:
         """Follow every wire."""
@@ -172,12 +168,12 @@ class Flow:
         del self._waiting[link.key]
         del self._ready[link.key]
         if not self.knows(link) or not self.take(link):
-            self.lost.add(link.key)
+            self.unknown.add(link.key)
 
     def fault(self, path: str, place: Place, problem: str, remedy: str = "") -> None:
-        """Tell a fault of a block, once for a wire that leads to several blocks of a part."""
-        if place not in self._told:
-            self._told.add(place)
+        """Report a fault of a block, once for a wire that leads to several blocks of a part."""
+        if place not in self._reported:
+            self._reported.add(place)
             self.faults.add(place, problem, remedy, subject=f"block '{path}'")
 
     def knows(self, link: Link) -> bool:
@@ -185,7 +181,7 @@ class Flow:
         raise NotImplementedError
 
     def take(self, link: Link) -> bool:
-        """Give it to the consumer; False if it does not fit, which is told."""
+        """Give it to the consumer; False if it does not fit, which is reported."""
         raise NotImplementedError
 
     def settle(self, path: str) -> None:
@@ -237,7 +233,7 @@ class ShapeFlow(Flow):
         return self._fit(link.draft, link.port, part[1], source, remedy)
 
     def _fit(self, draft: Draft, port: str, shape: Sequence[int], source: str, remedy: str = "") -> bool:
-        signal = draft.block.interface.inputs[port].signal
+        signal = draft.interface.inputs[port].signal
         sizes = self.nodes[draft.path].sizes
         trial = dict(sizes)
         if signal.unify(tuple(shape), trial):
@@ -253,18 +249,18 @@ class ShapeFlow(Flow):
         """Let constants fix what wires do not; sizes that nothing fixes become a scalar or 1."""
         draft, node = self.drafts[path], self.nodes[path]
         for port, connection in draft.connections.items():
-            if isinstance(connection.source, Constant) and (path, port) not in self.lost:
+            if isinstance(connection.source, Constant) and (path, port) not in self.unknown:
                 shape = np.shape(connection.source.value)
                 if not self._fit(draft, port, shape, f"the constant has {shape_text(shape)}"):
-                    self.lost.add((path, port))
-        if not draft.whole:
+                    self.unknown.add((path, port))
+        if draft.block is UNKNOWN:
             return
         interface = node.block.interface
-        doubtful = {
-            size for port, declared in interface.inputs.items() if (path, port) in self.lost
+        undecided = {
+            size for port, declared in interface.inputs.items() if (path, port) in self.unknown
             for size in declared.signal.shape
         }  # fmt: skip
         for declared in (*interface.outputs.values(), *interface.inputs.values()):
             for size in declared.signal.shape:
-                if isinstance(size, str) and size not in doubtful:
+                if isinstance(size, str) and size not in undecided:
                     node.sizes.setdefault(size, () if size == "*" else 1)

@@ -28,7 +28,7 @@ def load(
     seed: int | None = None,
     own_blocks: OwnBlocks = True,
 ) -> Diagram:
-    """Load and check a diagram; DiagramError tells all its faults at once.
+    """Load and check a diagram; DiagramError has all its faults.
 
     ``settings`` replace parameters: ``{"control/roll.bandwidth": "2.5 rad/s"}``, or texts
     ``control/roll.bandwidth=2.5 rad/s``; a name without a dot is a parameter of the diagram. ``params`` are
@@ -40,7 +40,7 @@ def load(
     """
     faults = Faults()
     texts = setting_texts(settings)
-    with quoting_only(_quotable(path, params, texts)), _told_once(faults) as digests:
+    with quoting_only(_quotable(path, params, texts)), _reported_once(faults) as digests:
         given, files = read_settings(settings, params, faults)
         spec = read_file(Path(path), faults)
         diagram = Assembly(spec, faults, files, own_blocks).diagram(variant, given, stop_time, seed)
@@ -56,7 +56,7 @@ def load_text(
 ) -> Diagram:
     """Load a diagram from a text, such as the resolved one in a log, as if it stood in a file of a folder."""
     faults = Faults()
-    with quoting_only([folder]), _told_once(faults) as digests:
+    with quoting_only([folder]), _reported_once(faults) as digests:
         spec = read_text(text, Path(folder) / name, faults)
         diagram = Assembly(spec, faults, own_blocks=own_blocks).diagram()
         return replace(diagram, files=digests)
@@ -65,10 +65,10 @@ def load_text(
 def check(
     path: str | Path, settings: Given = (), params: Files = (), own_blocks: OwnBlocks = True
 ) -> Diagram:
-    """Load a diagram, and with each of its variants in turn; DiagramError tells the faults of all of them."""
+    """Load a diagram, and with each of its variants in turn; DiagramError has the faults of all of them."""
     faults = Faults()
     quotable = _quotable(path, params, setting_texts(settings))
-    with quoting_only(quotable), _told_once(faults) as digests:
+    with quoting_only(quotable), _reported_once(faults) as digests:
         given, files = read_settings(settings, params, faults)
         spec = read_file(Path(path), faults)
         assembly = Assembly(spec, faults, files, own_blocks)
@@ -88,7 +88,7 @@ def _quotable(path: str | Path, params: Files, settings: Sequence[str]) -> Itera
 
 
 @contextmanager
-def _told_once(faults: Faults) -> Iterator[Mapping[str, str]]:
+def _reported_once(faults: Faults) -> Iterator[Mapping[str, str]]:
     """Raise what was found, and give the SHA-256 of every file that is read meanwhile, by path.
 
     One cause may be met from several blocks: its place and problem are the same.

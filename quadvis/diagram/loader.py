@@ -9,28 +9,28 @@ from quadvis.diagram.sections.header import is_version
 from quadvis.diagram.sections.section import DIAGRAM, PART, Values
 from quadvis.diagram.spec import FileSpec
 from quadvis.document import YamlMap, YamlNode, parse_yaml, read_yaml
-from quadvis.errors import Faults, Place
+from quadvis.errors import UNKNOWN, Faults, Place, Unknown
 
 
-def read_file(path: Path, faults: Faults) -> FileSpec | None:
-    """Read a diagram; faults are collected, and None means that nothing could be read."""
+def read_file(path: Path, faults: Faults) -> FileSpec | Unknown:
+    """Read a diagram; faults are collected."""
     return _read(path, faults.collect(read_yaml, path, faults), faults, DIAGRAM)
 
 
-def read_part(path: Path, faults: Faults) -> FileSpec | None:
+def read_part(path: Path, faults: Faults) -> FileSpec | Unknown:
     """Read a part likewise."""
     return _read(path, faults.collect(read_yaml, path, faults), faults, PART)
 
 
-def read_text(text: str, path: Path, faults: Faults) -> FileSpec | None:
+def read_text(text: str, path: Path, faults: Faults) -> FileSpec | Unknown:
     """Read the text of a diagram as if it stood in a file."""
     return _read(path, faults.collect(parse_yaml, text, str(path), faults), faults, DIAGRAM)
 
 
-def _read(path: Path, node: YamlNode | None, faults: Faults, kind: str) -> FileSpec | None:
+def _read(path: Path, node: YamlNode | None, faults: Faults, kind: str) -> FileSpec | Unknown:
     root = faults.collect(node.mapping) if node is not None else None
     if root is None or not is_version(root, faults) or not _is_kind(root, faults, kind):
-        return None
+        return UNKNOWN
     fields = root.fields(keys(kind, required=True), keys(kind, required=False), faults)
     values = Values()
     for section in FILE_SECTIONS:

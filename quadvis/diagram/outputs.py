@@ -38,7 +38,7 @@ def files_written(blocks: Iterable[Block]) -> list[str]:
 
 
 def check_writers(drafts: Sequence[Draft], sources: Iterable[Path], faults: Faults) -> None:
-    """Tell the blocks that would write over what is read, into a folder that is played, or over another."""
+    """Report blocks that would write over what is read, into a folder that is played, or over another."""
     blocks = {draft.path: draft.block for draft in drafts if isinstance(draft.block, Block)}
     writers = [
         Writer(draft.path, name, path, draft.places.get(name, draft.place))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from quadvis.document import YamlNode
 from quadvis.engine.graph import Index
 from quadvis.engine.names import read_name
-from quadvis.errors import Faults, Place
+from quadvis.errors import UNKNOWN, Faults, Place, Unknown
 
 
 @dataclass(frozen=True)
@@ -20,14 +20,14 @@ class Reference:
     index: Index = ()
 
 
-def read_reference(node: YamlNode, faults: Faults) -> Reference | None:
-    """Read the name of a signal; None if it is none, which is told."""
+def read_reference(node: YamlNode, faults: Faults) -> Reference | Unknown:
+    """Return the signal that a text names."""
     text = faults.collect(node.text)
     if text is None:
-        return None
+        return UNKNOWN
     named = read_name(text)
     if named is None:
         remedy = "write block.port, block.port[0] or part/block.port[0:2]"
         faults.add(node.place, f"'{text}' is not a signal", remedy)
-        return None
+        return UNKNOWN
     return Reference(node.place, named.block, named.port, named.index)

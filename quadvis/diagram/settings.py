@@ -23,7 +23,7 @@ from quadvis.diagram.sections.forms import TEXT, Schema, map_of, ref
 from quadvis.diagram.sections.header import is_version
 from quadvis.diagram.values import read_constant
 from quadvis.document import YamlList, YamlMap, YamlNode, parse_yaml, read_yaml
-from quadvis.errors import DiagramError, Faults, Odd, Place
+from quadvis.errors import UNKNOWN, DiagramError, Faults, Odd, Place, Unknown, known
 from quadvis.errors.characters import first_odd
 from quadvis.machine.missing_file import file_trouble
 
@@ -37,10 +37,10 @@ SETTING: Schema = {"pattern": r"^([A-Za-z_][A-Za-z0-9_/]*\.)?[A-Za-z_][A-Za-z0-9
 
 @dataclass(frozen=True)
 class Setting:
-    """A value given from outside, and where its name stands; None: what is wrong with it has been told."""
+    """A value given from outside, and where its name stands."""
 
     place: Place
-    value: YamlNode | None
+    value: YamlNode | Unknown
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ def _read_file(
 
 
 def _is_parameters(root: YamlMap, faults: Faults) -> bool:
-    """Tell a diagram or a part in one sentence, not by all that is odd in it."""
+    """Report a diagram or a part in one sentence, not by all that is odd in it."""
     if "set" in root or "blocks" not in root:
         return True
     problem = "this is a diagram or a part of one, since it has 'blocks'"
@@ -163,8 +163,8 @@ def _from_texts(texts: Iterable[str], origin: str, faults: Faults) -> Iterator[t
                     remedy = "write block.parameter and value, such as {{'{}': '{}'}}".format(*example)
                 faults.add(place, problem, remedy)
                 continue
-            node = faults.collect(_value, text, parameter, place)
-            yield name, Setting(place, read_constant(node, faults) if node is not None else None)
+            node = faults.read(_value, text, parameter, place)
+            yield name, Setting(place, read_constant(node, faults) if known(node) else UNKNOWN)
 
 
 def _odd(name: str) -> Odd | None:

@@ -9,11 +9,10 @@ from quadvis.block import Out
 from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec
 from quadvis.diagram.sections.variants import VARIANTS, Variants
 from quadvis.diagram.spec import FileSpec
-from quadvis.errors import Faults, suggestion
+from quadvis.errors import UNKNOWN, Faults, known, suggestion
 
 Outputs = Mapping[str, Mapping[str, Out]]  # by slot and port
 Pair = tuple[BlockSpec, BlockSpec]  # what stands in a slot, and what a variant puts there
-Refused = set[tuple[str, str]]  # slots and ports that another block should have, which is told
 
 
 def fill_slots(spec: FileSpec, variant: str | None, faults: Faults) -> FileSpec:
@@ -55,20 +54,20 @@ def _fitting(
     spec: FileSpec, variant: str, faults: Faults
 ) -> Iterator[tuple[str, tuple[BlockSpec, BlockSpec]]]:
     """Yield by slot the diagram's block and the variant's; what fits no slot is reported."""
-    known = spec[BLOCKS]
+    blocks = spec[BLOCKS]
     for slot, block in spec[VARIANTS][variant].slots.items():
-        if block is None or (slot in known and known[slot] is None):
+        base = blocks.get(slot)
+        if block is UNKNOWN or base is UNKNOWN:
             continue
-        base = known.get(slot)
         if base is None:
-            remedy = suggestion(slot, [name for name, other in known.items() if other and other.slot])
+            remedy = suggestion(slot, [name for name, other in blocks.items() if known(other) and other.slot])
             problem = f"variant '{variant}' fills '{slot}', which is not in the diagram"
             faults.add(block.place, problem, remedy)
-        elif base.slot is not None:
-            yield slot, (base, block)
-        elif "slot" not in base.told:
+        elif base.slot is None:
             problem = f"variant '{variant}' fills '{slot}', which is not a slot"
             faults.add(block.place, problem, f"write 'slot: true' in block '{slot}'")
+        elif known(base.slot):
+            yield slot, (base, block)
 
 
 def _in_slot(base: BlockSpec, block: BlockSpec) -> BlockSpec:
@@ -79,12 +78,12 @@ def _in_slot(base: BlockSpec, block: BlockSpec) -> BlockSpec:
 
 def check_slots(
     spec: FileSpec, filled: FileSpec, promised: Outputs, given: Outputs, faults: Faults
-) -> Refused:
-    """Tell the outputs that a block in a slot lacks, or has of another kind, and return them."""
-    refused = set()
+) -> set[tuple[str, str]]:
+    """Report the outputs that a block in a slot lacks, or has of another kind; return slots and ports."""
+    found = set()
     for slot, outputs in given.items():
         before, now = spec[BLOCKS][slot], filled[BLOCKS][slot]
-        assert before is not None and now is not None
+        assert known(before) and known(now)
         for port, wanted in promised[slot].items():
             offered = outputs.get(port)
             problem = ""
@@ -94,10 +93,10 @@ def check_slots(
                 this, that = _words(offered), _words(wanted)
                 problem = f"output '{port}' of '{now.kind}' is {this}, that of '{before.kind}' is {that}"
             if problem:
-                refused.add((slot, port))
+                found.add((slot, port))
                 remedy = "choose one with the same outputs"
                 faults.add(now.kind_place, problem, remedy, subject=f"block '{slot}'")
-    return refused
+    return found
 
 
 def _differ(offered: Out, wanted: Out) -> bool:

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from fractions import Fraction
 
-from quadvis.diagram.check import NO_TASK, rate_text
+from quadvis.diagram.check import rate_text
 from quadvis.diagram.sections.rates import RATES
 from quadvis.diagram.sections.solver import SOLVER
 from quadvis.diagram.spec import FileSpec
 from quadvis.diagram.times import time_text
-from quadvis.engine.graph import Graph, Task, common_divisor
-from quadvis.errors import Faults, Place
+from quadvis.engine.graph import Task, common_divisor, rate_monotonic
+from quadvis.errors import UNKNOWN, Faults, Place, known
 
 MOST = 10**9  # hours of computing, even without a block
 
 
-def check_ticks(spec: FileSpec, graph: Graph, stop: Fraction, faults: Faults) -> None:
-    """Tell a run of too many ticks, with the rates that make it so."""
-    tasks = [task for task in graph.tasks if task is not NO_TASK]
-    if not tasks or stop / graph.tick < MOST:
+def check_ticks(
+    spec: FileSpec, used: Collection[Task], step: Fraction | None, stop: Fraction, faults: Faults
+) -> None:
+    """Report a run of too many ticks, with those of the rates in use that make it so."""
+    tasks = rate_monotonic(used)
+    if not tasks or stop / (step or _tick(tasks)) < MOST:
         return
     run = f"a run of {time_text(stop)}"
-    if graph.step is not None:
-        problem = f"with a step of {time_text(graph.step)} {run} {_count(stop / graph.tick)}"
+    if step is not None:
+        problem = f"with a step of {time_text(step)} {run} {_count(stop / step)}"
         place = spec[SOLVER].place or spec.place
         faults.add(place, problem, "choose a larger step or a shorter stop time", subject="")
         return
@@ -69,5 +71,5 @@ def _rate(task: Task) -> str:
 
 
 def _place(spec: FileSpec, task: Task) -> Place:
-    rate = spec[RATES].get(task.name)
-    return rate.place if rate is not None else spec.place
+    rate = spec[RATES].get(task.name, UNKNOWN)
+    return rate.place if known(rate) else spec.place

@@ -11,7 +11,7 @@ from quadvis.block import Declared, Param
 from quadvis.diagram.flow import ONE, Flow, Key, Link
 from quadvis.diagram.values import Bare, OpenUnits
 from quadvis.engine.graph import Constant, selected
-from quadvis.errors import Place
+from quadvis.errors import UNKNOWN, Place, known
 from quadvis.units import Unit, unify
 
 
@@ -129,7 +129,7 @@ class UnitFlow(Flow):
         """Note the units of all ports and parameters."""
         for path, node in self.nodes.items():
             interface = node.block.interface
-            params = interface.params.values() if self.drafts[path].whole else ()
+            params = interface.params.values() if known(self.drafts[path].block) else ()
             for declared in (*interface.outputs.values(), *params, *interface.inputs.values()):
                 units = self._units(path, declared)
                 if not any(unit.variables for unit in units):
@@ -177,11 +177,15 @@ class UnitFlow(Flow):
     def _given(self, path: str) -> Iterator[tuple[str, Declared, OpenUnits]]:
         """Yield the parameters and constants that are given, with the units in which they were written."""
         draft = self.drafts[path]
-        interface = draft.block.interface
+        interface = draft.interface
         for name, units in draft.units.items():
             yield name, interface.params[name], self._tried(path, name, units)
         for name, connection in draft.connections.items():
-            if isinstance(connection.source, Constant) and connection.units and (path, name) not in self.lost:
+            if (
+                isinstance(connection.source, Constant)
+                and connection.units
+                and (path, name) not in self.unknown
+            ):
                 yield name, interface.inputs[name], self._tried(path, name, connection.units)
 
     def _tried(self, path: str, name: str, units: OpenUnits) -> OpenUnits:
@@ -202,10 +206,10 @@ class UnitFlow(Flow):
 
     def settle(self, path: str) -> None:
         """Let given values bind what wires do not; what is still open then counts as plain numbers."""
-        bindings, interface = self.bindings[path], self.drafts[path].block.interface
+        bindings, interface = self.bindings[path], self.drafts[path].interface
         self._match_given(path)
-        doubtful = [port for name, port in interface.inputs.items() if (path, name) in self.lost]
-        if bindings.open(doubtful) or not self.drafts[path].whole:
+        undecided = [port for name, port in interface.inputs.items() if (path, name) in self.unknown]
+        if bindings.open(undecided) or self.drafts[path].block is UNKNOWN:
             return
         self._match_bare(path)
         bindings.spread()
@@ -221,23 +225,23 @@ class UnitFlow(Flow):
         for name, declared, units in self._given(path):
             wrong = bindings.refuses(declared.units, units)
             if wrong is not None:
-                self._tell_given(path, name, declared, wrong, None)
+                self._report_given(path, name, declared, wrong, None)
 
     def _match_given(self, path: str) -> None:
         for name, declared, units in self._given(path):
             wrong = self.bindings[path].match(declared.units, units)
             if wrong is not None:
                 unit = units[wrong]
-                self._tell_given(path, name, declared, wrong, unit if isinstance(unit, Unit) else None)
+                self._report_given(path, name, declared, wrong, unit if isinstance(unit, Unit) else None)
 
     def _match_bare(self, path: str) -> None:
         """Let numbers without unit bind what is open, first those that stand for a variable itself."""
-        outputs = {unit for port in self.drafts[path].block.interface.outputs.values() for unit in port.units}
+        outputs = {unit for port in self.drafts[path].interface.outputs.values() for unit in port.units}
         given = sorted(self._given(path), key=lambda item: (not _variable(item[1].units[0]), item[0]))
         for _, declared, units in given:
             self.bindings[path].match_bare(declared.units, units, outputs)
 
-    def _tell_given(self, path: str, name: str, declared: Declared, index: int, unit: Unit | None) -> None:
+    def _report_given(self, path: str, name: str, declared: Declared, index: int, unit: Unit | None) -> None:
         draft = self.drafts[path]
         wanted = self.bindings[path].unit(declared.units, index)
         place = draft.connections[name].place if name in draft.connections else draft.places[name]
@@ -256,7 +260,7 @@ class UnitFlow(Flow):
         units = {type(unit) for _, _, units in self._given(path) for unit in units}
         if Unit in units and path not in self._prepared:
             return 3
-        if any((path, port) in self.lost for port in self.drafts[path].block.interface.inputs):
+        if any((path, port) in self.unknown for port in self.drafts[path].interface.inputs):
             return 2
         return int(Bare in units)
 

@@ -1,4 +1,4 @@
-"""Units that do not fit: several wires that one value makes wrong are told as one fault, at that value.
+"""Units that do not fit: several wires that one value makes wrong are one fault, at that value.
 
 Which value that is, is tried out: the units flow again with a unit that is as much larger or smaller as the
 first wires are wrong. If wires fit then that did not, the value is to blame.
@@ -22,7 +22,7 @@ MOST_WORK = 5_000  # blocks that are looked at in all trials together
 
 
 class _Trial(Faults):
-    """Faults of which nobody is told; there is no end to them."""
+    """Faults that nobody sees; their number has no limit."""
 
     LIMIT = 10**9
 
@@ -40,19 +40,19 @@ def follow_units(
     drafts: Mapping[str, Draft],
     nodes: Mapping[str, Node],
     links: Sequence[Link],
-    lost: Collection[Key],
+    unknown: Collection[Key],
     faults: Faults,
 ) -> UnitFlow:
-    """Let the units flow along the wires, note them in the nodes, and tell what does not fit."""
+    """Let the units flow along the wires, note them in the nodes, and report what does not fit."""
 
     def flow(changed: Mapping[Key, Unit]) -> UnitFlow:
-        found = UnitFlow(drafts, nodes, links, lost, _Trial())
+        found = UnitFlow(drafts, nodes, links, unknown, _Trial())
         found.changed = changed
         found.run()
         return found
 
     found = flow({})
-    told: list[Fault] = []
+    blames: list[Fault] = []
     ratios: dict[Place, Unit] = {}
     work = MOST_WORK
     while _is_chain(found) and work > 0:
@@ -60,7 +60,7 @@ def follow_units(
         for value in _values(found):
             trial = flow({**found.changed, **dict.fromkeys(value.keys, value.factor)})
             work -= len(drafts)
-            if _count(trial) < _count(found) - 1 and _told(trial) < _told(found):
+            if _count(trial) < _count(found) - 1 and _places(trial) < _places(found):
                 least = min(_count(flow) for _, flow in (*best, (value, trial)))
                 best = [pair for pair in (*best, (value, trial)) if _count(pair[1]) == least]
             if work <= 0:
@@ -71,10 +71,10 @@ def follow_units(
         gone = [fault for fault in found.faults if fault.place not in {other.place for other in trial.faults}]
         # If several values could be to blame, the beginning of the chain stands for all of it.
         blamed = _blame(drafts, value, len(gone)) if len(best) == 1 else gone[0]
-        told.append(blamed)
+        blames.append(blamed)
         ratios[blamed.place] = value.factor
         found = trial
-    for fault in (*told, *found.faults):
+    for fault in (*blames, *found.faults):
         ratio = (ratios | found.ratios | found.given_ratios).get(fault.place)
         rule = faults.once(ANGLES) if ratio is not None and _is_angle(ratio) else ""
         faults.append(replace(fault, remedy="; ".join(filter(None, (fault.remedy, rule)))))
@@ -85,7 +85,7 @@ def follow_units(
 def _is_chain(flow: UnitFlow) -> bool:
     """Say whether one value may be behind several faults.
 
-    Values that do not fit the wires that they meet are told where they stand, unless they lack an angle only.
+    Values that do not fit the wires that they meet are reported where they stand, unless they lack an angle only.
     """
     return _count(flow) > 1 and (bool(flow.ratios) or all(map(_is_angle, flow.given_ratios.values())))
 
@@ -94,7 +94,7 @@ def _count(flow: UnitFlow) -> int:
     return len(flow.ratios) + len(flow.given_ratios)
 
 
-def _told(flow: UnitFlow) -> set[Place]:
+def _places(flow: UnitFlow) -> set[Place]:
     return {fault.place for fault in flow.faults}
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from quadvis.block import Param, SignalType
 from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar, measure
 from quadvis.document.number_lists import Numbers
-from quadvis.errors import Faults, quoted, suggestion
+from quadvis.errors import UNKNOWN, Faults, Unknown, known, quoted, suggestion
 from quadvis.units import Unit, parse_quantity, split_quantity
 
 QUANTITY_KEYS = ("value", "unit")
@@ -27,57 +27,57 @@ BARE = Bare()
 OpenUnits = tuple[Unit | Bare | None, ...]  # of the elements; None is a 0 without unit, which fits any
 
 
-def read_constant(node: YamlNode, faults: Faults) -> YamlNode | None:
+def read_constant(node: YamlNode, faults: Faults) -> YamlNode | Unknown:
     """Return a value with each unit at its number: ``{value: [1, 2], unit: m}`` becomes ``[1 m, 2 m]``.
 
-    None if it is wrong, which is told; ``$name`` has no place in it.
+    ``$name`` has no place in it.
     """
     return substitute(node, None, faults)
 
 
 def substitute(
-    node: YamlNode, params: Mapping[str, YamlNode | None] | None, faults: Faults
-) -> YamlNode | None:
-    """Do the same, with every ``$name`` and ``$name[i]`` replaced by the parameter that it names."""
+    node: YamlNode, params: Mapping[str, YamlNode | Unknown] | None, faults: Faults
+) -> YamlNode | Unknown:
+    """Return a value likewise, with ``$name`` and ``$name[i]`` replaced by the parameter that they name."""
     if isinstance(node, YamlScalar):
         return _parameter(node, params, faults) if node.value.startswith("$") else node
     if isinstance(node, Numbers):
         return node
     if isinstance(node, YamlList):
         found = [substitute(child, params, faults) for child in node]
-        whole = [child for child in found if child is not None]
+        whole = [child for child in found if known(child)]
         if len(whole) < len(found):
-            return None
+            return UNKNOWN
         return YamlList(whole, node.file, node.line, node.column, node.key)
     assert isinstance(node, YamlMap)
     if not any(key in node for key in QUANTITY_KEYS):
         return node  # no value at all: whoever reads it will say so
     node = node.fields(QUANTITY_KEYS[:1], QUANTITY_KEYS[1:], faults)
-    value = substitute(node["value"], params, faults) if "value" in node else None
-    return None if value is None else faults.collect(_spread, value, node.get("unit"), node.key)
+    value = substitute(node["value"], params, faults) if "value" in node else UNKNOWN
+    return faults.read(_spread, value, node.get("unit"), node.key) if known(value) else UNKNOWN
 
 
 def _parameter(
-    node: YamlScalar, params: Mapping[str, YamlNode | None] | None, faults: Faults
-) -> YamlNode | None:
+    node: YamlScalar, params: Mapping[str, YamlNode | Unknown] | None, faults: Faults
+) -> YamlNode | Unknown:
     if params is None:
         faults.add(node.place, f"{quoted(node.value)} stands where a value must", "write the value itself")
-        return None
+        return UNKNOWN
     match = _PARAMETER.fullmatch(node.value)
     if match is None or match["name"] not in params:
         name = match["name"] if match else node.value[1:]
         remedy = suggestion(name, params) or "declare it under 'params'"
         faults.add(node.place, f"there is no parameter {quoted(name)} here", remedy)
-        return None
+        return UNKNOWN
     found = params[match["name"]]
-    if found is None or match["element"] is None:
+    if found is UNKNOWN or match["element"] is None:
         return found
     element = int(match["element"])
     if isinstance(found, YamlList) and element < len(found):
         return found[element]
     count = f"has {len(found)} elements" if isinstance(found, YamlList) else "is one value"
     faults.add(node.place, f"parameter '{match['name']}' {count}, there is no [{element}]", "count from 0")
-    return None
+    return UNKNOWN
 
 
 def named_parameters(node: YamlNode) -> set[str]:

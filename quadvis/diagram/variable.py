@@ -13,7 +13,7 @@ from quadvis.diagram.wiring import Wiring
 from quadvis.document import YamlList, YamlNode, YamlScalar
 from quadvis.engine.graph import Graph, Node
 from quadvis.engine.names import PATH, PORT
-from quadvis.errors import DiagramError, suggestion
+from quadvis.errors import UNKNOWN, DiagramError, Unknown, known, suggestion
 from quadvis.units import Unit, UnitError, parse_quantity
 
 NAME = re.compile(rf"(?:(?P<block>{PATH})\.)?(?P<parameter>{PORT})(?:\[(?P<element>\d{{1,6}})\])?", re.ASCII)
@@ -62,10 +62,10 @@ def _values(
     wiring: Wiring, graph: Graph, node: YamlNode, path: str, name: str
 ) -> tuple[list[Unit], tuple[str, ...]]:
     """Return the units and the texts of a parameter's elements."""
-    scope: Scope | None = wiring.expansion.root
+    scope: Scope | Unknown = wiring.expansion.root
     for part in path.split("/") if path else ():
-        scope = scope.children.get(part) if scope is not None else None
-    if scope is not None:
+        scope = scope.children.get(part, UNKNOWN) if known(scope) else UNKNOWN
+    if known(scope):
         if name not in scope.params:
             where = f"part '{path}'" if path else "the diagram"
             raise node.fault(f"{where} has no parameter '{name}'", suggestion(name, scope.params))
@@ -77,12 +77,11 @@ def _values(
 
 
 def _written(
-    wiring: Wiring, node: YamlNode, name: str, value: YamlNode | None
+    wiring: Wiring, node: YamlNode, name: str, value: YamlNode | Unknown
 ) -> tuple[list[Unit], tuple[str, ...]]:
-    leaves = list(value) if isinstance(value, YamlList) else [value] if value is not None else []
-    wrong = {fault.place for fault in wiring.faults}
-    if value is None or any(leaf.place in wrong for leaf in leaves):
-        raise DiagramError(())  # what is wrong with it has been reported
+    leaves = list(value) if isinstance(value, YamlList) else [value]
+    if any(leaf is UNKNOWN or wiring.faults.reported(leaf.place) for leaf in leaves):
+        raise DiagramError(())
     units, texts = [], []
     for leaf in leaves:
         try:

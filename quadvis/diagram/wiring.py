@@ -10,37 +10,36 @@ from quadvis.diagram.expand import Expansion, FlatBlock, Scope
 from quadvis.diagram.reference import Reference
 from quadvis.diagram.sections.blocks import BLOCKS, INSIDE, InputSpec
 from quadvis.diagram.sections.ports import PORTS
-from quadvis.diagram.slots import Refused
 from quadvis.diagram.values import substitute
 from quadvis.document import YamlList, YamlNode
 from quadvis.engine.graph import Index, Wire
-from quadvis.errors import Faults, Place, suggestion
+from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known, suggestion
 
 MAX_PORTS = 50  # of parts, that a signal passes without meeting a block
 
 
 @dataclass(frozen=True)
 class Source:
-    """What an input is given; None where the fault has been told."""
+    """What an input is given, and where it is written how the wire crosses between rates."""
 
     place: Place
-    source: Wire | YamlNode | None
-    across: Place | None = None
+    source: Wire | YamlNode | Unknown
+    across: Place | Unknown | None = None
 
 
 class Wiring:
-    """Finds what is behind a name. ``refused`` are outputs of slots whose fault has been told."""
+    """Finds what is behind a name. ``unknown`` are blocks and outputs of slots that do not fit."""
 
     def __init__(self, expansion: Expansion, faults: Faults) -> None:
         self.expansion, self.faults = expansion, faults
-        self.refused: Refused = set()
-        # What goes in and out of parts is sought once, so that a fault in it is told once.
+        self.unknown: set[tuple[str, str]] = set()
+        # What goes in and out of parts is sought once, so that a fault in it is reported once.
         self._found: dict[tuple[str, str], Source] = {}
         self._sought: set[tuple[str, str]] = set()
 
     def check_ports(self, scope: Scope) -> None:
         """Look at what goes in and out of every part, used or not."""
-        for child in scope.children.values():
+        for child in scope.parts:
             for port in child.spec[PORTS].inputs:
                 self._entry(child, port)
             for port in child.spec[PORTS].outputs:
@@ -50,7 +49,7 @@ class Wiring:
     def ports(self, scope: Scope | None = None) -> Iterator[tuple[str, Wire]]:
         """Yield what goes out of every part, by its full name such as "control/heading.right"."""
         scope = scope or self.expansion.root
-        for child in scope.children.values():
+        for child in scope.parts:
             for port in child.spec[PORTS].outputs:
                 source = self._export(child, port).source
                 if isinstance(source, Wire):
@@ -59,20 +58,21 @@ class Wiring:
 
     def inputs(self, block: FlatBlock) -> Iterator[tuple[str, Source]]:
         """Yield what each input of a block is given."""
-        for port, given in (block.spec.inputs or {}).items():
+        inputs = block.spec.inputs or {}
+        for port, given in inputs.items() if known(inputs) else ():
             yield port, self._source(block.scope, given)
 
     def outputs(self, name: str) -> Mapping[str, Out]:
         """Return the outputs of one of the diagram's own blocks or parts, as far as they are right."""
         blocks, child = self.expansion.blocks, self.expansion.root.children.get(name)
-        if child is None:
-            kind = blocks[name].kind if name in blocks else None
-            return kind.interface.outputs if kind is not None else {}
+        if child is None or child is UNKNOWN:
+            kind = blocks[name].kind if name in blocks else UNKNOWN
+            return kind.interface.outputs if known(kind) else {}
         found = {}
         for port in child.spec[PORTS].outputs:
             source = self._export(child, port).source
-            kind = blocks[source.block].kind if isinstance(source, Wire) else None
-            if isinstance(source, Wire) and kind is not None:
+            kind = blocks[source.block].kind if isinstance(source, Wire) else UNKNOWN
+            if isinstance(source, Wire) and known(kind):
                 found[port] = kind.interface.outputs[source.port]
         return found
 
@@ -82,27 +82,27 @@ class Wiring:
             return self._indexed(self._inside(scope, reference), reference)
         owner, name = _owner(scope, reference.block)
         path = owner.prefix + name
-        if name.partition("/")[0] in owner.broken or name in owner.broken:
-            return Source(reference.place, None)
+        if not owner.knows(name):
+            return Source(reference.place, UNKNOWN)
         if name not in owner.spec[BLOCKS]:
             way = reference.block.removesuffix(name)
-            known = [way + other for other, block in owner.spec[BLOCKS].items() if block is not None]
-            known += [INSIDE] if owner.spec[PORTS].inputs else []
-            remedy = suggestion(reference.block, known)
+            names = [way + other for other, block in owner.spec[BLOCKS].items() if known(block)]
+            names += [INSIDE] if owner.spec[PORTS].inputs else []
+            remedy = suggestion(reference.block, names)
             self.faults.add(reference.place, f"there is no block '{reference.block}'", remedy)
-            return Source(reference.place, None)
+            return Source(reference.place, UNKNOWN)
         child = owner.children.get(name)
-        if child is None:
+        if child is None or child is UNKNOWN:
             kind = self.expansion.blocks[path].kind
-            if kind is None or not self._offers(path, reference, kind.interface.outputs):
-                return Source(reference.place, None)
+            if kind is UNKNOWN or not self._offers(path, reference, kind.interface.outputs):
+                return Source(reference.place, UNKNOWN)
             return Source(reference.place, Wire(path, reference.port, reference.index))
         if not self._offers(path, reference, child.spec[PORTS].outputs):
-            return Source(reference.place, None)
+            return Source(reference.place, UNKNOWN)
         return self._indexed(replace(self._export(child, reference.port), place=reference.place), reference)
 
     def _offers(self, path: str, reference: Reference, outputs: Mapping[str, object]) -> bool:
-        if (path, reference.port) in self.refused:
+        if (path, reference.port) in self.unknown:
             return False
         if reference.port not in outputs:
             remedy = suggestion(reference.port, outputs) if outputs else "it has none"
@@ -111,14 +111,16 @@ class Wiring:
         return reference.port in outputs
 
     def _source(self, scope: Scope, given: InputSpec) -> Source:
-        if given.source is None:
-            return Source(given.place, None)
+        if given.source is UNKNOWN:
+            return Source(given.place, UNKNOWN)
         if isinstance(given.source, YamlNode):
             return Source(given.place, substitute(given.source, scope.params, self.faults))
         found = self.find(scope, given.source)
-        if isinstance(found.source, Wire) and given.across is not None:
-            return Source(found.place, replace(found.source, crossing=given.across), given.across_place)
-        return found
+        if not isinstance(found.source, Wire) or given.across is None:
+            return found
+        if given.across is UNKNOWN:
+            return replace(found, across=UNKNOWN)
+        return Source(found.place, replace(found.source, crossing=given.across), given.across_place)
 
     def _inside(self, scope: Scope, reference: Reference) -> Source:
         if scope.parent is None:
@@ -132,26 +134,26 @@ class Wiring:
             self.faults.add(reference.place, f"this part has no input '{reference.port}'", remedy)
         else:
             return self._entry(scope, reference.port)
-        return Source(reference.place, None)
+        return Source(reference.place, UNKNOWN)
 
     def _entry(self, scope: Scope, port: str) -> Source:
         """Return what comes into a part by a port."""
         assert scope.instance is not None and scope.parent is not None
-        given = (scope.instance.inputs or {}).get(port)
-        if given is None:
-            return Source(scope.instance.place, None)
+        inputs = scope.instance.inputs or {}
+        if inputs is UNKNOWN or port not in inputs:
+            return Source(scope.instance.place, UNKNOWN)
         key = (f"{scope.prefix}{INSIDE}", port)
         if self._begin(key, scope, scope.spec[PORTS].inputs[port]):
             with self.faults.about(scope.subject):
-                self._found[key] = self._source(scope.parent, given)
+                self._found[key] = self._source(scope.parent, inputs[port])
             self._sought.discard(key)
         return self._found[key]
 
     def _export(self, scope: Scope, port: str) -> Source:
         """Return what goes out of a part by a port."""
         reference = scope.spec[PORTS].outputs[port]
-        if reference is None:
-            return Source(scope.spec.place, None)
+        if reference is UNKNOWN:
+            return Source(scope.spec.place, UNKNOWN)
         key = (scope.prefix, port)
         if self._begin(key, scope, reference.place):
             with self.faults.about(scope.subject):
@@ -170,46 +172,47 @@ class Wiring:
             problem = f"port '{key[1]}' leads through more than {MAX_PORTS} ports of parts and no block"
         if problem:
             self.faults.add(place, problem, remedy, subject=scope.subject)
-            self._found[key] = Source(place, None)
+            self._found[key] = Source(place, UNKNOWN)
             return False
         self._sought.add(key)
         return True
 
     def _indexed(self, found: Source, reference: Reference) -> Source:
-        if not reference.index or found.source is None:
+        if not reference.index or found.source is UNKNOWN:
             return found
         place = reference.place
         if isinstance(found.source, YamlNode):
             part = _element(found.source, reference.index)
-            if part is None:
+            if part is UNKNOWN:
                 self.faults.add(place, "the constant has no such element", "count from 0")
             return Source(place, part)
         if found.source.index:
             problem = "the signal is an element or a run already, it cannot take a second index"
             self.faults.add(place, problem, "write one index")
-            return Source(place, None)
+            return Source(place, UNKNOWN)
         return Source(place, replace(found.source, index=reference.index), found.across)
 
 
 def _owner(scope: Scope, name: str) -> tuple[Scope, str]:
     """Return the scope in which a block is named, and its name there: names may reach into parts."""
     head, slash, rest = name.partition("/")
-    if slash and name not in scope.spec[BLOCKS] and head in scope.children:
-        return _owner(scope.children[head], rest)
+    child = scope.children.get(head, UNKNOWN)
+    if slash and name not in scope.spec[BLOCKS] and known(child):
+        return _owner(child, rest)
     return scope, name
 
 
-def _element(node: YamlNode, index: Index) -> YamlNode | None:
-    """Return a part of a constant; None if there is no such part."""
+def _element(node: YamlNode, index: Index) -> YamlNode | Unknown:
+    """Return a part of a constant, if there is one."""
     for part in index:
         if not isinstance(node, YamlList):
-            return None
+            return UNKNOWN
         if isinstance(part, slice):
             values = node.values[part]
             if len(index) > 1 or not values or (part.stop or 0) > len(node):
-                return None
+                return UNKNOWN
             return YamlList(values, node.file, node.line, node.column, node.key)
         if part >= len(node):
-            return None
+            return UNKNOWN
         node = node[part]
     return node

@@ -20,7 +20,6 @@ CROSSINGS = {
     "delay": "the producer's value of one of its periods ago, which breaks loops",
     "newest": "whatever the producer gave last, for rates that do not fit into each other",
 }
-TOLD = "told"  # in place of a crossing that cannot be read
 CONTINUOUS = "continuous"  # the rate of what the solver integrates; all others are sampled
 SOLVERS = ("ode1", "ode2", "ode3", "ode4")
 
@@ -107,8 +106,7 @@ class Graph:
     @cached_property
     def tasks(self) -> list[Task]:
         """The tasks in use, fastest first (rate-monotonic), the continuous one before all."""
-        used = dict.fromkeys(node.task for node in self.nodes)
-        return sorted(used, key=lambda task: (not task.continuous, task.period, task.offset, task.name))
+        return rate_monotonic(dict.fromkeys(node.task for node in self.nodes))
 
     @cached_property
     def tick(self) -> Fraction:
@@ -124,6 +122,11 @@ class Graph:
         if count.denominator != 1:
             raise ValueError(f"{time} s is not a whole number of ticks of {self.tick} s")
         return count.numerator
+
+
+def rate_monotonic(tasks: Iterable[Task]) -> list[Task]:
+    """Return tasks fastest first, the continuous one before all."""
+    return sorted(tasks, key=lambda task: (not task.continuous, task.period, task.offset, task.name))
 
 
 def common_divisor(times: Sequence[Fraction]) -> Fraction:

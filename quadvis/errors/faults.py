@@ -13,6 +13,7 @@ from typing import ClassVar, NamedTuple, ParamSpec, TypeVar
 
 from quadvis.errors.characters import advice, character_name
 from quadvis.errors.discretion import is_foreign, without_quotes
+from quadvis.errors.unknown import UNKNOWN, Unknown
 from quadvis.errors.words import on_one_line, sentence
 
 _Arguments = ParamSpec("_Arguments")
@@ -165,6 +166,17 @@ class Faults(list[Fault]):
                 if fault not in self:
                     self.append(fault if fault.subject else replace(fault, subject=self.subject))
             return None
+
+    def read(
+        self, read: Callable[_Arguments, _Result], *args: _Arguments.args, **kwargs: _Arguments.kwargs
+    ) -> _Result | Unknown:
+        """Do the same as `collect`, for what is handed on: `UNKNOWN` in place of None."""
+        found = self.collect(read, *args, **kwargs)
+        return UNKNOWN if found is None else found
+
+    def reported(self, place: Place) -> bool:
+        """Say whether a fault at a place is kept."""
+        return any(fault.place == place for fault in self)
 
     @contextmanager
     def about(self, subject: str) -> Iterator[None]:

@@ -17,7 +17,7 @@ from quadvis.diagram.variable import Variable, find_variable
 from quadvis.diagram.wiring import Wiring
 from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar
 from quadvis.engine.names import wire_text
-from quadvis.errors import Faults
+from quadvis.errors import UNKNOWN, Faults, Unknown, known
 from quadvis.units import Unit, split_quantity
 
 ANALYSE_KEYS = ("at", "cuts", "limits")
@@ -76,8 +76,8 @@ class Questions:
         found = [_cut(label, _list(signals), context) for label, signals in cuts.items()]
         sought = [_limit(label, _map(limit), context) for label, limit in limits.items()]
         faults.check()
-        added = tuple(cut for cut in found if cut is not None)
-        return self.cuts + added, self.limits + tuple(limit for limit in sought if limit is not None)
+        added = tuple(cut for cut in found if known(cut))
+        return self.cuts + added, self.limits + tuple(limit for limit in sought if known(limit))
 
 
 class Analyse(RunSection[Questions]):
@@ -100,8 +100,8 @@ class Analyse(RunSection[Questions]):
         return Questions(
             context,
             AT if at is None else float(at),
-            tuple(cut for cut in found if cut is not None),
-            tuple(limit for limit in sought if limit is not None),
+            tuple(cut for cut in found if known(cut)),
+            tuple(limit for limit in sought if known(limit)),
         )
 
     def schema(self) -> Schema:
@@ -141,54 +141,54 @@ def _map(limit: tuple[str, str, str]) -> YamlMap:
     return YamlMap({}, values, "--vary", 0, 0)
 
 
-def _cut(label: str, node: YamlNode, context: Context) -> Cut | None:
+def _cut(label: str, node: YamlNode, context: Context) -> Cut | Unknown:
     """Read ``[control/heading.right, control/heading.right_velocity]`` or one signal."""
     items = node.values if isinstance(node, YamlList) else [node]
     if not items:
         problem, remedy = f"cut '{label}' has no signals", "name one, such as control/roll.torque"
         context.faults.add(node.place, problem, remedy)
     found = [_signal(item, context) for item in items]
-    signals = tuple(signal for signal in found if signal is not None)
-    return Cut(label, signals) if signals and len(signals) == len(items) else None
+    signals = tuple(signal for signal in found if known(signal))
+    return Cut(label, signals) if signals and len(signals) == len(items) else UNKNOWN
 
 
-def _signal(node: YamlNode, context: Context) -> CutSignal | None:
+def _signal(node: YamlNode, context: Context) -> CutSignal | Unknown:
     source, faults = context.wire(node), context.faults
-    if source is None:
-        return None
+    if source is UNKNOWN:
+        return UNKNOWN
     found = context.nodes[source.block]
     declared = found.block.interface.outputs[source.port]
     if declared.signal.scalar != "float64":
         problem = f"'{source.source}' holds {declared.signal.scalar} values, which vary in no small steps"
         faults.add(node.place, problem, "open the loop at a signal of real numbers")
-        return None
+        return UNKNOWN
     if source.port not in found.units:
-        return None
+        return UNKNOWN
     shape = found.shape(source.port)
     try:
         flat = np.arange(math.prod(shape)).reshape(shape)[source.index]
     except IndexError:
         faults.add(node.place, misfit(source, shape), "count from 0" if shape else "leave it out")
-        return None
+        return UNKNOWN
     elements = tuple(int(element) for element in np.ravel(flat))
     return CutSignal(wire_text(source), source.block, source.port, elements)
 
 
-def _limit(label: str, node: YamlNode, context: Context) -> Limit | None:
+def _limit(label: str, node: YamlNode, context: Context) -> Limit | Unknown:
     """Read ``{vary: eyes/camera.latency, from: 50 ms, to: 2 s}``."""
     faults = context.faults
     fields = faults.collect(node.fields, LIMIT_KEYS, (), faults)
     if fields is None or any(key not in fields for key in LIMIT_KEYS):
-        return None
+        return UNKNOWN
     variable = faults.collect(find_variable, context.wiring, context.graph, fields["vary"])
     if variable is None:
-        return None
+        return UNKNOWN
     start, end = (faults.collect(fields[key].quantity, variable.unit, bare=False) for key in LIMIT_KEYS[1:])
     if start is None or end is None:
-        return None
+        return UNKNOWN
     if start == end:
         faults.add(fields["to"].place, "'from' and 'to' are the same", "give the end of a range")
-        return None
+        return UNKNOWN
     unit = split_quantity(fields["to"].text())[1]
     return Limit(label, variable, start, end, Unit.parse(unit) if unit else variable.unit)
 

@@ -15,8 +15,8 @@ from quadvis.diagram.sections.forms import Schema, map_of, ref
 from quadvis.diagram.sections.section import DIAGRAM, PART, Checked, FileSection
 from quadvis.diagram.values import QUANTITY_KEYS
 from quadvis.document import YamlMap, YamlNode, YamlScalar
-from quadvis.engine.graph import CROSSINGS, TOLD
-from quadvis.errors import Faults, Place, closest
+from quadvis.engine.graph import CROSSINGS
+from quadvis.errors import UNKNOWN, Faults, Place, Unknown, closest, known
 
 INSIDE = "in"  # the name under which a part's blocks see what comes in
 
@@ -26,8 +26,8 @@ class InputSpec:
     """What an input is given: a signal or a constant, and how the wire crosses between rates."""
 
     place: Place
-    source: Reference | YamlNode | None  # None: what is wrong has been told
-    across: str | None = None
+    source: Reference | YamlNode | Unknown
+    across: str | Unknown | None = None
     across_place: Place | None = None
 
 
@@ -40,50 +40,63 @@ class BlockSpec:
     kind: str
     kind_place: Place
     is_part: bool
-    rate: tuple[str, Place] | None = None
-    slot: Place | None = None
-    parameters: dict[str, YamlNode] = field(default_factory=dict)
+    rate: tuple[str, Place] | Unknown | None = None
+    slot: Place | Unknown | None = None
+    parameters: dict[str, YamlNode] | Unknown = field(default_factory=dict)
     parameter_places: dict[str, Place] = field(default_factory=dict)
-    inputs: dict[str, InputSpec] | None = None  # None: no 'in' was written
-    told: frozenset[str] = frozenset()  # keys that are wrong or misspelt: what they lack is no news
+    inputs: dict[str, InputSpec] | Unknown | None = None  # None: no 'in' was written
 
 
-Blocks = dict[str, BlockSpec | None]  # None: an entry that could not be read, which has been reported
+Blocks = dict[str, BlockSpec | Unknown]
 
 
-def read_block(name: str, place: Place, node: YamlNode, faults: Faults) -> BlockSpec | None:
-    """Read one entry under ``blocks`` or under a variant's ``slots``; None if it does not say what it is."""
+def read_block(name: str, place: Place, node: YamlNode, faults: Faults) -> BlockSpec | Unknown:
+    """Read one entry under ``blocks`` or under a variant's ``slots``."""
     fields = faults.collect(node.fields, (), BLOCK_KEYS, faults)
     if fields is None:
-        return None
-    told = {closest(key, BLOCK_KEYS) or "" for key in fields if key not in BLOCK_KEYS}
+        return UNKNOWN
     kinds = [fields[key] for key in ("block", "part") if key in fields]
     kind = faults.collect(kinds[0].text) if len(kinds) == 1 else None
-    given = faults.collect(with_clean_names, fields["with"], faults) if "with" in fields else None
-    wired = faults.collect(with_clean_names, fields["in"], faults) if "in" in fields else None
-    inputs = {port: _read_input(value, faults) for port, value in (wired.values if wired else {}).items()}
-    rate = faults.collect(fields["rate"].text) if "rate" in fields else None
-    is_slot = faults.collect(fields["slot"].boolean) if "slot" in fields else False
-    if len(kinds) != 1 and not told & {"block", "part"}:
+    given = faults.read(with_clean_names, fields["with"], faults) if "with" in fields else None
+    inputs = _read_inputs(fields["in"], faults) if "in" in fields else None
+    doubled = {closest(key, BLOCK_KEYS) for key in fields if key not in BLOCK_KEYS}
+    if len(kinds) != 1 and not doubled & {"block", "part"}:
         problem = "both 'block' and 'part' are given" if kinds else "neither 'block' nor 'part' is given"
         faults.add(place, problem, "give 'block: group.name' or 'part: file.yaml'")
     if kind is None:
-        return None
-    read = {"rate": rate, "with": given, "in": wired, "slot": is_slot}
-    told |= {key for key, value in read.items() if key in fields and value is None}
+        return UNKNOWN
     return BlockSpec(
         name,
         place,
         kind,
         kinds[0].place,
         is_part="part" in fields,
-        rate=(rate, fields["rate"].place) if rate is not None else None,
-        slot=fields["slot"].place if is_slot else None,
-        parameters=given.values if given is not None else {},
-        parameter_places={key: node.place for key, node in given.keys.items()} if given is not None else {},
-        inputs=inputs if "in" in fields else None,
-        told=frozenset(told),
+        rate=faults.read(_read_rate, fields["rate"]) if "rate" in fields else None,
+        slot=_read_slot(fields["slot"], faults) if "slot" in fields else None,
+        parameters=UNKNOWN if given is UNKNOWN or "with" in doubled else given.values if given else {},
+        parameter_places=_places(given) if given is not None and known(given) else {},
+        inputs=UNKNOWN if "in" in doubled else inputs,
     )
+
+
+def _read_rate(node: YamlNode) -> tuple[str, Place]:
+    return node.text(), node.place
+
+
+def _read_slot(node: YamlNode, faults: Faults) -> Place | Unknown | None:
+    is_slot = faults.read(node.boolean)
+    return UNKNOWN if is_slot is UNKNOWN else node.place if is_slot else None
+
+
+def _places(given: YamlMap) -> dict[str, Place]:
+    return {key: node.place for key, node in given.keys.items()}
+
+
+def _read_inputs(node: YamlNode, faults: Faults) -> dict[str, InputSpec] | Unknown:
+    wired = faults.collect(with_clean_names, node, faults)
+    if wired is None:
+        return UNKNOWN
+    return {port: _read_input(value, faults) for port, value in wired.values.items()}
 
 
 def _read_input(node: YamlNode, faults: Faults) -> InputSpec:
@@ -91,14 +104,15 @@ def _read_input(node: YamlNode, faults: Faults) -> InputSpec:
     is_value = isinstance(node, YamlMap) and any(key in node for key in QUANTITY_KEYS)
     if isinstance(node, YamlMap) and is_value and "from" in node:
         faults.add(node.place, "a signal and a value are given at once", "keep 'from' or 'value'")
-        return InputSpec(node.place, None)
+        return InputSpec(node.place, UNKNOWN)
     if isinstance(node, YamlMap) and not is_value:
         node = node.fields(WIRE_KEYS[:1], WIRE_KEYS[1:], faults)
-        source = read_reference(node["from"], faults) if "from" in node else None
+        source = read_reference(node["from"], faults) if "from" in node else UNKNOWN
         across = node.get("across")
-        crossing = faults.collect(across.choice, CROSSINGS) if across is not None else None
-        if crossing is None and len(node) > 1:
-            crossing = TOLD
+        if across is not None:
+            crossing: str | Unknown | None = faults.read(across.choice, CROSSINGS)
+        else:
+            crossing = UNKNOWN if len(node) > 1 else None  # under a key that is wrong
         return InputSpec(node.place, source, crossing, across.place if across is not None else None)
     if isinstance(node, YamlScalar) and _is_reference(node.value):
         return InputSpec(node.place, read_reference(node, faults))

@@ -16,7 +16,7 @@ from quadvis.diagram.wiring import Wiring
 from quadvis.document import YamlList, YamlMap, YamlNode
 from quadvis.engine.graph import Graph, Node, Wire
 from quadvis.engine.names import wire_text
-from quadvis.errors import Faults, Place
+from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known
 
 
 @dataclass
@@ -24,7 +24,7 @@ class Context:
     """The blocks that exist, and when the run ends (s); faults are collected.
 
     ``shortened`` says that the diagram by itself ends later. ``values`` has the sections that are read
-    already. ``nodes`` are the blocks by path; one that is missing there has been reported.
+    already.
     """
 
     wiring: Wiring
@@ -43,20 +43,20 @@ class Context:
     @property
     def is_whole(self) -> bool:
         """Whether all blocks are known, so that a name that fits none of them is a fault."""
-        return not self.wiring.expansion.unknown
+        return self.wiring.expansion.is_whole
 
-    def wire(self, node: YamlNode) -> Wire | None:
-        """Return what the name of a signal names; None if it names none, which is reported."""
+    def wire(self, node: YamlNode) -> Wire | Unknown:
+        """Return the output that the name of a signal means."""
         reference = read_reference(node, self.faults)
-        return self.source(reference) if reference is not None else None
+        return self.source(reference) if known(reference) else UNKNOWN
 
-    def source(self, reference: Reference) -> Wire | None:
-        """Return the output behind a name; None if there is none, which is reported."""
+    def source(self, reference: Reference) -> Wire | Unknown:
+        """Return the output behind a name."""
         source = self.wiring.find(self.wiring.expansion.root, reference).source
         if isinstance(source, YamlNode):
             self.faults.add(reference.place, "this is a constant, not a signal", "name an output of a block")
         if not isinstance(source, Wire) or source.block not in self.nodes:
-            return None
+            return UNKNOWN
         self.names[reference.place] = wire_text(source)
         return source
 

@@ -12,6 +12,7 @@ from quadvis.diagram.sections.forms import QUANTITY, SIGNAL, Schema, closed, lis
 from quadvis.diagram.sections.section import Checked
 from quadvis.diagram.sections.signals import STRETCH_KEYS, Asked, read_stretch
 from quadvis.document import YamlNode
+from quadvis.errors import UNKNOWN
 from quadvis.output.statistics import COUNT
 from quadvis.units import Unit, split_quantity
 
@@ -62,7 +63,7 @@ def _read(node: YamlNode, context: Context) -> Iterator[Expectation]:
     if not kinds and all(key in ("signal", *STRETCH_KEYS) for key in fields):
         problem = "nothing is expected of the signal"
         faults.add(node.place, problem, f"add one of {', '.join(EXPECTATIONS)}")
-    if found is None:
+    if found is UNKNOWN:
         return
     for kind in kinds:
         is_count = EXPECTATIONS[kind].statistic == COUNT

@@ -34,7 +34,7 @@ from quadvis.diagram.times import SECOND
 from quadvis.diagram.unit_flow import words
 from quadvis.document import YamlList, YamlMap, YamlNode, parse_yaml
 from quadvis.engine.graph import Wire
-from quadvis.errors import Faults
+from quadvis.errors import UNKNOWN, Faults, Unknown, known
 from quadvis.output.figures import Figure, Panel, Trace
 from quadvis.output.stretch import NANOSECONDS, stamp
 from quadvis.units import Unit, UnitError
@@ -136,29 +136,29 @@ class FigureReader:
         title, signals, unit, reference = map(entry.get, ("title", "signals", "unit", "reference"))
         shown = self.faults.collect(_unit, unit) if unit else None
         entries = _some(signals) if isinstance(signals, YamlList) else [signals] if signals else []
-        traces = [self.faults.collect(self._trace, trace, shown) for trace in entries]
+        traces = [self.faults.read(self._trace, trace, shown) for trace in entries]
         level = self.faults.collect(reference.quantity, shown or Unit()) if reference else None
         name = self.faults.collect(title.text) if title and not single else None
-        return Panel(tuple(trace for trace in traces if trace), name or "", shown, level)
+        return Panel(tuple(trace for trace in traces if known(trace)), name or "", shown, level)
 
-    def _trace(self, node: YamlNode, shown: Unit | None) -> Trace | None:
+    def _trace(self, node: YamlNode, shown: Unit | None) -> Trace | Unknown:
         label = None
         if isinstance(node, YamlMap):
             entry = node.fields(TRACE_KEYS[:1], TRACE_KEYS[1:])
             node, label = entry["signal"], entry.get("label")
         reference = read_reference(node, self.faults)
-        if reference is None:
-            return None
-        wire: Wire | None = Wire(reference.block, reference.port, reference.index)
+        if reference is UNKNOWN:
+            return UNKNOWN
+        wire: Wire | Unknown = Wire(reference.block, reference.port, reference.index)
         if self.context is not None:
             wire = self.context.source(reference)
-            if wire is not None:
+            if known(wire):
                 self._check(node, wire, shown, self.context)
-        return Trace(wire, label.text() if label else "") if wire is not None else None
+        return Trace(wire, label.text() if label else "") if known(wire) else UNKNOWN
 
     def _check(self, node: YamlNode, wire: Wire, shown: Unit | None, context: Context) -> None:
         found = check_signal(node, wire, context)
-        if found is not None and shown is not None and not shown.dimension_equals(found.part.unit):
+        if known(found) and shown is not None and not shown.dimension_equals(found.part.unit):
             problem = f"'{found.part.text}' has {words(found.part.unit)}, the panel is in {words(shown)}"
             self.faults.add(node.place, problem, "give it a panel of its own")
 

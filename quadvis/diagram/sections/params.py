@@ -7,9 +7,9 @@ from quadvis.diagram.sections.forms import Schema, map_of, ref
 from quadvis.diagram.sections.section import DIAGRAM, PART, FileSection
 from quadvis.diagram.values import read_constant
 from quadvis.document import YamlNode
-from quadvis.errors import Faults
+from quadvis.errors import Faults, Unknown
 
-Params = dict[str, YamlNode | None]  # None: what is wrong has been reported
+Params = dict[str, YamlNode | Unknown]
 
 
 class ParamsSection(FileSection[Params]):

@@ -9,17 +9,17 @@ from quadvis.diagram.reference import Reference, read_reference
 from quadvis.diagram.sections.forms import TEXT, Schema, closed, list_of, map_of, ref
 from quadvis.diagram.sections.section import PART, FileSection
 from quadvis.document import YamlNode
-from quadvis.errors import Faults, Place
+from quadvis.errors import Faults, Place, Unknown
 
 PORT_KEYS = ("in", "out")
 
 
 @dataclass
 class Ports:
-    """Names of what comes in, and what goes out; None if what is wrong with it has been reported."""
+    """Names of what comes in, and what goes out."""
 
     inputs: dict[str, Place] = field(default_factory=dict)
-    outputs: dict[str, Reference | None] = field(default_factory=dict)
+    outputs: dict[str, Reference | Unknown] = field(default_factory=dict)
 
 
 class PortsSection(FileSection[Ports]):

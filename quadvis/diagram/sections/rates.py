@@ -12,7 +12,7 @@ from quadvis.diagram.sections.section import Checked, FileSection
 from quadvis.diagram.times import read_duration, read_period
 from quadvis.document import YamlMap, YamlNode
 from quadvis.engine.graph import CONTINUOUS
-from quadvis.errors import Faults, Place
+from quadvis.errors import Faults, Place, Unknown
 
 RATE_KEYS = ("rate", "offset")
 
@@ -26,7 +26,7 @@ class Rate:
     place: Place = field(default=Place(""), compare=False)
 
 
-Rates = dict[str, Rate | None]  # None: what is wrong has been reported
+Rates = dict[str, Rate | Unknown]
 
 
 def read_rate(node: YamlNode) -> Rate:
@@ -52,7 +52,7 @@ class RatesSection(FileSection[Rates]):
         """Return periods and offsets."""
         found: Rates = {}
         for name, value in named_entries(node, "rate", faults):
-            found[name] = faults.collect(read_rate, value)
+            found[name] = faults.read(read_rate, value)
             if name == CONTINUOUS:
                 remedy = "choose another name, or set 'solver: {step: ...}'"
                 faults.add(value.place, "'continuous' is the rate of the solver", remedy)

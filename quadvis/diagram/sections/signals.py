@@ -15,6 +15,7 @@ from quadvis.diagram.times import read_duration
 from quadvis.document import YamlMap, YamlNode
 from quadvis.engine.graph import Node, Wire, selected
 from quadvis.engine.names import wire_text
+from quadvis.errors import UNKNOWN, Unknown, known
 from quadvis.output.stretch import Sampling, Stretch
 from quadvis.units import Unit
 
@@ -40,31 +41,31 @@ class Signal:
     scalar: str
 
 
-def read_signal(node: YamlNode, context: Context) -> Signal | None:
-    """Return the signal that a section names; None if it names none, which is reported."""
+def read_signal(node: YamlNode, context: Context) -> Signal | Unknown:
+    """Return the signal that a section names."""
     wire = context.wire(node)
-    return check_signal(node, wire, context) if wire is not None else None
+    return check_signal(node, wire, context) if known(wire) else UNKNOWN
 
 
-def check_signal(node: YamlNode, wire: Wire, context: Context) -> Signal | None:
-    """Return a signal of numbers of one unit; None if it is no such, which is reported."""
+def check_signal(node: YamlNode, wire: Wire, context: Context) -> Signal | Unknown:
+    """Return a signal, which must be of numbers of one unit."""
     faults, name, found = context.faults, wire.source, context.nodes[wire.block]
     declared = found.block.interface.outputs[wire.port].signal
     if declared.scalar == "frame":
         faults.add(node.place, f"'{name}' is a picture, not a number", "name another signal")
     is_open = any(isinstance(size, str) and size not in found.sizes for size in declared.shape)
     if declared.scalar == "frame" or wire.port not in found.units or is_open:
-        return None
+        return UNKNOWN
     shape = found.shape(wire.port)
     try:
         part = selected(shape, wire.index)
     except IndexError:
         faults.add(node.place, misfit(wire, shape), "count from 0" if shape else "leave it out")
-        return None
+        return UNKNOWN
     if part is None:
         remedy = "take one element, or a run of them"
         faults.add(node.place, "the elements do not lie side by side", remedy)
-        return None
+        return UNKNOWN
     if wire.block not in context.values[LOG].paths:
         problem = f"block '{wire.block}' is not logged"
         faults.add(node.place, problem, f"add '{wire.block}' under 'log: {{signals: [...]}}'")
@@ -72,7 +73,7 @@ def check_signal(node: YamlNode, wire: Wire, context: Context) -> Signal | None:
     if len(units) > 1:
         problem = f"the elements of '{name}' have different units: {', '.join(sorted(map(str, units)))}"
         faults.add(node.place, problem, "take elements of one unit")
-        return None
+        return UNKNOWN
     unit = units.pop()
     shown = DEGREE if str(unit) == "rad" else unit
     stretch = Stretch(_sampling(found, context))
@@ -86,16 +87,16 @@ def _sampling(node: Node, context: Context) -> Sampling:
     return Sampling(node.task.offset, node.task.period * every, context.stop, context.shortened)
 
 
-def read_stretch(fields: YamlMap, context: Context) -> Signal | None:
+def read_stretch(fields: YamlMap, context: Context) -> Signal | Unknown:
     """Return the signal of an expectation or of a line of the summary, over its stretch of the run."""
-    found = read_signal(fields["signal"], context) if "signal" in fields else None
+    found = read_signal(fields["signal"], context) if "signal" in fields else UNKNOWN
     after, before = (
         context.faults.collect(read_duration, fields[name]) if name in fields else None
         for name in STRETCH_KEYS[:2]
     )
     context.warn_window(fields, STRETCH_KEYS[:2], after, before)
-    if found is None:
-        return None
+    if found is UNKNOWN:
+        return UNKNOWN
     part = found.part
     of = context.faults.collect(fields["of"].quantity, part.unit, bare=False) if "of" in fields else None
     stretch = replace(part.stretch, after=after or Fraction(0), before=before)

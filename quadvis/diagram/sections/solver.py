@@ -11,7 +11,7 @@ from quadvis.diagram.sections.section import Checked, FileSection
 from quadvis.diagram.times import read_step
 from quadvis.document import YamlNode
 from quadvis.engine.graph import SOLVERS
-from quadvis.errors import Faults, Place
+from quadvis.errors import UNKNOWN, Faults, Place, Unknown
 
 SOLVER_KEYS = ("method", "step")
 
@@ -21,9 +21,8 @@ class Solver:
     """The method and the step (s) of the solver, and where the step is written."""
 
     method: str = "ode4"
-    step: Fraction | None = None
+    step: Fraction | Unknown | None = None
     place: Place | None = None
-    told: bool = False
 
 
 class SolverSection(FileSection[Solver]):
@@ -36,12 +35,12 @@ class SolverSection(FileSection[Solver]):
         """Return method and step."""
         fields = faults.collect(node.fields, (), SOLVER_KEYS, faults) if node is not None else None
         if fields is None:
-            return Solver(told=node is not None)
+            return Solver(step=UNKNOWN if node is not None else None)
         method = faults.collect(fields["method"].choice, SOLVERS) if "method" in fields else None
         if "step" not in fields:
             return Solver(method or Solver.method)
-        step = faults.collect(read_step, fields["step"])
-        return Solver(method or Solver.method, step, fields["step"].place, step is None)
+        step = faults.read(read_step, fields["step"])
+        return Solver(method or Solver.method, step, fields["step"].place)
 
     def schema(self) -> Schema:
         """Return the schema: method and step."""

@@ -8,18 +8,18 @@ from quadvis.diagram.sections.forms import QUANTITY, Schema
 from quadvis.diagram.sections.section import Checked, FileSection
 from quadvis.diagram.times import read_duration
 from quadvis.document import YamlNode
-from quadvis.errors import Faults
+from quadvis.errors import Faults, Unknown
 
 
-class StopTime(FileSection[Fraction | None]):
+class StopTime(FileSection[Fraction | Unknown | None]):
     """The length of a run (s); None where it is not written."""
 
     key = "stop_time"
     words = "how long a run is"
 
-    def read(self, node: YamlNode | None, faults: Faults) -> Fraction | None:
-        """Return the time; 0 s stands for one that cannot be read."""
-        return (faults.collect(read_duration, node) or Fraction(0)) if node is not None else None
+    def read(self, node: YamlNode | None, faults: Faults) -> Fraction | Unknown | None:
+        """Return the time."""
+        return faults.read(read_duration, node) if node is not None else None
 
     def schema(self) -> Schema:
         """Return the schema: a time."""

@@ -12,6 +12,7 @@ from quadvis.diagram.sections.section import Checked
 from quadvis.diagram.sections.signals import STRETCH_KEYS, Asked, read_stretch
 from quadvis.diagram.unit_flow import words
 from quadvis.document import YamlMap, YamlNode
+from quadvis.errors import UNKNOWN, Unknown, known
 from quadvis.output.statistics import COUNT, STATISTICS
 
 SUMMARY_KEYS = (*STRETCH_KEYS, "show", "unit")
@@ -34,7 +35,7 @@ class Summary(RunSection[Asked[Entry]]):
             if entries is not None
             else []
         )
-        return Asked(tuple(entry for entry in read if entry is not None), context.written(node))
+        return Asked(tuple(entry for entry in read if known(entry)), context.written(node))
 
     def schema(self) -> Schema:
         """Return the schema: lines by label."""
@@ -52,20 +53,20 @@ class Summary(RunSection[Asked[Entry]]):
         return diagram.values[self].written
 
 
-def _read(label: str, node: YamlNode, context: Context) -> Entry | None:
+def _read(label: str, node: YamlNode, context: Context) -> Entry | Unknown:
     """Read a line of the summary: ``x: {signal: plant.position[0], after: 40 s, show: [rms, max]}``."""
     faults = context.faults
     if not isinstance(node, YamlMap):
         node = YamlMap({}, {"signal": node}, node.file, node.line, node.column)
     fields = faults.collect(node.fields, ("signal",), SUMMARY_KEYS, faults)
     if fields is None:
-        return None
+        return UNKNOWN
     found = read_stretch(fields, context)
     names = faults.collect(fields["show"].items) if "show" in fields else None
     show = [faults.collect(name.choice, STATISTICS) for name in names or []]
     unit = faults.collect(fields["unit"].unit) if "unit" in fields else None
-    if found is None:
-        return None
+    if found is UNKNOWN:
+        return UNKNOWN
     part = found.part
     if unit is not None and not unit.dimension_equals(part.unit):
         problem = f"'{part.text}' has {words(part.unit)}, which is not shown in {words(unit)}"
