@@ -85,7 +85,8 @@ def follow_units(
 def _is_chain(flow: UnitFlow) -> bool:
     """Say whether one value may be behind several faults.
 
-    Values that do not fit the wires that they meet are reported where they stand, unless they lack an angle only.
+    Values that do not fit the wires that they meet are reported where they stand, unless they lack only an
+    angle.
     """
     return _count(flow) > 1 and (bool(flow.ratios) or all(map(_is_angle, flow.given_ratios.values())))
 
