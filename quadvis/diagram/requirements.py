@@ -1,7 +1,7 @@
-"""What a diagram requires of a run, and what its summary shows: signals, stretches, limits.
+"""What a diagram requires of a run, and what its summary shows: selections of signals, criteria, limits.
 
-Parts with several elements count element by element: the RMS of ``craft.position[0:2]`` is over both axes
-together, its maximum the larger of the two, its final value one number for each.
+Selections with several elements count element by element: the RMS of ``craft.position[0:2]`` is over both
+axes together, its maximum is the larger of the two, its final value is one number for each.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ WHOLE = Stretch(Sampling())
 
 
 @dataclass(frozen=True)
-class Part:
-    """A signal, or a part of it, over a stretch of the run; it is judged by its distance from ``of``.
+class Selection:
+    """Elements of a signal over a stretch of the run; they are judged by their distance from ``of``.
 
-    ``shape`` is that of the whole signal. ``unit`` is the unit of the elements, ``shown`` the one that people
-    read them in.
+    ``shape`` is the shape of the whole signal. ``unit`` is the unit of the elements, ``shown`` the unit of
+    texts.
     """
 
     name: str
@@ -42,18 +42,18 @@ class Part:
 
     @property
     def elements(self) -> tuple[str, ...]:
-        """The elements as a diagram writes them, "[0]" or "[2,1]"; "" if there is one only."""
+        """The elements as a diagram writes them, "[0]" or "[2,1]"; "" for a scalar."""
         places = np.arange(math.prod(self.shape)).reshape(self.shape)[self.index].ravel().tolist()
         if len(places) == 1:
             return ("",)
         return tuple(index_text(tuple(map(int, np.unravel_index(place, self.shape)))) for place in places)
 
     def scaled(self, value: float) -> float:
-        """Return a value of the elements in the unit that people read."""
+        """Return a value of the elements in the unit of texts."""
         return value * self.unit.scale / self.shown.scale
 
     def shows(self, value: Value) -> str:
-        """Return a value of the elements for people; of several elements, all of them."""
+        """Return a value of the elements as text; several elements are all listed."""
         if isinstance(value, tuple):
             number = f"({', '.join(f'{self.scaled(each):.4g}' for each in value)})"
         else:
@@ -62,21 +62,21 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Kind:
-    """A way to judge samples: the statistic, how it is compared with the limit, and how that is said."""
+class Criterion:
+    """A criterion for samples: the statistic, its comparison with the limit, and the words for it."""
 
     statistic: str
     holds: Callable[[float, float], bool]
     words: str
 
 
-EXPECTATIONS: Mapping[str, Kind] = {
-    "within": Kind("max", lambda found, limit: found <= limit, "within {limit}{of}"),
-    "rms": Kind("rms", lambda found, limit: found <= limit, "rms at most {limit}{of}"),
-    "below": Kind("highest", lambda found, limit: found < limit, "always below {limit}{of}"),
-    "above": Kind("lowest", lambda found, limit: found > limit, "always above {limit}{of}"),
-    "count": Kind(COUNT, lambda found, limit: found <= limit, "true at most {limit} times"),
-    "at_least": Kind(COUNT, lambda found, limit: found >= limit, "true at least {limit} times"),
+EXPECTATIONS: Mapping[str, Criterion] = {
+    "within": Criterion("max", lambda found, limit: found <= limit, "within {limit}{of}"),
+    "rms": Criterion("rms", lambda found, limit: found <= limit, "rms at most {limit}{of}"),
+    "below": Criterion("highest", lambda found, limit: found < limit, "always below {limit}{of}"),
+    "above": Criterion("lowest", lambda found, limit: found > limit, "always above {limit}{of}"),
+    "count": Criterion(COUNT, lambda found, limit: found <= limit, "true at most {limit} times"),
+    "at_least": Criterion(COUNT, lambda found, limit: found >= limit, "true at least {limit} times"),
 }
 
 
@@ -84,7 +84,7 @@ EXPECTATIONS: Mapping[str, Kind] = {
 class Expectation:
     """One requirement on a run: ``kind`` is a key of EXPECTATIONS, ``limit`` in the unit of the elements."""
 
-    part: Part
+    selection: Selection
     kind: str
     limit: float
 
@@ -94,25 +94,25 @@ class Expectation:
         return EXPECTATIONS[self.kind].statistic
 
     def __str__(self) -> str:
-        of = f" of {self.part.shows(self.part.of)}" if self.part.of else ""
+        of = f" of {self.selection.shows(self.selection.of)}" if self.selection.of else ""
         what = EXPECTATIONS[self.kind].words.format(limit=self.shows(self.limit), of=of)
-        return " ".join(filter(None, (self.part.text, what, str(self.part.stretch))))
+        return " ".join(filter(None, (self.selection.text, what, str(self.selection.stretch))))
 
     def shows(self, value: float) -> str:
-        """Return a limit, or what was found, for people."""
-        return f"{value:g}" if self.statistic == COUNT else self.part.shows(value)
+        """Return a limit, or a value that was found, as text."""
+        return f"{value:g}" if self.statistic == COUNT else self.selection.shows(value)
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A line of the summary: statistics of a part."""
+    """A line of the summary: statistics of a selection."""
 
     label: str
-    part: Part
+    selection: Selection
     show: tuple[str, ...]
 
     def shows(self, name: str, value: Value) -> str:
-        """Return one of the statistics for people."""
+        """Return one of the statistics as text."""
         if isinstance(value, float) and math.isnan(value):
             return "none"
-        return f"{value:g}" if name == COUNT else self.part.shows(value)
+        return f"{value:g}" if name == COUNT else self.selection.shows(value)

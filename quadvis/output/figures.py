@@ -1,4 +1,4 @@
-"""What is drawn of a run: figures of panels, panels of curves, and the curves out of the recorded signals.
+"""What is drawn of a run: figures of panels, panels of traces.
 
 A diagram asks for figures under its key `figures`; without that there is one figure per block.
 """
@@ -6,15 +6,12 @@ A diagram asks for figures under its key `figures`; without that there is one fi
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from quadvis.engine.graph import CONTINUOUS, Wire
-from quadvis.engine.names import index_text, wire_text
-from quadvis.errors import QuadvisError, quoted, suggestion
-from quadvis.output.panel import Curve
+from quadvis.engine.graph import Wire
+from quadvis.engine.names import wire_text
 from quadvis.output.recording import Recorded
 from quadvis.units import Unit, parse_units
 
@@ -65,47 +62,3 @@ def block_figures(recorded: Recorded) -> list[Figure]:
             traces = tuple(Trace(wire, wire_text(wire).removeprefix(f"{block}.")) for wire in wires)
             panels.append(Panel(traces, port))
     return [Figure(block, tuple(panels)) for block, panels in blocks.items()]
-
-
-def panel_curves(recorded: Recorded, figure: Figure, panel: Panel) -> list[Curve]:
-    """Return a panel's curves over the figure's stretch of the run, in the unit that the panel shows."""
-    found = [curve for trace in panel.traces for curve in _elements(recorded, trace)]
-    if not found:
-        raise QuadvisError(f"panel {quoted(panel.title)} has no signals; name one")
-    shown = panel.unit or found[0].unit
-    curves = []
-    for curve in found:
-        if not curve.unit.dimension_equals(shown):
-            raise QuadvisError(f"{quoted(curve.label)} is in {curve.unit}, which cannot be shown in {shown}")
-        part = (curve.times >= figure.start) & (curve.times <= figure.stop)
-        values = curve.values * (curve.unit.scale / shown.scale)
-        earlier = values[curve.times < figure.start]
-        before = float(earlier[-1]) if earlier.size else math.nan
-        times = curve.times[part]
-        curves.append(replace(curve, unit=shown, times=times, values=values[part], before=before))
-    return curves
-
-
-def _elements(recorded: Recorded, trace: Trace) -> Iterator[Curve]:
-    """Return one curve for every element that a trace selects."""
-    name, index = trace.signal.source, trace.signal.index
-    if name not in recorded.units:
-        remedy = suggestion(name, recorded.units) or "the log may leave its block out"
-        raise QuadvisError(f"there is no signal {quoted(name)}; {remedy}")
-    rows, times, units = recorded[name], recorded.times(name), parse_units(recorded.units[name])
-    shape, size = rows.shape[1:], math.prod(rows.shape[1:])
-    try:
-        chosen = np.arange(size).reshape(shape)[index].ravel().tolist()
-    except IndexError:
-        chosen = []
-    if not chosen:
-        extent = f"the shape {list(shape)}" if shape else "one element and takes no index"
-        raise QuadvisError(f"{quoted(wire_text(trace.signal))} does not exist; {quoted(name)} has {extent}")
-    elements = rows.reshape(len(rows), size)
-    held = rows.dtype.kind != "f" or recorded.rate(name) not in ("", CONTINUOUS)
-    for element in chosen:
-        label = trace.label or name
-        if shape and (len(chosen) > 1 or not trace.label):
-            label += index_text(np.unravel_index(element, shape))
-        values = elements[:, element].astype(np.float64)
-        yield Curve(label, units[element % len(units)], times, values, held, rows.dtype.kind != "f")

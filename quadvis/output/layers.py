@@ -15,7 +15,8 @@ from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from typing import Any
 
-from quadvis.output.bands import ASPECT, EDGE, GAP, Box, Net, Point, Sheet
+from quadvis.output.bands import EDGE, Sheet
+from quadvis.output.boxes import ASPECT, GAP, Box, Net, Point
 
 TITLE = 30.0  # pixels that a part leaves free above its boxes
 

@@ -14,14 +14,13 @@ import struct
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib import import_module
-from typing import Any
+
+from quadvis.output.mcap_chunks import CHUNK_HEAD, packing_of, unpacked
 
 MAGIC = b"\x89MCAP0\r\n"
 HEADER, FOOTER, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX = 0x01, 0x02, 0x04, 0x05, 0x06, 0x07
 ATTACHMENT, METADATA, DATA_END, LAST, PRIVATE = 0x09, 0x0C, 0x0F, 0x0F, 0x80
 HEAD = struct.Struct("<BQ")
-CHUNK_HEAD = struct.Struct("<QQQII")  # first and last time, size unpacked, its CRC, length of the packing
 FREE, RATIO = 4 << 20, 64  # bytes that any file may unpack to, and times its size
 
 # Where a record can be recognised in the middle of anything: chunks, and what begins and ends a log.
@@ -154,7 +153,7 @@ class Scan:
             return
         if HEAD.unpack_from(self.data, position)[1] <= len(body):
             return  # it is all there, but not what it was
-        packing = _packing(body)
+        packing = packing_of(body)
         if packing is None or len(body) < CHUNK_HEAD.size + len(packing) + 8:
             return
         try:
@@ -164,56 +163,20 @@ class Scan:
 
     def _unpacked(self, body: memoryview) -> bytes | memoryview | None:
         """Return the contents of a chunk, or as much as there is; None if it is damaged or too large."""
-        size, packing = CHUNK_HEAD.unpack_from(body)[2], _packing(body)
+        size, packing = CHUNK_HEAD.unpack_from(body)[2], packing_of(body)
         packed = body[CHUNK_HEAD.size + len(packing or "") + 8 :]
         if not packing:
             return packed
         if size > self._left:
             return None
         self._left -= size
-        return _unpack(packing, packed, size)
-
-
-def _packing(body: memoryview) -> str | None:
-    """Return by what a chunk is packed, "" if by nothing; None for what nobody can unpack."""
-    length = CHUNK_HEAD.unpack_from(body)[4]
-    name = bytes(body[CHUNK_HEAD.size : CHUNK_HEAD.size + min(length, 8)])
-    return name.decode() if name in (b"", b"lz4", b"zstd") and len(name) == length else None
-
-
-def _unpack(packing: str, packed: memoryview, size: int) -> bytes | None:
-    """Return what a chunk unpacks to, but no more than one byte above `size`; None if it is damaged."""
-    try:
-        return (_unpack_lz4 if packing == "lz4" else _unpack_zstd)(bytes(packed), size + 1)
-    except (ImportError, RuntimeError, EOFError, ValueError, MemoryError):
-        return None
-
-
-def _unpack_lz4(packed: bytes, most: int) -> bytes:
-    frame: Any = import_module("lz4.frame")
-    return bytes(frame.LZ4FrameDecompressor().decompress(packed, max_length=most))
-
-
-def _unpack_zstd(packed: bytes, most: int) -> bytes:
-    import zstandard
-
-    # What the format recommends that every decoder can hold, or what a frame of this size may ask for.
-    window = min(max(8 << 20, 1 << most.bit_length()), 1 << 31)
-    parts = []
-    try:
-        with zstandard.ZstdDecompressor(max_window_size=window).stream_reader(packed) as reader:
-            while most > 0 and (part := reader.read(min(most, 1 << 20))):
-                parts.append(part)
-                most -= len(part)
-    except zstandard.ZstdError as error:
-        raise ValueError(str(error)) from error
-    return b"".join(parts)
+        return unpacked(packing, packed, size)
 
 
 def _check(kind: int, body: memoryview) -> None:
     """Raise BrokenError if the lengths inside a record are not those of the record."""
     if kind == CHUNK:
-        packing = _packing(body) if len(body) >= CHUNK_HEAD.size else None
+        packing = packing_of(body) if len(body) >= CHUNK_HEAD.size else None
         start = CHUNK_HEAD.size + len(packing or "")
         if packing is None or len(body) < start + 8:
             raise BrokenError

@@ -10,10 +10,9 @@ from itertools import takewhile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from quadvis.output.curves import Curve
 from quadvis.output.style import COLOURS, DASHES, POINT, STYLE, fitted, measure, pretty
-from quadvis.units import Unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,23 +31,6 @@ BESIDE, BETWEEN = (  # inches: what a label has beside it, and columns between t
     )
 )
 MARGIN = 0.95  # inches beside the axes: numbers, unit, and the space to the neighbour
-
-
-@dataclass(frozen=True)
-class Curve:
-    """The samples of one number in a stretch of the run, in the unit that is shown.
-
-    Between samples a ``held`` one stands still, others are joined by lines; ``before`` is what it held when
-    the stretch began. ``whole`` numbers are counts, levels and truths.
-    """
-
-    label: str
-    unit: Unit
-    times: NDArray[np.float64]
-    values: NDArray[np.float64]
-    held: bool
-    whole: bool
-    before: float = math.nan
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 from quadvis.errors import QuadvisError, quoted
 from quadvis.machine.files import PNG, write_output
 from quadvis.output.canvas import blank_sheet
-from quadvis.output.figures import Figure, block_figures, panel_curves
-from quadvis.output.panel import Curve, draw_panel, legend_of
+from quadvis.output.curves import Curve, panel_curves
+from quadvis.output.figures import Figure, block_figures
+from quadvis.output.panel import draw_panel, legend_of
 from quadvis.output.recording import Recorded
 from quadvis.output.style import STYLE, WIDTHS, fitted, measure
 

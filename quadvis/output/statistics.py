@@ -174,7 +174,7 @@ STATISTICS: Mapping[str, Callable[[int, int], Statistic]] = {
 
 
 def finite(value: Value) -> Any:
-    """Return a value as JSON can hold it: None in place of a number that is infinite or none."""
+    """Return a value for JSON: None in place of an infinite number or NaN."""
     if isinstance(value, tuple):
         return [finite(each) for each in value]
     return value if math.isfinite(value) else None

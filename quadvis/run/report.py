@@ -29,8 +29,12 @@ def summary_lines(result: Result) -> list[str]:
 def _entry_row(entry: Entry, outcome: Outcome) -> tuple[str, ...]:
     values = outcome.summary[entry.label]
     shown = ", ".join(f"{name} {entry.shows(name, value)}" for name, value in values.items())
-    of = f"of {entry.part.shows(entry.part.of)}" if entry.part.of else ""
-    return entry.label, shown, ", ".join(filter(None, (of, str(entry.part.stretch), entry.part.stretch.cut)))
+    of = f"of {entry.selection.shows(entry.selection.of)}" if entry.selection.of else ""
+    return (
+        entry.label,
+        shown,
+        ", ".join(filter(None, (of, str(entry.selection.stretch), entry.selection.stretch.cut))),
+    )
 
 
 def _verdict_row(verdict: Verdict) -> tuple[str, ...]:

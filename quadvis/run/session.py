@@ -102,8 +102,8 @@ class Result:
         """
         summary = {
             entry.label: {
-                "signal": entry.part.text,
-                "unit": str(entry.part.unit),
+                "signal": entry.selection.text,
+                "unit": str(entry.selection.unit),
                 **{name: finite(value) for name, value in self.outcome.summary[entry.label].items()},
             }
             for entry in self.diagram.summary

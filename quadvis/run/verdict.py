@@ -1,6 +1,6 @@
-"""What a run showed: statistics of its signals, and whether it met what the diagram requires.
+"""The outcome of a run: statistics of its signals, and verdicts on the diagram's expectations.
 
-NaN meets no expectation, and neither does a run that has not all samples of the window.
+NaN meets no expectation, and neither does a run without all samples of the stretch.
 """
 
 from __future__ import annotations
@@ -13,32 +13,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.diagram.requirements import EXPECTATIONS, Entry, Expectation, Part
+from quadvis.diagram.requirements import EXPECTATIONS, Entry, Expectation, Selection
 from quadvis.output.recording import Recorded
 from quadvis.output.statistics import COUNT, STATISTICS, Samples, Value, finite
 
 
-def _distances(part: Part, rows: NDArray[Any]) -> Samples:
-    """Return the distances of a part from its ``of`` in rows of the signal, as (N, elements)."""
-    found = rows[(slice(None), *part.index)]
-    return found.reshape(len(found), math.prod(found.shape[1:])).astype(np.float64) - part.of
+def _distances(selection: Selection, rows: NDArray[Any]) -> Samples:
+    """Return the distances (N, elements) of rows of the signal from ``of``."""
+    found = rows[(slice(None), *selection.index)]
+    return found.reshape(len(found), math.prod(found.shape[1:])).astype(np.float64) - selection.of
 
 
 class Measured:
-    """Statistics of a part, taken as the rows of its stretch come: ``size`` of them, or all there may be."""
+    """Statistics of a selection from ``size`` rows, by default all rows of its stretch, as they come."""
 
-    def __init__(self, part: Part, names: Iterable[str], size: int | None = None) -> None:
-        self.part, self.found = part, 0
-        count = len(part.stretch.rows) if size is None else size
-        self._statistics = {name: STATISTICS[name](count, len(part.elements)) for name in names}
+    def __init__(self, selection: Selection, names: Iterable[str], size: int | None = None) -> None:
+        self.selection, self.found = selection, 0
+        count = len(selection.stretch.rows) if size is None else size
+        self._statistics = {name: STATISTICS[name](count, len(selection.elements)) for name in names}
 
     def add(self, rows: NDArray[Any]) -> None:
-        """Take rows of the stretch."""
+        """Take further rows of the stretch."""
         if not len(rows):
             return
         self.found += len(rows)
-        samples = _distances(self.part, rows)
-        with np.errstate(over="ignore", invalid="ignore"):  # what runs away far enough has an infinite RMS
+        samples = _distances(self.selection, rows)
+        with np.errstate(over="ignore", invalid="ignore"):  # a signal that diverges has an infinite RMS
             for statistic in self._statistics.values():
                 statistic.add(samples)
 
@@ -47,15 +47,15 @@ class Measured:
 
     @property
     def lack(self) -> str:
-        """Why these are not the statistics of the whole stretch; empty if they are."""
-        return self.part.stretch.lack(self.found)
+        """Why these are not the statistics of the whole stretch; "" if they are."""
+        return self.selection.stretch.lack(self.found)
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """An expectation with what the run gave, in the unit of the elements; NaN if it gave nothing to judge.
+    """An expectation and the value found, in the unit of the elements; NaN if no value was found.
 
-    ``lack`` says why the run cannot be judged: it has not all samples of the window.
+    ``lack`` says why the run cannot be judged: samples of the stretch are missing.
     """
 
     expectation: Expectation
@@ -65,20 +65,20 @@ class Verdict:
 
     @property
     def shown(self) -> str:
-        """What the run gave, for people."""
+        """The value that was found, as text."""
         found = "nothing to judge" if math.isnan(self.found) else self.expectation.shows(self.found)
         if self.lack:
             return f"{found}: {self.lack}"
-        return " ".join(filter(None, (found, self.expectation.part.stretch.cut)))
+        return " ".join(filter(None, (found, self.expectation.selection.stretch.cut)))
 
     def facts(self) -> dict[str, Any]:
         """Return the verdict as plain data."""
-        part = self.expectation.part
+        selection = self.expectation.selection
         return {
             "expectation": str(self.expectation),
-            "signal": part.text,
+            "signal": selection.text,
             "kind": self.expectation.kind,
-            "unit": "1" if self.expectation.statistic == COUNT else str(part.unit),
+            "unit": "1" if self.expectation.statistic == COUNT else str(selection.unit),
             "limit": self.expectation.limit,
             "found": finite(self.found),
             "met": self.met,
@@ -90,7 +90,7 @@ class Verdict:
 
 
 def judge(expectation: Expectation, measured: Measured) -> Verdict:
-    """Return whether a run meets an expectation; one that has not all samples of the window does not."""
+    """Return whether a run meets an expectation; a run without all samples of the stretch does not."""
     found = measured[expectation.statistic]
     assert isinstance(found, float)
     lack = measured.lack
@@ -112,41 +112,41 @@ class Outcome:
 
 
 class Judging:
-    """Judges a run while it goes on, from the rows as they come, or a recording of one."""
+    """Judges a run from its rows as they come, or from a recording."""
 
     def __init__(self, summary: Sequence[Entry], expectations: Sequence[Expectation]) -> None:
         self._summary, self._expectations = summary, expectations
-        wanted = [(entry.part, entry.show) for entry in summary]
-        wanted += [(expectation.part, (expectation.statistic,)) for expectation in expectations]
-        self._measured = [Measured(part, names) for part, names in wanted]
+        wanted = [(entry.selection, entry.show) for entry in summary]
+        wanted += [(expectation.selection, (expectation.statistic,)) for expectation in expectations]
+        self._measured = [Measured(selection, names) for selection, names in wanted]
         self._by_name: dict[str, list[int]] = {}
-        for place, (part, _) in enumerate(wanted):
-            self._by_name.setdefault(part.name, []).append(place)
+        for place, (selection, _) in enumerate(wanted):
+            self._by_name.setdefault(selection.name, []).append(place)
         self._wanted = wanted
 
     @property
     def names(self) -> Iterable[str]:
-        """The signals that are looked at."""
+        """The signals that are judged."""
         return self._by_name.keys()
 
     def take(self, name: str, number: int, rows: NDArray[Any]) -> None:
-        """Take rows of a signal; ``number`` counts those before, from the first row of the run."""
+        """Take rows of a signal; ``number`` is the number of rows before them since the start of the run."""
         for place in self._by_name[name]:
-            wanted = self._measured[place].part.stretch.rows
+            wanted = self._measured[place].selection.stretch.rows
             first, last = max(wanted.start - number, 0), max(wanted.stop - number, 0)
             self._measured[place].add(rows[first:last])
 
     def read(self, signals: Recorded) -> None:
-        """Take all rows of a recording, in which some may be missing."""
-        for place, (part, names) in enumerate(self._wanted):
-            first, last = part.stretch.stamps
-            stamps = signals.stamps(part.name)
-            rows = signals[part.name][(stamps >= first) & (stamps <= last)]
-            self._measured[place] = Measured(part, names, len(rows))
+        """Take all rows of a recording; some rows may be missing."""
+        for place, (selection, names) in enumerate(self._wanted):
+            first, last = selection.stretch.stamps
+            stamps = signals.stamps(selection.name)
+            rows = signals[selection.name][(stamps >= first) & (stamps <= last)]
+            self._measured[place] = Measured(selection, names, len(rows))
             self._measured[place].add(rows)
 
     def outcome(self) -> Outcome:
-        """Return the summary and the verdicts of what was taken."""
+        """Return the summary and the verdicts from the rows taken."""
         entries = zip(self._summary, self._measured, strict=False)
         summary = {entry.label: {name: found[name] for name in entry.show} for entry, found in entries}
         judged = zip(self._expectations, self._measured[len(self._summary) :], strict=True)

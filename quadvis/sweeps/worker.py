@@ -15,7 +15,7 @@ from quadvis.output.statistics import COUNT, FINAL
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
-    from quadvis.diagram.requirements import Part
+    from quadvis.diagram.requirements import Selection
     from quadvis.library.catalogue import OwnBlocks
     from quadvis.run.verdict import Outcome
 
@@ -109,15 +109,19 @@ class Row:
 def quantities(diagram: Diagram) -> list[Quantity]:
     """Return what the runs of a diagram give, in the order of `numbers`; of vectors one for each element."""
     found = [
-        Quantity(f"{entry.label}.{name}{element}", _unit(entry.part, name), _limit(diagram, entry.part, name))
+        Quantity(
+            f"{entry.label}.{name}{element}",
+            _unit(entry.selection, name),
+            _limit(diagram, entry.selection, name),
+        )
         for entry in diagram.summary
         for name in entry.show
-        for element in (entry.part.elements if name == FINAL else ("",))
+        for element in (entry.selection.elements if name == FINAL else ("",))
     ]
     for expectation in diagram.expectations:
-        part, name = expectation.part, expectation.statistic
-        limit = expectation.limit * _scale(part, name)
-        found.append(Quantity(str(expectation), _unit(part, name), limit, summary=False))
+        selection, name = expectation.selection, expectation.statistic
+        limit = expectation.limit * _scale(selection, name)
+        found.append(Quantity(str(expectation), _unit(selection, name), limit, summary=False))
     return found
 
 
@@ -128,26 +132,26 @@ def numbers(diagram: Diagram, outcome: Outcome) -> list[float]:
         for name in entry.show:
             value = outcome.summary[entry.label][name]
             values = value if isinstance(value, tuple) else (value,)
-            found += [each * _scale(entry.part, name) for each in values]
+            found += [each * _scale(entry.selection, name) for each in values]
     for verdict in outcome.verdicts:
-        found.append(verdict.found * _scale(verdict.expectation.part, verdict.expectation.statistic))
+        found.append(verdict.found * _scale(verdict.expectation.selection, verdict.expectation.statistic))
     return found
 
 
-def _unit(part: Part, statistic: str) -> str:
-    return str(part.shown) if part.shown.symbols and statistic != COUNT else ""
+def _unit(selection: Selection, statistic: str) -> str:
+    return str(selection.shown) if selection.shown.symbols and statistic != COUNT else ""
 
 
-def _scale(part: Part, statistic: str) -> float:
-    return 1.0 if statistic == COUNT else part.unit.scale / part.shown.scale
+def _scale(selection: Selection, statistic: str) -> float:
+    return 1.0 if statistic == COUNT else selection.unit.scale / selection.shown.scale
 
 
-def _limit(diagram: Diagram, part: Part, statistic: str) -> float | None:
+def _limit(diagram: Diagram, selection: Selection, statistic: str) -> float | None:
     """Return what is expected of a number of the summary, if an expectation is about the same."""
     for expectation in diagram.expectations:
-        same = replace(expectation.part, shown=part.shown, text=part.text) == part
+        same = replace(expectation.selection, shown=selection.shown, text=selection.text) == selection
         if same and expectation.statistic == statistic:
-            return expectation.limit * _scale(part, statistic)
+            return expectation.limit * _scale(selection, statistic)
     return None
 
 

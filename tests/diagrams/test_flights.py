@@ -202,12 +202,12 @@ def test_a_camera_that_delivers_nothing_does_not_pass_the_hover_where_nothing_mo
     sets = [DIAGRAMS / "sets" / "sq.yaml"]
     result = fly("hover", "geometric", params=sets, settings=NO_FRAMES | quiet)
     assert not result.passed
-    missed = [verdict.expectation.part.text for verdict in result.outcome.verdicts if not verdict.met]
+    missed = [verdict.expectation.selection.text for verdict in result.outcome.verdicts if not verdict.met]
     assert missed == ["eyes/camera.fresh"]
 
 
 @pytest.mark.parametrize("name", ["step", "trajectory", "takeover"])
 def test_a_camera_that_loses_a_third_of_its_frames_passes_no_flight(name: str) -> None:
     result = fly(name, settings={"eyes/camera.drop_rate": "0.33"})
-    missed = [verdict.expectation.part.text for verdict in result.outcome.verdicts if not verdict.met]
+    missed = [verdict.expectation.selection.text for verdict in result.outcome.verdicts if not verdict.met]
     assert "eyes/camera.fresh" in missed

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from quadvis.diagram.requirements import EXPECTATIONS, Entry, Expectation, Part
+from quadvis.diagram.requirements import EXPECTATIONS, Entry, Expectation, Selection
 from quadvis.output.statistics import COUNT, STATISTICS, finite
 from quadvis.output.stretch import Sampling, Stretch
 from quadvis.run.verdict import Judging, Outcome, Verdict
@@ -34,13 +34,13 @@ class Signals:
         return np.arange(len(self.rows)) * 100_000_000
 
 
-def part(rows: Any, after: str = "0", before: str | None = None, **changes: Any) -> Part:
+def part(rows: Any, after: str = "0", before: str | None = None, **changes: Any) -> Selection:
     """Return a part of the signal in a run that ends with these rows."""
     shape = np.shape(rows)[1:]
     sampling = Sampling(spacing=Fraction(1, 10), end=Fraction(max(len(rows) - 1, 0), 10))
     stretch = Stretch(sampling, Fraction(after), None if before is None else Fraction(before))
     given = {"text": NAME, "unit": METRE, "shown": METRE, "stretch": stretch, "shape": shape}
-    return Part(NAME, **given | changes)
+    return Selection(NAME, **given | changes)
 
 
 def judged(kind: str, rows: Any, limit: float = 0.0, **changes: Any) -> Verdict:
@@ -196,7 +196,7 @@ def test_the_final_value_of_several_elements_has_all_of_them(
 ) -> None:
     entry, values = summary(rows, "final", index=index)
     assert repr(values["final"]) == repr(value)
-    assert entry.part.elements == elements
+    assert entry.selection.elements == elements
     assert finite(values["final"]) == ([1.0, None] if repr(math.nan) in repr(value) else (
         list(value) if isinstance(value, tuple) else value
     ))  # fmt: skip

@@ -67,12 +67,12 @@ def _read(node: YamlNode, context: Context) -> Iterator[Expectation]:
         return
     for kind in kinds:
         is_count = EXPECTATIONS[kind].statistic == COUNT
-        unit = ONE if is_count else found.part.unit
+        unit = ONE if is_count else found.selection.unit
         limit = faults.collect(fields[kind].quantity, unit, bare=False)
         if limit is not None:
-            shown = _written_unit(fields[kind]) or found.part.shown
-            part = found.part if is_count else replace(found.part, shown=shown)
-            yield Expectation(part, kind, limit)
+            shown = _written_unit(fields[kind]) or found.selection.shown
+            selection = found.selection if is_count else replace(found.selection, shown=shown)
+            yield Expectation(selection, kind, limit)
 
 
 def _written_unit(node: YamlNode) -> Unit | None:

@@ -158,8 +158,11 @@ class FigureReader:
 
     def _check(self, node: YamlNode, wire: Wire, shown: Unit | None, context: Context) -> None:
         found = check_signal(node, wire, context)
-        if known(found) and shown is not None and not shown.dimension_equals(found.part.unit):
-            problem = f"'{found.part.text}' has {words(found.part.unit)}, the panel is in {words(shown)}"
+        if not known(found) or shown is None:
+            return
+        text, unit = found.selection.text, found.selection.unit
+        if not shown.dimension_equals(unit):
+            problem = f"'{text}' has {words(unit)}, the panel is in {words(shown)}"
             self.faults.add(node.place, problem, "give it a panel of its own")
 
 

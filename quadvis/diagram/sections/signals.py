@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any, Generic, TypeVar
 
 from quadvis.diagram.flow import misfit
-from quadvis.diagram.requirements import Part
+from quadvis.diagram.requirements import Selection
 from quadvis.diagram.sections.context import Context
 from quadvis.diagram.sections.log import LOG
 from quadvis.diagram.times import read_duration
@@ -37,7 +37,7 @@ class Asked(Generic[Item]):
 class Signal:
     """A signal that is logged, over the whole run, with its scalar kind."""
 
-    part: Part
+    selection: Selection
     scalar: str
 
 
@@ -78,7 +78,7 @@ def check_signal(node: YamlNode, wire: Wire, context: Context) -> Signal | Unkno
     shown = DEGREE if str(unit) == "rad" else unit
     stretch = Stretch(_sampling(found, context))
     text = wire_text(wire)
-    return Signal(Part(name, wire.index, text, unit, shown, 0.0, stretch, shape), declared.scalar)
+    return Signal(Selection(name, wire.index, text, unit, shown, 0.0, stretch, shape), declared.scalar)
 
 
 def _sampling(node: Node, context: Context) -> Sampling:
@@ -97,7 +97,7 @@ def read_stretch(fields: YamlMap, context: Context) -> Signal | Unknown:
     context.warn_window(fields, STRETCH_KEYS[:2], after, before)
     if found is UNKNOWN:
         return UNKNOWN
-    part = found.part
-    of = context.faults.collect(fields["of"].quantity, part.unit, bare=False) if "of" in fields else None
-    stretch = replace(part.stretch, after=after or Fraction(0), before=before)
-    return replace(found, part=replace(part, of=of or 0.0, stretch=stretch))
+    selection = found.selection
+    of = context.faults.collect(fields["of"].quantity, selection.unit, bare=False) if "of" in fields else None
+    stretch = replace(selection.stretch, after=after or Fraction(0), before=before)
+    return replace(found, selection=replace(selection, of=of or 0.0, stretch=stretch))

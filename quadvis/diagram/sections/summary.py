@@ -67,13 +67,13 @@ def _read(label: str, node: YamlNode, context: Context) -> Entry | Unknown:
     unit = faults.collect(fields["unit"].unit) if "unit" in fields else None
     if found is UNKNOWN:
         return UNKNOWN
-    part = found.part
-    if unit is not None and not unit.dimension_equals(part.unit):
-        problem = f"'{part.text}' has {words(part.unit)}, which is not shown in {words(unit)}"
+    selection = found.selection
+    if unit is not None and not unit.dimension_equals(selection.unit):
+        problem = f"'{selection.text}' has {words(selection.unit)}, which is not shown in {words(unit)}"
         faults.add(fields["unit"].place, problem, "write a unit of the same kind")
     default = ("rms", "max") if found.scalar == "float64" else (COUNT,)
     shown = tuple(name for name in show if name is not None) or default
-    return Entry(label, replace(part, shown=unit or part.shown), shown)
+    return Entry(label, replace(selection, shown=unit or selection.shown), shown)
 
 
 SUMMARY = Summary()

@@ -1,0 +1,78 @@
+"""The curves of a panel, out of the recorded signals: one for each element, in the unit of the panel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.engine.graph import CONTINUOUS
+from quadvis.engine.names import index_text, wire_text
+from quadvis.errors import QuadvisError, quoted, suggestion
+from quadvis.output.figures import Figure, Panel, Trace
+from quadvis.output.recording import Recorded
+from quadvis.units import Unit, parse_units
+
+
+@dataclass(frozen=True)
+class Curve:
+    """The samples of one number in a stretch of the run, in the unit that is shown.
+
+    Between samples a ``held`` one stands still, others are joined by lines; ``before`` is what it held when
+    the stretch began. ``whole`` numbers are counts, levels and truths.
+    """
+
+    label: str
+    unit: Unit
+    times: NDArray[np.float64]
+    values: NDArray[np.float64]
+    held: bool
+    whole: bool
+    before: float = math.nan
+
+
+def panel_curves(recorded: Recorded, figure: Figure, panel: Panel) -> list[Curve]:
+    """Return a panel's curves over the figure's stretch of the run, in the unit that the panel shows."""
+    found = [curve for trace in panel.traces for curve in _elements(recorded, trace)]
+    if not found:
+        raise QuadvisError(f"panel {quoted(panel.title)} has no signals; name one")
+    shown = panel.unit or found[0].unit
+    curves = []
+    for curve in found:
+        if not curve.unit.dimension_equals(shown):
+            raise QuadvisError(f"{quoted(curve.label)} is in {curve.unit}, which cannot be shown in {shown}")
+        part = (curve.times >= figure.start) & (curve.times <= figure.stop)
+        values = curve.values * (curve.unit.scale / shown.scale)
+        earlier = values[curve.times < figure.start]
+        before = float(earlier[-1]) if earlier.size else math.nan
+        times = curve.times[part]
+        curves.append(replace(curve, unit=shown, times=times, values=values[part], before=before))
+    return curves
+
+
+def _elements(recorded: Recorded, trace: Trace) -> Iterator[Curve]:
+    """Return one curve for every element that a trace selects."""
+    name, index = trace.signal.source, trace.signal.index
+    if name not in recorded.units:
+        remedy = suggestion(name, recorded.units) or "the log may leave its block out"
+        raise QuadvisError(f"there is no signal {quoted(name)}; {remedy}")
+    rows, times, units = recorded[name], recorded.times(name), parse_units(recorded.units[name])
+    shape, size = rows.shape[1:], math.prod(rows.shape[1:])
+    try:
+        chosen = np.arange(size).reshape(shape)[index].ravel().tolist()
+    except IndexError:
+        chosen = []
+    if not chosen:
+        extent = f"the shape {list(shape)}" if shape else "one element and takes no index"
+        raise QuadvisError(f"{quoted(wire_text(trace.signal))} does not exist; {quoted(name)} has {extent}")
+    elements = rows.reshape(len(rows), size)
+    held = rows.dtype.kind != "f" or recorded.rate(name) not in ("", CONTINUOUS)
+    for element in chosen:
+        label = trace.label or name
+        if shape and (len(chosen) > 1 or not trace.label):
+            label += index_text(np.unravel_index(element, shape))
+        values = elements[:, element].astype(np.float64)
+        yield Curve(label, units[element % len(units)], times, values, held, rows.dtype.kind != "f")
