@@ -17,7 +17,7 @@ SOLVER_KEYS = ("method", "step")
 
 
 @dataclass(frozen=True)
-class Solver:
+class SolverSpec:
     """The method and the step (s) of the solver, and where the step is written."""
 
     method: str = "ode4"
@@ -25,22 +25,22 @@ class Solver:
     place: Place | None = None
 
 
-class SolverSection(FileSection[Solver]):
+class SolverSection(FileSection[SolverSpec]):
     """The solver of a diagram."""
 
     key = "solver"
     words = "`{method: ode1 to ode4, step: 5 ms}` for continuous blocks; the step divides every period"
 
-    def read(self, node: YamlNode | None, faults: Faults) -> Solver:
+    def read(self, node: YamlNode | None, faults: Faults) -> SolverSpec:
         """Return method and step."""
         fields = faults.collect(node.fields, (), SOLVER_KEYS, faults) if node is not None else None
         if fields is None:
-            return Solver(step=UNKNOWN if node is not None else None)
+            return SolverSpec(step=UNKNOWN if node is not None else None)
         method = faults.collect(fields["method"].choice, SOLVERS) if "method" in fields else None
         if "step" not in fields:
-            return Solver(method or Solver.method)
+            return SolverSpec(method or SolverSpec.method)
         step = faults.read(read_step, fields["step"])
-        return Solver(method or Solver.method, step, fields["step"].place)
+        return SolverSpec(method or SolverSpec.method, step, fields["step"].place)
 
     def schema(self) -> Schema:
         """Return the schema: method and step."""
