@@ -16,6 +16,7 @@ from quadvis.library.catalogue import OwnBlocks
 if TYPE_CHECKING:
     from quadvis.analysis.analyse import Analysis
     from quadvis.output.recording import Recorded
+    from quadvis.run.live import LiveRun
     from quadvis.run.session import Progress, Result
     from quadvis.run.verdict import Outcome
 
@@ -36,6 +37,12 @@ class Diagram(Checked):
         from quadvis.run.session import run
 
         return run(self, log=log, progress=progress, keep=keep)
+
+    def start(self) -> LiveRun:
+        """Return a run to be advanced step by step; see ``quadvis.run.live.LiveRun``."""
+        from quadvis.run.live import LiveRun
+
+        return LiveRun(self)
 
     def judge(self, signals: Recorded) -> Outcome:
         """Return the summary and the verdicts of a recorded run; it may have ended early."""

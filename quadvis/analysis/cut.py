@@ -39,7 +39,7 @@ def with_breaks(graph: Graph, signals: Iterable[tuple[str, str]]) -> Graph:
         for block, port in sorted(opened):
             if block == node.path:
                 nodes.append(_break(node, port))
-    return Graph(graph.name, nodes, graph.solver, graph.step)
+    return replace(graph, nodes=nodes)
 
 
 def _rerouted(source: Wire | Constant, opened: set[tuple[str, str]]) -> Wire | Constant:

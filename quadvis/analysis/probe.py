@@ -15,7 +15,7 @@ from quadvis.analysis.cut import break_path
 from quadvis.block import Random
 from quadvis.diagram.sections.analyse import Cut
 from quadvis.engine.engine import Engine
-from quadvis.engine.graph import Graph, Node, Task
+from quadvis.engine.graph import Graph, Node, Task, Wire
 from quadvis.engine.layout import TIME, Placed
 from quadvis.engine.memory import Slot
 from quadvis.errors import QuadvisError
@@ -195,8 +195,16 @@ class Probe:
                 if state.signal.scalar == "float64":
                     yield from _elements(block.field(name), f"{path}.{name}")
             for port, wire in node.wires():
-                if wire.crossing == "delay" and block.inputs[port].scalar == "float64":
-                    yield from _elements(block.inputs[port], f"{path}.{port}")
+                if wire.delayed and block.inputs[port].scalar == "float64":
+                    yield from _elements(self._late(wire, block.inputs[port]), f"{path}.{port}")
+
+    def _late(self, wire: Wire, read: Slot) -> Slot:
+        """Return the slot that keeps a delayed value from tick to tick; what is latched is a copy of it."""
+        if not wire.latched:
+            return read
+        output = self.program[wire.block].outputs[wire.port]
+        delays = self.program.task(self.program[wire.block].task).delays
+        return next(op.targets[0] for op in delays if op.sources[0] == output)
 
     def _continuous(self) -> Positions:
         """Return where the continuous states of the loop are."""

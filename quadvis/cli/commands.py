@@ -244,6 +244,16 @@ def draw(options: argparse.Namespace) -> int:
     return _write(draw_diagram(diagram), output, SVG, diagram.inputs)
 
 
+def program(options: argparse.Namespace) -> int:
+    """Print the program of a diagram as a table."""
+    from quadvis.engine.program import make_program
+    from quadvis.run.listing import program_lines
+
+    diagram = _load(options)
+    print("\n".join(program_lines(make_program(diagram.graph, diagram.seed))))
+    return 0
+
+
 def plot(options: argparse.Namespace) -> int:
     """Draw the figures of a log."""
     from quadvis.diagram.sections.figures import read_figures

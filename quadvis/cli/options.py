@@ -93,6 +93,8 @@ def parser() -> Parser:
         metavar="PATH",
         help="default NAME.svg, with the variant in it; '-' for standard output",
     )
+    program = add("program", commands.program, "print what is called at which ticks, and in which order")
+    _diagram_options(program)
     plot = add("plot", commands.plot, "draw the figures that a log's diagram declares, as PNG")
     plot.add_argument("log", metavar="LOG")
     plot.add_argument("--output", "-o", metavar="FOLDER", help="default: beside the log")

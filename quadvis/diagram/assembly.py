@@ -20,6 +20,7 @@ from quadvis.diagram.sections.files import FILES, check_files
 from quadvis.diagram.sections.seed import SEED
 from quadvis.diagram.sections.solver import SOLVER
 from quadvis.diagram.sections.stop_time import STOP_TIME
+from quadvis.diagram.sections.tasking import TASKING
 from quadvis.diagram.sections.variants import VARIANTS
 from quadvis.diagram.settings import ParameterFile, Settings
 from quadvis.diagram.slots import Outputs, check_slots, fill_slots
@@ -72,7 +73,8 @@ class Assembly:
         builder = Builder(spec, expansion, wiring, self.made, faults)
         drafts = builder.drafts()
         step = builder.step if known(builder.step) else None
-        graph = Graph(spec.name, WireCheck(drafts, faults).run(), spec[SOLVER].method, step)
+        nodes = WireCheck(drafts, faults, spec[TASKING]).run()
+        graph = Graph(spec.name, nodes, spec[SOLVER].method, step, spec[TASKING])
         stop = _stop_time(spec, stop_time, faults)
         if known(builder.step):
             tasks = {draft.task for draft in drafts if known(draft.task)}

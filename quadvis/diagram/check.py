@@ -14,7 +14,7 @@ from quadvis.diagram.flow import Draft, Key, Link, ShapeFlow
 from quadvis.diagram.names import absent, remedy_for
 from quadvis.diagram.unit_repair import follow_units
 from quadvis.diagram.values import shape_text
-from quadvis.engine.graph import Constant, Node, Task, Wire, execution_order
+from quadvis.engine.graph import MULTI, SINGLE, Constant, Node, Task, Wire, execution_order, with_transitions
 from quadvis.errors import UNKNOWN, Faults, Place, known
 
 _ANY_TASK = Task("unknown", Fraction(1))  # a node needs one; no check looks at it
@@ -23,9 +23,9 @@ _ANY_TASK = Task("unknown", Fraction(1))  # a node needs one; no check looks at 
 class WireCheck:
     """Checks the wires between drafts, and turns them into the nodes of a graph."""
 
-    def __init__(self, drafts: Sequence[Draft], faults: Faults) -> None:
+    def __init__(self, drafts: Sequence[Draft], faults: Faults, tasking: str = SINGLE) -> None:
         self.drafts = {draft.path: draft for draft in drafts}
-        self.faults = faults
+        self.faults, self.tasking = faults, tasking
         self.unknown: set[Key] = set()  # inputs of which nothing is known
         self.nodes = {draft.path: self._node(draft) for draft in drafts}
 
@@ -63,6 +63,8 @@ class WireCheck:
         for path, port in units.unknown | {link.key for link in links if link.connection.across is UNKNOWN}:
             # A loop through such a wire would be reported twice.
             self.nodes[path].inputs.pop(port, None)
+        if self.tasking == MULTI:
+            with_transitions(self.nodes.values())
         order, loops = execution_order(list(self.nodes.values()))
         for loop in loops:
             self._report_loop(loop)

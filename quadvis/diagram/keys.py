@@ -20,10 +20,11 @@ from quadvis.diagram.sections.seed import SEED
 from quadvis.diagram.sections.solver import SOLVER
 from quadvis.diagram.sections.stop_time import STOP_TIME
 from quadvis.diagram.sections.summary import SUMMARY
+from quadvis.diagram.sections.tasking import TASKING
 from quadvis.diagram.sections.variants import VARIANTS
 
 FILE_SECTIONS: tuple[FileSection[Any], ...] = (
-    FORMAT, NAME, DOC, PARAMS, RATES, SOLVER, STOP_TIME, SEED, FILES, BLOCKS, VARIANTS, PORTS,
+    FORMAT, NAME, DOC, PARAMS, RATES, SOLVER, TASKING, STOP_TIME, SEED, FILES, BLOCKS, VARIANTS, PORTS,
 )  # fmt: skip
 RUN_SECTIONS: tuple[RunSection[Any], ...] = (LOG, EXPECT, SUMMARY, FIGURES, ANALYSE)
 SECTIONS: tuple[Section[Any], ...] = (*FILE_SECTIONS, *RUN_SECTIONS)

@@ -163,7 +163,7 @@ def _from_texts(texts: Iterable[str], origin: str, faults: Faults) -> Iterator[t
                     remedy = "write block.parameter and value, such as {{'{}': '{}'}}".format(*example)
                 faults.add(place, problem, remedy)
                 continue
-            node = faults.read(_value, text, parameter, place)
+            node = faults.read(read_setting, text, parameter, place)
             yield name, Setting(place, read_constant(node, faults) if known(node) else UNKNOWN)
 
 
@@ -172,7 +172,7 @@ def _odd(name: str) -> Odd | None:
     return Odd(0, 0, char) if char is not None else None
 
 
-def _value(text: str, parameter: str, place: Place) -> YamlNode:
+def read_setting(text: str, parameter: str, place: Place) -> YamlNode:
     """Read a value that stands in no file. A file named there is relative to the working directory."""
     try:
         node = parse_yaml(text, place.file)

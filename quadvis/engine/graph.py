@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -22,6 +22,8 @@ CROSSINGS = {
 }
 CONTINUOUS = "continuous"  # the rate of what the solver integrates; all others are sampled
 SOLVERS = ("ode1", "ode2", "ode3", "ode4")
+SINGLE, MULTI = TASKINGS = ("single", "multi")
+DELAY = "delay"
 
 Index = tuple[Any, ...]  # integers, then slices, as numpy takes them
 
@@ -38,17 +40,28 @@ class Task:
 
 @dataclass(frozen=True)
 class Wire:
-    """Where an input comes from: a port of a block, perhaps a part of it; how it crosses between rates."""
+    """Where an input comes from: a port of a block, perhaps a part of it; how it crosses between rates.
+
+    ``late`` and ``latched`` are what `with_transitions` adds where each task runs by itself: the value of one
+    of the producer's periods ago; a value that stands still until the reader is due again.
+    """
 
     block: str
     port: str
     index: Index = ()
     crossing: str | None = None
+    late: bool = False
+    latched: bool = False
 
     @property
     def source(self) -> str:
         """The wire's source as a diagram writes it, without the index."""
         return f"{self.block}.{self.port}"
+
+    @property
+    def delayed(self) -> bool:
+        """True if the wire gives what the producer gave one of its periods ago."""
+        return self.late or self.crossing == DELAY
 
 
 @dataclass(frozen=True)
@@ -90,12 +103,17 @@ class Node:
 
 @dataclass
 class Graph:
-    """All blocks, each after the blocks whose outputs its own need, and the exact time base."""
+    """All blocks, each after the blocks whose outputs its own need, and the exact time base.
+
+    ``tasking`` is ``single`` (one order of execution a tick) or ``multi`` (each task by itself, the fastest
+    first; the wires have transitions then).
+    """
 
     name: str
     nodes: list[Node]
     solver: str = "ode4"
     step: Fraction | None = None
+    tasking: str = SINGLE
 
     def __post_init__(self) -> None:
         self._by_path = {node.path: node for node in self.nodes}
@@ -126,7 +144,7 @@ class Graph:
 
 def rate_monotonic(tasks: Iterable[Task]) -> list[Task]:
     """Return tasks fastest first, the continuous one before all."""
-    return sorted(tasks, key=lambda task: (not task.continuous, task.period, task.offset, task.name))
+    return sorted(tasks, key=rank)
 
 
 def common_divisor(times: Sequence[Fraction]) -> Fraction:
@@ -190,5 +208,35 @@ def execution_order(nodes: Sequence[Node]) -> tuple[list[Node], list[list[tuple[
 def _needs(node: Node) -> Iterator[tuple[str, str]]:
     """Yield what must be computed before this block: its feedthrough inputs and where they come from."""
     for port, wire in node.wires(node.block.interface.feedthrough):
-        if wire.crossing != "delay":
+        if not wire.delayed:
             yield port, wire.block
+
+
+def rank(task: Task) -> tuple[bool, Fraction, Fraction, str]:
+    """Return the place of a task among others: the continuous one first, then fastest first."""
+    return not task.continuous, task.period, task.offset, task.name
+
+
+def with_transitions(nodes: Iterable[Node]) -> None:
+    """Make wires between tasks deterministic where each task runs by itself and faster ones interrupt it.
+
+    As Simulink's rate transitions do: from a slower task a faster one reads what the slower gave one of the
+    slower's periods ago, swapped when the slower is due again, since its present value may not be ready.
+    From a faster task a slower one reads what the faster gave when the slower became due; the value is
+    latched, since the faster runs on meanwhile. So is a late value, unless the reader is always through
+    before it changes.
+    """
+    nodes = list(nodes)
+    tasks = {node.path: node.task for node in nodes}
+    for node in nodes:
+        for port, wire in list(node.wires()):
+            producer, reader = tasks.get(wire.block, node.task), node.task
+            if producer != reader:
+                late = not wire.delayed and rank(producer) > rank(reader)
+                through = (late or wire.delayed) and _falls_on(producer, reader)
+                node.inputs[port] = replace(wire, late=late, latched=not through)
+
+
+def _falls_on(task: Task, other: Task) -> bool:
+    """Return whether every tick of a task is one of another, from the later offset on."""
+    return task.period % other.period == 0 and (task.offset - other.offset) % other.period == 0

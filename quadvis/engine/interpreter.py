@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.block import NO_FRAME, Block
+from quadvis.engine.graph import SINGLE
 from quadvis.engine.layout import TIME
 from quadvis.engine.memory import SLOT, Memory
-from quadvis.engine.program import COPY, PHASES, Op, Program
+from quadvis.engine.program import COPY, Op, Program, TaskProgram
 from quadvis.engine.solver import Solver, Vector
 from quadvis.engine.taps import Observer, Tap
 
@@ -161,18 +162,18 @@ class Interpreter:
     def _prepare(self, due: tuple[bool, ...]) -> _Moment:
         rhythms = {rhythm for rhythm, flag in zip(self._rhythms, due, strict=True) if flag}
         tasks = [task for task in self.program.tasks if (task.every, task.offset) in rhythms]
-        ops = {
-            phase: sorted((op for task in tasks for op in task.phases[phase]), key=lambda op: op.block)
-            for phase in PHASES
-        }
-        enter = [op for task in tasks for op in task.enter]
+        groups = [tasks] if self.program.tasking == SINGLE else [[task] for task in tasks]
+        before = [op for task in tasks for op in task.delays]
+        for group in groups:
+            before += [op for task in group for op in task.latches]
+            before += [*_in_order(group, "read"), *_in_order(group, "output")]
         finite = np.array([position for task in tasks for position in task.finite], np.intp)
         names = {task.name for task in tasks}
         attached = [observer for observer in self._observers if self._rhythm(observer) in rhythms]
         made = _Moment(
-            [self.call(op) for op in (*enter, *ops["read"], *ops["output"])],
-            [self.call(op) for op in ops["write"]],
-            [self.call(op) for op in ops["update"]],
+            [self.call(op) for op in before],
+            [self.call(op) for group in groups for op in _in_order(group, "write")],
+            [self.call(op) for group in groups for op in _in_order(group, "update")],
             finite,
             np.zeros(finite.size),
             [observer.call for observer in attached if isinstance(observer, Observer)],
@@ -213,6 +214,11 @@ class Interpreter:
         except Exception as error:
             raise _MinorError(call, error) from error
         return floats[self._slopes]
+
+
+def _in_order(tasks: Sequence[TaskProgram], phase: str) -> list[Op]:
+    """Return the calls of a phase in the order of execution."""
+    return sorted((op for task in tasks for op in task.phases[phase]), key=lambda op: op.block)
 
 
 class _MinorError(Exception):

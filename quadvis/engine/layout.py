@@ -81,7 +81,8 @@ class Placed:
 class Layout:
     """Gives every block of a graph its places, in the order of execution: ``blocks``.
 
-    ``copies`` are the delayed values: from an output to where its readers find it, with the producer's task.
+    ``delays`` and ``latches`` are copies from slot to slot between an output and its readers, by the task at
+    whose ticks they are made: the producer's for a delay, the reader's for a latch.
     """
 
     def __init__(self, graph: Graph) -> None:
@@ -95,19 +96,28 @@ class Layout:
             for port, source in node.inputs.items()
             if isinstance(source, Constant)
         }
-        self._delayed: dict[tuple[str, str], Slot] = {}
+        self.delays: dict[str, dict[Slot, Slot]] = {}
+        self.latches: dict[str, dict[Slot, Slot]] = {}
         for node in graph.nodes:
             for _, wire in node.wires():
-                key = (wire.block, wire.port)
-                if wire.crossing == "delay" and key not in self._delayed:
-                    self._delayed[key] = self._take(graph[wire.block], wire.port)
+                self._whole(node, wire)
         slopes = {node.path: self._slopes(node) for node in graph.nodes}
         self.blocks = tuple(self._place(node, slopes[node.path]) for node in graph.nodes)
 
-    def copies(self) -> Iterator[tuple[str, Slot, Slot]]:
-        """Yield the task of the producer, its output, and the slot that holds the output's delayed value."""
-        for (path, port), slot in self._delayed.items():
-            yield self._graph[path].task.name, self._outputs[path][port], slot
+    def _whole(self, node: Node, wire: Wire) -> Slot:
+        """Return the slot from which a wire reads: an output, or a copy of it, for which room is made."""
+        slot = self._outputs[wire.block][wire.port]
+        producer = self._graph[wire.block]
+        for copied, copies, task in (
+            (wire.delayed, self.delays, producer.task),
+            (wire.latched, self.latches, node.task),
+        ):
+            if copied:
+                made = copies.setdefault(task.name, {})
+                if slot not in made:
+                    made[slot] = self._take(producer, wire.port)
+                slot = made[slot]
+        return slot
 
     def _signals(self) -> dict[str, Slots]:
         found = {}
@@ -165,10 +175,7 @@ class Layout:
         source = node.inputs[port]
         if not isinstance(source, Wire):
             return self._constants[node.path, port]
-        delayed = source.crossing == "delay"
-        slot = (
-            self._delayed[source.block, source.port] if delayed else self._outputs[source.block][source.port]
-        )
+        slot = self._whole(node, source)
         if not source.index:
             return slot
         part = selected(slot.shape, source.index)

@@ -41,10 +41,11 @@ class Op:
 class TaskProgram:
     """What the blocks of one rate do at each of their ticks, phase by phase.
 
-    The task is due at tick ``offset`` and then at every ``every`` ticks. ``enter``: copies for wires that
-    delay or cross into other tasks. ``reads``: blocks fetch what the world outside offers. ``outputs``: the
-    blocks compute. ``finite``: the slots that must hold finite numbers then. ``writes``: blocks hand their
-    inputs to the world outside. ``updates``: the blocks change their states.
+    The task is due at tick ``offset`` and then at every ``every`` ticks. ``delays``: copies of outputs of one
+    period ago, made before any block runs. ``latches``: copies of what faster tasks gave, made once those are
+    through, where each task runs by itself. ``reads``: blocks fetch what the world outside offers.
+    ``outputs``: the blocks compute. ``finite``: the slots that must hold finite numbers then. ``writes``:
+    blocks hand their inputs to the world outside. ``updates``: the blocks change their states.
     """
 
     name: str
@@ -52,7 +53,8 @@ class TaskProgram:
     every: int
     offset: int
     continuous: bool
-    enter: tuple[Op, ...]
+    delays: tuple[Op, ...]
+    latches: tuple[Op, ...]
     reads: tuple[Op, ...]
     outputs: tuple[Op, ...]
     writes: tuple[Op, ...]
@@ -80,7 +82,8 @@ class Tunable:
 class Program:
     """The program of one graph and one seed.
 
-    ``blocks`` are in the order of execution, ``tasks`` fastest first. ``image`` is the memory at the
+    ``tasking`` is ``single``: all blocks that are due run in one order; or ``multi``: task by task, fastest
+    first. ``blocks`` are in the order of execution, ``tasks`` fastest first. ``image`` is the memory at the
     beginning: parameters, initial states, constants, random streams. ``held`` is the number of slots that
     minor steps write over: time and the signals of the continuous task. ``states`` are the slots of the
     continuous states, ``slopes`` those of their derivatives, in one order. ``derivatives`` are the calls that
@@ -90,6 +93,7 @@ class Program:
     name: str
     period: Fraction  # of the base tick (s)
     solver: str
+    tasking: str
     tasks: tuple[TaskProgram, ...]
     blocks: tuple[Placed, ...]
     image: bytes
@@ -133,9 +137,6 @@ def make_program(graph: Graph, seed: int) -> Program:
     """Lay out memory and list the calls of every task; states hold their initial values, seeded."""
     layout = Layout(graph)
     blocks = layout.blocks
-    copies: dict[str, list[Op]] = {}
-    for producer, source, target in layout.copies():
-        copies.setdefault(producer, []).append(Op(NO_BLOCK, COPY, (source,), (target,)))
     calls = {method: _calls(graph, blocks, method) for method in (*PHASES, "deriv")}
     tasks = []
     for task in graph.tasks:
@@ -150,7 +151,8 @@ def make_program(graph: Graph, seed: int) -> Program:
                 graph.ticks(task.period),
                 graph.ticks(task.offset),
                 task.continuous,
-                tuple(copies.get(task.name, ())),
+                _copies(layout.delays.get(task.name, {})),
+                _copies(layout.latches.get(task.name, {})),
                 read,
                 output,
                 write,
@@ -163,6 +165,7 @@ def make_program(graph: Graph, seed: int) -> Program:
         graph.name,
         graph.tick,
         graph.solver,
+        graph.tasking,
         tuple(tasks),
         blocks,
         _image(graph, layout, seed),
@@ -174,6 +177,10 @@ def make_program(graph: Graph, seed: int) -> Program:
         tuple(calls["output"][number] for number in _minor(graph.nodes) if number in calls["output"]),
         tuple(_tunables(graph, blocks)),
     )
+
+
+def _copies(slots: Mapping[Slot, Slot]) -> tuple[Op, ...]:
+    return tuple(Op(NO_BLOCK, COPY, (source,), (target,)) for source, target in slots.items())
 
 
 def _calls(graph: Graph, blocks: Sequence[Placed], method: str) -> dict[int, Op]:
@@ -258,4 +265,4 @@ def _moving(nodes: Sequence[Node]) -> set[str]:
 
 def _sources(node: Node, ports: Iterable[str]) -> Iterator[str]:
     """Yield the blocks whose present outputs some inputs of a block read."""
-    return (wire.block for _, wire in node.wires(ports) if wire.crossing != "delay")
+    return (wire.block for _, wire in node.wires(ports) if not wire.delayed)

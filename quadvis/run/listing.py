@@ -23,7 +23,8 @@ def program_lines(program: Program) -> list[str]:
     slots = len(program.image) // 8
     lines = [
         f"{program.name}: base tick {_time(float(program.period))}, {program.solver}, "
-        f"{len(program.blocks)} blocks, {slots} slots of 8 bytes, {program.frames} frames",
+        f"{program.tasking} tasking, {len(program.blocks)} blocks, {slots} slots of 8 bytes, "
+        f"{program.frames} frames",
         f"program {program.hash[:16]}, memory at the beginning included",
     ]
     rows: list[Row] = []
@@ -31,7 +32,7 @@ def program_lines(program: Program) -> list[str]:
         often = "every tick" if task.every == 1 else f"every {task.every} ticks"
         offset = f" from tick {task.offset} on" if task.offset else ""
         rows.append((f"task {task.name}", f"{often}{offset}, {_time(float(task.period))}", "", "", ""))
-        for phase, ops in (("enter", task.enter), *task.phases.items()):
+        for phase, ops in (("delay", task.delays), ("latch", task.latches), *task.phases.items()):
             rows += _phase(phase, ops, names)
     for title, ops in (("derivatives", program.derivatives), ("minor steps", program.minor)):
         if ops:
@@ -83,8 +84,9 @@ class _Names:
             for state, slot in block.slopes.items():
                 self._name(f"d/dt {block.path}.{state}", slot)
         for task in program.tasks:
-            for op in task.enter:
-                self._name(f"delayed {self.of(op.sources[0])}", op.targets[0])
+            for word, ops in (("delayed", task.delays), ("latched", task.latches)):
+                for op in ops:
+                    self._name(f"{word} {self.of(op.sources[0])}", op.targets[0])
 
     def _name(self, name: str, slot: Slot) -> None:
         if slot.scalar == "frame":

@@ -1,0 +1,128 @@
+"""A run that is held by hand: advanced step by step, looked into, tuned, and taken back."""
+
+from __future__ import annotations
+
+import math
+from contextlib import ExitStack
+from fractions import Fraction
+from types import TracebackType
+from typing import Any, Self
+
+from quadvis.block import Param
+from quadvis.diagram.diagram import Diagram
+from quadvis.diagram.settings import read_setting
+from quadvis.diagram.times import read_duration
+from quadvis.diagram.values import read_constant, read_value
+from quadvis.document import YamlScalar
+from quadvis.engine.clock import Clock
+from quadvis.engine.engine import Engine, Snapshot
+from quadvis.engine.graph import Node
+from quadvis.engine.names import read_name
+from quadvis.engine.tuning import Change
+from quadvis.errors import Faults, Place, QuadvisError, quoted, sentence, suggestion
+
+
+class LiveRun:
+    """A run of a diagram between its beginning and its end: use it as a context manager.
+
+    ``run["craft.position"]`` is what a signal, a parameter or a state holds now, in SI units; an index is
+    allowed, and so are the ports of parts. ``run["control/roll.bandwidth"] = "3 rad/s"`` lets a tunable
+    parameter have a new value from the next tick on; numbers are in SI units. Blocks are closed, and outputs
+    left at their safe values, when the context ends.
+    """
+
+    def __init__(self, diagram: Diagram, clock: Clock | None = None) -> None:
+        self.diagram = diagram
+        self._engine = Engine(diagram.graph, diagram.seed, clock)
+        self._reached = Fraction(0)  # s; the run has passed all ticks before that
+        self._stack = ExitStack()
+
+    def __enter__(self) -> Self:
+        with ExitStack() as stack:
+            stack.enter_context(self.diagram.guarded(None))
+            stack.enter_context(self._engine)
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stack.__exit__(kind, error, trace)
+
+    @property
+    def time(self) -> float:
+        """The time of the next tick (s)."""
+        return self._engine.time
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """The parameters that were tuned, with the ticks before which they took their values."""
+        return tuple(self._engine.tuning.changes)
+
+    def advance(self, duration: str | float = 0.0) -> None:
+        """Run all ticks of the next ``duration``, such as "1 s" or a number of seconds; if 0, one tick."""
+        engine = self._engine
+        if duration:
+            self._reached += _seconds(duration)
+            engine.run(max(0, math.ceil(self._reached / engine.period) - engine.tick))
+        else:
+            engine.run(1)
+            self._reached = max(self._reached, engine.tick * engine.period)
+
+    def __getitem__(self, name: str) -> Any:
+        path, port, index = self._find(name)
+        value = self._engine.read(path, port)
+        return value[index] if index else value
+
+    def __setitem__(self, name: str, value: Any) -> None:
+        path, parameter, index = self._find(name)
+        if index:
+            raise QuadvisError(f"{quoted(name)} is a part of a parameter; give all of it")
+        node = self.diagram.graph[path]
+        params = node.block.interface.params
+        if parameter not in params:
+            remedy = suggestion(name, self._engine.tuning.names) or "only parameters can be tuned"
+            raise QuadvisError(f"{quoted(name)} is no parameter; {remedy}")
+        self._engine.tuning.set(path, parameter, _value(node, params[parameter], name, value))
+
+    def _find(self, name: str) -> tuple[str, str, Any]:
+        """Return the block, the name within it, and the index; QuadvisError if nothing has the name."""
+        nodes = self.diagram.graph.nodes
+        head, bracket, tail = name.partition("[")
+        wire = read_name(self.diagram.ports.get(head, head) + bracket + tail)
+        if wire is None or wire.block not in (node.path for node in nodes):
+            outputs = [f"{node.path}.{port}" for node in nodes for port in node.block.interface.outputs]
+            known = [*outputs, *self.diagram.ports, *self._engine.tuning.names]
+            raise QuadvisError(sentence(f"this run has no {quoted(name)}", suggestion(head, known)))
+        interface = self.diagram.graph[wire.block].block.interface
+        known = [*interface.outputs, *interface.inputs, *interface.params, *interface.states]
+        if wire.port not in known:
+            raise QuadvisError(
+                sentence(f"block '{wire.block}' has no '{wire.port}'", suggestion(wire.port, known))
+            )
+        return wire.block, wire.port, wire.index
+
+    def snapshot(self) -> Snapshot:
+        """Return the whole state between two ticks."""
+        return self._engine.snapshot()
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to a snapshot of this diagram; the run from there repeats to the bit."""
+        self._engine.restore(snapshot)
+        self._reached = snapshot.tick * self._engine.period
+
+
+def _seconds(duration: str | float) -> Fraction:
+    text = duration if isinstance(duration, str) else f"{float(duration)!r} s"
+    return read_duration(YamlScalar(text, False, "advance", 0, 0))
+
+
+def _value(node: Node, param: Param, name: str, value: Any) -> Any:
+    """Return a value in SI units, read from a text in the parameter's unit or taken as it is."""
+    if not isinstance(value, str) or param.is_text or param.choices:
+        return value
+    faults = Faults()
+    written = read_constant(read_setting(value, param.name, Place(name)), faults)
+    faults.check()
+    assert written is not None
+    return read_value(param.signal, node.units[param.name], written)[0]
