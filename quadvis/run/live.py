@@ -19,7 +19,7 @@ from quadvis.engine.engine import Engine, Snapshot
 from quadvis.engine.graph import Node
 from quadvis.engine.names import read_name
 from quadvis.engine.tuning import Change
-from quadvis.errors import Faults, Place, QuadvisError, quoted, sentence, suggestion
+from quadvis.errors import Faults, Place, QuadvisError, known, quoted, sentence, suggestion
 
 
 class LiveRun:
@@ -92,13 +92,13 @@ class LiveRun:
         wire = read_name(self.diagram.ports.get(head, head) + bracket + tail)
         if wire is None or wire.block not in (node.path for node in nodes):
             outputs = [f"{node.path}.{port}" for node in nodes for port in node.block.interface.outputs]
-            known = [*outputs, *self.diagram.ports, *self._engine.tuning.names]
-            raise QuadvisError(sentence(f"this run has no {quoted(name)}", suggestion(head, known)))
+            names = [*outputs, *self.diagram.ports, *self._engine.tuning.names]
+            raise QuadvisError(sentence(f"this run has no {quoted(name)}", suggestion(head, names)))
         interface = self.diagram.graph[wire.block].block.interface
-        known = [*interface.outputs, *interface.inputs, *interface.params, *interface.states]
-        if wire.port not in known:
+        names = [*interface.outputs, *interface.inputs, *interface.params, *interface.states]
+        if wire.port not in names:
             raise QuadvisError(
-                sentence(f"block '{wire.block}' has no '{wire.port}'", suggestion(wire.port, known))
+                sentence(f"block '{wire.block}' has no '{wire.port}'", suggestion(wire.port, names))
             )
         return wire.block, wire.port, wire.index
 
@@ -124,5 +124,5 @@ def _value(node: Node, param: Param, name: str, value: Any) -> Any:
     faults = Faults()
     written = read_constant(read_setting(value, param.name, Place(name)), faults)
     faults.check()
-    assert written is not None
+    assert known(written)
     return read_value(param.signal, node.units[param.name], written)[0]
