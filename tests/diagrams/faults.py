@@ -1,10 +1,11 @@
 """Flights under the failsafe with a camera that fails for three seconds, and what became of them.
 
-``python -m tests.diagrams.faults``, or the same with ``pictures``, flies all kinds in five seeds and prints a
-line for each; the tests fly one seed.
+``python -m tests.diagrams.faults --seeds 1:5`` flies all kinds at all places with both designs, prints a line
+for each flight and a table in the end; the tests fly one seed.
 """
 
-import sys
+import argparse
+from collections import defaultdict
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -41,6 +42,7 @@ PLACES = {
     "blackout": Place("blackout", 2.0, {"blackout.during": "[[100 s, 101 s]]"}),
     "landing": Place("landing", 2.5, {}),
     "descent": Place("landing", 2.5, {"wish.at": "3.5 s"}, end=13.0, lands=True),
+    "touchdown": Place("landing", 2.5, {"wish.at": "3.5 s"}, begin=11.5, end=18.0, lands=True),
     "takeover": Place("takeover", 1.5, {}, begin=13.0, end=19.0),
 }
 
@@ -52,6 +54,7 @@ class Flight:
     farthest: float  # m, from the target, from the begin of the fault on
     lowest: float  # m
     highest: float  # m
+    impact: float  # m/s, greatest at which it came to the ground; 0 if it did not
     lost: bool
     left: float  # s from the begin of the fault until vision was no longer FRESH; inf if it was all the time
     reasons: list[int]
@@ -101,24 +104,50 @@ def _judged(result: Any, where: Place) -> Flight:
         away = np.maximum(away, np.abs(position[:, 2] - where.height))
     lowest, highest = float(position[:, 2].min()), float(position[:, 2].max())
     hit = highest > where.height + 3.0 - MARGIN or (not where.lands and lowest < MARGIN)
+    impact = float(result["craft/ground.impact"].max()) if where.lands else 0.0
     times, state = result.times("supervision/vision.state"), result["supervision/vision.state"]
     gone = times[(times >= where.begin - 1e-9) & (state != FRESH)]
     during = (times >= where.begin) & (state != FRESH)
     reasons = sorted(set(result["supervision/vision.reason"][during].tolist()))
     return Flight(
-        float(away.max()), lowest, highest, bool(away.max() > LOST or hit),
+        float(away.max()), lowest, highest, impact, bool(away.max() > LOST or hit),
         float(gone[0] - where.begin) if len(gone) else np.inf, reasons, bool(state[-1] == FRESH),
     )  # fmt: skip
 
 
-def sweep(pictures: bool, seeds: int) -> None:
-    """Print what becomes of every place, design, kind and seed: ``python -m tests.diagrams.faults``."""
-    kinds = OF_FRAMES if pictures else OF_POINTS
-    for place, variant, kind, seed in product(PLACES, (None, "fused"), kinds, range(1, seeds + 1)):
-        with TemporaryDirectory() as folder:
+def sweep(pictures: bool, places: list[str], designs: list[str], kinds: list[str], seeds: range) -> None:
+    """Print what becomes of every seed, kind, design and place, and a table by kind."""
+    flown: dict[tuple[str, str], list[Flight]] = defaultdict(list)
+    with TemporaryDirectory() as folder:
+        for seed, kind, design, place in product(seeds, kinds, designs, places):
+            variant = None if design == "paper" else design
             flight = fly(Path(folder), place, variant, kind, seed, pictures)
-        print("LOST" if flight.lost else "    ", place, variant or "paper", kind, seed, flight, flush=True)
+            flown[kind, design].append(flight)
+            print("LOST" if flight.lost else "    ", place, design, kind, seed, flight, flush=True)
+    print(f"{'kind':16}{'design':8}flights lost not-back farthest/m impact/(m/s) left/s: first median last")
+    for (kind, design), flights in sorted(flown.items()):
+        left = sorted(flight.left for flight in flights)
+        print(
+            f"{kind:16}{design:8}{len(flights):7}{sum(f.lost for f in flights):5}"
+            f"{sum(not f.back for f in flights):9}{max(f.farthest for f in flights):11.2f}"
+            f"{max(f.impact for f in flights):13.2f}"
+            f"        {left[0]:5.2f} {left[len(left) // 2]:6.2f} {left[-1]:4.2f}"
+        )
+
+
+def main() -> None:
+    """Fly what the command line says."""
+    parser = argparse.ArgumentParser(prog="python -m tests.diagrams.faults", description=__doc__)
+    parser.add_argument("--pictures", action="store_true", help="render pictures, and let them fail")
+    parser.add_argument("--places", nargs="+", choices=PLACES, default=[*PLACES])
+    parser.add_argument("--designs", nargs="+", choices=("paper", "fused"), default=["paper", "fused"])
+    parser.add_argument("--kinds", nargs="+", choices=sorted({*OF_FRAMES, *OF_POINTS}))
+    parser.add_argument("--seeds", default="1:5", metavar="FIRST:LAST")
+    asked = parser.parse_args()
+    first, last = map(int, asked.seeds.split(":"))
+    kinds = asked.kinds or list(OF_FRAMES if asked.pictures else OF_POINTS)
+    sweep(asked.pictures, asked.places, asked.designs, kinds, range(first, last + 1))
 
 
 if __name__ == "__main__":
-    sweep(pictures="pictures" in sys.argv[1:], seeds=5)
+    main()

@@ -6,18 +6,23 @@ import math
 from typing import Any
 
 from quadvis.block import Block, In, Out, Param, State
+from quadvis_blocks._digest import NOTHING, digest
 from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, judge, note
 from quadvis_blocks.supervision._vision import FROZEN, trouble_of
+
+RECENT = 32  # frames that are remembered: a camera that goes round in up to so many old ones has no news
+STALE = 0  # of the choices of repeats
 
 
 class FrameNews(Block):
     """The stamp of the newest frame that is news, in the time of the run; it stands still while none is.
 
     A frame is news if its stamp is (later than all before, not ahead of the time, finite) and if what was
-    measured in it is not the same to the last bit as in the frame before: a camera has noise, so a picture or
-    a measurement that repeats is a camera that froze, whatever stamps and numbers it gives. Leave ``value``
-    out for a measurement without noise, which may repeat because nothing moves. A clock that started again
-    counts again after ``restart``, with its stamps shifted into the time of the run.
+    measured in it is not the same to the last bit as in one of the last 32 different frames: a camera has
+    noise, so a picture or a measurement that repeats is a camera that froze, or that goes round in old ones,
+    whatever stamps and numbers it gives. Measurements without noise may repeat because nothing moves: for
+    them set ``repeats`` to ``news``, or leave ``value`` out. A clock that started again counts again after
+    ``restart``, with its stamps shifted into the time of the run.
 
     Put it where frames come in, and hand its stamp to all that ask for one: they agree then on which frames
     count.
@@ -32,6 +37,9 @@ class FrameNews(Block):
         tune=True,
         doc="how long a clock that started again runs until it counts",
     )
+    repeats = Param(
+        "stale", choices=("stale", "news"), doc="a measurement that repeats to the bit: no news, or news"
+    )
     stamp = In(unit="s", doc="instant of the newest frame as the camera says; NaN for none yet")
     value = In("float64[*]", unit="a", default=math.nan, doc="what was measured in it, if it has noise")
     frozen = In("bool", default=False, doc="whether whoever looks at the pictures says that they repeat")
@@ -39,7 +47,7 @@ class FrameNews(Block):
     fresh = Out("bool", doc="whether there is one at this tick")
     reason = Out("int64", doc="what was wrong with the newest: 0 nothing, 4 frozen, 5 its stamp, 6 its clock")
     taken = State(unit="s", init=math.nan)
-    last = State("float64[*]", math.nan)
+    recent = State(f"int64[{RECENT}]", NOTHING)  # digests of measurements, the newest first
     cause = State("int64")
     stamps = State(f"float64[{SIZE}]")
 
@@ -50,7 +58,7 @@ class FrameNews(Block):
     def output(self, stamp: float, value: Any, frozen: bool, time: float) -> tuple[float, bool, int]:
         """Return the instant of the newest frame that was news, whether it is new, and what is wrong."""
         verdict, made = judge(self.stamps, stamp, time, self.restart)
-        if frozen or (verdict == NEWS and _same(value, self.last)):
+        if frozen or (verdict == NEWS and self.repeats == STALE and _is_known(digest(value), self.recent)):
             return self.taken, False, FROZEN
         cause = trouble_of(verdict, self.cause)
         if verdict != NEWS or math.isnan(stamp):
@@ -60,24 +68,18 @@ class FrameNews(Block):
     def update(self, stamp: float, value: Any, frozen: bool, time: float) -> None:
         """Keep a new frame."""
         verdict, made = note(self.stamps, stamp, time, self.restart)
-        if frozen or (verdict == NEWS and _same(value, self.last)):
+        seen = digest(value) if verdict == NEWS and self.repeats == STALE else NOTHING
+        if frozen or _is_known(seen, self.recent):
             self.cause = FROZEN
             return
         self.cause = trouble_of(verdict, self.cause)
         if verdict == NEWS and not math.isnan(stamp):
             self.taken = made
-            self.last = value
+        if seen != NOTHING:
+            self.recent[1:] = self.recent[:-1].copy()
+            self.recent[0] = seen
 
 
-def _same(value: Any, last: Any) -> bool:
-    """Return whether two measurements are the same to the bit; those without a number are not."""
-    if isinstance(value, float):
-        return bool(value == last)
-    numbers = 0
-    for place in range(value.size):
-        element, other = value.flat[place], last.flat[place]
-        if element == element or other == other:
-            if element != other:
-                return False
-            numbers += 1
-    return numbers > 0
+def _is_known(seen: int, recent: Any) -> bool:
+    """Return whether a measurement is one of the recent ones; one without a number never is."""
+    return bool(seen != NOTHING and (recent == seen).any())

@@ -14,6 +14,7 @@ TIMING = (
     "drop",  # no frame comes
     "bursts",  # three come, three do not
     "freeze",  # the last picture again and again, under new stamps and numbers
+    "alternate",  # the last two pictures by turns, under new stamps and numbers
     "stutter",  # every other frame is the one before
     "late",  # frames come three ticks later, with the stamps that they had
     "outdated",  # pictures of three ticks ago under the stamps of now
@@ -50,7 +51,9 @@ def comes(kind: str, count: int) -> int:
 
 
 def shows(kind: str, count: int) -> int:
-    """Return whose picture a frame has: of so many ticks ago; -1: the picture that is shown."""
+    """Return whose picture a frame has: of so many ticks ago; -1: the one that is shown; -2: before that."""
+    if kind == "alternate":
+        return -2
     if kind == "freeze" or (kind == "stutter" and count % 2 == 0):
         return -1
     return LATE if kind == "outdated" else 0

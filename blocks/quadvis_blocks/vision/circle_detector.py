@@ -25,6 +25,7 @@ from quadvis_vision.detection.detect import (
 )
 
 STALE_PICTURE = 0  # of the choices of repeats
+RECENT = 32  # pictures that are remembered
 FOLLOW_MAX = 0.5  # s between two pictures; after more than that the target is searched for, not followed
 
 
@@ -37,9 +38,10 @@ class CircleDetector(Block, numeric=False):
     else in the picture could be meant; once found, three or two that moved together keep it. A circle that
     something hides in part, from about a tenth of its diameter on, has no centre, and its quality says why.
     Steps without a new picture repeat the last result with `fresh` false, also its stamp and sequence number.
-    So do pictures that are the last one to the bit, whatever stamp and number they have: a sensor has noise,
-    and a picture that repeats is a camera that froze. Set `repeats` to `news` for pictures without noise, as
-    a renderer or a recording may give, where nothing moves. A frame that is not a picture is a target that is
+    So do pictures that are one of the last 32 different ones to the bit, whatever stamp and number they have:
+    a sensor has noise, and a picture that repeats is a camera that froze, or goes round in old ones. Set
+    `repeats` to `news` for pictures without noise, as a renderer or a recording may give, where nothing
+    moves, and for recordings that begin again. A frame that is not a picture is a target that is
     not found.
 
     `status`: 0 four circles, 1 three, 2 two, 3 target not found, 4 circles of all colours that are no
@@ -59,7 +61,7 @@ class CircleDetector(Block, numeric=False):
     stamp = Out(unit="s", nan=True, doc="instant at which the picture was taken")
     sequence = Out("int64", doc="number of the picture; 0 before the first")
     fresh = Out("bool", doc="a picture that was not there at the step before")
-    frozen = Out("bool", doc="whether the newest frame has the picture of the one before, to the bit")
+    frozen = Out("bool", doc="whether the newest frame has the picture of a recent one, to the bit")
 
     colours = Param(type="file", doc="colours of the circles (YAML)")
     side = Param(SIDE, unit="m", above=0.0, doc="distance between the centres of neighbouring circles")
@@ -72,7 +74,7 @@ class CircleDetector(Block, numeric=False):
     )
 
     repeats = Param(
-        "stale", choices=("stale", "news"), doc="a picture that is the last one to the bit: no news, or news"
+        "stale", choices=("stale", "news"), doc="a picture that is a recent one to the bit: no news, or news"
     )
 
     last_centres = State("float64[4,2]", math.nan)
@@ -80,7 +82,7 @@ class CircleDetector(Block, numeric=False):
     last_status = State("int64", STALE)
     last_stamp = State("float64", math.nan)
     last_sequence = State("int64", 0)
-    last_picture = State("int64", 0)  # a checksum of its pixels
+    recent = State(f"int64[{RECENT}]", 0)  # checksums of the last pictures, the newest first
     newest = State("int64", 0)  # number of the frame that came last, frozen or not
     stuck = State("bool")
     places = State("float64[4,6]")  # of all four circles, to follow them; see Detection
@@ -134,7 +136,9 @@ class CircleDetector(Block, numeric=False):
         if self._new:
             self.last_centres, self.last_quality, self.last_status, self.places = self._seen
             self.last_stamp, self.last_sequence = frame.stamp, frame.sequence
-            self.last_picture = self._sum
+            if self._sum != 0:
+                self.recent[1:] = self.recent[:-1].copy()
+                self.recent[0] = self._sum
 
     def _look(self, frame: Frame) -> None:
         """Find out whether there is a new picture, what it shows, and whether the camera is frozen."""
@@ -143,7 +147,7 @@ class CircleDetector(Block, numeric=False):
             return
         self._sum = checksum(frame)
         known = self.last_sequence != 0 and self.repeats == STALE_PICTURE and usable(frame.pixels)
-        self._frozen = known and self._sum == self.last_picture
+        self._frozen = known and bool((self.recent == self._sum).any())
         self._new = not self._frozen
         if self._new:
             self._seen = self._detect(frame)

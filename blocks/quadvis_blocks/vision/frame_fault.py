@@ -15,10 +15,10 @@ class FrameFault(Block, numeric=False):
     """Frames as they come, and with a fault of one kind for ``duration`` from ``begin`` on.
 
     Put it between a camera and those who look, to see what they make of it. For ``drop``, ``bursts``,
-    ``late`` and ``swap`` frames do not come, or not when they should; with ``freeze``, ``stutter`` and
-    ``outdated`` an old picture comes under a new stamp and number; the kinds in ``_stamp`` and
-    ``clock_restart`` change the stamps alone; all others change the picture and leave stamp and number as
-    they are. It counts a frame a tick, so it runs at the rate of the camera.
+    ``late`` and ``swap`` frames do not come, or not when they should; with ``freeze``, ``alternate``,
+    ``stutter`` and ``outdated`` an old picture comes under a new stamp and number; the kinds in ``_stamp``
+    and ``clock_restart`` change the stamps alone; all others change the picture and leave stamp and number
+    as they are. It counts a frame a tick, so it runs at the rate of the camera.
     """
 
     kind = Param(NO_FAULT, choices=KINDS, doc="what goes wrong")
@@ -31,6 +31,7 @@ class FrameFault(Block, numeric=False):
     drawn = State()  # for the picture of the coming tick
     ticks = State("int64")  # of the fault so far
     shown = State("frame")  # at the tick before
+    shown_before = State("frame")  # and the one before
     one = State("frame")  # that came a tick ago
     two = State("frame")
     three = State("frame")
@@ -51,7 +52,7 @@ class FrameFault(Block, numeric=False):
 
     def update(self, frame: Frame) -> None:
         """Keep what came and what was shown."""
-        self.shown = self._given
+        self.shown, self.shown_before = self._given, self.shown
         self.one, self.two, self.three = frame, self.one, self.two
         self.ticks = self.ticks + 1 if self.on else 0
         self.drawn = uniform(self.chance)
@@ -63,7 +64,8 @@ class FrameFault(Block, numeric=False):
         if which < 0 or past[which].sequence == 0:
             return shown
         frame, picture = past[which], shows(kind, self.ticks)
-        pixels = shown.pixels if picture < 0 else past[which + picture].pixels
+        before = self.shown_before if picture == -2 and self.shown_before.sequence else shown
+        pixels = before.pixels if picture < 0 else past[which + picture].pixels
         if kind in PICTURES:
             chance = np.random.default_rng(int(self.drawn * 2**53))
             pixels = PICTURES[kind](frame.pixels, self.one.pixels, chance)

@@ -36,7 +36,11 @@ class ImageFolder(Block, numeric=False):
 
     folder = Param(type="file", doc="folder with png, jpg or bmp files")
     pattern = Param("*", type="str", doc="which files, e.g. left*.jpg")
-    loop = Param(False, type="bool", doc="begin again after the last picture")
+    loop = Param(
+        False,
+        type="bool",
+        doc="begin again after the last picture; detectors then need `repeats: news`",
+    )
 
     played = State("int64", 0)  # pictures that were on the wire
     stamp = State("float64")  # of the last one

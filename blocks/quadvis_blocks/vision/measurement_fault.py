@@ -13,7 +13,7 @@ from quadvis_blocks.vision._fault_timing import LATE, NO_FAULT, TIMING, comes, i
 SHAPES = ("no_target", "turned", "mirrored", "shifted", "noise", "other_colours", "half_gone", "two_left")
 KINDS = (NO_FAULT, *TIMING, *SHAPES)
 STAMP, CENTRES, WIDTH = 0, 1, 9  # a measurement: stamp, u, v of four circles
-SHOWN = LATE + 1  # the measurement that was shown last, after those of so many ticks ago
+SHOWN = LATE + 1  # the measurement that was shown last, after those of so many ticks ago; then the one before
 
 
 class MeasurementFault(Block, numeric=False):
@@ -36,7 +36,7 @@ class MeasurementFault(Block, numeric=False):
     chance = Random()
     drawn = State("float64[8]")  # for the measurement of the coming tick
     ticks = State("int64")  # of the fault so far
-    kept = State(f"float64[{SHOWN + 1},{WIDTH}]", math.nan)  # of this tick and before, and the one shown
+    kept = State(f"float64[{SHOWN + 2},{WIDTH}]", math.nan)  # of this tick and before, and those shown
     row = Work(f"float64[{WIDTH}]")  # that is shown now
     on = Work("bool")
 
@@ -55,6 +55,7 @@ class MeasurementFault(Block, numeric=False):
         """Keep what came and what was shown."""
         self.kept[1:SHOWN] = self.kept[: SHOWN - 1].copy()
         self.kept[0] = _row(centres, instant)
+        self.kept[SHOWN + 1] = self.kept[SHOWN]
         self.kept[SHOWN] = self.row
         self.ticks = self.ticks + 1 if self.on else 0
         fill_normal(self.chance, self.drawn)
@@ -69,7 +70,7 @@ class MeasurementFault(Block, numeric=False):
         if which < 0 or math.isnan(past[which][STAMP]):
             return self.kept[SHOWN].copy()
         row, picture = past[which].copy(), shows(kind, self.ticks)
-        row[CENTRES:] = self.kept[SHOWN][CENTRES:] if picture < 0 else past[which + picture][CENTRES:]
+        row[CENTRES:] = (self.kept[SHOWN - 1 - picture] if picture < 0 else past[which + picture])[CENTRES:]
         before = float(self.kept[SHOWN][STAMP])
         row[STAMP] = stamped(kind, float(row[STAMP]), self.ticks, self.period, self.begin, before)
         row[CENTRES:] = self._moved(kind, row[CENTRES:].reshape(4, 2)).ravel()

@@ -31,7 +31,11 @@ class VideoFile(Block, numeric=False):
     finished = Out("bool", doc="true when there is no frame left")
 
     file = Param(type="file", doc="video file, in any format that OpenCV reads")
-    loop = Param(False, type="bool", doc="begin again after the last frame")
+    loop = Param(
+        False,
+        type="bool",
+        doc="begin again after the last frame; detectors then need `repeats: news`",
+    )
 
     played = State("int64", 0)  # frames that were on the wire
     stamp = State("float64")  # of the last one

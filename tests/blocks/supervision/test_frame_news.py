@@ -33,9 +33,25 @@ def test_measurements_that_repeat_to_the_bit_are_a_frozen_camera() -> None:
     assert found.fresh[40:].all() and (found.reason[40:] == NONE).all()
 
 
+@pytest.mark.parametrize("cycle", [2, 3, 7, 32])
+def test_so_is_one_that_goes_round_in_old_ones(cycle: int) -> None:
+    value = np.random.default_rng(1).normal(size=(120, 4, 2))
+    value[40:100] = np.resize(value[40 - cycle : 40], (60, 4, 2))
+    found = drive(FrameNews(), stamp=0.1 * np.arange(120) - 0.1, value=value, rate="10 Hz")
+    assert not found.fresh[40:100].any() and (found.reason[40:100] == FROZEN).all()
+    assert found.fresh[:40].all() and found.fresh[100:].all() and (found.reason[100:] == NONE).all()
+
+
+def test_old_ones_among_new_ones_are_no_news_and_the_new_ones_are() -> None:
+    value = np.random.default_rng(1).normal(size=(60, 4, 2))
+    value[30:40:2] = value[[20, 28, 23, 20, 26]]
+    found = watch(STAMPS, value)
+    assert np.array_equal(np.flatnonzero(~found.fresh), np.arange(30, 40, 2))
+
+
 def test_one_bit_is_enough_to_be_news() -> None:
     value = np.ones((60, 4, 2))
-    value[1::2, 3, 1] = np.nextafter(1.0, 2.0)
+    value[:, 3, 1] += np.finfo(float).eps * np.arange(60)
     assert watch(STAMPS, value).fresh.all()
 
 
@@ -47,6 +63,11 @@ def test_circles_that_are_missing_do_not_hide_that_the_others_repeat() -> None:
 
 def test_a_target_that_is_not_there_again_and_again_is_no_frozen_camera() -> None:
     assert watch(STAMPS, np.full((60, 4, 2), math.nan)).fresh.all()
+
+
+def test_measurements_without_noise_may_repeat_where_the_user_says_so() -> None:
+    found = drive(FrameNews(repeats="news"), stamp=STAMPS, value=np.ones((60, 4, 2)), rate="10 Hz")
+    assert found.fresh.all() and (found.reason == NONE).all()
 
 
 def test_without_a_measurement_stamps_alone_count() -> None:

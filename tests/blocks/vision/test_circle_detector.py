@@ -381,7 +381,7 @@ def test_what_is_no_picture_is_a_target_not_found(kind):
 
 @pytest.mark.parametrize("kind", PLAIN)
 def test_pictures_of_nothing_have_no_target(kind):
-    seen = detect([PLAIN[kind], plain_shot(), PLAIN[kind], plain_shot()])
+    seen = detect([PLAIN[kind], plain_shot(), PLAIN[kind], plain_shot()], repeats="news")
     assert (seen.status[[0, 2]] >= NOT_FOUND).all() and seen.lost[[0, 2]].all()
     assert (seen.status[[1, 3]] == 0).all()
 
@@ -521,6 +521,17 @@ def test_a_picture_that_repeats_to_the_bit_is_no_news_whatever_its_stamp_and_num
     assert not found.lost.any()
 
 
+@pytest.mark.parametrize("cycle", [2, 3])
+def test_so_is_one_that_comes_again_after_others(cycle):
+    rng = np.random.default_rng(1)
+    shots = frames([expose(scene(random_pose(rng))[0], rng) for _ in range(cycle + 1)])
+    turns = [*range(cycle), *range(cycle), *range(cycle), cycle]
+    round_and_round = [Frame(shots[which].pixels.copy(), 0.1 * n, n) for n, which in enumerate(turns, 1)]
+    found = drive(CircleDetector(colours=COLOURS), frame=round_and_round, rate="10 Hz")
+    assert found.fresh.tolist() == [True] * cycle + [False] * 2 * cycle + [True]
+    assert found.frozen.tolist() == [False] * cycle + [True] * 2 * cycle + [False]
+
+
 def test_pictures_without_noise_may_repeat_where_the_user_says_so():
     found = drive(CircleDetector(colours=COLOURS, repeats="news"), frame=stuck(), rate="10 Hz")
     assert found.fresh.all() and not found.frozen.any()
@@ -540,9 +551,9 @@ def test_a_frame_that_is_there_still_leaves_the_camera_frozen_or_not():
 )
 def test_what_is_no_picture_may_repeat_and_does_no_harm(pixels):
     rng = np.random.default_rng(2)
-    good = frames([expose(scene(random_pose(rng))[0], rng) for _ in range(2)])
+    good = frames([expose(scene(random_pose(rng))[0], rng) for _ in range(3)])
     bad = [Frame(pixels, 0.1 * number, number) for number in (3, 4)]
-    after = Frame(good[0].pixels, 0.5, 5)
+    after = Frame(good.pop().pixels, 0.5, 5)
     found = drive(CircleDetector(colours=COLOURS), frame=[*good, *bad, after], rate="10 Hz")
     assert found.status[2] == 7 and found.lost[2] and not found.frozen.any()
     assert found.fresh[4] and found.found[4]

@@ -53,6 +53,7 @@ def test_before_and_after_the_fault_frames_pass_untouched(kind: str) -> None:
         ("late", [10, 10, 10, 11, 12, 13, 14, 15, 16, 17]),
         ("swap", [10, 12, 11, 14, 13, 16, 15, 18, 17, 20]),
         ("freeze", list(range(11, 21))),
+        ("alternate", list(range(11, 21))),
         ("outdated", list(range(11, 21))),
     ],
 )
@@ -63,7 +64,10 @@ def test_frames_come_when_the_kind_says(kind: str, shown: list[int]) -> None:
     assert [frame.stamp for frame in found] == [frames[number - 1].stamp for number in shown]
 
 
-@pytest.mark.parametrize(("kind", "of"), [("freeze", [10] * 10), ("outdated", list(range(8, 18)))])
+@pytest.mark.parametrize(
+    ("kind", "of"),
+    [("freeze", [10] * 10), ("alternate", [9, 10] * 5), ("outdated", list(range(8, 18)))],
+)
 def test_old_pictures_come_under_new_stamps(kind: str, of: list[int]) -> None:
     frames = pictures()
     for frame, number in zip(fail(kind, frames)[BEGIN:END], of, strict=True):
