@@ -28,12 +28,17 @@ NOTHING, TAKEN, REFUSED, LATE, RESET = range(5)  # what becomes of a frame
 def begin(chains: Any, position: Any, sigma: Any, disturbance: Any) -> None:
     """Set estimates to rest at a position (3,); `sigma` (2,) are the deviations of position and velocity."""
     for axis in range(3):
-        for column in range(9):
-            chains[axis, column] = 0.0
-        chains[axis, 0] = position[axis]
-        chains[axis, 3] = sigma[0] * sigma[0]
-        chains[axis, 6] = sigma[1] * sigma[1]
-        chains[axis, 8] = disturbance[axis] * disturbance[axis]
+        begin_axis(chains, axis, position[axis], sigma, disturbance[axis])
+
+
+def begin_axis(chains: Any, axis: int, position: float, sigma: Any, disturbance: float) -> None:
+    """Set the estimates of one axis to rest at a position."""
+    for column in range(9):
+        chains[axis, column] = 0.0
+    chains[axis, 0] = position
+    chains[axis, 3] = sigma[0] * sigma[0]
+    chains[axis, 6] = sigma[1] * sigma[1]
+    chains[axis, 8] = disturbance * disturbance
 
 
 def predict(chains: Any, before: Any, after: Any, step: float, model: Any) -> None:
@@ -127,18 +132,20 @@ def place(ticks: Any, oldest: int, stamp: float) -> int:
 
 def filtered(
     chains: Any, past: Any, ticks: Any, oldest: int, now: Any, frames: Any, held: int, frame: Any,
-    model: Any, sigma: Any, gate: float, tolerance: float, strain: float, limit: float, believe: bool,
-    keep: bool,
+    model: Any, sigma: Any, gate: float, tolerance: float, strain: float, limit: float, contact: float,
+    believe: bool, keep: bool,
 ) -> tuple[int, int, int, float, float]:  # fmt: skip
     """Give the estimates at the tick `now`, before its own frames, with a new frame if that is believed.
 
     `now` (4,) is the tick after those in `ticks`, and `frame` has NaN for a stamp if there is
     none. A frame beyond the gate is refused, and one by which the `strain` goes beyond a limit; if `believe`,
-    it resets the estimates instead. Returned are what became of the frame, how many are held, the oldest tick
+    it resets the estimates instead. Up to the height `contact` there is no such limit; and where both the
+    frame and what was expected are no higher, a frame that is beyond the gate in height alone resets the
+    height. Returned are what became of the frame, how many are held, the oldest tick
     of use, the frame's squared innovation over its variance, and the strain. Without `keep` the past stays as
     it is.
     """
-    first, verdict, nis = TICKS - 1, NOTHING, math.nan
+    first, verdict, nis, grounded = TICKS - 1, NOTHING, math.nan, False
     if not math.isnan(frame[STAMP]):
         stamp = min(float(frame[STAMP]), float(now[0]))
         found = place(ticks, oldest, stamp)
@@ -148,15 +155,21 @@ def filtered(
             first, frame[STAMP] = found, stamp
             chains[:] = past[first]
             again(chains, past, ticks, first, now, stamp, frames, held, model, False)
-            nis, greatest, level = innovation(chains, frame, tolerance)
-            near = greatest <= gate * gate
+            nis, level, beside, above = innovation(chains, frame, tolerance)
+            low = frame[VALUE + 2] <= contact
+            near = max(beside, above) <= gate * gate
             if near:  # one frame alone, however far, does not do it
-                strain += STRAIN * (min(level, 2.0 * limit) - strain) if limit < math.inf else -strain
+                strain += -strain if low else STRAIN * (min(level, 2.0 * limit) - strain)
             verdict = TAKEN if near and strain <= limit else (RESET if believe else REFUSED)
+            if verdict == REFUSED and low and chains[2, 0] <= contact and beside <= gate * gate:
+                verdict, grounded = RESET, True
     chains[:] = past[first]
     if verdict == RESET:
         held, oldest, strain = 0, first, 0.0
-        begin(chains, frame[VALUE:VARIANCE], sigma, model[3:6])
+        if grounded:
+            begin_axis(chains, 2, float(frame[VALUE + 2]), sigma, float(model[5]))
+        else:
+            begin(chains, frame[VALUE:VARIANCE], sigma, model[3:6])
         if keep:
             past[first] = chains
     if verdict in (TAKEN, RESET):
@@ -198,17 +211,22 @@ def insert(frames: Any, held: int, frame: Any, horizon: float) -> int:
     return held + 1
 
 
-def innovation(chains: Any, frame: Any, tolerance: float) -> tuple[float, float, float]:
-    """Return the squared innovation over its variance: of all, the greatest beyond tolerance, of x and y."""
-    total = greatest = level = 0.0
+def innovation(chains: Any, frame: Any, tolerance: float) -> tuple[float, float, float, float]:
+    """Return the squared innovation over its variance: of all axes and of x and y, summed; and what goes
+    beyond the tolerance, the greater one of x and y, and of the height.
+    """
+    total = level = beside = above = 0.0
     for axis in range(3):
         off = float(frame[VALUE + axis]) - float(chains[axis, 0])
         variance = float(chains[axis, 3]) + float(frame[VARIANCE + axis])
         total += off * off / variance
         level += off * off / variance if axis < 2 else 0.0
         beyond = max(abs(off) - tolerance, 0.0)
-        greatest = max(greatest, beyond * beyond / variance)
-    return total, greatest, level
+        if axis < 2:
+            beside = max(beside, beyond * beyond / variance)
+        else:
+            above = beyond * beyond / variance
+    return total, level, beside, above
 
 
 def latest(chains: Any, frames: Any, held: int, now: float) -> None:

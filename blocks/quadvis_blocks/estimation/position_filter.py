@@ -43,7 +43,8 @@ class PositionFilter(Block):
     some three frames, is above ``strain_limit``. It is 2 when all is well, and rises at once when
     positions are of other instants than their stamps say, or contradict the known accelerations in
     another way. Up to the height ``contact`` the ground may carry and hold the craft, which the
-    accelerations do not know: nothing strains there. When for ``reset_after`` nothing else came, the
+    accelerations do not know: nothing strains there, and a frame that is too far in height alone, where the
+    craft was expected no higher, is believed and sets the height anew. When for ``reset_after`` nothing else came, the
     filter believes it, and begins anew there. A frame counts if its stamp is news, or goes back as that
     of one overtaken on its way does; it needs ``valid`` and finite numbers. From a refused frame to the
     next one that is believed the measurements contradict the known accelerations.
@@ -150,7 +151,7 @@ class PositionFilter(Block):
             verdict, held, _, nis, _ = filtered(
                 chains, self.past, self.ticks, self.oldest, now, frames, self.held, frame,
                 _model(self.acceleration_noise, self.wander, self.decay), self.initial_sigma, self.gate,
-                self.tolerance, self.strain, _limit(position, self.contact, self.strain_limit),
+                self.tolerance, self.strain, self.strain_limit, self.contact,
                 time - self.refusing >= self.reset_after, False,
             )  # fmt: skip
             latest(chains, frames, held, time)
@@ -175,7 +176,7 @@ class PositionFilter(Block):
             verdict, self.held, self.oldest, _, self.strain = filtered(
                 chains, self.past, self.ticks, self.oldest, now, self.frames, self.held, frame,
                 _model(self.acceleration_noise, self.wander, self.decay), self.initial_sigma, self.gate,
-                self.tolerance, self.strain, _limit(position, self.contact, self.strain_limit),
+                self.tolerance, self.strain, self.strain_limit, self.contact,
                 time - self.refusing >= self.reset_after, True,
             )  # fmt: skip
             self.newest = _newer(self.newest, made, verdict)
@@ -193,11 +194,6 @@ def _tick(time: float, acceleration: Any) -> Any:
 
 def _model(noise: Any, wander: Any, decay: Any) -> Any:
     return np.concatenate((noise, wander, decay))
-
-
-def _limit(position: Any, contact: float, limit: float) -> float:
-    """Return how much frames may strain the filter at a measured height."""
-    return limit if position[2] > contact else math.inf
 
 
 def _counts(verdict: int, made: float, stamp: float) -> float:
