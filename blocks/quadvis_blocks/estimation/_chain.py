@@ -22,6 +22,7 @@ TICKS = 64  # how many ticks are kept, and how many frames
 FRAMES = 64
 STAMP, VALUE, VARIANCE, WIDTH = 0, 1, 4, 7  # a frame: stamp, three positions, their variances
 STRAIN = 1.0 / 3.0  # share of a new frame in the strain
+BEGUN, LAST, STRAINED = range(3)  # of a trial
 NOTHING, TAKEN, REFUSED, LATE, RESET = range(5)  # what becomes of a frame
 
 
@@ -44,8 +45,9 @@ def begin_axis(chains: Any, axis: int, position: float, sigma: Any, disturbance:
 def predict(chains: Any, before: Any, after: Any, step: float, model: Any) -> None:
     """Carry estimates over a step (s) on which the known acceleration goes from `before` to `after` (3,).
 
-    `model` (9,) has for each axis the density of w (m/s^2 / sqrt(Hz)), then the deviation of d, then its
-    decay time. The noise of d reaches p and v as if d did not decay within the step.
+    `model` (10,) has for each axis the density of w (m/s^2 / sqrt(Hz)), then the deviation of d, then its
+    decay time; and the height up to which the ground may touch the craft. The noise of d reaches p and v as
+    if d did not decay within the step.
     """
     for axis in range(3):
         decay = float(model[6 + axis])
@@ -71,14 +73,15 @@ def predict(chains: Any, before: Any, after: Any, step: float, model: Any) -> No
         row[8] = keep * keep * dd + strength * (1.0 - keep * keep)
 
 
-def correct(chains: Any, frame: Any) -> None:
-    """Take the positions of a frame into account."""
+def correct(chains: Any, frame: Any, model: Any) -> None:
+    """Take the positions of a frame into account; of what the ground does no wind is learned."""
+    low = is_low(chains, frame, model)
     for axis in range(3):
         row = chains[axis]
         pp, pv, pd = float(row[3]), float(row[4]), float(row[5])
         spread = pp + float(frame[VARIANCE + axis])
         off = float(frame[VALUE + axis]) - float(row[0])
-        by_p, by_v, by_d = pp / spread, pv / spread, pd / spread
+        by_p, by_v, by_d = pp / spread, pv / spread, 0.0 if low and axis < 2 else pd / spread
         row[0] += by_p * off
         row[1] += by_v * off
         row[2] += by_d * off
@@ -105,7 +108,7 @@ def advance(chains: Any, begin: Any, end: Any, until: float, frames: Any, held: 
                 predict(chains, begin[1:] + slope * (at - begin[0]), begin[1:] + slope * (stamp - begin[0]),
                         stamp - at, model)  # fmt: skip
                 at = stamp
-            correct(chains, frames[index])
+            correct(chains, frames[index], model)
     if until > at:
         predict(chains, begin[1:] + slope * (at - begin[0]), begin[1:] + slope * (until - begin[0]),
                 until - at, model)  # fmt: skip
@@ -132,20 +135,21 @@ def place(ticks: Any, oldest: int, stamp: float) -> int:
 
 def filtered(
     chains: Any, past: Any, ticks: Any, oldest: int, now: Any, frames: Any, held: int, frame: Any,
-    model: Any, sigma: Any, gate: float, tolerance: float, strain: float, limit: float, contact: float,
-    believe: bool, keep: bool,
+    model: Any, sigma: Any, gate: float, tolerance: float, strain: float, limit: float, trial: Any,
+    tried: Any, reset_after: float, keep: bool,
 ) -> tuple[int, int, int, float, float]:  # fmt: skip
     """Give the estimates at the tick `now`, before its own frames, with a new frame if that is believed.
 
     `now` (4,) is the tick after those in `ticks`, and `frame` has NaN for a stamp if there is
-    none. A frame beyond the gate is refused, and one by which the `strain` goes beyond a limit; if `believe`,
-    it resets the estimates instead. Up to the height `contact` there is no such limit; and where both the
-    frame and what was expected are no higher, a frame that is beyond the gate in height alone resets the
-    height. Returned are what became of the frame, how many are held, the oldest tick
-    of use, the frame's squared innovation over its variance, and the strain. Without `keep` the past stays as
-    it is.
+    none. A frame beyond the gate is refused, and one by which the `strain` goes beyond a limit. Refused ones
+    are tried on estimates of their own, `trial` (3, 9) with `tried` (3,); if these have agreed with them for
+    `reset_after`, they are the estimates from then on. Where the ground may touch the craft nothing strains,
+    as long as frames are believed, and a frame that is beyond the gate in height alone resets the height.
+    Returned are what became of the frame, how many are held, the oldest tick of use, the frame's squared
+    innovation over its variance, and the strain. Without `keep` the past stays as it is.
     """
     first, verdict, nis, grounded = TICKS - 1, NOTHING, math.nan, False
+    start = chains.copy()
     if not math.isnan(frame[STAMP]):
         stamp = min(float(frame[STAMP]), float(now[0]))
         found = place(ticks, oldest, stamp)
@@ -156,26 +160,89 @@ def filtered(
             chains[:] = past[first]
             again(chains, past, ticks, first, now, stamp, frames, held, model, False)
             nis, level, beside, above = innovation(chains, frame, tolerance)
-            low = frame[VALUE + 2] <= contact
+            low = is_low(chains, frame, model)
             near = max(beside, above) <= gate * gate
             if near:  # one frame alone, however far, does not do it
-                strain += -strain if low else STRAIN * (min(level, 2.0 * limit) - strain)
-            verdict = TAKEN if near and strain <= limit else (RESET if believe else REFUSED)
-            if verdict == REFUSED and low and chains[2, 0] <= contact and beside <= gate * gate:
-                verdict, grounded = RESET, True
+                strain = 0.0 if low and math.isnan(tried[BEGUN]) else strained(strain, level, limit)
+            verdict = TAKEN if near and strain <= limit else REFUSED
+            grounded = verdict == REFUSED and low and beside <= gate * gate
+            if verdict == REFUSED:
+                start[:] = trial
+                since, last = float(tried[BEGUN]), float(tried[LAST])
+                agree(trial, tried, ticks, oldest, now, frame, model, sigma, gate, tolerance, limit)
+                if grounded and math.isnan(since):
+                    verdict = RESET
+                elif tried[BEGUN] == since and stamp - since >= reset_after - INSTANT:
+                    verdict, grounded = RESET, False
+                    carry(start, ticks, oldest, now, last, float(ticks[first, 0]), model)
     chains[:] = past[first]
     if verdict == RESET:
         held, oldest, strain = 0, first, 0.0
         if grounded:
             begin_axis(chains, 2, float(frame[VALUE + 2]), sigma, float(model[5]))
         else:
-            begin(chains, frame[VALUE:VARIANCE], sigma, model[3:6])
+            chains[:] = start
         if keep:
             past[first] = chains
     if verdict in (TAKEN, RESET):
+        tried[BEGUN] = math.nan
         held = insert(frames, held, frame, float(ticks[oldest, 0]))
     again(chains, past, ticks, first, now, float(now[0]), frames, held, model, keep)
     return verdict, held, oldest, nis, strain
+
+
+def agree(
+    trial: Any, tried: Any, ticks: Any, oldest: int, now: Any, frame: Any, model: Any, sigma: Any,
+    gate: float, tolerance: float, limit: float,
+) -> None:  # fmt: skip
+    """Try a refused frame on estimates of its own: they go on with it, or begin anew there.
+
+    `tried` (3,) are the stamps of the first and of the last frame that agreed, and their strain.
+    """
+    stamp, strain = float(frame[STAMP]), 0.0
+    if tried[LAST] >= stamp and tried[BEGUN] <= stamp:
+        return  # it was overtaken on its way
+    goes_on = tried[BEGUN] < stamp and place(ticks, oldest, float(tried[LAST])) >= 0
+    if goes_on:
+        carry(trial, ticks, oldest, now, float(tried[LAST]), stamp, model)
+        _, level, beside, above = innovation(trial, frame, tolerance)
+        if is_low(trial, frame, model):
+            if above > gate * gate:
+                begin_axis(trial, 2, float(frame[VALUE + 2]), sigma, float(model[5]))
+        else:
+            strain = strained(float(tried[STRAINED]), level, limit)
+            goes_on = above <= gate * gate
+        goes_on = goes_on and beside <= gate * gate and strain <= limit
+    if goes_on:
+        correct(trial, frame, model)
+        for axis in range(3):  # what only an unlikely wind explains does not agree either
+            goes_on = goes_on and abs(trial[axis, 2]) <= gate * model[3 + axis]
+    if not goes_on:
+        strain, tried[BEGUN] = 0.0, stamp
+        begin(trial, frame[VALUE:VARIANCE], sigma, model[3:6])
+        correct(trial, frame, model)
+    tried[LAST], tried[STRAINED] = stamp, strain
+
+
+def strained(strain: float, level: float, limit: float) -> float:
+    """Return the strain after a frame with such a squared innovation over its variance, of x and y."""
+    return strain + STRAIN * (min(level, 2.0 * limit) - strain)
+
+
+def is_low(chains: Any, frame: Any, model: Any) -> bool:
+    """Return whether the ground may touch the craft, by the estimates and by a frame."""
+    return bool(frame[VALUE + 2] <= model[9] and chains[2, 0] <= model[9])
+
+
+def carry(chains: Any, ticks: Any, oldest: int, now: Any, since: float, until: float, model: Any) -> None:
+    """Carry estimates from an instant to another by the accelerations of the ticks alone."""
+    for number in range(oldest, TICKS):
+        tick, end = ticks[number], now if number + 1 == TICKS else ticks[number + 1]
+        after, before = max(since, float(tick[0])), min(until, float(end[0]))
+        if before > after:
+            slope = (end[1:] - tick[1:]) / float(end[0] - tick[0])
+            predict(chains, tick[1:] + slope * (after - tick[0]), tick[1:] + slope * (before - tick[0]),
+                    before - after, model)  # fmt: skip
 
 
 def again(
@@ -212,8 +279,9 @@ def insert(frames: Any, held: int, frame: Any, horizon: float) -> int:
 
 
 def innovation(chains: Any, frame: Any, tolerance: float) -> tuple[float, float, float, float]:
-    """Return the squared innovation over its variance: of all axes and of x and y, summed; and what goes
-    beyond the tolerance, the greater one of x and y, and of the height.
+    """Return the squared innovation over its variance: of all axes, of x and y; and what goes beyond.
+
+    Beyond the tolerance, that is: the greater one of x and y, and that of the height.
     """
     total = level = beside = above = 0.0
     for axis in range(3):
@@ -229,8 +297,8 @@ def innovation(chains: Any, frame: Any, tolerance: float) -> tuple[float, float,
     return total, level, beside, above
 
 
-def latest(chains: Any, frames: Any, held: int, now: float) -> None:
+def latest(chains: Any, frames: Any, held: int, now: float, model: Any) -> None:
     """Take the frames of this very instant into account."""
     for index in range(held - 1, -1, -1):
         if frames[index, STAMP] >= now:
-            correct(chains, frames[index])
+            correct(chains, frames[index], model)

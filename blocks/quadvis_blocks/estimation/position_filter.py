@@ -43,11 +43,15 @@ class PositionFilter(Block):
     some three frames, is above ``strain_limit``. It is 2 when all is well, and rises at once when
     positions are of other instants than their stamps say, or contradict the known accelerations in
     another way. Up to the height ``contact`` the ground may carry and hold the craft, which the
-    accelerations do not know: nothing strains there, and a frame that is too far in height alone, where the
-    craft was expected no higher, is believed and sets the height anew. When for ``reset_after`` nothing else came, the
-    filter believes it, and begins anew there. A frame counts if its stamp is news, or goes back as that
-    of one overtaken on its way does; it needs ``valid`` and finite numbers. From a refused frame to the
-    next one that is believed the measurements contradict the known accelerations.
+    accelerations do not know: where frames and estimates are both below, nothing strains, no disturbance in
+    x and y is learned, and a frame that is too far in height alone is believed and sets the height anew.
+
+    Refused frames are tried on estimates of their own. When these have agreed with them for ``reset_after``,
+    within the gate, without strain and with disturbances within ``gate`` deviations, they take the place of
+    the filter's. Frames that contradict the known accelerations never get there: the filter goes on by the
+    accelerations. A frame counts if its stamp is news, or goes back as that of one overtaken on its way does;
+    it needs ``valid`` and finite numbers. From a refused frame to the next one that is believed the
+    measurements contradict the known accelerations.
 
     Of the libraries, filterpy is no longer kept, and neither it nor scipy takes frames out of order or
     compiles.
@@ -107,7 +111,7 @@ class PositionFilter(Block):
     )
     contact = Param(0.2, unit="m", tune=True, doc="height up to which the ground may touch the craft")
     tolerance = Param(0.0, unit="m", min=0.0, tune=True, doc="innovation that is never too great")
-    reset_after = Param(1.0, unit="s", above=0.0, tune=True, doc="how long to refuse frames before believing")
+    reset_after = Param(1.0, unit="s", above=0.0, tune=True, doc="how long refused frames must agree")
     restart = Param(
         RESTART,
         unit="s",
@@ -128,8 +132,10 @@ class PositionFilter(Block):
     held = State("int64")
     stamps = State(f"float64[{SIZE}]")
     newest = State("float64", math.nan)
-    refusing = State("float64", math.nan)  # since when
+    refusing = State("bool")
     refusals = State("int64")
+    trial = State("float64[3,9]")  # estimates by refused frames alone
+    tried = State("float64[3]", math.nan)  # stamps of the first and the last of them, and their strain
     strain = State()  # squared innovations of x and y over their variances, by fading memory
 
     def start(self) -> None:
@@ -146,15 +152,15 @@ class PositionFilter(Block):
         frame = _frame(position, _counts(verdict, made, stamp), valid, measured, self.noise)
         frames, chains = self.frames.copy(), self.past[TICKS - 1].copy()
         newest, refused, nis = self.newest, self.refusals, math.nan
-        contradicted = not math.isnan(self.refusing)
+        contradicted = self.refusing
         if self.oldest < TICKS:
+            model = _model(self.acceleration_noise, self.wander, self.decay, self.contact)
             verdict, held, _, nis, _ = filtered(
-                chains, self.past, self.ticks, self.oldest, now, frames, self.held, frame,
-                _model(self.acceleration_noise, self.wander, self.decay), self.initial_sigma, self.gate,
-                self.tolerance, self.strain, self.strain_limit, self.contact,
-                time - self.refusing >= self.reset_after, False,
+                chains, self.past, self.ticks, self.oldest, now, frames, self.held, frame, model,
+                self.initial_sigma, self.gate, self.tolerance, self.strain, self.strain_limit,
+                self.trial.copy(), self.tried.copy(), self.reset_after, False,
             )  # fmt: skip
-            latest(chains, frames, held, time)
+            latest(chains, frames, held, time, model)
             newest = _newer(newest, made, verdict)
             refused += 1 if verdict in (REFUSED, LATE) else 0
             contradicted = verdict == REFUSED or (contradicted and verdict not in (TAKEN, RESET))
@@ -173,18 +179,18 @@ class PositionFilter(Block):
         if self.oldest < TICKS:
             verdict, made = note(self.stamps, stamp, time, self.restart)
             frame = _frame(position, _counts(verdict, made, stamp), valid, measured, self.noise)
+            model = _model(self.acceleration_noise, self.wander, self.decay, self.contact)
             verdict, self.held, self.oldest, _, self.strain = filtered(
-                chains, self.past, self.ticks, self.oldest, now, self.frames, self.held, frame,
-                _model(self.acceleration_noise, self.wander, self.decay), self.initial_sigma, self.gate,
-                self.tolerance, self.strain, self.strain_limit, self.contact,
-                time - self.refusing >= self.reset_after, True,
+                chains, self.past, self.ticks, self.oldest, now, self.frames, self.held, frame, model,
+                self.initial_sigma, self.gate, self.tolerance, self.strain, self.strain_limit,
+                self.trial, self.tried, self.reset_after, True,
             )  # fmt: skip
             self.newest = _newer(self.newest, made, verdict)
             self.refusals += 1 if verdict in (REFUSED, LATE) else 0
             if verdict in (TAKEN, RESET):
-                self.refusing = math.nan
-            elif verdict == REFUSED and math.isnan(self.refusing):
-                self.refusing = time
+                self.refusing = False
+            elif verdict == REFUSED:
+                self.refusing = True
         self.oldest = append(self.ticks, self.past, self.oldest, now, chains)
 
 
@@ -192,8 +198,8 @@ def _tick(time: float, acceleration: Any) -> Any:
     return np.array((time, acceleration[0], acceleration[1], acceleration[2]))
 
 
-def _model(noise: Any, wander: Any, decay: Any) -> Any:
-    return np.concatenate((noise, wander, decay))
+def _model(noise: Any, wander: Any, decay: Any, contact: float) -> Any:
+    return np.concatenate((noise, wander, decay, np.array([contact])))
 
 
 def _counts(verdict: int, made: float, stamp: float) -> float:

@@ -22,7 +22,9 @@ class Landing(Block):
     This needs neither the right height of the ground nor a rate. While the height is reckoned and not seen
     (``blind``), it has landed when the reference is ``margin`` below ``ground``; there the reference stops.
     When it is seen again the reference goes on from the craft. A craft that is more than
-    ``gap`` too high is not pushed sideways: x and y are its own. ``landed`` stays until ``descend`` is false.
+    ``gap`` too high is not pushed sideways: x and y are its own. So are they and their rate of change,
+    ``current_velocity``, once the reference is below the ground: what stands there must not be driven by
+    estimates that do not know that it stands. ``landed`` stays until ``descend`` is false.
     """
 
     speed = Param(0.3, unit="m/s", above=0.0, tune=True, doc="speed of the descent")
@@ -42,6 +44,9 @@ class Landing(Block):
     descend = In("bool", doc="whether to land")
     recapture = In("bool", default=False, doc="true to take x and y from the reference anew")
     current = In("float64[3]", unit="m", doc="where the craft is: x, y, h")
+    current_velocity = In(
+        "float64[3]", unit="m/s", default=(0.0, 0.0, 0.0), doc="its rate of change, as it is known"
+    )
     blind = In("bool", default=False, doc="whether the height is reckoned, not seen")
     position = Out("float64[3]", unit="m", doc="where to be: x, y, h")
     velocity = Out("float64[3]", unit="m/s", doc="its rate of change")
@@ -58,7 +63,7 @@ class Landing(Block):
 
     def output(
         self, position_reference: Any, velocity_reference: Any, descend: bool, recapture: bool, current: Any,
-        blind: bool, time: float,
+        current_velocity: Any, blind: bool, time: float,
     ) -> tuple[Any, Any, bool]:  # fmt: skip
         """Return the reference, and whether the craft has landed."""
         seen_again = self.was_blind and not blind
@@ -72,8 +77,12 @@ class Landing(Block):
         if not descend:
             return 1.0 * position_reference, 1.0 * velocity_reference, False
         speed = 0.0 if lowest else self.speed
+        where = 1.0 * spot
         pace = np.array((0.0, 0.0, -min(speed, self.touch_speed) if self.slow else -speed))
-        return spot, pace, self.down or self.stands
+        if spot[2] < self.ground:
+            where[:2] = current[:2]
+            pace[:2] = current_velocity[:2]
+        return where, pace, self.down or self.stands
 
     def update(self, descend: bool, current: Any, blind: bool, time: float) -> None:
         """Go down by one period."""

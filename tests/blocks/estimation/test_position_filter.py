@@ -87,7 +87,7 @@ def last(result: Driven, axis: int) -> np.ndarray:
 def test_in_the_long_run_its_covariance_is_that_of_the_algebraic_riccati_equation() -> None:
     states, known = flight(1, 400)
     position, stamp = frames(states, latency=0, every=1, seed=1)
-    result = estimate(known, position, stamp)
+    result = estimate(known, position, stamp, contact=-100.0)
     transition, noise = chain(STEP)
     sight = np.array([[1.0, 0.0, 0.0]])
     prior = solve_discrete_are(transition.T, sight.T, noise, np.array([[NOISE**2]]))
@@ -249,6 +249,54 @@ def test_positions_of_earlier_instants_than_their_stamps_strain_the_filter_until
     for more in ({"strain_limit": 1e9}, {"contact": 1.2}):
         lenient = estimate(known, position, times, tolerance=0.5, **model, **more)
         assert not lenient.contradicted[80:].any()
+
+
+def test_refused_frames_that_agree_with_each_other_are_believed_as_they_move() -> None:
+    times = STEP * np.arange(200)
+    place = np.array([0.0, 0.0, 2.0]) + np.outer(0.4 * times, [1.0, 0.0, 0.0])
+    place[:, 0] += np.where(times >= 5.0, 3.0, 0.0)
+    rng = np.random.default_rng(1)
+    model: dict[str, Any] = {"noise": (5e-3,) * 3, "initial": (0.0, 0.0, 2.0)}
+    found = estimate(np.zeros(3), place + rng.normal(0, 5e-3, (200, 3)), times, **model)
+    refused = (times >= 5.0 - 1e-9) & (times < 6.0 - 1e-9)
+    assert np.array_equal(found.contradicted, refused)
+    after = times >= 6.0 - 1e-9
+    assert np.abs(found.estimate[after] - place[after]).max() < 0.02
+    assert np.abs(found.velocity[after] - [0.4, 0.0, 0.0]).max() < 0.06
+
+
+def test_refused_frames_that_contradict_the_accelerations_are_never_believed() -> None:
+    times = STEP * np.arange(200)
+    rng = np.random.default_rng(1)
+    place = np.array([0.0, 0.0, 2.0]) + rng.normal(0, 5e-3, (200, 3))
+    wrong = times >= 5.0
+    sway = 2.0 + np.sin(4.0 * (times - 5.0))  # no acceleration is known that would move it so
+    place[:, 0] += np.where(wrong, sway, 0.0)
+    calm: dict[str, Any] = {"acceleration_noise": (0.01,) * 3, "wander": (0.02,) * 3, "noise": (5e-3,) * 3}
+    found = estimate(np.zeros(3), place, times, initial=(0.0, 0.0, 2.0), **calm)
+    assert found.contradicted[wrong].all()
+    assert np.abs(found.estimate[wrong] - [0.0, 0.0, 2.0]).max() < 0.1
+
+
+def fall(contact: float) -> Driven:
+    """Stand on the ground for 3 s with rotors that idle: the known acceleration says that it falls."""
+    times = STEP * np.arange(60)
+    place = np.random.default_rng(1).normal(0, 2e-3, (60, 3))
+    return estimate(np.array([0.3, 0.0, -9.8]), place, times, contact=contact, tolerance=0.1)
+
+
+def test_on_the_ground_frames_set_the_height_anew_and_teach_no_wind() -> None:
+    found = fall(contact=0.2)
+    assert not found.contradicted.any() and np.abs(found.estimate[:, 2]).max() < 0.5
+    assert np.abs(found.disturbance[:, :2]).max() == 0.0
+    assert fall(contact=-100.0).contradicted.any()
+
+
+def test_high_up_a_frame_of_the_ground_is_refused() -> None:
+    times = STEP * np.arange(100)
+    place = np.where((times >= 2.0)[:, None], np.zeros(3), np.array([0.0, 0.0, 2.0]))
+    found = estimate(np.zeros(3), place, times, initial=(0.0, 0.0, 2.0), contact=0.2, tolerance=0.1)
+    assert found.contradicted[40:58].all() and found.estimate[40:58, 2] == pytest.approx(2.0, abs=0.05)
 
 
 def test_a_frame_from_before_its_memory_or_from_the_future_is_refused() -> None:

@@ -48,6 +48,15 @@ def test_near_the_ground_it_slows_down() -> None:
     assert (found.velocity[found.position[:, 2] < 0.5, 2] == -0.2).all()
 
 
+def test_once_the_reference_is_below_the_ground_nothing_pushes_the_craft_sideways() -> None:
+    found = land(8.0, current_velocity=[0.7, -0.4, 0.1])
+    below = found.position[:, 2] < 0.0
+    assert below.any() and (found.position[~below, :2] == HERE[:2]).all()
+    assert (found.velocity[~below, :2] == 0.0).all()
+    assert (found.position[below, :2] == AWAY[:2]).all()
+    assert (found.velocity[below, :2] == [0.7, -0.4]).all() and (found.velocity[below, 2] < 0.0).any()
+
+
 def test_a_craft_that_does_not_follow_for_a_second_has_landed() -> None:
     height = np.maximum(1.5 - 0.3 * np.arange(160) / 20, 0.17)  # the ground is where nobody said it is
     noise = np.random.default_rng(1).normal(0.0, 0.01, len(height))
