@@ -25,6 +25,19 @@ FRESH = 0
 LOST = 5.0  # m
 MARGIN = 0.25  # m, of the craft's middle from floor and ceiling
 
+NO_FRAMES, TARGET_LOST, FROZEN, BAD_STAMP, CLOCK_RESTARTED, CONTRADICTED = 1, 2, 4, 5, 6, 7
+# Frames from which nothing can be learned, or that do not say of when they are; and what the watchdog says.
+NO_TRUTH = {
+    "drop": NO_FRAMES, "freeze": FROZEN, "alternate": FROZEN, "outdated": FROZEN, "repeated_stamp": NO_FRAMES,
+    "future_stamp": BAD_STAMP, "nan_stamp": BAD_STAMP, "inf_stamp": BAD_STAMP, "falling_stamp": BAD_STAMP,
+    "back_stamp": CLOCK_RESTARTED, "lagging_stamp": CLOCK_RESTARTED, "clock_restart": CLOCK_RESTARTED,
+    "no_target": TARGET_LOST, "turned": CONTRADICTED, "black": FROZEN, "white": FROZEN, "noise": TARGET_LOST,
+    "blur": TARGET_LOST, "inverted": TARGET_LOST, "mirrored": TARGET_LOST, "wrong_shape": TARGET_LOST,
+    "one_channel": TARGET_LOST, "wrong_type": TARGET_LOST, "nan_pixels": TARGET_LOST,
+    "no_pixels": TARGET_LOST,
+}  # fmt: skip
+POLICY = 0.3 + 1e-9  # s; so soon the failsafe takes notice of them
+
 
 @dataclass(frozen=True)
 class Place:
@@ -123,7 +136,16 @@ def sweep(pictures: bool, places: list[str], designs: list[str], kinds: list[str
             variant = None if design == "paper" else design
             flight = fly(Path(folder), place, variant, kind, seed, pictures)
             flown[kind, design].append(flight)
-            print("LOST" if flight.lost else "    ", place, design, kind, seed, flight, flush=True)
+            late = kind in NO_TRUTH and flight.left > POLICY
+            print(
+                "LOST" if flight.lost else "LATE" if late else "    ",
+                place,
+                design,
+                kind,
+                seed,
+                flight,
+                flush=True,
+            )
     print(f"{'kind':16}{'design':8}flights lost not-back farthest/m impact/(m/s) left/s: first median last")
     for (kind, design), flights in sorted(flown.items()):
         left = sorted(flight.left for flight in flights)
