@@ -163,7 +163,8 @@ def filtered(
             low = is_low(chains, frame, model)
             near = max(beside, above) <= gate * gate
             if near:  # one frame alone, however far, does not do it
-                strain = 0.0 if low and math.isnan(tried[BEGUN]) else strained(strain, level, limit)
+                calm = low and math.isnan(tried[BEGUN])
+                strain += -strain if calm else STRAIN * (min(level, 2.0 * limit) - strain)
             verdict = TAKEN if near and strain <= limit else REFUSED
             grounded = verdict == REFUSED and low and beside <= gate * gate
             if verdict == REFUSED:
@@ -210,7 +211,8 @@ def agree(
             if above > gate * gate:
                 begin_axis(trial, 2, float(frame[VALUE + 2]), sigma, float(model[5]))
         else:
-            strain = strained(float(tried[STRAINED]), level, limit)
+            strain = float(tried[STRAINED])
+            strain += STRAIN * (min(level, 2.0 * limit) - strain)
             goes_on = above <= gate * gate
         goes_on = goes_on and beside <= gate * gate and strain <= limit
     if goes_on:
@@ -222,11 +224,6 @@ def agree(
         begin(trial, frame[VALUE:VARIANCE], sigma, model[3:6])
         correct(trial, frame, model)
     tried[LAST], tried[STRAINED] = stamp, strain
-
-
-def strained(strain: float, level: float, limit: float) -> float:
-    """Return the strain after a frame with such a squared innovation over its variance, of x and y."""
-    return strain + STRAIN * (min(level, 2.0 * limit) - strain)
 
 
 def is_low(chains: Any, frame: Any, model: Any) -> bool:
@@ -279,10 +276,7 @@ def insert(frames: Any, held: int, frame: Any, horizon: float) -> int:
 
 
 def innovation(chains: Any, frame: Any, tolerance: float) -> tuple[float, float, float, float]:
-    """Return the squared innovation over its variance: of all axes, of x and y; and what goes beyond.
-
-    Beyond the tolerance, that is: the greater one of x and y, and that of the height.
-    """
+    """Return squared innovations over variances: of all axes; of x, y; beyond tolerance of x, y and of h."""
     total = level = beside = above = 0.0
     for axis in range(3):
         off = float(frame[VALUE + axis]) - float(chains[axis, 0])
