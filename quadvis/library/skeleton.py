@@ -11,7 +11,7 @@ from quadvis.library.catalogue import STANDARD, Catalogue
 from quadvis.machine.files import Kind, reason, write_output
 
 SKELETON = Kind("the skeleton")
-TAKEN = ("Any", "Block", "In", "Out", "Param", "State")  # what the skeleton imports
+TAKEN = ("Any", "Block", "In", "Out", "Param", "State", "Work")  # what the skeleton imports
 
 BLOCK = '''"""{title}."""
 
@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State
+from quadvis.block import Block, In, Out, Param, State, Work
 
 
 class {name}(Block):
@@ -33,14 +33,16 @@ class {name}(Block):
     u = In(unit="a", doc="the signal")
     y = Out(unit="a", doc="the lagged signal")
     last = State()
+    lagged = Work()
 
     def output(self, u: Any) -> Any:
         """Return the lagged signal."""
-        return self.last + self.share * (u - self.last)
+        self.lagged = self.last + self.share * (u - self.last)
+        return self.lagged
 
-    def update(self, u: Any) -> None:
+    def update(self) -> None:
         """Keep it for the next tick."""
-        self.last += self.share * (u - self.last)
+        self.last = self.lagged
 '''
 
 TEST = '''"""Tests of the block {path}."""

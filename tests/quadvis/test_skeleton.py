@@ -55,13 +55,21 @@ def test_what_is_written_is_as_ruff_wants_it(name: str, ours: bool, project: Pat
         assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.slow
+def test_what_is_written_is_as_mypy_wants_it() -> None:
+    paths = [str(path) for path in new_block("signal.my_filter")]
+    command = [sys.executable, "-m", "mypy", "--strict", *paths]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
 def test_the_test_of_a_new_block_finds_a_breach_of_the_contract(
     project: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     block, test = new_block("signal.my_filter")
     text = block.read_text()
     block.write_text(
-        text.replace("        return self.last", "        self.last += 0.001 * u\n        return self.last")
+        text.replace("        return self.lagged", "        self.last += u\n        return self.lagged")
     )
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     done = subprocess.run([sys.executable, "-m", "pytest", "-q", str(test)], capture_output=True, text=True)
