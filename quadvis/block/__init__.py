@@ -2,11 +2,13 @@
 
 from quadvis.block.block import METHODS, OUTSIDE, Block, Interface, units_of
 from quadvis.block.declare import Declared, In, Out, Param, ParameterError, Random, Safe, State, Work
+from quadvis.block.elements import all_finite, clip, copied, inward, saturated, zeros_like
 from quadvis.block.random import fill_normal, normal, normal_like, random_signs, uniform
 from quadvis.block.signals import NO_FRAME, SCALARS, Frame, Shape, SignalType, Sizes
 
 __all__ = [
     "METHODS", "NO_FRAME", "OUTSIDE", "SCALARS", "Block", "Declared", "Frame", "In", "Interface", "Out",
     "Param", "ParameterError", "Random", "Safe", "Shape", "SignalType", "Sizes", "State", "Work",
-    "fill_normal", "normal", "normal_like", "random_signs", "uniform", "units_of",
+    "all_finite", "clip", "copied", "fill_normal", "inward", "normal", "normal_like", "random_signs",
+    "saturated", "uniform", "units_of", "zeros_like",
 ]  # fmt: skip

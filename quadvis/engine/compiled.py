@@ -67,18 +67,18 @@ class Compiler:
                 function.__code__, scope, function.__name__, function.__defaults__, function.__closure__
             )
             self._known[function] = numba.njit(copy, error_model="numpy")
-            for name in _names(function.__code__):
+            for name in names_in(function.__code__):
                 if isinstance(scope.get(name), types.FunctionType):
                     scope[name] = self._jit(scope[name])
         return self._known[function]
 
 
-def _names(code: types.CodeType) -> Iterator[str]:
-    """Yield the global names in a function and in what is nested in it."""
+def names_in(code: types.CodeType) -> Iterator[str]:
+    """Yield the names of globals and attributes in a function and in what is nested in it."""
     yield from code.co_names
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
-            yield from _names(constant)
+            yield from names_in(constant)
 
 
 def _pointed(slot: Slot) -> Any:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from quadvis.block import Block, In, Out, Param, ParameterError
+from quadvis.block import Block, In, Out, Param, saturated
 from quadvis_blocks._craft import GRAVITY, MASS
-from quadvis_blocks.control._saturation import saturated
+from quadvis_blocks.control._gains import check_gains, gain_pair
 
 
 class Altitude(Block):
@@ -40,9 +40,7 @@ class Altitude(Block):
 
     def check(self) -> None:
         """Refuse one gain without the other."""
-        if (self.gains[0] > 0.0) != (self.gains[1] > 0.0):
-            problem = "gains must both be above 0, or both 0 to take them from the bandwidth"
-            raise ParameterError("gains", f"{problem}, got {self.gains[0]:g}, {self.gains[1]:g}")
+        check_gains(self.gains)
 
     def output(
         self,
@@ -55,10 +53,7 @@ class Altitude(Block):
         feedforward: float,
     ) -> float:
         """Return the collective thrust."""
-        damping, stiffness = self.gains[0], self.gains[1]
-        if stiffness == 0.0:
-            damping = 2.0 * self.mass * self.bandwidth
-            stiffness = self.mass * self.bandwidth * self.bandwidth
+        damping, stiffness = gain_pair(self.gains, self.bandwidth, self.mass)
         force = -damping * (climb - climb_reference) - stiffness * (height - height_reference)
         lift: float = saturated(force, self.force_limit) + feedforward + self.mass * self.gravity
         upright: float = max(math.cos(pitch) * math.cos(roll), self.tilt_floor)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, ParameterError
+from quadvis.block import Block, In, Out, Param, ParameterError, clip
 from quadvis_blocks._craft import ARM, INERTIA, THRUST_MAX, TORQUE_RATIO
 
 ROUNDING = 1e-12  # N; a demand right at a limit is not called saturated
@@ -67,10 +67,10 @@ class Mixer(Block):
             side, front = side * half / reach, front * half / reach
         # With yaw free to choose, opposite rotors share what roll and pitch leave them.
         room = half - 0.5 * (abs(side) + abs(front))
-        allowed = _within(mean, least + half - room, least + half + room)
+        allowed = clip(mean, least + half - room, least + half + room)
         lowest = max(least + abs(front) - allowed, allowed + abs(side) - most)
         highest = min(most - abs(front) - allowed, allowed - abs(side) - least)
-        turned = _within(turn, lowest, highest)
+        turned = clip(turn, lowest, highest)
         high, slow = abs(allowed - mean) > ROUNDING, abs(turned - turn) > ROUNDING
         thrusts = np.array(
             (
@@ -86,7 +86,3 @@ class Mixer(Block):
             np.array((4.0 * allowed, side / per_roll, front / per_pitch, turned / per_yaw)),
             np.array((high, steep and side != 0.0, steep and front != 0.0, slow)),
         )
-
-
-def _within(value: float, lower: float, upper: float) -> float:
-    return min(max(value, lower), upper)

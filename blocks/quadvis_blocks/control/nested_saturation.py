@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param
+from quadvis.block import Block, In, Out, Param, saturated
 from quadvis_blocks._craft import GRAVITY
-from quadvis_blocks.control._saturation import saturated
 
 ROLL, PITCH = range(2)
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param
+from quadvis.block import Block, In, Out, Param, saturated
 from quadvis_blocks._craft import GRAVITY, MASS
-from quadvis_blocks.control._saturation import saturated
 
 
 class Trim(Block):

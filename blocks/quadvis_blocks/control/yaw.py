@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from quadvis.block import Block, In, Out, Param, ParameterError
+from quadvis.block import Block, In, Out, Param, saturated
 from quadvis_blocks._angles import wrapped
-from quadvis_blocks.control._saturation import saturated
+from quadvis_blocks.control._gains import check_gains, gain_pair
 
 
 class Yaw(Block):
@@ -38,9 +38,7 @@ class Yaw(Block):
 
     def check(self) -> None:
         """Refuse one gain without the other."""
-        if (self.gains[0] > 0.0) != (self.gains[1] > 0.0):
-            problem = "gains must both be above 0, or both 0 to take them from the bandwidth"
-            raise ParameterError("gains", f"{problem}, got {self.gains[0]:g}, {self.gains[1]:g}")
+        check_gains(self.gains)
 
     def output(
         self,
@@ -51,10 +49,7 @@ class Yaw(Block):
         feedforward: float,
     ) -> float:
         """Return the yaw torque."""
-        damping, stiffness = self.gains[0], self.gains[1]
-        if stiffness == 0.0:
-            damping = 2.0 * self.bandwidth
-            stiffness = self.bandwidth * self.bandwidth
+        damping, stiffness = gain_pair(self.gains, self.bandwidth, 1.0)
         error = wrapped(angle - angle_reference)
         return saturated(
             -damping * (angular_rate - angular_rate_reference) - stiffness * error + feedforward,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, ParameterError, Random, State, random_signs
+from quadvis.block import Block, In, Out, Param, ParameterError, Random, State, clip, random_signs
 from quadvis_blocks._angles import wrapped
 from quadvis_blocks._craft import ARM, GRAVITY, INERTIA, MASS, MOTOR_LAG, THRUST_MAX, TORQUE_RATIO
 
@@ -149,10 +149,10 @@ class Rotorcraft(Block):
         mass, drag = self.mass, self.drag
         lift = front + right + rear + left
         return (
-            (_within(float(thrust[0]), least, most) - front) / lag,
-            (_within(float(thrust[1]), least, most) - right) / lag,
-            (_within(float(thrust[2]), least, most) - rear) / lag,
-            (_within(float(thrust[3]), least, most) - left) / lag,
+            (clip(float(thrust[0]), least, most) - front) / lag,
+            (clip(float(thrust[1]), least, most) - right) / lag,
+            (clip(float(thrust[2]), least, most) - rear) / lag,
+            (clip(float(thrust[3]), least, most) - left) / lag,
             vx, vy, vh,
             (lift * forward + drag * (float(wind[0]) - vx) + float(force[0])) / mass,
             (lift * rightward + drag * (float(wind[1]) - vy) + float(force[1])) / mass,
@@ -160,12 +160,6 @@ class Rotorcraft(Block):
             roll_rate, pitch_rate, yaw_rate,
             p_rate, q_rate, r_rate,
         )  # fmt: skip
-
-
-def _within(command: float, least: float, most: float) -> float:
-    if command < least:
-        return least
-    return most if command > most else command
 
 
 def _paper_lift(roll: float, pitch: float) -> tuple[float, float, float]:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State, Work
+from quadvis.block import Block, In, Out, Param, State, Work, all_finite, copied, zeros_like
 from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, keep
-from quadvis_blocks.signal._elements import all_finite
 
 
 class Derivative(Block):
@@ -65,11 +64,11 @@ class Derivative(Block):
         self.good = valid and self.verdict == NEWS and elapsed > 0.0 and all_finite(u)
         if self.good:
             self.ok_now = in_time and elapsed <= longest
-            self.rate_now = (u - self.last) / elapsed if self.ok_now else 0.0 * u
-            return 1.0 * self.rate_now, self.ok_now
+            self.rate_now = (u - self.last) / elapsed if self.ok_now else zeros_like(u)
+            return copied(self.rate_now), self.ok_now
         if in_time:
-            return 1.0 * self.last_rate, self.last_ok
-        return 0.0 * self.last_rate, False
+            return copied(self.last_rate), self.last_ok
+        return zeros_like(self.last_rate), False
 
     def update(self, u: Any, stamp: float, time: float) -> None:
         """Keep this sample if it is new and good."""

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State, Work
+from quadvis.block import Block, In, Out, Param, State, Work, all_finite, copied
 from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, keep
-from quadvis_blocks.signal._elements import all_finite
 
 
 class HoldValid(Block):
@@ -54,11 +53,11 @@ class HoldValid(Block):
         self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)
         self.good = self.verdict == NEWS and _is_good(value, valid, self.moment, self.seen, self.measured)
         if self.good:
-            held, measured, seen = 1.0 * value, self.moment, True
+            held, measured, seen = copied(value), self.moment, True
         elif self.seen:
-            held, measured, seen = 1.0 * self.last, self.measured, True
+            held, measured, seen = copied(self.last), self.measured, True
         else:
-            held, measured, seen = 1.0 * initial, 0.0, False
+            held, measured, seen = copied(initial), 0.0, False
         age = time - measured
         return held, age, seen and age <= self.max_age + INSTANT
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, ParameterError, State, Work
+from quadvis.block import Block, In, Out, Param, ParameterError, State, Work, copied
 from quadvis_blocks._stamps import INSTANT
 
 
@@ -35,8 +35,8 @@ class Outage(Block):
         """Return the signal or what is left of it."""
         self.out = _inside(self.during, time + INSTANT)
         if self.out:
-            return 1.0 * self.last, False
-        return 1.0 * u, valid
+            return copied(self.last), False
+        return copied(u), valid
 
     def update(self, u: Any) -> None:
         """Keep the last value."""

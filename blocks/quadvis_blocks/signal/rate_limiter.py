@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State, Work
-from quadvis_blocks.signal._elements import clip
+from quadvis.block import Block, In, Out, Param, State, Work, clip
 
 
 class RateLimiter(Block):

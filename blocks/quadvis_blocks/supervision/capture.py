@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, State, Work
+from quadvis.block import Block, In, Out, Param, State, Work, copied
 from quadvis_blocks._angles import wrapped
 
 COLLECTIVE, ROLL, PITCH, YAW = range(4)
@@ -53,7 +53,7 @@ class Capture(Block):
         self.shift_now = shift
         self.away = away
         speed = min(self.return_speed, away / self.period)
-        velocity = velocity_reference - shift * (speed / away) if away > 0.0 else 1.0 * velocity_reference
+        velocity = velocity_reference - shift * (speed / away) if away > 0.0 else copied(velocity_reference)
         self.turn_now = heading - heading_reference if engaged[YAW] else self.turn
         return position_reference + shift, velocity, wrapped(heading_reference + self.turn_now), taken
 

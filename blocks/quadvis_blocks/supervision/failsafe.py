@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from quadvis.block import Block, In, Out, Param, State, Work
 from quadvis_blocks.supervision._vision import COAST, FRESH, LEVEL, REARMING
 from quadvis_blocks.supervision._vision import LAND as LOST
@@ -84,7 +86,7 @@ class Failsafe(Block):
         """Return who has what, what counts, and why."""
         given_up = _given_up(self.given_up, self.on_loss, vision, sticks_stale, automatic)
         allowed = automatic & (not given_up)
-        neutral = allowed & False
+        neutral = np.zeros(allowed.size, np.bool_)
         if imu_stale:
             nobody = self.imu_lost == NEUTRAL or sticks_stale
             allowed[ROLL], allowed[PITCH] = False, False

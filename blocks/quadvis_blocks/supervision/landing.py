@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, State, Work
+from quadvis.block import Block, In, Out, Param, State, Work, copied
 from quadvis_blocks._stamps import INSTANT
 
 TOUCH = 1e-9  # m; a height no further from another one is the same
@@ -75,7 +75,7 @@ class Landing(Block):
         self.slow = spot[2] <= self.ground + self.flare
         self.stands = lowest if blind else rests and time - self.since >= self.settle - INSTANT
         if not descend:
-            return 1.0 * position_reference, 1.0 * velocity_reference, False
+            return copied(position_reference), copied(velocity_reference), False
         speed = 0.0 if lowest else self.speed
         where = 1.0 * spot
         pace = np.array((0.0, 0.0, -min(speed, self.touch_speed) if self.slow else -speed))
@@ -104,7 +104,7 @@ def _spot(
 ) -> Any:
     """Return the reference of the descent at this tick."""
     if not active:
-        return 1.0 * reference
+        return copied(reference)
     h = current[2] if seen_again else spot[2]
     if current[2] - h > gap:
         return np.array((current[0], current[1], h))

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State, Work
+from quadvis.block import Block, In, Out, Param, State, Work, all_finite, copied, zeros_like
 from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, keep
-from quadvis_blocks.signal._elements import all_finite
 
 
 class OutputHold(Block):
@@ -50,10 +49,10 @@ class OutputHold(Block):
         self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)
         self.good = self.verdict == NEWS and valid and all_finite(u) and self.moment > self.made
         if time - (self.moment if self.good else self.made) > self.max_age + INSTANT:
-            return 0.0 * self.last + self.safe, True
+            return zeros_like(self.last) + self.safe, True
         if self.good:
-            return 1.0 * u, False
-        return 1.0 * self.last, False
+            return copied(u), False
+        return copied(self.last), False
 
     def update(self, u: Any, stamp: float, time: float) -> None:
         """Keep a good command."""

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from quadvis.block import Block
+from quadvis.engine.compiled import names_in
 from quadvis.testing.rig import Subject
 
 
@@ -48,16 +49,13 @@ def all_declarations_used(subject: Subject) -> None:
     assert not idle, f"no method asks for {', '.join(idle)}; take it away"
     classes = [kind for kind in subject.block.__mro__ if kind not in Block.__mro__]
     functions = [value for kind in classes for value in vars(kind).values() if inspect.isfunction(value)]
-    names = {name for function in functions for name in _names(inspect.unwrap(function).__code__)}
+    names = {name for function in functions for name in _named(inspect.unwrap(function).__code__)}
     names |= {item.name for item in interface.safe.values()}  # the contract writes them
     idle = [name for name in (*interface.params, *interface.states, *interface.work) if name not in names]
     assert not idle, f"no method uses {', '.join(idle)}; take it away"
 
 
-def _names(code: types.CodeType) -> Iterator[str]:
-    yield from code.co_names
-    for constant in code.co_consts:
-        if isinstance(constant, types.CodeType):
-            yield from _names(constant)
-        elif isinstance(constant, str) and "read_file" in code.co_names:  # read_file("calibration", ...)
-            yield constant
+def _named(code: types.CodeType) -> Iterator[str]:
+    yield from names_in(code)
+    if "read_file" in code.co_names:  # read_file("calibration", ...)
+        yield from (constant for constant in code.co_consts if isinstance(constant, str))

@@ -8,13 +8,29 @@ from typing import Any
 import numpy as np
 
 
+def copied(value: Any) -> Any:
+    """Return a float or an array of floats once more, so that it lives apart from the first."""
+    return 1.0 * value
+
+
+def zeros_like(value: Any) -> Any:
+    """Return as many zeros as there are elements, all of them finite; each zero has its element's sign."""
+    return 0.0 * value
+
+
 def clip(value: Any, lower: float, upper: float) -> Any:
     """Return ``value`` held between the limits, element by element; NaN stays NaN."""
     if isinstance(value, float):
-        if value < lower:
-            return lower
-        return upper if value > upper else value
+        held = lower if value < lower else value
+        return upper if held > upper else held
     return np.minimum(np.maximum(value, lower), upper)
+
+
+def saturated(value: float, limit: float) -> float:
+    """Return ``value`` held to [-limit, limit]: sigma_a(s) of section 4; NaN stays NaN."""
+    if value < -limit:
+        return -limit
+    return limit if value > limit else value
 
 
 def all_finite(value: Any) -> bool:
