@@ -8,7 +8,7 @@ verdict   a stamp that                                                 counts
 NEWS      is later than all that counted, and not ahead of the time    as it stands
 REPEATED  is the one seen last                                         no
 BACK      is not later than one that counted: overtaken on its way     no
-AHEAD     is ahead of the time by more than `INSTANT`                  no
+AHEAD     is ahead of the time                                          no
 MISSING   is NaN or infinite                                           no
 RESTARTED is of a clock that was set back or started again             no; as NEWS after a while
 ========= ============================================================ =========================
@@ -31,7 +31,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-INSTANT = 1e-9  # s; two instants no further apart are one: sums of decimal times must not miss their tick
+from quadvis.block import INSTANT as INSTANT
+from quadvis.block import passed, reached
+
 RESTART = 1.0  # s; how long a clock that started again must run before it is taken
 NEWS, REPEATED, BACK, AHEAD, MISSING, RESTARTED = range(6)
 
@@ -65,17 +67,17 @@ def judge(clock: Any, stamp: float, time: float, restart: float) -> tuple[int, f
     if stamp == clock[SEEN]:
         return REPEATED, -math.inf
     made = _instant(clock, stamp, time)
-    fits = clock[MADE] < made <= time + INSTANT
+    fits = clock[MADE] < made and reached(time, made)
     if _in_row(clock, stamp, time, restart):
         lasted = time - clock[ROW]
         nearer = abs(time - stamp - clock[ROW_AGE]) < abs(time - made - clock[DELAY])
-        if lasted >= 0.25 * restart - INSTANT and (nearer or not fits):
-            if lasted < restart - INSTANT:
+        if reached(lasted, 0.25 * restart) and (nearer or not fits):
+            if not reached(lasted, restart):
                 return RESTARTED, -math.inf
             return NEWS, stamp + min(clock[ROW_AGE], time - stamp) - clock[DELAY]
     if fits:
         return NEWS, min(made, time)
-    return (AHEAD, -math.inf) if made > time + INSTANT else (BACK, made)
+    return (AHEAD, -math.inf) if passed(made, time) else (BACK, made)
 
 
 def note(clock: Any, stamp: float, time: float, restart: float) -> tuple[int, float]:
@@ -90,7 +92,7 @@ def keep(clock: Any, stamp: float, time: float, restart: float, verdict: int, ma
     if not math.isfinite(stamp):
         return
     if verdict == NEWS:
-        clock[SHIFT] = made - stamp if abs(made - stamp) > INSTANT else 0.0
+        clock[SHIFT] = made - stamp if passed(abs(made - stamp), 0.0) else 0.0
         clock[MADE] = made
         clock[DELAY] = time - made
         clock[ROW] = math.nan
@@ -107,10 +109,10 @@ def keep(clock: Any, stamp: float, time: float, restart: float, verdict: int, ma
 def _instant(clock: Any, stamp: float, time: float) -> float:
     """Return the instant of a stamp: as it stands, or by the shift of its clock, whichever fits."""
     shifted = float(stamp + clock[SHIFT])
-    plain = clock[MADE] < stamp <= time + INSTANT
+    plain = clock[MADE] < stamp and reached(time, stamp)
     if not plain:
-        return stamp if shifted > time + INSTANT >= stamp else shifted
-    if shifted > time + INSTANT or abs(time - stamp - clock[DELAY]) < abs(time - shifted - clock[DELAY]):
+        return stamp if passed(shifted, time) and reached(time, stamp) else shifted
+    if passed(shifted, time) or abs(time - stamp - clock[DELAY]) < abs(time - shifted - clock[DELAY]):
         return stamp
     return shifted
 

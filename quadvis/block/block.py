@@ -8,6 +8,7 @@ the author.
 from __future__ import annotations
 
 import inspect
+import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from quadvis.units import Unit
 
 METHODS = ("start", "read", "output", "write", "update", "deriv")
 OUTSIDE = ("read", "write")
-CHECKS = ("check", "check_period", "doubts")
+CHECKS = ("check", "doubts")
 FILES = ("reads", "read_file", "verify_files")
 TAGS = ("not_replayable", "not_restorable", "harmless")
 RESERVED = {
@@ -57,8 +58,8 @@ class Interface:
 class Block:
     """One reusable unit of computation or input/output; see the module's docstring for the contract.
 
-    ``Gain(factor=2.0)`` is a block with its parameters chosen; ParameterError if one is unknown, missing or
-    out of range. It runs once the engine has bound it to memory.
+    ``Gain(factor=2.0)`` is a block with its parameters chosen, and with ``period`` (s) if it is known;
+    ParameterError if one is unknown, missing or out of range. It runs once the engine has bound it to memory.
     """
 
     interface: ClassVar[Interface]
@@ -66,7 +67,7 @@ class Block:
     not_replayable: ClassVar[str] = ""  # why a second run may differ from the first: "it reads a camera"
     not_restorable: ClassVar[str] = ""  # why it cannot go back to a snapshot: "the model has no way back"
     harmless: ClassVar[str] = ""  # why what it writes needs no safe value: "a file moves nothing"
-    period: float
+    period: float = math.nan
 
     def __init_subclass__(cls, *, numeric: bool | None = None, bound: bool = False) -> None:
         if bound:
@@ -75,7 +76,8 @@ class Block:
             cls.numeric = numeric
         cls.interface = _interface(cls)
 
-    def __init__(self, **parameters: Any) -> None:
+    def __init__(self, *, period: float = math.nan, **parameters: Any) -> None:
+        self.period = period
         declared = self.interface.params
         for name in parameters:
             if name not in declared:
@@ -96,18 +98,17 @@ class Block:
         }
 
     def check(self) -> None:
-        """Refuse parameters that contradict each other or name unreadable files, with ParameterError."""
+        """Refuse with ParameterError what no run can do with, so that `quadvis check` finds it.
+
+        That is: parameters that contradict each other or do not go with ``self.period`` (s), and files that
+        are not usable. It is called as the block is made, with a period of NaN where that is not known (so
+        compare with it such that NaN refuses nothing), and before a run with a period that is another.
+        """
 
     def reads(self) -> list[str]:
         """Return the files that a run reads: those that parameters name, and all files of a folder."""
         files = (param for param in self.interface.params.values() if param.is_file and not param.writes)
         return [path for path in (getattr(self, param.name) for param in files) if path]
-
-    def check_period(self) -> None:
-        """Refuse parameters that do not go with ``self.period`` (s), with ParameterError.
-
-        It is called when a diagram is checked, as soon as the block's rate is known, and again before a run.
-        """
 
     def doubts(self) -> list[ParameterError]:
         """Return what can be run, but is surely not what was meant at ``self.period`` (s): the warnings."""

@@ -78,7 +78,7 @@ class State(Declared):
 
 @dataclass(eq=False)
 class Work(Declared):
-    """Scratch of one tick: ``output`` writes what it has computed, ``update`` of the same tick reads it.
+    """Scratch of one tick: ``output`` or ``read`` writes what it has found, ``update`` of that tick uses it.
 
     So nothing is computed twice. It is no state: nothing reads what an earlier tick left in it, ``deriv``
     never reads it, and a snapshot holds zeros in its place.

@@ -173,11 +173,7 @@ class Builder:
         key = (flat.path, kind, repr(sorted(values.items())), period)
         try:
             if key not in self.made:
-                block = kind(**values)
-                if period is not None:
-                    block.period = float(period)
-                    block.check_period()
-                self.made[key] = block
+                self.made[key] = kind(period=math.nan if period is None else float(period), **values)
             return self.made[key]
         except ParameterError as error:
             self.faults.add(self._place(flat, error), str(error))

@@ -75,7 +75,8 @@ class Engine:
         try:
             for number in numbers:
                 self._guarded(number, "verify_files")
-                self._guarded(number, "check_period")
+                if self._selves[number].period != self.graph.nodes[number].block.period:
+                    self._guarded(number, "check")  # with a period that it did not know when it was made
             for number in numbers:
                 self._opened.append(number)
                 self._guarded(number, "open")

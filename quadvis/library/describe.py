@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, Declared, In, Out, Param, State
+from quadvis.block import TAGS, Block, Declared, In, Out, Param, Safe, State
 from quadvis.library.catalogue import Catalogue
 from quadvis.output.columns import table
 
@@ -34,6 +34,8 @@ def description(name: str, block: type[Block], width: int | None = None) -> str:
     """Return a block's docstring, ports, parameters and states as text, and how a diagram uses it."""
     interface = block.interface
     lines = [name, "", *(inspect.getdoc(block) or "").splitlines(), ""]
+    if tags := _tags(block):
+        lines += [*(f"{tag}: {reason}" for tag, reason in tags.items()), ""]
     feedthrough = interface.feedthrough
     for title, rows in (
         ("inputs", [_input_row(port, port.name in feedthrough) for port in interface.inputs.values()]),
@@ -45,6 +47,11 @@ def description(name: str, block: type[Block], width: int | None = None) -> str:
             lines += [title, *(f"  {line}" for line in table(rows, width and width - 2)), ""]
     lines += ["in a diagram", *(f"  {line}" for line in example(name, block))]
     return "\n".join(lines)
+
+
+def _tags(block: type[Block]) -> dict[str, str]:
+    """Return what makes the block unlike others, in words, and why."""
+    return {tag.replace("_", " "): reason for tag in TAGS if (reason := getattr(block, tag))}
 
 
 def _input_row(port: In, direct: bool) -> tuple[str, ...]:
@@ -67,6 +74,7 @@ def _param_row(param: Param) -> tuple[str, ...]:
     if len(choices) > MANY:  # into the column that wraps
         choices, doc = f"{len(param.choices)} choices", f"{doc}: {', '.join(param.choices)}"
     words = [choices, bounds(param), "tunable" if param.tune else ""]
+    words += [f"safe value of {param.input}"] if isinstance(param, Safe) else []
     kind = "" if param.choices else _kind(param)
     return param.name, kind, _short(given), "; ".join(filter(None, words)), doc
 
@@ -131,6 +139,8 @@ def facts(name: str, block: type[Block]) -> dict[str, Any]:
         "states": plain(interface.states.values()),
         "feedthrough": sorted(interface.feedthrough),
         "numeric": block.numeric,
+        "tags": _tags(block),
+        "safe": {name: param.name for name, param in interface.safe.items()},
     }
 
 

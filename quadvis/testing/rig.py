@@ -44,10 +44,7 @@ class Subject:
 
         ParameterError if they do not go with each other or with ``PERIOD``.
         """
-        block = self.block(**{**self.given, **parameters})
-        block.period = float(PERIOD)
-        block.check_period()
-        return block
+        return self.block(period=float(PERIOD), **{**self.given, **parameters})
 
 
 @dataclass

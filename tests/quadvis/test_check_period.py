@@ -90,3 +90,23 @@ def test_a_file_that_is_no_video_is_found_at_check(tmp_path: Path) -> None:
     text = "quadvis: 1\nname: x\nrates: {c: 10 Hz}\nstop_time: 1 s\nblocks:\n"
     with pytest.raises(DiagramError, match="is not a video that OpenCV can read"):
         load_text(text + "  x: {block: vision.video_file, rate: c, with: {file: film.mp4}}\n", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("block", "given", "file"),
+    [
+        ("vision.video_writer", "file: film.mp4", "film.mp4"),
+        ("vision.frame_writer", "folder: .", "000001.png"),
+    ],
+)
+def test_a_file_that_writing_would_destroy_is_found_at_check(
+    block: str, given: str, file: str, tmp_path: Path
+) -> None:
+    (tmp_path / file).write_text("notes")
+    text = "quadvis: 1\nname: x\nrates: {c: 10 Hz}\nstop_time: 1 s\nblocks:\n"
+    text += "  in: {block: vision.image_folder, rate: c, with: {folder: shown}}\n"
+    text += f"  x: {{block: {block}, rate: c, with: {{{given}}}, in: {{frame: in.frame}}}}\n"
+    (tmp_path / "shown").mkdir()
+    (tmp_path / "shown" / "1.png").write_bytes(b"no picture either")
+    with pytest.raises(DiagramError, match="a file of another kind is there"):
+        load_text(text, tmp_path)

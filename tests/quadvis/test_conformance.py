@@ -219,7 +219,7 @@ FAULTS = [
         "refuses_before_a_run",
         "        self.now = uniform(self.stream)",
         "        self.now = uniform(self.stream)\n        1 / (self.blades < 9)",
-        "refuse it in check or check_period",
+        "refuse it in check",
     ),
     ("starts_the_same", "        self.now = uniform(self.stream)", REMEMBERS, "keep nothing in attributes"),
     (

@@ -5,13 +5,14 @@ from __future__ import annotations
 import inspect
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from quadvis.api import load_text
-from quadvis.block import Block, In, Out, Param, State
+from quadvis.block import Block, In, Out, Param, Safe, State
 from quadvis.document import parse_yaml
 from quadvis.errors import DiagramError
 from quadvis.library.catalogue import Catalogue
@@ -191,3 +192,21 @@ def test_many_choices_stand_where_the_text_wraps() -> None:
 def test_an_empty_table_has_no_lines() -> None:
     assert table([]) == []
     assert table([("", "")]) == [""]
+
+
+def test_what_sets_a_block_apart_is_said_with_its_reason() -> None:
+    class Servo(Block, numeric=False):
+        """A servo."""
+
+        not_replayable = "it reads a sensor"
+        angle = In("float64[2]", unit="rad", doc="wanted")
+        rest = Safe("angle", doc="angle when the run ends")
+
+        def write(self, angle):
+            raise NotImplementedError
+
+    text = description("own.servo", Servo)
+    assert "\nA servo.\n\nnot replayable: it reads a sensor\n\ninputs\n" in text
+    assert re.search(r"rest +\[2\] rad +required +safe value of angle +angle when the run ends", text)
+    found = facts("own.servo", Servo)
+    assert (found["tags"], found["safe"]) == ({"not replayable": "it reads a sensor"}, {"angle": "rest"})

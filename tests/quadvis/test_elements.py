@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadvis.block import all_finite, clip, copied, inward, saturated, zeros_like
+from quadvis.block import all_finite, clip, copied, inward, passed, reached, saturated, zeros_like
 
 NUMBERS = st.floats(-10.0, 10.0)
 
@@ -46,3 +46,15 @@ def test_a_copy_lives_apart_and_zeros_have_its_shape(value: float | np.ndarray) 
 def test_finite_means_every_element() -> None:
     assert all_finite(1.0) and all_finite(np.ones(2))
     assert not all_finite(math.inf) and not all_finite(np.array([0.0, math.nan]))
+
+
+@given(st.integers(0, 10**6), st.sampled_from([0.001, 0.01, 0.1, 1 / 3]))
+def test_a_sum_of_periods_reaches_its_tick_and_no_other(tick: int, period: float) -> None:
+    instant = math.fsum([period] * (tick % 1000)) + period * (tick - tick % 1000)
+    assert reached(tick * period, instant) and not passed(tick * period, instant)
+    assert not reached((tick - 1) * period, instant) and passed((tick + 1) * period, instant)
+
+
+def test_nothing_is_reached_or_passed_by_nan() -> None:
+    assert not reached(math.nan, 0.0) and not passed(math.nan, 0.0) and not passed(0.0, math.nan)
+    assert reached(0.3, np.array([0.1 + 0.2, 0.4])).tolist() == [True, False]

@@ -259,7 +259,7 @@ def test_a_file_that_a_block_reads_by_itself_must_be_what_it_was(tmp_path: Path)
 def test_what_a_run_has_written_is_no_part_of_the_hash(project: Path) -> None:
     before = quadvis.load(project / "watch.yaml").hash
     (project.parent / "runs").mkdir()
-    (project.parent / "runs" / "watch.mp4").write_bytes(b"an earlier video")
+    (project.parent / "runs" / "watch.mp4").write_bytes(b"\0\0\0 ftypmp42, an earlier video")
     assert quadvis.load(project / "watch.yaml").hash == before
 
 

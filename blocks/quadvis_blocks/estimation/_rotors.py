@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis_blocks._stamps import INSTANT
+from quadvis.block import reached
 
 CAPACITY = 128  # commands: the last that arrived, and those on their way
 
@@ -44,7 +44,7 @@ def send(times: Any, commands: Any, count: int, time: float, delay: float, comma
     its way must not depend on the values. `check_delay` has seen to it that there is room.
     """
     first = 0
-    while first + 1 < count and times[first + 1] <= time + INSTANT:
+    while first + 1 < count and reached(time, times[first + 1]):
         first += 1
     if first > 0:
         count -= first
@@ -66,11 +66,11 @@ def follow(
         mean[index] = 0.0
     at = begin
     place = count - 1
-    while place > 0 and times[place] > begin + INSTANT:
+    while place > 0 and not reached(begin, times[place]):
         place -= 1
-    while at < end - INSTANT:
+    while not reached(at, end):
         until = end
-        if place + 1 < count and times[place + 1] < end - INSTANT:
+        if place + 1 < count and not reached(times[place + 1], end):
             until = float(times[place + 1])
         keep, time = math.exp((at - until) / lag), until - at
         for index in range(4):

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State, Work
+from quadvis.block import INSTANT, Block, In, Out, Param, State, Work
 from quadvis_blocks._angles import wrapped
-from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, keep
+from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, judge, keep
 
 CAPACITY = 128
 DEGREE = math.pi / 180.0

@@ -68,7 +68,7 @@ class Predictor(Block):
     count = State("int64", 1)
     now = State("float64[4]")  # the wrench of the rotors
 
-    def check_period(self) -> None:
+    def check(self) -> None:
         """Refuse a delay in which more commands come in than there is room for."""
         check_delay(self.delay, CAPACITY - 1, self.period)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State, Work, all_finite, copied, zeros_like
-from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, keep
+from quadvis.block import Block, In, Out, Param, State, Work, all_finite, copied, passed, zeros_like
+from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, judge, keep
 
 
 class Derivative(Block):
@@ -57,13 +57,13 @@ class Derivative(Block):
 
     def output(self, u: Any, stamp: float, valid: bool, time: float) -> tuple[Any, bool]:
         """Return the rate, and whether it means anything."""
-        longest = max(self.gap_reset, 1.5 * self.period) + INSTANT
-        in_time = time - self.arrived <= longest
+        longest = max(self.gap_reset, 1.5 * self.period)
+        in_time = not passed(time - self.arrived, longest)
         self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)
         elapsed = self.moment - self.measured
         self.good = valid and self.verdict == NEWS and elapsed > 0.0 and all_finite(u)
         if self.good:
-            self.ok_now = in_time and elapsed <= longest
+            self.ok_now = in_time and not passed(elapsed, longest)
             self.rate_now = (u - self.last) / elapsed if self.ok_now else zeros_like(u)
             return copied(self.rate_now), self.ok_now
         if in_time:

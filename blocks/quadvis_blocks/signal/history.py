@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from quadvis.block import Block, In, Out, State
-from quadvis_blocks._stamps import INSTANT
+from quadvis.block import Block, In, Out, State, passed
 
 CAPACITY = 256
 
@@ -32,13 +31,12 @@ class History(Block):
         """Return the value at the instant."""
         if math.isnan(instant):
             return u, False
-        if instant > time + INSTANT:
+        if passed(instant, time):
             return u, False
         kept = self.kept
-        age = (time - instant) / self.period
-        if age > kept + INSTANT / self.period:
+        if passed(time - instant, kept * self.period):
             return (u if kept == 0 else float(self.values[kept - 1])), False
-        age = min(max(age, 0.0), float(kept))
+        age = min(max((time - instant) / self.period, 0.0), float(kept))
         steps = min(int(age), kept - 1)
         if steps < 0:
             return u, True

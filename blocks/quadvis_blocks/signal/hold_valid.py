@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State, Work, all_finite, copied
-from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, keep
+from quadvis.block import Block, In, Out, Param, State, Work, all_finite, copied, passed
+from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, judge, keep
 
 
 class HoldValid(Block):
@@ -59,7 +59,7 @@ class HoldValid(Block):
         else:
             held, measured, seen = copied(initial), 0.0, False
         age = time - measured
-        return held, age, seen and age <= self.max_age + INSTANT
+        return held, age, seen and not passed(age, self.max_age)
 
     def update(self, value: Any, stamp: float, time: float) -> None:
         """Keep the value if it is valid."""

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, ParameterError, State, Work, copied
-from quadvis_blocks._stamps import INSTANT
+from quadvis.block import Block, In, Out, Param, ParameterError, State, Work, copied, reached
 
 
 class Outage(Block):
@@ -33,7 +32,7 @@ class Outage(Block):
 
     def output(self, u: Any, valid: bool, time: float) -> tuple[Any, bool]:
         """Return the signal or what is left of it."""
-        self.out = _inside(self.during, time + INSTANT)
+        self.out = _inside(self.during, time)
         if self.out:
             return copied(self.last), False
         return copied(u), valid
@@ -46,4 +45,4 @@ class Outage(Block):
 
 def _inside(during: Any, time: float) -> bool:
     """Return whether a time lies in one of the stretches."""
-    return bool(((during[:, 0] <= time) & (time < during[:, 1])).any())
+    return bool((reached(time, during[:, 0]) & ~reached(time, during[:, 1])).any())

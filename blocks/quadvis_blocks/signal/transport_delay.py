@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State
+from quadvis.block import Block, In, Out, Param, State, reached
 from quadvis_blocks._craft import RADIO_DELAY
 from quadvis_blocks._delay import check_delay
-from quadvis_blocks._stamps import INSTANT
 
 CAPACITY = 512
 
@@ -34,7 +33,7 @@ class TransportDelay(Block):
     values = State(f"float64[{CAPACITY},n]")  # the one that arrived last, then those on their way
     waiting = State("int64")
 
-    def check_period(self) -> None:
+    def check(self) -> None:
         """Refuse a delay in which more values come in than there is room for."""
         check_delay(self.delay, CAPACITY - 1, self.period)
 
@@ -64,6 +63,6 @@ class TransportDelay(Block):
 def _arrived(since: Any, waiting: int, instant: float) -> int:
     """Return the place of the last value sent by ``instant``; the first was there already."""
     place = 0
-    while place < waiting and since[place + 1] <= instant + INSTANT:
+    while place < waiting and reached(instant, since[place + 1]):
         place += 1
     return place

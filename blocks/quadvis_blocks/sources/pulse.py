@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, Out, Param, ParameterError
-from quadvis_blocks._stamps import INSTANT
+from quadvis.block import INSTANT, Block, Out, Param, ParameterError, reached
 
 
 class Pulse(Block):
@@ -30,7 +29,7 @@ class Pulse(Block):
 
     def doubts(self) -> list[ParameterError]:
         """Doubt pulses that may fall between two samples of the block."""
-        if not 0.0 < self.width < self.period * (1 - 1e-9):
+        if self.width == 0.0 or reached(self.width, self.period):
             return []
         problem = f"width is {self.width:g} s, shorter than the period of the block, {self.period:g} s"
         return [ParameterError("width", f"{problem}; some pulses are missed")]

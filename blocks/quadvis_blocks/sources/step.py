@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from quadvis.block import Block, Out, Param
+from quadvis.block import Block, Out, Param, reached
 
 
 class Step(Block):
@@ -20,4 +20,4 @@ class Step(Block):
 
     def output(self, time: float) -> Any:
         """Return the value on this side of the step."""
-        return self.after if time >= self.at else self.before
+        return self.after if reached(time, self.at) else self.before

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, State, Work, copied
-from quadvis_blocks._stamps import INSTANT
+from quadvis.block import Block, In, Out, Param, State, Work, copied, reached
 
 TOUCH = 1e-9  # m; a height no further from another one is the same
 
@@ -73,7 +72,7 @@ class Landing(Block):
         rests = self.active and abs(height - self.rest) <= self.band and height - spot[2] > self.gap
         self.place = spot
         self.slow = spot[2] <= self.ground + self.flare
-        self.stands = lowest if blind else rests and time - self.since >= self.settle - INSTANT
+        self.stands = lowest if blind else rests and reached(time - self.since, self.settle)
         if not descend:
             return copied(position_reference), copied(velocity_reference), False
         speed = 0.0 if lowest else self.speed

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State, Work, all_finite, copied, zeros_like
-from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, keep
+from quadvis.block import Block, In, Out, Param, State, Work, all_finite, copied, passed, zeros_like
+from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, judge, keep
 
 
 class OutputHold(Block):
@@ -48,7 +48,7 @@ class OutputHold(Block):
         """Return the command that counts, and whether it is the safe one."""
         self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)
         self.good = self.verdict == NEWS and valid and all_finite(u) and self.moment > self.made
-        if time - (self.moment if self.good else self.made) > self.max_age + INSTANT:
+        if passed(time - (self.moment if self.good else self.made), self.max_age):
             return zeros_like(self.last) + self.safe, True
         if self.good:
             return copied(u), False

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State, Work
-from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, keep
+from quadvis.block import Block, In, Out, Param, State, Work, passed
+from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, judge, keep
 
 
 class Staleness(Block):
@@ -59,7 +59,7 @@ class Staleness(Block):
         else:
             self.newest = self.news
         age = time - self.newest
-        return max(0.0, age), age > self.max_age + INSTANT
+        return max(0.0, age), passed(age, self.max_age)
 
     def update(self, stamp: float, sequence: int, value: Any, time: float) -> None:
         """Keep what came."""

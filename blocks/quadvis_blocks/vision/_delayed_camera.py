@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.block import Block, Param, ParameterError, Random, State, uniform
-from quadvis_blocks._stamps import INSTANT
+from quadvis.block import Block, Param, ParameterError, Random, State, passed, reached, uniform
 
 QUEUE = 16  # frames that can be on their way at once
 SEQUENCE, STAMP, ARRIVAL = range(3)  # the first columns of a row, the rest is what was captured
@@ -63,10 +62,10 @@ class DeliveringCamera(Block, numeric=False):
     shown = State(f"float64[{CONTENT}]")  # the row on the wire; sequence 0 before the first
     _arrivals: tuple[Row, list[Row]]  # the rows on the wire and on their way, from output to update
 
-    def check_period(self) -> None:
+    def check(self) -> None:
         """Refuse a latency that the queue cannot hold; ParameterError."""
         longest = QUEUE * self.every * self.period
-        if self.latency + self.jitter > longest * (1 + 1e-9):
+        if passed(self.latency + self.jitter, longest):
             together = " and jitter together" if self.jitter else ""
             bound = f"at most {QUEUE} frames, {longest:g} s"
             problem = f"latency{together} must be {bound}, got {self.latency + self.jitter:g} s"
@@ -93,12 +92,8 @@ class DeliveringCamera(Block, numeric=False):
 
     def _is_lost(self, time: float) -> bool:
         begin, length = self.blackout
-        after = self._now(time) - begin
-        return self._is_dropped() or (length > 0.0 and 0.0 <= after < length)
-
-    def _now(self, time: float) -> float:
-        """Return a moment later: a sum of decimal times must not miss its tick by a rounding error."""
-        return time + INSTANT
+        inside = reached(time, begin) and not reached(time, begin + length)
+        return self._is_dropped() or (length > 0.0 and inside)
 
     def _arrival(self, stamp: float) -> float:
         """Return when the frame of this tick arrives."""
@@ -113,13 +108,12 @@ class DeliveringCamera(Block, numeric=False):
 
         ``fresh`` is the row of the frame that is captured now, if it is not lost.
         """
-        now = self._now(time)
         queue = [row.copy() for row in self.pending[: self.waiting]] + ([] if fresh is None else [fresh])
-        due = [row for row in queue if row[ARRIVAL] <= now]
+        due = [row for row in queue if reached(time, row[ARRIVAL])]
         if not due:
             return self.shown.copy(), queue
         last = max(due, key=lambda row: (row[ARRIVAL], row[SEQUENCE]))
-        return last, [row for row in queue if row[ARRIVAL] > now]
+        return last, [row for row in queue if not reached(time, row[ARRIVAL])]
 
     def _deliver(self, fresh: Row | None, time: float) -> Row:
         """Return the row on the wire at this time; for ``output``, which hands it to `_advance`."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from quadvis_blocks._stamps import INSTANT
+from quadvis.block import reached
 
 NO_FAULT = "none"
 LATE = 3  # ticks that a late frame is late, and an old picture is old
@@ -33,7 +33,7 @@ TIMING = (
 
 def is_on(time: float, begin: float, duration: float) -> bool:
     """Return whether the fault is there."""
-    return begin <= time + INSTANT < begin + duration
+    return bool(reached(time, begin) and not reached(time, begin + duration))
 
 
 def comes(kind: str, count: int) -> int:

@@ -25,6 +25,8 @@ class FrameWriter(Block, numeric=False):
     be written.
     """
 
+    harmless = "pictures in a folder move nothing"
+
     frame = In("frame", doc="the frames to write")
 
     folder = Param(type="file", writes=True, doc="folder, made if it is not there")
@@ -35,33 +37,37 @@ class FrameWriter(Block, numeric=False):
     seen = State("int64", 0)  # how many new frames there were
 
     def check(self) -> None:
-        """Refuse a folder that is a file."""
+        """Refuse a folder that is a file, or has files that could be replaced and must not be."""
         if Path(self.folder).is_file():
             raise ParameterError("folder", f"folder must be a folder, '{self.folder}' is a file")
+        if Path(self.folder).is_dir():
+            self._check_old()
 
     def open(self) -> None:
         """Make the folder; ParameterError if a file that could be replaced must not be."""
         try:
             Path(self.folder).mkdir(parents=True, exist_ok=True)
-            old = [path for path in Path(self.folder).iterdir() if re.fullmatch(NAMES, path.name)]
         except OSError as error:
             raise RunError(f"cannot make the folder '{self.folder}': {error.strerror}") from error
+        self._check_old()
+
+    def _check_old(self) -> None:
+        try:
+            old = [path for path in Path(self.folder).iterdir() if re.fullmatch(NAMES, path.name)]
+        except OSError as error:
+            problem = f"folder '{self.folder}' cannot be read: {error.strerror}"
+            raise ParameterError("folder", problem) from error
         try:
             for path in old:
                 check_output(path, KINDS[path.suffix])
         except QuadvisError as error:
             raise ParameterError("folder", str(error)) from error
 
-    def update(self, frame: Frame) -> None:
+    def write(self, frame: Frame) -> None:
         """Write a frame that is new."""
-        if frame.sequence in (0, self.written):
+        due = self.seen % self.every == 0
+        if frame.sequence in (0, self.written) or not due or not is_picture(frame.pixels):
             return
-        self.written = frame.sequence
-        self.seen += 1
-        if (self.seen - 1) % self.every == 0 and is_picture(frame.pixels):
-            self._write(frame)
-
-    def _write(self, frame: Frame) -> None:
         import cv2
 
         path = Path(self.folder) / f"{frame.sequence:06d}{list(KINDS)[self.format]}"
@@ -72,3 +78,9 @@ class FrameWriter(Block, numeric=False):
         if not whole:
             raise RunError(f"cannot write the picture '{path}': the picture cannot be coded")
         write_output(path, KINDS[path.suffix], data.tobytes())
+
+    def update(self, frame: Frame) -> None:
+        """Count a frame that is new."""
+        if frame.sequence not in (0, self.written):
+            self.written = frame.sequence
+            self.seen += 1

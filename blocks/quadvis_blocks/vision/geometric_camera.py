@@ -66,7 +66,8 @@ class GeometricCamera(DeliveringCamera, numeric=False):
     last_sequence = State("int64")
 
     def check(self) -> None:
-        """Read the calibration."""
+        """Read the calibration, and refuse a latency that does not go with the period."""
+        super().check()
         self._load()
 
     def _load(self) -> CameraCalibration:

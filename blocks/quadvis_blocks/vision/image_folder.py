@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.block import Block, Frame, Out, Param, ParameterError, State
+from quadvis.block import Block, Frame, Out, Param, ParameterError, State, Work
 from quadvis.errors import QuadvisError
 from quadvis.machine.inputs import note_digest
 from quadvis_vision.pictures.reader import SUFFIXES, read_coded
@@ -44,13 +44,10 @@ class ImageFolder(Block, numeric=False):
 
     played = State("int64", 0)  # pictures that were on the wire
     stamp = State("float64")  # of the last one
+    at_end = Work("bool")
 
     def check(self) -> None:
         """Refuse a folder that is missing or has no picture."""
-        if not Path(self.folder).is_dir():
-            raise ParameterError(
-                "folder", f"folder '{self.folder}' does not exist; name a folder with pictures"
-            )
         if not self.read_file("folder", self._listed):
             kinds = ", ".join(suffix[1:] for suffix in SUFFIXES)
             problem = f"no picture in '{self.folder}' matches '{self.pattern}'"
@@ -66,6 +63,9 @@ class ImageFolder(Block, numeric=False):
 
     def _listed(self, folder: str) -> dict[Path, FileState]:
         """Return the files in the order in which they are played, and by what a change of them is known."""
+        if not Path(folder).is_dir():
+            problem = f"folder '{folder}' does not exist; name a folder with pictures"
+            raise ParameterError("folder", problem)
         found = {path: state for path in self._find() if (state := state_of(path)) is not None}
         note_digest(os.path.join(folder, ""), sha256(repr(sorted(found.items())).encode()).hexdigest())
         return found
@@ -90,14 +90,17 @@ class ImageFolder(Block, numeric=False):
         self._paths = list(self._states)
         self._last = Frame.none()
 
-    def output(self, time: float) -> tuple[Frame, bool]:
-        """Return the picture of this tick and whether the folder is at its end."""
-        finished = not self.loop and self.played >= len(self._paths)
-        sequence, stamp = (self.played, self.stamp) if finished else (self.played + 1, time)
+    def read(self, time: float) -> None:
+        """Read the picture of this tick."""
+        self.at_end = not self.loop and self.played >= len(self._paths)
+        sequence, stamp = (self.played, self.stamp) if self.at_end else (self.played + 1, time)
         if (self._last.sequence, self._last.stamp) != (sequence, stamp):
             pixels = self._read(self._paths[(sequence - 1) % len(self._paths)])
             self._last = Frame(pixels, stamp, sequence)
-        return self._last, finished
+
+    def output(self) -> tuple[Frame, bool]:
+        """Return the picture of this tick and whether the folder is at its end."""
+        return self._last, self.at_end
 
     def _read(self, path: Path) -> NDArray[np.uint8]:
         """Return a picture, or one without pixels if it cannot be used or is not what it was."""
@@ -105,7 +108,7 @@ class ImageFolder(Block, numeric=False):
 
     def update(self, time: float) -> None:
         """Count the picture that was on the wire."""
-        if self.loop or self.played < len(self._paths):
+        if not self.at_end:
             self.played += 1
             self.stamp = time
 

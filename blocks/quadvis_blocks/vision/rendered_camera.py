@@ -79,24 +79,21 @@ class RenderedCamera(DeliveringCamera, numeric=False):
     shown = State(f"float64[{WIDTH}]")
 
     def check(self) -> None:
-        """Read the calibration and compare the sizes of the target."""
+        """Read the calibration; refuse discs that overlap, and times that do not go with the period."""
+        super().check()
         self._load()
         if 2 * self.radius >= self.side:
             raise ParameterError(
                 "radius", f"radius must be below half of side ({self.side / 2:g} m), or discs overlap"
             )
-
-    def _load(self) -> CameraCalibration:
-        return self.read_file("calibration", CameraCalibration.load)
-
-    def check_period(self) -> None:
-        """Refuse a latency or an exposure that does not go with the period; ParameterError."""
-        super().check_period()
         if self.exposure_time > self.period:
             longest = f"at most the period, {self.period:g} s"
             raise ParameterError(
                 "exposure_time", f"exposure_time must be {longest}, got {self.exposure_time:g} s"
             )
+
+    def _load(self) -> CameraCalibration:
+        return self.read_file("calibration", CameraCalibration.load)
 
     def open(self) -> None:
         """Prepare the renderer."""

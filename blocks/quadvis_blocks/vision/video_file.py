@@ -39,7 +39,7 @@ class VideoFile(Block, numeric=False):
 
     played = State("int64", 0)  # frames that were on the wire
     stamp = State("float64")  # of the last one
-    finished_now = Work("bool")
+    at_end = Work("bool")
 
     def check(self) -> None:
         """Refuse a file that is missing or not a video."""
@@ -64,21 +64,24 @@ class VideoFile(Block, numeric=False):
         if "_video" in self.__dict__:
             self._video.close()
 
-    def output(self, time: float) -> tuple[Frame, bool]:
-        """Return the frame of this tick and whether the file is at its end."""
+    def read(self, time: float) -> None:
+        """Read the frame of this tick."""
         pixels = self._video.frame(self.played, self.loop)
-        self.finished_now = finished = pixels is None
-        sequence, stamp = (self.played, self.stamp) if finished else (self.played + 1, time)
+        self.at_end = pixels is None
+        sequence, stamp = (self.played, self.stamp) if self.at_end else (self.played + 1, time)
         if pixels is None:
             pixels = self._video.frame(self.played - 1)
             assert pixels is not None
         if (self._last.sequence, self._last.stamp) != (sequence, stamp):
             self._last = Frame(pixels, stamp, sequence)
-        return self._last, finished
+
+    def output(self) -> tuple[Frame, bool]:
+        """Return the frame of this tick and whether the file is at its end."""
+        return self._last, self.at_end
 
     def update(self, time: float) -> None:
         """Count the frame that was on the wire."""
-        if not self.finished_now:
+        if not self.at_end:
             self.played += 1
             self.stamp = time
 

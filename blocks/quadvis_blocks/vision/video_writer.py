@@ -34,6 +34,8 @@ class VideoWriter(Block, numeric=False):
     it cannot be written.
     """
 
+    harmless = "a video moves nothing"
+
     frame = In("frame", doc="the frames to write")
 
     file = Param(
@@ -45,12 +47,14 @@ class VideoWriter(Block, numeric=False):
     due = State("int64", 0)  # pictures up to now; black ones if no frame has told their size
 
     def check(self) -> None:
-        """Refuse a file that is a folder, and formats that are not known."""
+        """Refuse what is there and is no video, and formats that are not known."""
         if self._suffix not in CODECS:
             names = ", ".join(CODECS)
             raise ParameterError("file", f"file must end in one of {names}, got '{Path(self.file).name}'")
         if Path(self.file).is_dir():
             raise ParameterError("file", f"file must be a file, '{self.file}' is a folder")
+        if Path(self.file).exists():
+            self._check_old()
 
     def open(self) -> None:
         """Make the folder; the file is begun with the first frame, which has its size."""
@@ -61,6 +65,9 @@ class VideoWriter(Block, numeric=False):
             Path(self.file).parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise RunError(f"cannot make the folder of '{self.file}': {error.strerror}") from error
+        self._check_old()
+
+    def _check_old(self) -> None:
         try:
             check_output(self.file, self._kind)
         except QuadvisError as error:
@@ -76,19 +83,27 @@ class VideoWriter(Block, numeric=False):
             held.close()
         self._video = self._held = None
 
-    def update(self, frame: Frame) -> None:
+    def write(self, frame: Frame) -> None:
         """Write the frame of this tick."""
-        new = frame.sequence not in (0, self.last)
+        new = self._is_new(frame)
         if new:
-            self.last = frame.sequence
             if self._video is None and is_shown(frame.pixels):
                 self._begin(frame.pixels)
             if self._video is not None:
                 self._picture = fitted(frame.pixels, self._size)
+        if (new or self.keep_time) and self._video is not None:
+            self._video.write(self._picture)
+
+    def update(self, frame: Frame) -> None:
+        """Count the frame of this tick."""
+        new = self._is_new(frame)
+        if new:
+            self.last = frame.sequence
         if new or self.keep_time:
-            if self._video is not None:
-                self._video.write(self._picture)
             self.due += 1
+
+    def _is_new(self, frame: Frame) -> bool:
+        return frame.sequence not in (0, self.last)
 
     @property
     def _suffix(self) -> str:

@@ -59,4 +59,4 @@ def refuses_before_a_run(subject: Subject) -> None:
                 pass
         except QuadvisError as error:
             found = f"{name} = {value!r} stops a run before its first tick ({error})"
-            raise AssertionError(f"{found}; refuse it in check or check_period") from None
+            raise AssertionError(f"{found}; refuse it in check") from None
