@@ -1,6 +1,6 @@
 """The contract that blocks are written against: the names that an author imports."""
 
-from quadvis.block.block import METHODS, OUTSIDE, TAGS, Block, Interface, units_of
+from quadvis.block.block import METHODS, OUTSIDE, OWN_MODULES, TAGS, Block, Interface, units_of
 from quadvis.block.declare import Declared, In, Out, Param, ParameterError, Random, Safe, State, Work
 from quadvis.block.elements import all_finite, clip, copied, inward, saturated, zeros_like
 from quadvis.block.instants import INSTANT, passed, reached
@@ -8,8 +8,8 @@ from quadvis.block.random import fill_normal, normal, normal_like, random_signs,
 from quadvis.block.signals import NO_FRAME, SCALARS, Frame, Shape, SignalType, Sizes
 
 __all__ = [
-    "INSTANT", "METHODS", "NO_FRAME", "OUTSIDE", "SCALARS", "TAGS", "Block", "Declared", "Frame", "In",
-    "Interface", "Out", "Param", "ParameterError", "Random", "Safe", "Shape", "SignalType", "Sizes", "State",
-    "Work", "all_finite", "clip", "copied", "fill_normal", "inward", "normal", "normal_like", "passed",
-    "random_signs", "reached", "saturated", "uniform", "units_of", "zeros_like",
+    "INSTANT", "METHODS", "NO_FRAME", "OUTSIDE", "OWN_MODULES", "SCALARS", "TAGS", "Block", "Declared",
+    "Frame", "In", "Interface", "Out", "Param", "ParameterError", "Random", "Safe", "Shape", "SignalType",
+    "Sizes", "State", "Work", "all_finite", "clip", "copied", "fill_normal", "inward", "normal",
+    "normal_like", "passed", "random_signs", "reached", "saturated", "uniform", "units_of", "zeros_like",
 ]  # fmt: skip

@@ -19,6 +19,7 @@ from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.machine.inputs import file_digest
 from quadvis.units import Unit
 
+OWN_MODULES = "quadvis_own_blocks."  # before the names of modules that come with a diagram
 METHODS = ("start", "read", "output", "write", "update", "deriv")
 OUTSIDE = ("read", "write")
 CHECKS = ("check", "doubts")

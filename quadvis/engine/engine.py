@@ -118,7 +118,8 @@ class Engine:
             given = (self.time,) if method == "write_safe" else ()
             getattr(self._selves[number], method)(*given)
         except Exception as error:
-            raise cannot(method, self.program.blocks[number].path, error, self.time) from error
+            path, block = self.program.blocks[number].path, self._selves[number]
+            raise cannot(method, path, block, error, self.time) from error
 
     def attach(self, tap: Tap) -> None:
         """Have a block's rows taken from now on."""

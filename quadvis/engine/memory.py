@@ -22,6 +22,7 @@ from quadvis.block import Block, Shape, Sizes
 
 SLOT = 8
 C_TYPES = {"float64": ctypes.c_double, "int64": ctypes.c_int64, "bool": ctypes.c_bool}
+CALL = "<call of a block>"  # in place of a file, in tracebacks
 VIEWS = {"float64": "d", "int64": "q", "bool": "?"}
 
 
@@ -232,7 +233,7 @@ def _caller(arguments: tuple[str, ...], targets: tuple[str, ...]) -> Callable[..
         f"    return call\n"
     )
     namespace: dict[str, Any] = {}
-    exec(text, namespace)
+    exec(compile(text, CALL, "exec"), namespace)
     made: Callable[..., Callable[[], None]] = namespace["make"]
     return made
 

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import numpy as np
 
-from quadvis.block import ParameterError
-from quadvis.engine.graph import Graph
+from quadvis.block import OWN_MODULES, Block, ParameterError
+from quadvis.engine.graph import Graph, Node
 from quadvis.engine.interpreter import NOT_FINITE_OUTPUT, Stop
-from quadvis.engine.layout import Placed
+from quadvis.engine.layout import TIME, Placed
 from quadvis.engine.memory import Memory
 from quadvis.engine.program import Program
+from quadvis.engine.returned import returned_wrongly
 from quadvis.errors import QuadvisError, RunError, sentence
 from quadvis.machine.failures import MEMORY, arithmetic, is_short_of_memory, surroundings
+from quadvis.machine.source_line import source_line
 
 SHOWN = 4  # numbers in a message
 SMALLER_STEP = "a smaller solver step may help"
@@ -34,9 +37,9 @@ def explained(stop: Stop, graph: Graph, program: Program, memory: Memory) -> Qua
     raise AssertionError("a state that is not finite belongs to a block")
 
 
-def cannot(method: str, path: str, error: Exception, time: float) -> QuadvisError:
+def cannot(method: str, path: str, block: Block, error: Exception, time: float) -> QuadvisError:
     """Return the error of a method around the run, such as ``open``."""
-    return _own(error, path) or RunError(f"cannot {method}: {_reason(error)}", block=path, time=time)
+    return _own(error, path) or RunError(f"cannot {method}: {_reason(error, block)}", block=path, time=time)
 
 
 def _own(error: Exception, path: str) -> QuadvisError | None:
@@ -52,15 +55,30 @@ def _failed(error: Exception, block: Placed, graph: Graph, memory: Memory, time:
     own = _own(error, block.path)
     if own is not None:
         return own
+    node = graph[block.path]
     if not arithmetic(error):
-        return RunError(_reason(error), block=block.path, time=time)
+        reason = _returned(error, node, block, memory) or _reason(error, node.block)
+        return RunError(reason, block=block.path, time=time)
     outputs = list(block.outputs)
-    reason = sentence(f"{arithmetic(error)}{_inputs(block, memory)}", _remedy(graph, block.path))
+    own_code = node.block.__module__.startswith(OWN_MODULES)
+    place = source_line(error, _file(type(node.block))) if own_code else ""
+    problem = f"{arithmetic(error)}{f' in {place}' if place else ''}{_inputs(block, memory)}"
+    reason = sentence(problem, _remedy(graph, block.path))
     return RunError(reason, block=block.path, port=outputs[0] if len(outputs) == 1 else "", time=time)
 
 
-def _reason(error: Exception) -> str:
-    """Return what went wrong in a block."""
+def _returned(error: Exception, node: Node, block: Placed, memory: Memory) -> str:
+    """Return what is wrong with what ``output`` or ``deriv`` has returned; "" if it is something else."""
+    for method, slots in (("output", block.outputs), ("deriv", block.slopes)):
+        names = node.block.interface.arguments.get(method, ())
+        sources = [TIME if name == "time" else block.inputs[name] for name in names]
+        if wrong := returned_wrongly(error, method, [memory.read(slot) for slot in sources], slots):
+            return wrong
+    return ""
+
+
+def _reason(error: Exception, block: Block) -> str:
+    """Return what went wrong in a block, and in which line of its code if that says more."""
     if isinstance(error, QuadvisError):
         return str(error)
     if problem := arithmetic(error):
@@ -69,7 +87,13 @@ def _reason(error: Exception) -> str:
         return MEMORY
     if isinstance(error, RecursionError):
         return surroundings(error)
-    return f"{type(error).__name__}: {error}"
+    place = source_line(error, _file(type(block)))
+    return f"{type(error).__name__}: {error}{f' in {place}' if place else ''}"
+
+
+def _file(kind: type[Block]) -> str:
+    """Return the file in which a block's class was written."""
+    return str(getattr(sys.modules.get(kind.__module__), "__file__", ""))
 
 
 def _inputs(block: Placed, memory: Memory) -> str:

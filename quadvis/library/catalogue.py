@@ -19,8 +19,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 
-from quadvis.block import Block
+from quadvis.block import OWN_MODULES, Block
 from quadvis.errors import QuadvisError, sentence, suggestion
+from quadvis.machine.source_line import source_line
 
 STANDARD = "quadvis_blocks"
 GROUP = "quadvis.libraries"
@@ -170,7 +171,7 @@ def _import(module: str, name: str) -> ModuleType:
 
 
 def _load_file(file: Path, name: str) -> ModuleType:
-    module_name = "quadvis_own_blocks." + name
+    module_name = OWN_MODULES + name
     spec = importlib.util.spec_from_file_location(module_name, file)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -179,7 +180,9 @@ def _load_file(file: Path, name: str) -> ModuleType:
         spec.loader.exec_module(module)
     except Exception as error:
         del sys.modules[module_name]
-        problem = f"block '{name}' cannot be loaded from {file}: {type(error).__name__}: {error}"
+        place = source_line(error, str(file)) or file
+        reason = error.msg if isinstance(error, SyntaxError) else error
+        problem = f"block '{name}' cannot be loaded from {place}: {type(error).__name__}: {reason}"
         raise CatalogueError(problem) from error
     return module
 

@@ -235,7 +235,7 @@ FAULTS = [
         "returns_what_it_declares",
         "[0], self.count",
         "[0], 0.5 * self.count",
-        "must return int64 for turns, not 0.0",
+        "must return int64 for turns, it returned 0.0",
     ),
     (
         "returns_what_it_declares",
