@@ -31,7 +31,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import INSTANT as INSTANT
 from quadvis.block import passed, reached
 
 RESTART = 1.0  # s; how long a clock that started again must run before it is taken

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis_blocks._stamps import INSTANT
+from quadvis.block import passed, reached
 
 TICKS = 64  # how many ticks are kept, and how many frames
 FRAMES = 64
@@ -136,7 +136,7 @@ def place(ticks: Any, oldest: int, stamp: float) -> int:
 def filtered(
     chains: Any, past: Any, ticks: Any, oldest: int, now: Any, frames: Any, held: int, frame: Any,
     model: Any, sigma: Any, gate: float, tolerance: float, strain: float, limit: float, trial: Any,
-    tried: Any, reset_after: float, keep: bool,
+    tried: Any, reset_after: float,
 ) -> tuple[int, int, int, float, float]:  # fmt: skip
     """Give the estimates at the tick `now`, before its own frames, with a new frame if that is believed.
 
@@ -145,15 +145,15 @@ def filtered(
     are tried on estimates of their own, `trial` (3, 9) with `tried` (3,); if these have agreed with them for
     `reset_after`, they are the estimates from then on. Where the ground may touch the craft nothing strains,
     as long as frames are believed, and a frame that is beyond the gate in height alone resets the height.
-    Returned are what became of the frame, how many are held, the oldest tick of use, the frame's squared
-    innovation over its variance, and the strain. Without `keep` the past stays as it is.
+    Past, frames, trial and tried are renewed in place. Returned are what became of the frame, how many are
+    held, the oldest tick of use, the frame's squared innovation over its variance, and the strain.
     """
     first, verdict, nis, grounded = TICKS - 1, NOTHING, math.nan, False
     start = chains.copy()
     if not math.isnan(frame[STAMP]):
         stamp = min(float(frame[STAMP]), float(now[0]))
         found = place(ticks, oldest, stamp)
-        if found < 0 or frame[STAMP] > now[0] + INSTANT:
+        if found < 0 or passed(frame[STAMP], now[0]):
             verdict = LATE
         else:
             first, frame[STAMP] = found, stamp
@@ -173,7 +173,7 @@ def filtered(
                 agree(trial, tried, ticks, oldest, now, frame, model, sigma, gate, tolerance, limit)
                 if grounded and math.isnan(since):
                     verdict = RESET
-                elif tried[BEGUN] == since and stamp - since >= reset_after - INSTANT:
+                elif tried[BEGUN] == since and reached(stamp - since, reset_after):
                     verdict, grounded = RESET, False
                     carry(start, ticks, oldest, now, last, float(ticks[first, 0]), model)
     chains[:] = past[first]
@@ -183,12 +183,11 @@ def filtered(
             begin_axis(chains, 2, float(frame[VALUE + 2]), sigma, float(model[5]))
         else:
             chains[:] = start
-        if keep:
-            past[first] = chains
+        past[first] = chains
     if verdict in (TAKEN, RESET):
         tried[BEGUN] = math.nan
         held = insert(frames, held, frame, float(ticks[oldest, 0]))
-    again(chains, past, ticks, first, now, float(now[0]), frames, held, model, keep)
+    again(chains, past, ticks, first, now, float(now[0]), frames, held, model, True)
     return verdict, held, oldest, nis, strain
 
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, State
-from quadvis_blocks._stamps import AHEAD, BACK, INSTANT, NEWS, RESTART, SIZE, judge, note
+from quadvis.block import Block, In, Out, Param, State, Work, passed
+from quadvis_blocks._stamps import AHEAD, BACK, NEWS, RESTART, SIZE, judge, keep
 from quadvis_blocks._stamps import begin as begin_clock
 from quadvis_blocks.estimation._chain import (
     FRAMES,
@@ -137,6 +137,19 @@ class PositionFilter(Block):
     trial = State("float64[3,9]")  # estimates by refused frames alone
     tried = State("float64[3]", math.nan)  # stamps of the first and the last of them, and their strain
     strain = State()  # squared innovations of x and y over their variances, by fading memory
+    verdict = Work("int64")  # on the stamp of now
+    moment = Work(unit="s")  # the instant that it stands for
+    chains = Work("float64[3,9]")  # the estimates just before the frames of now
+    past_now = Work(f"float64[{TICKS},3,9]")
+    oldest_now = Work("int64")
+    frames_now = Work(f"float64[{FRAMES},{WIDTH}]")
+    held_now = Work("int64")
+    newest_now = Work(unit="s")
+    refusing_now = Work("bool")
+    refusals_now = Work("int64")
+    trial_now = Work("float64[3,9]")
+    tried_now = Work("float64[3]")
+    strain_now = Work()
 
     def start(self) -> None:
         """Begin at rest at the initial position."""
@@ -147,51 +160,50 @@ class PositionFilter(Block):
         self, acceleration: Any, position: Any, stamp: float, valid: bool, measured: Any, time: float
     ) -> tuple[Any, ...]:
         """Return the estimate with what is known now."""
-        now = _tick(time, acceleration)
-        verdict, made = judge(self.stamps, stamp, time, self.restart)
-        frame = _frame(position, _counts(verdict, made, stamp), valid, measured, self.noise)
-        frames, chains = self.frames.copy(), self.past[TICKS - 1].copy()
-        newest, refused, nis = self.newest, self.refusals, math.nan
-        contradicted = self.refusing
+        now, nis = _tick(time, acceleration), math.nan
+        self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)
+        self.chains = self.past[TICKS - 1]
+        self.oldest_now, self.newest_now = self.oldest, self.newest
+        self.refusing_now, self.refusals_now = self.refusing, self.refusals
+        estimates = self.chains.copy()
         if self.oldest < TICKS:
+            self.past_now = self.past
+            self.frames_now = self.frames
+            self.trial_now = self.trial
+            self.tried_now = self.tried
             model = _model(self.acceleration_noise, self.wander, self.decay, self.contact)
-            verdict, held, _, nis, _ = filtered(
-                chains, self.past, self.ticks, self.oldest, now, frames, self.held, frame, model,
-                self.initial_sigma, self.gate, self.tolerance, self.strain, self.strain_limit,
-                self.trial.copy(), self.tried.copy(), self.reset_after, False,
+            counts = _counts(self.verdict, self.moment, stamp)
+            frame = _frame(position, counts, valid, measured, self.noise)
+            became, self.held_now, self.oldest_now, nis, self.strain_now = filtered(
+                self.chains, self.past_now, self.ticks, self.oldest, now, self.frames_now, self.held, frame,
+                model, self.initial_sigma, self.gate, self.tolerance, self.strain, self.strain_limit,
+                self.trial_now, self.tried_now, self.reset_after,
             )  # fmt: skip
-            latest(chains, frames, held, time, model)
-            newest = _newer(newest, made, verdict)
-            refused += 1 if verdict in (REFUSED, LATE) else 0
-            contradicted = verdict == REFUSED or (contradicted and verdict not in (TAKEN, RESET))
+            estimates[:] = self.chains
+            latest(estimates, self.frames_now, self.held_now, time, model)
+            self.newest_now = _newer(self.newest, self.moment, became)
+            self.refusals_now += 1 if became in (REFUSED, LATE) else 0
+            self.refusing_now = became == REFUSED or (self.refusing and became not in (TAKEN, RESET))
+        newest = self.newest_now
         age = time - (0.0 if math.isnan(newest) else newest)
-        ok = not math.isnan(newest) and age <= self.max_age + INSTANT
+        ok = not math.isnan(newest) and not passed(age, self.max_age)
         return (
-            chains[:, 0].copy(), chains[:, 1].copy(), chains[:, 2].copy(), _covariance(chains),
-            age, ok, contradicted, nis, refused,
+            estimates[:, 0].copy(), estimates[:, 1].copy(), estimates[:, 2].copy(), _covariance(estimates),
+            age, ok, self.refusing_now, nis, self.refusals_now,
         )  # fmt: skip
 
-    def update(
-        self, acceleration: Any, position: Any, stamp: float, valid: bool, measured: Any, time: float
-    ) -> None:
+    def update(self, acceleration: Any, stamp: float, time: float) -> None:
         """Keep what came in, and the estimates just before the frames of this instant."""
-        now, chains = _tick(time, acceleration), self.past[TICKS - 1].copy()
         if self.oldest < TICKS:
-            verdict, made = note(self.stamps, stamp, time, self.restart)
-            frame = _frame(position, _counts(verdict, made, stamp), valid, measured, self.noise)
-            model = _model(self.acceleration_noise, self.wander, self.decay, self.contact)
-            verdict, self.held, self.oldest, _, self.strain = filtered(
-                chains, self.past, self.ticks, self.oldest, now, self.frames, self.held, frame, model,
-                self.initial_sigma, self.gate, self.tolerance, self.strain, self.strain_limit,
-                self.trial, self.tried, self.reset_after, True,
-            )  # fmt: skip
-            self.newest = _newer(self.newest, made, verdict)
-            self.refusals += 1 if verdict in (REFUSED, LATE) else 0
-            if verdict in (TAKEN, RESET):
-                self.refusing = False
-            elif verdict == REFUSED:
-                self.refusing = True
-        self.oldest = append(self.ticks, self.past, self.oldest, now, chains)
+            keep(self.stamps, stamp, time, self.restart, self.verdict, self.moment)
+            self.past = self.past_now
+            self.frames = self.frames_now
+            self.trial = self.trial_now
+            self.tried = self.tried_now
+            self.held, self.strain = self.held_now, self.strain_now
+            self.newest, self.refusing, self.refusals = self.newest_now, self.refusing_now, self.refusals_now
+        now = _tick(time, acceleration)
+        self.oldest = append(self.ticks, self.past, self.oldest_now, now, self.chains)
 
 
 def _tick(time: float, acceleration: Any) -> Any:

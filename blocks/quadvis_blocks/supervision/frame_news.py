@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State
+from quadvis.block import Block, In, Out, Param, State, Work
 from quadvis_blocks._digest import NOTHING, digest
-from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, judge, note
+from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, judge, keep
 from quadvis_blocks.supervision._vision import FROZEN, trouble_of
 
 RECENT = 32  # frames that are remembered: a camera that goes round in up to so many old ones has no news
@@ -50,6 +50,11 @@ class FrameNews(Block):
     recent = State(f"int64[{RECENT}]", NOTHING)  # digests of measurements, the newest first
     cause = State("int64")
     stamps = State(f"float64[{SIZE}]")
+    verdict = Work("int64")  # on the stamp of now
+    moment = Work(unit="s")  # the instant that it stands for
+    seen = Work("int64")  # digest of the measurement of now
+    known = Work("bool")  # whether it is a recent one
+    cause_now = Work("int64")
 
     def start(self) -> None:
         """Know no frame yet."""
@@ -57,27 +62,25 @@ class FrameNews(Block):
 
     def output(self, stamp: float, value: Any, frozen: bool, time: float) -> tuple[float, bool, int]:
         """Return the instant of the newest frame that was news, whether it is new, and what is wrong."""
-        verdict, made = judge(self.stamps, stamp, time, self.restart)
-        if frozen or (verdict == NEWS and self.repeats == STALE and _is_known(digest(value), self.recent)):
-            return self.taken, False, FROZEN
-        cause = trouble_of(verdict, self.cause)
-        if verdict != NEWS or math.isnan(stamp):
-            return self.taken, False, cause
-        return made, True, cause
+        self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)
+        self.seen = digest(value) if self.verdict == NEWS and self.repeats == STALE else NOTHING
+        self.known = frozen or _is_known(self.seen, self.recent)
+        self.cause_now = FROZEN if self.known else trouble_of(self.verdict, self.cause)
+        if self.known or self.verdict != NEWS or math.isnan(stamp):
+            return self.taken, False, self.cause_now
+        return self.moment, True, self.cause_now
 
-    def update(self, stamp: float, value: Any, frozen: bool, time: float) -> None:
+    def update(self, stamp: float, time: float) -> None:
         """Keep a new frame."""
-        verdict, made = note(self.stamps, stamp, time, self.restart)
-        seen = digest(value) if verdict == NEWS and self.repeats == STALE else NOTHING
-        if frozen or _is_known(seen, self.recent):
-            self.cause = FROZEN
+        keep(self.stamps, stamp, time, self.restart, self.verdict, self.moment)
+        self.cause = self.cause_now
+        if self.known:
             return
-        self.cause = trouble_of(verdict, self.cause)
-        if verdict == NEWS and not math.isnan(stamp):
-            self.taken = made
-        if seen != NOTHING:
+        if self.verdict == NEWS and not math.isnan(stamp):
+            self.taken = self.moment
+        if self.seen != NOTHING:
             self.recent[1:] = self.recent[:-1].copy()
-            self.recent[0] = seen
+            self.recent[0] = self.seen
 
 
 def _is_known(seen: int, recent: Any) -> bool:

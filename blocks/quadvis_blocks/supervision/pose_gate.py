@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, State
+from quadvis.block import Block, In, Out, Param, State, Work
 from quadvis_blocks._angles import wrapped
-from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, judge, note
+from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, judge, keep
 from quadvis_blocks.supervision._vision import CONTRADICTED, NONE
 
 DEGREE = math.pi / 180.0
@@ -66,6 +66,11 @@ class PoseGate(Block):
     doubted = State("bool")  # whether there was one, and no row has ended it
     refused = State("bool")
     stamps = State(f"float64[{SIZE}]")
+    verdict = Work("int64")  # on the stamp of now
+    moment = Work(unit="s")  # the instant that it stands for
+    compared = Work("bool")  # whether there is a new pose
+    row_now = Work("int64")
+    refused_now = Work("bool")
 
     def start(self) -> None:
         """Know no pose yet."""
@@ -75,39 +80,32 @@ class PoseGate(Block):
         self, position: Any, yaw: float, stamp: float, valid: bool, trouble: int, time: float
     ) -> tuple[bool, int]:
         """Return whether the newest pose counts, and why not."""
-        verdict, made = judge(self.stamps, stamp, time, self.restart)
-        refused = self.refused
-        if verdict == NEWS:
-            refused = False
-        if verdict == NEWS and valid and _finite(position, yaw):
+        self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)
+        self.refused_now = self.refused and self.verdict != NEWS
+        self.compared = self.verdict == NEWS and valid and _finite(position, yaw)
+        if self.compared:
             limits = _limits(self.jump, self.speed, self.acceleration, self.turn, self.drift)
-            reached = _agrees(position, yaw, self.counted, self.counted_turn, made - self.counted_at, limits)
-            agreed = _agrees(position, yaw, self.newest, self.newest_turn, made - self.newest_at, limits)
-            row = _row(self.row, reached, agreed)
-            refused = row == 0 or (self.doubted and row < self.confirm)
-        return valid and not refused, CONTRADICTED if refused else trouble
+            since, last = self.moment - self.counted_at, self.moment - self.newest_at
+            reached = _agrees(position, yaw, self.counted, self.counted_turn, since, limits)
+            agreed = _agrees(position, yaw, self.newest, self.newest_turn, last, limits)
+            self.row_now = _row(self.row, reached, agreed)
+            self.refused_now = self.row_now == 0 or (self.doubted and self.row_now < self.confirm)
+        return valid and not self.refused_now, CONTRADICTED if self.refused_now else trouble
 
-    def update(
-        self, position: Any, yaw: float, stamp: float, valid: bool, yaw_rate: float, time: float
-    ) -> None:
+    def update(self, position: Any, yaw: float, stamp: float, yaw_rate: float, time: float) -> None:
         """Keep a pose that counts, and turn with the gyro."""
-        verdict, made = note(self.stamps, stamp, time, self.restart)
-        if verdict == NEWS:
-            self.refused = False
-        if verdict == NEWS and valid and _finite(position, yaw):
-            limits = _limits(self.jump, self.speed, self.acceleration, self.turn, self.drift)
-            reached = _agrees(position, yaw, self.counted, self.counted_turn, made - self.counted_at, limits)
-            agreed = _agrees(position, yaw, self.newest, self.newest_turn, made - self.newest_at, limits)
-            self.row = _row(self.row, reached, agreed)
-            self.refused = self.row == 0 or (self.doubted and self.row < self.confirm)
+        keep(self.stamps, stamp, time, self.restart, self.verdict, self.moment)
+        self.refused = self.refused_now
+        if self.compared:
+            self.row = self.row_now
             self.doubted = self.refused
             self.newest[:3] = position
             self.newest[3] = yaw
-            self.newest_at = made
+            self.newest_at = self.moment
             self.newest_turn = 0.0
             if not self.refused:
                 self.counted = self.newest
-                self.counted_at = made
+                self.counted_at = self.moment
                 self.counted_turn = 0.0
         self.counted_turn += self.period * yaw_rate
         self.newest_turn += self.period * yaw_rate

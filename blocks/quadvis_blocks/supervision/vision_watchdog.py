@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from quadvis.block import Block, In, Out, Param, ParameterError, State
-from quadvis_blocks._stamps import INSTANT, NEWS, RESTART, SIZE, begin, judge, note
+from quadvis.block import Block, In, Out, Param, ParameterError, State, Work, passed, reached
+from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, judge, keep
 from quadvis_blocks.supervision._vision import (
     COAST,
     CONTRADICTED,
@@ -87,6 +87,14 @@ class VisionWatchdog(Block):
     row = State("int64")
     cause = State("int64")  # what is wrong with the stamp that was seen last
     stamps = State(f"float64[{SIZE}]")
+    verdict = Work("int64")  # on the stamp of now
+    moment = Work(unit="s")  # the instant that it stands for
+    state_now = Work("int64")
+    newest_now = Work(unit="s")
+    good_now = Work(unit="s")
+    first_now = Work(unit="s")
+    row_now = Work("int64")
+    cause_now = Work("int64")
 
     def check(self) -> None:
         """Refuse times that do not follow on each other."""
@@ -105,42 +113,37 @@ class VisionWatchdog(Block):
         self, stamp: float, valid: bool, trouble: int, contradicted: bool, time: float
     ) -> tuple[int, int, float, bool, bool]:
         """Return state, reason, age, whether that is too great, and whether vision has just come back."""
-        verdict, made = judge(self.stamps, stamp, time, self.restart)
-        made = made if verdict == NEWS and not math.isnan(stamp) else -math.inf
+        self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)
+        made = self.moment if self.verdict == NEWS and not math.isnan(stamp) else -math.inf
         newest, good, first, row = _counted(
             made, valid and not contradicted, self.newest, self.good, self.first, self.row, self.coast
         )
         age = time - good
-        stale = row == 0 or age > self.coast + INSTANT
-        proven = row >= self.frames and good - first >= self.proof - INSTANT
+        stale = bool(row == 0 or passed(age, self.coast))
+        proven = bool(row >= self.frames and reached(good - first, self.proof))
         state = _state(self.now, stale, proven, time - self.since, self.level, self.land)
+        self.newest_now, self.good_now, self.first_now = newest, good, first
+        self.row_now, self.state_now = 0 if stale else row, state
+        self.cause_now = trouble_of(self.verdict, self.cause)
         if state == FRESH:
             reason = NONE
         elif not stale:
             reason = REARMING
         elif trouble != NONE:
             reason = trouble
-        elif time - newest > self.coast + INSTANT:
-            reason = max(trouble_of(verdict, self.cause), NO_FRAMES)
+        elif passed(time - newest, self.coast):
+            reason = max(self.cause_now, NO_FRAMES)
         else:
             reason = CONTRADICTED if contradicted else TARGET_LOST
         return state, reason, age, stale, state == FRESH and self.now != FRESH
 
-    def update(self, stamp: float, valid: bool, contradicted: bool, time: float) -> None:
+    def update(self, stamp: float, time: float) -> None:
         """Keep the state."""
-        verdict, made = note(self.stamps, stamp, time, self.restart)
-        made = made if verdict == NEWS and not math.isnan(stamp) else -math.inf
-        newest, good, first, row = _counted(
-            made, valid and not contradicted, self.newest, self.good, self.first, self.row, self.coast
-        )
-        self.cause = trouble_of(verdict, self.cause)
-        stale = row == 0 or time - good > self.coast + INSTANT
-        proven = row >= self.frames and good - first >= self.proof - INSTANT
-        self.now = _state(self.now, stale, proven, time - self.since, self.level, self.land)
-        self.newest, self.good, self.first = newest, good, first
-        self.row = 0 if stale else row
+        keep(self.stamps, stamp, time, self.restart, self.verdict, self.moment)
+        self.cause, self.now, self.row = self.cause_now, self.state_now, self.row_now
+        self.newest, self.good, self.first = self.newest_now, self.good_now, self.first_now
         if self.now == FRESH or self.clock == OF_FRAME:
-            self.since = good
+            self.since = self.good
 
 
 def _counted(
@@ -154,7 +157,7 @@ def _counted(
         return newest, good, first, row
     if not well:
         return made, good, first, row
-    if row == 0 or made - good > longest + INSTANT:
+    if row == 0 or passed(made - good, longest):
         return made, made, made, 1
     return made, made, first, row + 1
 
@@ -165,8 +168,8 @@ def _state(state: int, stale: bool, proven: bool, gone: float, level: float, lan
         return FRESH if proven or state == FRESH else state
     if state == FRESH:
         return COAST
-    if state == COAST and gone > level + INSTANT:
+    if state == COAST and passed(gone, level):
         return LEVEL
-    if state == LEVEL and gone > land + INSTANT:
+    if state == LEVEL and passed(gone, land):
         return LAND
     return state
