@@ -53,7 +53,7 @@ class Tuning:
         param = block.interface.params[name]
         accepted = param.accept(value)
         given = {each: self._now(path, each, block) for each in block.interface.params}
-        type(block)(**given | {name: value})
+        type(block)(period=block.period, **given | {name: value})
         self._waiting[key] = accepted
 
     def _now(self, path: str, name: str, block: Block) -> Any:
