@@ -1,1 +1,1 @@
-"""The vision of the library, free of blocks: what they, the tools and the trials are made of."""
+"""The mathematics of vision, without blocks, for the blocks, the tools and the trials."""

@@ -1,1 +1,1 @@
-"""What tools/calibrate and tools/calibrate_colours do: from photographs to calibration files."""
+"""From photographs to calibration files: the mathematics of tools/calibrate and tools/calibrate_colours."""

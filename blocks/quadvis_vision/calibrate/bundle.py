@@ -1,13 +1,13 @@
 """Poses of a flat board in several views, with the camera and its lens: bundle adjustment.
 
-A flat board gives eq. (9) nothing to hold on to, as all its points lie in one plane. Several views of it do,
-once their boards stand in one common frame, that of the camera. The poses that place them come from here: a
-homography per view, Zhang's two constraints per homography for the focal lengths (Zhang, 2000, section 3.1,
-with the principal point at the centre of the picture), then Levenberg-Marquardt over the camera, the lens and
-all poses.
+All points of a flat board lie in one plane, so eq. (9) alone does not determine a camera from it. Several
+views of the board do, once their boards are placed in one common frame, the camera's. This module finds the
+poses that place them: a homography for each view, Zhang's two constraints per homography for the focal
+lengths (Zhang, 2000, section 3.1, with the principal point at the centre of the picture), then
+Levenberg-Marquardt over the camera, the lens and all poses.
 
-The lens is OpenCV's model k1 k2 p1 p2 k3. Skew is held at zero unless it is asked for: pixels of real cameras
-are square-angled, and five lens parameters leave little to tell skew from.
+The lens is OpenCV's model k1 k2 p1 p2 k3. Skew is held at zero unless the caller asks for it: real pixels
+have right angles, and beside five lens parameters the views hardly determine a skew.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 LENS = ("k1", "k2", "p1", "p2", "k3")
 
 _STEPS = 100
-_SETTLED = 1e-10  # relative fall of the squared error at which a step was the last
-_STIFFEST = 1e10  # damping at which no direction leads downhill any more
+_SETTLED = 1e-10  # a step whose relative fall of the squared error is below this is the last one
+_STIFFEST = 1e10  # a damping above this means that no direction leads downhill
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +74,8 @@ def adjust(
 ) -> Bundle:
     """Return the camera and the poses that best explain views (m, n, 2) of a board (n, 2), m >= 3, in pixels.
 
-    size is the width and height of the picture in pixels. skew says whether K may have one, lens which of k1,
-    k2, p1, p2, k3 the lens may have; the rest stays zero.
+    size is the width and height of the picture in pixels. skew says whether K may have a skew; lens names
+    those of k1, k2, p1, p2, k3 that are free. All other terms stay zero.
 
     `QuadvisError` for fewer than 3 views, or views that show the board from one direction only.
     """
@@ -104,7 +104,7 @@ def adjust(
 
 
 def free_parameters(*, skew: bool, lens: Collection[str]) -> NDArray[np.bool_]:
-    """Return which of the ten parameters of a camera are found, (10,), in the order of `Bundle.camera`."""
+    """Return a mask (10,) of the free parameters of a camera, in the order of `Bundle.camera`."""
     return np.array([True] * 4 + [skew] + [name in lens for name in LENS])
 
 
@@ -122,8 +122,9 @@ def linearise(bundle: Bundle, board: Floats, views: Floats) -> tuple[Floats, Flo
 def derivatives(placed: Floats, turned: Floats, matrix: Floats, lens: Floats) -> tuple[Floats, Floats]:
     """Return the pixels (m, n, 2) of points (m, n, 3) in camera axes, and their derivatives (m, n, 2, 16).
 
-    The first ten columns belong to the camera, in the order of `Bundle.camera`, then three to a small turn
-    about camera axes, which moves the points by its cross product with `turned`, and three to a shift.
+    The first ten columns belong to the camera, in the order of `Bundle.camera`, the next three to a small
+    turn about the camera's axes, the last three to a shift. A turn moves the points by its cross product with
+    `turned`.
     """
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         depth = placed[..., 2]
@@ -143,7 +144,7 @@ def derivatives(placed: Floats, turned: Floats, matrix: Floats, lens: Floats) ->
 
 
 def _start(board: Floats, views: Floats, size: tuple[int, int]) -> Bundle:
-    """Return focal lengths in closed form and the poses that belong to them, without a lens."""
+    """Return the starting bundle: focal lengths in closed form and their poses, without a lens."""
     maps = np.stack([homography(board, view) for view in views])
     centre = np.array([(size[0] - 1) / 2, (size[1] - 1) / 2])
     fx, fy = _focal_lengths(maps, centre)
@@ -163,7 +164,7 @@ def _focal_lengths(maps: Floats, centre: Floats) -> tuple[float, float]:
     rows, sides = [], []
     for h in maps:
         a, b = _centred(h, centre)[:, :2].T
-        # A view is weighted by its own scale, so that near and far boards count alike.
+        # Each view is divided by its own scale, so that near and far boards count alike.
         scale = 1 / (np.linalg.norm(a) * np.linalg.norm(b))
         rows += [a[:2] * b[:2] * scale, (a[:2] ** 2 - b[:2] ** 2) * scale]
         sides += [-a[2] * b[2] * scale, -(a[2] ** 2 - b[2] ** 2) * scale]
@@ -174,7 +175,7 @@ def _focal_lengths(maps: Floats, centre: Floats) -> tuple[float, float]:
 
 
 def undetermined() -> QuadvisError:
-    """Return the sentence about views from which no camera follows."""
+    """Return the error for views that do not determine a camera."""
     return QuadvisError(
         "the views do not determine the focal length; show the board tilted in several directions"
     )

@@ -1,12 +1,11 @@
 """From photographs of a chessboard to correspondences, and from those to the camera by eq. (7)-(10).
 
-A flat board alone gives eq. (9) no depth. So the boards of all views are placed in one frame, the camera's,
-by the poses of our own bundle adjustment (`_bundle`; nothing of OpenCV's calibration is used), the lens is
-taken out of the corners, and K, R, C come from all of them at once by eq. (7)-(10). The poses carry a K of
-their own, hence (7)-(10) does not measure a second time: it has all eleven parameters free and must return
-that K, R = I and C = 0 up to noise.
+A flat board alone gives eq. (9) no depth. So our own bundle adjustment (`bundle`) places the boards of all
+views in one frame, the camera's. Then the lens is removed from the corners, and K, R, C follow from all
+corners at once by eq. (7)-(10). The bundle has already found a K, hence (7)-(10) is no second measurement:
+with all eleven parameters free it must return that K, R = I and C = 0 up to noise.
 
-OpenCV finds the corners, and its calibrateCamera stands beside the result for comparison.
+OpenCV finds the corners. Its calibrateCamera is used for comparison only.
 """
 
 from __future__ import annotations
@@ -35,18 +34,18 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Picture = NDArray[np.uint8]
 
-# OpenCV's calibration sample uses this half width. Where squares look small, neighbours pull corners away.
+# OpenCV's calibration sample uses this half width. Where squares look small, neighbouring corners disturb.
 USUAL_WINDOW = 11
 _SMALLEST_WINDOW = 2
-# Half widths over the distance between corners; from 0.4 on the residuals of a view double.
+# Half width divided by the distance between corners; from 0.4 on the residuals of a view double.
 _CLEAR, _CROWDED = 0.3, 0.4
-# Terms of the lens to do without, one set after the other, until it does not fold the picture.
+# Terms of the lens to omit: one set after the other is tried until the lens does not fold the picture.
 _OMITTED: tuple[tuple[str, ...], ...] = ((), ("k3",), ("k2", "k3"), LENS)
 
 
 @dataclass(frozen=True)
 class Board:
-    """A chessboard by its inner corners: columns x rows of them, `square` apart (any unit of length)."""
+    """A chessboard with columns x rows inner corners, `square` apart (any unit of length)."""
 
     columns: int
     rows: int
@@ -72,7 +71,7 @@ class Board:
 
 @dataclass(frozen=True, eq=False)
 class Corners:
-    """The corners (n, 2) of the board in one picture, in pixels; `crowded` if neighbours were in the way."""
+    """The corners (n, 2) of the board in one picture (px); `crowded` if neighbouring corners are too near."""
 
     pixels: Floats
     crowded: bool
@@ -80,11 +79,12 @@ class Corners:
 
 @dataclass(frozen=True, eq=False)
 class Views:
-    """The m pictures out of several that show the board.
+    """The m pictures that show the board, out of all that were read.
 
-    `names` and `corners` (n, 2) of each; `size`, the width and height of all pictures; `missed`, the paths of
-    those without the board; `crowded`, the names of those with crowded corners; `notes`, what to say of the
-    files, such as that one is there twice; `picture`, the last, in grey.
+    `names` and `corners` (n, 2) belong to these; `size` is the width and height of all pictures; `missed` are
+    the paths of pictures without the board; `crowded` are the names of pictures with crowded corners; `notes`
+    are sentences for the user, such as one about a picture that was given twice; `picture` is the last
+    picture, in grey.
     """
 
     names: list[str]
@@ -100,12 +100,13 @@ class Views:
 class ChessboardCalibration:
     """A camera from m views of a board.
 
-    `homogeneous` is K, R, C of eq. (7)-(10) from the corners without the lens, in the frame of `bundle`,
-    which has the poses, the lens and the camera they were found with. `camera` is K of eq. (7)-(10) with that
-    lens, as the file holds it. `measured` corners are (m, n, 2) in pixels, `predicted` ones follow from
-    `camera` and `homogeneous`. `bundle_rms` is what the bundle itself leaves, in pixels. `omitted` names
-    terms of the lens that are held at zero: corners that do not go out far enough let the lens fold what lies
-    beyond them. `deviations` are those of the bundle, whose K that of (7)-(10) repeats.
+    `bundle` holds the poses, the lens, and the camera of the bundle adjustment. `homogeneous` is K, R, C of
+    eq. (7)-(10) from the corners without the lens, in the frame of `bundle`. `camera` is K of eq. (7)-(10)
+    with the bundle's lens, as the file holds it. `measured` are the corners (m, n, 2) in pixels; `predicted`
+    corners follow from `camera` and `homogeneous`. `bundle_rms` is the rms error of the bundle itself, in
+    pixels. `omitted` names the terms of the lens that are held at zero, because the corners do not reach far
+    enough out and the lens would fold the picture beyond them. `deviations` are the standard deviations of
+    the bundle.
     """
 
     homogeneous: HomogeneousCalibration
@@ -131,8 +132,8 @@ class ChessboardCalibration:
 def find_corners(picture: Picture, board: Board, window: int | None = USUAL_WINDOW) -> Corners | None:
     """Return the inner corners of the board to a fraction of a pixel, or None if not all of it is in view.
 
-    window is half the width in pixels of the surroundings that refine a corner; None keeps it clear of the
-    neighbouring corners in every picture, which is the better choice wherever squares look small.
+    window is half the width in pixels of the surroundings that refine a corner. With None it is chosen for
+    each picture so that it contains no neighbouring corner; this is better where squares look small.
     """
     import cv2
 
@@ -153,12 +154,12 @@ def read_views(
 ) -> Views:
     """Return the corners of the board in photographs; those that do not show it are left out.
 
-    A picture that is there twice counts once, whatever its files are called: it is known by its pixels.
+    A picture that is given twice counts once, whatever its files are called: pixels are compared, not names.
 
-    `QuadvisError` if fewer than `least` show it, if one is no picture, or if they differ in size.
+    `QuadvisError` if fewer than `least` pictures show the board, if a file is no picture, or if sizes differ.
     """
     read: list[CodedPicture] = []
-    first: dict[bytes, str] = {}  # by what the pixels hash to
+    first: dict[bytes, str] = {}  # by the hash of the pixels
     again: list[str] = []
     found: list[tuple[str, Corners | None]] = []
     for path in paths:
@@ -201,7 +202,7 @@ def calibrate_views(
 ) -> ChessboardCalibration:
     """Return the camera from the corners (n, 2) of 3 or more views; size is width and height in pixels.
 
-    skew lets the poses' own camera have one too; eq. (7)-(10) leaves it free in any case.
+    skew says whether the bundle's camera may have a skew; in eq. (7)-(10) the skew is always free.
 
     `QuadvisError` for too few views, or views that do not determine a camera.
     """
@@ -227,10 +228,10 @@ def calibrate_views(
 def at_heights(
     board: Board, views: Sequence[Floats], heights: Sequence[float]
 ) -> tuple[list[Floats], list[Floats]]:
-    """Return points (n, 3) and pixels (n, 2) of each view of a board that was moved along its normal alone.
+    """Return points (n, 3) and pixels (n, 2) of each view of a board that was moved only along its normal.
 
-    heights are those of the views (n, 2) in the unit of the board; z goes toward the camera. x follows that
-    edge of the board which goes most to the right in the first picture, y is up from it.
+    heights are the heights of the board in the views (n, 2), in the unit of the board; z points toward the
+    camera. x is along the edge of the board that points most to the right in the first picture, y is up.
     """
     points, pixels, right = [], [], np.array([1.0, 0.0])
     for view, height in zip(views, heights, strict=True):
@@ -244,9 +245,9 @@ def at_heights(
 
 
 def _turned(grid: Floats, right: Floats) -> Floats:
-    """Return the corners (rows, columns, 2) in the order that has its columns most along a direction.
+    """Return the corners (rows, columns, 2), turned so that columns follow each other most along a direction.
 
-    Which corner of a board comes first is OpenCV's choice, and may change from one picture to the next.
+    OpenCV chooses which corner of a board comes first; its choice may change from one picture to the next.
     """
     down = (grid[-1] - grid[0]).mean(axis=0)
     across = _along(grid)
@@ -266,7 +267,7 @@ def _along(grid: Floats) -> Floats:
 def _adjusted(
     board: Board, views: Floats, size: tuple[int, int], skew: bool
 ) -> tuple[Bundle, CameraCalibration, tuple[str, ...]]:
-    """Return the bundle, its camera, and the terms of the lens that were left out because of folds."""
+    """Return the bundle, its camera, and the terms of the lens that were omitted to avoid folds."""
     for omitted in _OMITTED:
         lens = [name for name in LENS if name not in omitted]
         bundle = adjust(board.points, views, size, skew=skew, lens=lens)

@@ -1,7 +1,7 @@
 """Colour calibration without clicks, from one to five pictures of the target in any light.
 
-The circles are known by size and square before their colours are; see `_colour_search`. Source: the colour
-calibration of section 5.
+The circles are found by their size and by the square that they form, before their colours are known; see
+`colour_search`. Source: the colour calibration of section 5.
 """
 
 from __future__ import annotations
@@ -22,23 +22,25 @@ from quadvis_vision.detection.colours import NAMES, THRESHOLD, ColourCalibration
 from quadvis_vision.detection.detect import search
 
 PICTURES_MAX = 5
-CLIPPED = 250.0  # grey levels: from there on a channel may be over-exposed
-DARK = 12.0  # grey levels: a ceiling below that has no colours
-DISAGREE = 0.2  # of a picture's colours from those of all; four colours are at least 0.3 apart
-# No paint is brighter than white. Beside a grey ceiling one may be; then all four look lighter than beside a
-# white one, where dark colours would be taken for black. So the ceiling is said to be as bright as the
-# brightest paint, but no more than this: the colours must fit the pictures that they are from.
+CLIPPED = 250.0  # grey levels: a channel at or above this level may be over-exposed
+DARK = 12.0  # grey levels: a ceiling below this level has no measurable colour
+DISAGREE = 0.2  # distance of a picture's colours from the colours of all; four colours are at least 0.3 apart
+# No paint is brighter than a white ceiling. A paint brighter than the ceiling means that the ceiling is grey;
+# then all four colours look lighter than beside white, and beside white the dark ones would be taken for
+# black. So the ceiling counts as at most as bright as the brightest paint, corrected by no more than this
+# factor: the colours must still fit the pictures that they come from.
 GREY_MAX = 1.8
-SAME = 1.0  # px, and a tenth of the radius: how far the detector may find a circle from where it was
+SAME = 1.0  # px, plus a tenth of the radius: the detector finds the same circle if it is no further away
 
 
 @dataclass(frozen=True, eq=False)
 class Calibrated:
-    """What pictures tell: the colours, and by picture its name, what was seen in it and how far off it is.
+    """The result of a colour calibration: the colours, and for each picture its name, circles and errors.
 
-    `samples` (pictures, 4, 3) are its colours over the ceiling's, `distances` (pictures, 4) how far they are
-    from those of all, as `ColourCalibration.nearest` measures it. `found` says how many circles the detector
-    finds again with the new colours. `warnings` are sentences for the user.
+    `samples` (pictures, 4, 3) are the colours in each picture divided by the ceiling's; `distances`
+    (pictures, 4) are their distances from the calibrated colours, as `ColourCalibration.nearest` measures
+    them. `found` counts the circles that the detector finds again with the new colours. `warnings` are
+    sentences for the user.
     """
 
     colours: ColourCalibration
@@ -56,7 +58,7 @@ def calibrate_colours(
     """Return the colours of the four circles in pictures, whose `names` are for messages.
 
     `ratio` is a circle's radius over the square's side; `order` names the colours of corners 1 to 4,
-    clockwise. The colours are the medians of all pictures. `QuadvisError` says what is missing.
+    clockwise. The colours are the medians over all pictures. `QuadvisError` says what is missing.
     """
     check_order(order)
     if not 0 < ratio < 0.5:
@@ -67,7 +69,7 @@ def calibrate_colours(
     whole = [np.ascontiguousarray(picture) for picture in pictures]
     seen = tuple(find_circles(*known, ratio, order) for known in zip(whole, names, strict=True))
     measured = np.array([sighting.ratios for sighting in seen])
-    # Colours that are alike may be told apart beside this ceiling only: then they stay as they are.
+    # Similar colours may be separable beside this very ceiling only: then they are not corrected.
     tried = []
     for grey_max in (GREY_MAX, 1.0):
         colours, samples = _colours(measured, grey_max, order)
@@ -91,9 +93,9 @@ def calibrate_colours(
 def _colours(
     measured: NDArray[np.float64], grey_max: float, order: Sequence[str]
 ) -> tuple[ColourCalibration, NDArray[np.float64]]:
-    """Return the colours with their evidence, and the samples, of ratios (n, 4, 3) as measured.
+    """Return the colours with their evidence, and the samples, from measured ratios (n, 4, 3).
 
-    A ceiling is said to be up to `grey_max` times as bright as it is.
+    A grey ceiling is corrected by up to the factor `grey_max`.
     """
     grey = measured.max(axis=(1, 2), keepdims=True).clip(1.0, grey_max)
     samples = np.round(measured / grey, DIGITS)
@@ -104,13 +106,13 @@ def _colours(
 
 
 def _threshold(measured: NDArray[np.float64]) -> float:
-    """Return the threshold of the file: the usual one, or half way up to the ceiling from a lighter paint."""
+    """Return the usual threshold; with a lighter paint, the middle between that paint and the ceiling."""
     lightest = float(np.median(measured.min(axis=2), axis=0).max())
     return round(min(max(THRESHOLD, (1 + lightest) / 2), 0.95), 3)
 
 
 def _count_found(picture: Pixels, seen: Sighting, colours: ColourCalibration, ratio: float) -> int:
-    """Return how many circles the detector sees where they are; 0 if it sees one elsewhere."""
+    """Return the number of circles that the detector finds in their places; 0 if it finds one elsewhere."""
     target = Target(colours, ratio, RADIUS_MIN / 2, RADIUS_MAX * picture.shape[1])
     centres = [complex(u, v) for u, v in search(picture, target).centres.tolist() if not math.isnan(u)]
     there = [
@@ -122,7 +124,7 @@ def _count_found(picture: Pixels, seen: Sighting, colours: ColourCalibration, ra
 def _warnings(
     seen: Sequence[Sighting], names: Sequence[str], farthest: Sequence[float], found: Sequence[int]
 ) -> Iterator[str]:
-    """Yield what is wrong with pictures that were used all the same."""
+    """Yield a warning for each fault of a picture that was used nevertheless."""
     for sighting, name, off, again in zip(seen, names, farthest, found, strict=True):
         if max(map(max, sighting.lights)) >= CLIPPED:
             yield f"{name}: the ceiling is over-exposed, so its colours are not exact; take it darker"

@@ -1,7 +1,7 @@
-"""What the names of colours mean: which of four circles, seen clockwise, is corner 1.
+"""The meaning of colour names, which decide which of four circles is corner 1.
 
-Geometry gives the order of the corners but not the first one. The names tell it, and whether the picture is
-mirrored.
+Geometry gives the clockwise order of the corners but not the first corner. The names give the first corner,
+and show whether the picture is mirrored.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ HUES = {  # deg
     "magenta": 310.0,
 }  # fmt: skip
 KNOWN = (*HUES, "black")
-CHROMA_MIN = 0.1  # largest minus smallest ratio of what is called a colour
-FIT_MAX = 0.8  # of a colour from what its name says: 48 deg of hue, or a black of 0.8 of the ceiling
+CHROMA_MIN = 0.1  # largest minus smallest ratio; a smaller difference is no colour but a grey
+FIT_MAX = 0.8  # distance of a colour from its name: 48 deg of hue, or a black as bright as 0.8 of the ceiling
 
 
 def check_order(order: Sequence[str]) -> None:
@@ -36,24 +36,24 @@ def check_order(order: Sequence[str]) -> None:
 
 
 def cost(ratios: Sequence[Colour], names: Sequence[str]) -> float:
-    """Return how far colours are from what their names say, all together; infinity if one is none of that."""
+    """Return the total distance of colours from their names; infinity if one colour does not fit its name."""
     parts = [_distance(ratio, name) for ratio, name in zip(ratios, names, strict=True)]
     return sum(parts) if max(parts) <= FIT_MAX else math.inf
 
 
 def named(ratios: Sequence[Colour], names: Sequence[str]) -> tuple[str, ...] | None:
-    """Return four names in the order in which they fit four colours best; None if they do not fit in any."""
+    """Return four names in the order that fits four colours best; None if they fit in no order."""
     best = min(permutations(names), key=lambda some: cost(ratios, some))
     return best if cost(ratios, best) < math.inf else None
 
 
 def nearest_name(ratio: Colour) -> str:
-    """Return the name of a colour."""
+    """Return the name that is nearest to a colour."""
     return min(KNOWN, key=lambda name: _distance(ratio, name))
 
 
 def _distance(ratio: Colour, name: str) -> float:
-    """Return how far a colour (blue, green, red over the ceiling) is from its name, in steps of 60 deg."""
+    """Return the distance of a colour (blue, green, red over the ceiling) from a name, in steps of 60 deg."""
     blue, green, red = ratio
     chroma = max(ratio) - min(ratio)
     if name == "black":

@@ -1,4 +1,4 @@
-"""The pictures of a colour calibration with what was found in them, and the colours beside each other."""
+"""Draw the pictures of a colour calibration: the circles that were found, and the colours side by side."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from quadvis_vision.detection.circles import Disc
 from quadvis_vision.detection.colours import Colour
 from quadvis_vision.pictures.drawing import PLATE, SHIFT, Picture, sixteenths, width_of, write, write_on_plate
 
-WIDTH = 640  # px of one picture in the drawing
+WIDTH = 640  # px, the width of one picture in the drawing
 ROW = 78  # px, the height of a row of colours
-TITLE = 30  # px, that of a line of words
+TITLE = 30  # px, the height of a line of words
 GAP = 4  # px between pictures
-WHITE = 235.0  # grey level that the stored colours are shown beside
+WHITE = 235.0  # grey level of the ceiling beside which the stored colours are shown
 
 _LIGHT, _DARK = (245, 245, 245), (25, 25, 25)
 _GOOD, _BAD = (120, 230, 120), (90, 90, 255)  # blue-green-red
@@ -26,7 +26,7 @@ _SCALE = 0.5  # of the letters
 
 
 def draw_calibration(pictures: Sequence[Picture], found: Calibrated) -> Picture:
-    """Return all pictures with the circles that were found, and below the colours that are stored.
+    """Return all pictures with the circles found in them, and below them the stored colours.
 
     The colours of a picture are shown in the light of that picture, beside its ceiling.
     """
@@ -60,8 +60,8 @@ def _panel(
         (f"{corner}", np.multiply(disc.ratio, light), light, ratio)
         for corner, (disc, light, ratio) in enumerate(zip(seen.discs, seen.lights, ratios, strict=True), 1)
     ]
-    told = (f"{again} found again", _GOOD if again == 4 else _BAD)
-    return np.vstack((canvas, _title(WIDTH, f"{name}   rms off {error:.3f}", *told), _row(WIDTH, colours)))
+    count = (f"{again} found again", _GOOD if again == 4 else _BAD)
+    return np.vstack((canvas, _title(WIDTH, f"{name}   rms off {error:.3f}", *count), _row(WIDTH, colours)))
 
 
 def _legend(width: int, found: Calibrated) -> Picture:
@@ -74,18 +74,18 @@ def _legend(width: int, found: Calibrated) -> Picture:
     return np.vstack((_title(width, title, "", _LIGHT), _row(width, colours)))
 
 
-def _title(width: int, words: str, told: str, colour: tuple[int, int, int]) -> Picture:
-    """Return a bar with words at its left and what is told at its right."""
+def _title(width: int, words: str, result: str, colour: tuple[int, int, int]) -> Picture:
+    """Return a bar with words at its left and a coloured result at its right."""
     bar = np.full((TITLE, width, 3), PLATE, dtype=np.uint8)
-    room = width - 36 - _SCALE * width_of(told)
+    room = width - 36 - _SCALE * width_of(result)
     scale = min(_SCALE, room / max(1.0, width_of(words)))
     write(bar, words, (10, 20), _LIGHT, scale)
-    write(bar, told, (width - 10 - math.ceil(_SCALE * width_of(told)), 20), colour, _SCALE)
+    write(bar, result, (width - 10 - math.ceil(_SCALE * width_of(result)), 20), colour, _SCALE)
     return bar
 
 
 def _row(width: int, colours: Sequence[tuple[str, Any, Colour, Colour]]) -> Picture:
-    """Return a bar with four discs on the ceiling: each with its label, levels, the ceiling's, and ratio."""
+    """Return a bar with four discs on their ceilings, from (label, levels, ceiling's levels, ratio)."""
     import cv2
 
     bar: Any = np.full((ROW, width, 3), PLATE, dtype=np.uint8)
@@ -103,7 +103,7 @@ def _row(width: int, colours: Sequence[tuple[str, Any, Colour, Colour]]) -> Pict
 
 
 def _outline(disc: Disc) -> Any:
-    """Return the ellipse (n, 2) px that has the disc's area and bend."""
+    """Return the outline (n, 2) in px of the ellipse with the disc's area and bend."""
     size = abs(disc.bend)
     total = 2 * disc.radius**2 / math.sqrt(1 - min(size, 0.99) ** 2)  # of the squares of the half axes
     axes = math.sqrt(total * (1 + size) / 2), math.sqrt(total * (1 - size) / 2)
@@ -114,7 +114,7 @@ def _outline(disc: Disc) -> Any:
 
 
 def _edge(first: Disc, second: Disc) -> Any:
-    """Return the ends (2, 2) px of the line from circle to circle, beside their paint."""
+    """Return the ends (2, 2) in px of the line between two circles, outside their paint."""
     along = second.centre - first.centre
     along /= max(abs(along), 1e-9)
     ends = np.array((first.centre + 1.2 * first.radius * along, second.centre - 1.2 * second.radius * along))
@@ -122,14 +122,14 @@ def _edge(first: Disc, second: Disc) -> Any:
 
 
 def _beyond(disc: Disc, seen: Sighting) -> Any:
-    """Return a place (2,) px beside a circle, away from the middle of the square."""
+    """Return a place (2,) in px beside a circle, away from the middle of the square."""
     away = disc.centre - sum(other.centre for other in seen.discs) / 4
     place = disc.centre + away / max(abs(away), 1e-9) * (disc.radius * 1.25 + 6)
     return np.array((place.real, place.imag))
 
 
 def _line(canvas: Any, points: Any, colour: tuple[int, int, int]) -> None:
-    """Draw a closed line that is seen on any ground."""
+    """Draw a closed line that is visible on any background."""
     import cv2
 
     for part, width in ((_DARK, 3), (colour, 1)):
@@ -137,7 +137,7 @@ def _line(canvas: Any, points: Any, colour: tuple[int, int, int]) -> None:
 
 
 def _beside(panels: Sequence[Picture], columns: int) -> Picture:
-    """Return panels beside each other, filled up below and to the right."""
+    """Return the panels beside each other, with empty space filled below and to the right."""
     height = max(len(panel) for panel in panels)
     canvas = np.full((height, columns * WIDTH, 3), PLATE, dtype=np.uint8)
     for place, panel in enumerate(panels):

@@ -1,4 +1,4 @@
-"""What a colour calibration found, as a table for people and as JSON for programs."""
+"""The results of a colour calibration: a table for people and JSON for programs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _WIDTH = 22  # of the column of pictures, at least
 
 
 def header(found: Calibrated) -> str:
-    """Return the comment of a colour file."""
+    """Return the comment at the top of a colour file."""
     count = len(found.names)
     pictures = "1 picture" if count == 1 else f"{count} pictures"
     return (
@@ -49,7 +49,7 @@ def text(found: Calibrated) -> str:
 
 
 def as_json(found: Calibrated) -> str:
-    """Return everything; centres and radii in px, ratios blue, green, red."""
+    """Return all results; centres and radii are in px, ratios are blue, green, red."""
     colours = found.colours
     pictures = [
         {
@@ -84,7 +84,7 @@ def as_json(found: Calibrated) -> str:
 
 
 def _nearest_two(found: Calibrated) -> tuple[str, str, float]:
-    """Return the names of the two colours that are nearest to each other, and how far they are."""
+    """Return the names of the two colours nearest to each other, and their distance."""
     tones = {name: tone(ratio) for name, ratio in zip(found.colours.names, found.colours.ratios, strict=True)}
     pairs = [
         (float(np.linalg.norm(np.subtract(tones[a], tones[b]))), a, b) for a, b in combinations(tones, 2)

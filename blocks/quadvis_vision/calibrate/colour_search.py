@@ -1,7 +1,8 @@
-"""The four circles of a picture when their colours are not known yet: found by size and square.
+"""Find the four circles of a picture when their colours are not known yet, by their size and their square.
 
-Four whole circles of one size and of four colours at the corners of a square are looked for. Source: finding
-shapes first and learning their colours after is from Gunnarsson, Wiesel and Rojas, "The Color and the Shape".
+The search is for four whole circles of one size and of four colours at the corners of a square. Source: to
+find shapes first and to learn their colours afterwards is from Gunnarsson, Wiesel and Rojas, "The Color and
+the Shape".
 """
 
 from __future__ import annotations
@@ -22,27 +23,27 @@ from quadvis_vision.detection.colours import APART, THRESHOLD, Colour, tone
 from quadvis_vision.detection.detect import usable
 from quadvis_vision.detection.square import expected_radii, square_cost
 
-THRESHOLDS = (THRESHOLD, 0.9, 0.55)  # to find circles of unknown colours, one after the other
+THRESHOLDS = (THRESHOLD, 0.9, 0.55)  # tried one after the other, as the colours are unknown
 WIDTH = 400  # px: about the size to which a picture is reduced for a first look
 RADIUS_MIN = 3.0  # px
 RADIUS_MAX = 0.2  # of the picture's width
-CIRCLES_MAX = 60  # that are looked at; the time to arrange them grows with the square of their number
+CIRCLES_MAX = 60  # that are considered; the time to arrange circles grows with the square of their number
 SYMMETRY_MIN = (
     0.75  # of a whole circle; compression takes more from one that is nearly as bright as the ceiling
 )
-SIZES_MAX = math.log(1.2)  # of one circle against the others
-NEIGHBOURS = 0.3  # of half a diagonal: how far a corner may be from where the opposite two put it
-INSIDE = 0.7  # of the radius: the part of a circle that its colour is taken from
-RING = (1.3, 1.7)  # of the radius: where the ceiling is taken from
-STAINED = 0.5  # of the ceiling's light: a ring that differs by more has something else in it
+SIZES_MAX = math.log(1.2)  # size of one circle relative to the others
+NEIGHBOURS = 0.3  # of half a diagonal: distance of a corner from the place that two opposite corners predict
+INSIDE = 0.7  # of the radius: a circle's colour is measured within this radius
+RING = (1.3, 1.7)  # of the radius: the ceiling's colour is measured between these radii
+STAINED = 0.5  # of the ceiling's light: a ring that differs by more contains another thing
 
 
 @dataclass(frozen=True)
 class Sighting:
     """The four circles of one picture, clockwise.
 
-    `discs` are as measured, their `ratio` the mean colour over that of the ceiling around them (blue, green,
-    red); `lights` are the grey levels of the ceiling around each.
+    `discs` are the measured circles; the `ratio` of each is its mean colour divided by the colour of the
+    ceiling around it (blue, green, red). `lights` are the grey levels of the ceiling around each circle.
     """
 
     discs: tuple[Disc, ...]
@@ -54,16 +55,16 @@ class Sighting:
         return tuple(disc.ratio for disc in self.discs)
 
     def turned(self, steps: int) -> Sighting:
-        """Return the same circles, beginning so many further on."""
+        """Return the same circles in the same order, beginning `steps` circles later."""
         discs, lights = ((*part[steps:], *part[:steps]) for part in (self.discs, self.lights))
         return replace(self, discs=discs, lights=lights)
 
 
 def find_circles(pixels: Pixels, name: str, ratio: float, order: Sequence[str]) -> Sighting:
-    """Return the four circles of a picture from corner 1 on; `QuadvisError` if they are not there.
+    """Return the four circles of a picture from corner 1 on; `QuadvisError` if they are not found.
 
-    `name` is the picture's for messages, `ratio` a circle's radius over the square's side; `order` names the
-    colours of corners 1 to 4. Of several squares that with these colours is taken.
+    `name` names the picture in messages, `ratio` is a circle's radius over the square's side, `order` names
+    the colours of corners 1 to 4. Of several squares the one with these colours is returned.
     """
     if not usable(pixels):
         raise QuadvisError(f"{name}: this is no colour picture of {SMALLEST} x {SMALLEST} px or more")
@@ -92,7 +93,7 @@ def find_circles(pixels: Pixels, name: str, ratio: float, order: Sequence[str]) 
 
 
 def _begun(seen: Sighting, order: Sequence[str]) -> Sighting | None:
-    """Return a sighting from corner 1 on, or None if its colours are not those of the order in its sense."""
+    """Return a sighting turned to begin at corner 1; None if its colours are not in that cyclic order."""
     names = named(seen.ratios, order)
     for steps in range(4):
         if names is not None and (*names[steps:], *names[:steps]) == tuple(order):
@@ -135,7 +136,7 @@ def _discs(pixels: Pixels, ceiling: Ceiling, threshold: float) -> list[Disc]:
 
 
 def _squares(discs: Sequence[Disc], ratio: float) -> Iterator[tuple[tuple[Disc, ...], float]]:
-    """Yield four circles clockwise that may be the corners of a square, and how badly they are."""
+    """Yield every four circles, clockwise, that may be a square's corners, with the cost of the square."""
     for first, third in combinations(discs, 2):
         middle, half = (first.centre + third.centre) / 2, (third.centre - first.centre) / 2
         seconds, fourths = (
@@ -158,7 +159,7 @@ def _squares(discs: Sequence[Disc], ratio: float) -> Iterator[tuple[tuple[Disc, 
 
 
 def _look(pixels: Pixels, ceiling: Ceiling, corners: Sequence[Disc]) -> Sighting:
-    """Return four circles with their exact colours: the mean within each over the median of a ring around."""
+    """Return four circles with exact colours: the mean inside each over the median of a ring around it."""
     discs, lights = [], []
     for disc in corners:
         paint, light = _paint_and_light(pixels, disc, np.array(ceiling.at(disc.centre)))
@@ -173,7 +174,7 @@ def _colour(levels: Any) -> Colour:
 
 
 def _paint_and_light(pixels: Pixels, disc: Disc, coarse: Any) -> tuple[Any, Any]:
-    """Return the grey levels of a circle and of the ceiling around it, which are about the coarse ones."""
+    """Return the levels of a circle and of the ceiling around it; `coarse` ones where the ring is stained."""
     reach = math.ceil(RING[1] * disc.radius)
     left, top = (max(0, int(part) - reach) for part in (disc.centre.real, disc.centre.imag))
     window: Any = pixels[top : top + 2 * reach + 2, left : left + 2 * reach + 2].astype(np.float64)

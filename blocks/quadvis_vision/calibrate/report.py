@@ -1,4 +1,4 @@
-"""What a calibration found, as a table for people and as JSON for programs."""
+"""The results of a camera calibration: a table for people and JSON for programs."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _LENS = ("k1", "k2", "p1", "p2", "k3")
 
 @dataclass
 class Report:
-    """Cameras (name, K, rms px), lenses by name, and views (name, rms px, OpenCV's rms px if it has one).
+    """Cameras (name, K, rms px), lenses by name, and views (name, rms px, and OpenCV's rms px if known).
 
-    `deviations` are the standard deviations of what was found, by its name: fx, k1 and so on. `cautions` are
-    those warnings that a user of the calibration must know, too.
+    `deviations` are standard deviations by the names of the parameters: fx, k1 and so on. `cautions` are the
+    warnings that also concern every user of the calibration.
     """
 
     cameras: list[tuple[str, Floats, float]] = field(default_factory=list)
@@ -34,7 +34,7 @@ class Report:
     cautions: list[str] = field(default_factory=list)
 
     def header(self) -> str:
-        """Return the comment of a camera file."""
+        """Return the comment at the top of a camera file."""
         found = [f"{name}: {' '.join(f'{number:.3f}' for number in _five(k))}" for name, k, _ in self.cameras]
         known = [self.deviations.get(name) for name in _INTRINSICS]
         numbers = " ".join("-" if value is None else f"{value:.3f}" for value in known)
@@ -67,7 +67,7 @@ class Report:
         return "\n".join(lines)
 
     def _spread(self, names: tuple[str, ...], digits: int) -> list[str]:
-        """Return the row of the standard deviations, if there is one; a dash for what was held."""
+        """Return the row of the standard deviations, if known; a dash for each parameter that was held."""
         if not self.deviations:
             return []
         known = [self.deviations.get(name) for name in names]
@@ -75,7 +75,7 @@ class Report:
         return [f"{_DEVIATION:<{_WIDTH}}{''.join(f'{number:>10}' for number in numbers)}"]
 
     def json(self) -> str:
-        """Return everything; lengths in pixels."""
+        """Return all results; lengths are in pixels."""
         views = [
             {"name": name, "rms": ours} | ({} if theirs is None else {"OpenCV": theirs})
             for name, ours, theirs in self.views

@@ -1,4 +1,4 @@
-"""What a calibration leaves unexplained: its size, and a picture of it."""
+"""The residuals of a calibration: their size and a picture of them."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def draw_residuals(
     title: str = "residuals",
     magnification: float = 30.0,
 ) -> Picture:
-    """Return the grey picture, faded and enlarged if small, with arrows from measured to predicted pixels.
+    """Return the picture in pale grey, enlarged if small, with arrows from measured to predicted pixels.
 
-    measured and predicted are m views of pixels (n, 2); each view has a colour of its own. Arrows are
-    `magnification` times too long; the title and the rms are written below.
+    measured and predicted are m views of pixels (n, 2); each view has its own colour. Arrows are drawn
+    `magnification` times too long. The title and the rms are written below.
     """
     import cv2
 

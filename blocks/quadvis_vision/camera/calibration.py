@@ -30,11 +30,11 @@ CAMERA = Kind("the camera", pattern=rb"^matrix:")
 
 @dataclass(frozen=True, eq=False)
 class CameraCalibration:
-    """What is known of a camera; impossible values raise `CalibrationError`.
+    """The calibration of a camera; impossible values raise `CalibrationError`.
 
     `size` is (width, height) in px. `matrix` is K = [[fx, s, cx], [0, fy, cy], [0, 0, 1]] in px, pixel
-    centres at whole numbers. `distortion` is (k1, k2, p1, p2, k3). `evidence` says how it was found, if
-    known; its points are in camera axes.
+    centres at whole numbers. `distortion` is (k1, k2, p1, p2, k3). `evidence` says how the calibration was
+    found, if known; its points are in camera axes.
     """
 
     size: tuple[int, int]
@@ -60,7 +60,7 @@ class CameraCalibration:
 
         The file is YAML: `size: [width, height]`, `matrix: 3x3`, `distortion: [k1, k2, p1, p2, k3]` and,
         optionally, `rms` (px), `errors: [px of each view]`, `date` and `points: [[x, y, z, u, v], ...]` in
-        camera axes, which the camera must meet as well as `rms` says.
+        camera axes. The camera must project these points to their pixels as exactly as `rms` says.
         """
         fields = read_fields(path, "a camera calibration", ("size", "matrix", "distortion"), KEYS)
         try:
@@ -85,7 +85,7 @@ class CameraCalibration:
         write_output(path, CAMERA, head + dump_yaml(data | self.evidence.facts()))
 
     def normalise(self, pixels: ArrayLike) -> Array:
-        """Return the undistorted rays (x, y) at depth 1 of pixels (n, 2): K and the lens are taken out.
+        """Return the rays (n, 2), as (x, y) at depth 1, of pixels (n, 2): K and the lens are removed.
 
         Rows with NaN stay NaN; a pixel that no ray reaches through this lens becomes NaN.
         """
@@ -110,7 +110,7 @@ class CameraCalibration:
         return np.asarray(xy @ self.matrix[:2, :2].T + self.matrix[:2, 2])
 
     def _undistort(self, distorted: Array) -> Array:
-        """Invert the distortion by Newton's method; NaN where no point, or only one behind a fold, fits."""
+        """Invert the distortion by Newton's method; NaN where no point fits, or only one behind a fold."""
         xy = distorted.copy()
         with np.errstate(all="ignore"):
             bent, jacobian = lens_model.linearise(xy, self.distortion)
@@ -127,7 +127,7 @@ class CameraCalibration:
 
 
 def _solve(matrices: Array, right: Array) -> Array:
-    """Solve (n, 2, 2) linear systems by Cramer's rule; a singular one gives infinities, no exception."""
+    """Solve linear systems (n, 2, 2) by Cramer's rule; a singular system gives infinities, no exception."""
     a, b, c, d = matrices[:, 0, 0], matrices[:, 0, 1], matrices[:, 1, 0], matrices[:, 1, 1]
     e, f = right[:, 0], right[:, 1]
     return np.column_stack((e * d - b * f, a * f - e * c)) / _determinant(matrices)[:, None]

@@ -1,7 +1,7 @@
-"""Reading the YAML of calibration files: a file that is something else is refused without a word of it.
+"""Read the YAML of calibration files; refuse any other file without quoting it.
 
-A diagram may come from anybody and name any file as its calibration. Messages that quote what is wrong help
-whoever edits a calibration, but must not show lines of another file to whoever reads the messages.
+A diagram may come from anybody and may name any file as its calibration. A message that quotes the wrong line
+helps a person who edits a calibration. Of any other file a message must not show a line.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
 
 def read_fields(path: str | Path, kind: str, required: Collection[str], optional: Collection[str]) -> YamlMap:
-    """Return the nodes of a file's keys; `DiagramError` as `quadvis.document.read_yaml` and `Node.fields`.
+    """Return the values of a file by key; `DiagramError` as for `read_yaml` and `YamlNode.fields`.
 
-    `kind` is what the file should be, such as "a camera calibration". One that does not look like it is
-    refused as a whole.
+    `kind` says what the file should be, such as "a camera calibration". A file that does not look like this
+    kind is refused as a whole.
     """
     try:
         return read_yaml(path).fields(required, optional)

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-# Below these a set of points is flat, or its equations leave more than one camera, up to rounding.
+# Below these limits the points lie in one plane, or more than one camera solves their equations, up to
+# rounding.
 _FLAT = 1e-7
 _AMBIGUOUS = 1e-9
 _SINGULAR = 1e-12
@@ -157,8 +158,8 @@ def read_correspondences(path: str | Path) -> tuple[Floats, Floats]:
 
     The first line names the columns; further columns and empty lines do not matter.
 
-    `QuadvisError` for an unreadable file, a missing column, or a cell that is no finite number, with its
-    line.
+    `QuadvisError` for an unreadable file, for a missing column, and, with its line, for a cell that is not a
+    finite number.
     """
     try:
         lines = read_input(path).decode("utf-8-sig").splitlines()
@@ -215,13 +216,13 @@ def _finite(values: ArrayLike, columns: int, place: str) -> Floats:
 
 
 def _flatness(points: Floats) -> float:
-    """Return thickness over extent of a set of points: 0 for points in one plane."""
+    """Return the thickness of a set of points divided by its extent: 0 for points in one plane."""
     extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     return float(extents[2] / extents[0]) if extents[0] > 0 else 0.0
 
 
 def _normalise(points: Floats) -> tuple[Floats, Floats]:
-    """Return homogeneous points with mean 0 and rms 1 per coordinate, and the matrix that makes them."""
+    """Return homogeneous points with mean 0 and rms 1 per coordinate, and the matrix of this scaling."""
     dimension = points.shape[1]
     mean = points.mean(axis=0)
     spread = np.sqrt(np.mean(np.sum((points - mean) ** 2, axis=1)) / dimension)

@@ -1,4 +1,4 @@
-"""From pixels to two planes and to what follows from it: the equations (1) to (6) one by one.
+"""Maps from pixels to two planes, and the focal point and image plane from them: equations (1) to (6).
 
 Vectors are rows, as in the published matrices (36): (x, y, z) = (rho, gamma, 1) H.
 """
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-PARALLEL = 1e-9  # relative size below which lines meet nowhere, or a map is singular
+PARALLEL = 1e-9  # relative size below which lines count as parallel and a map as singular
 
 
 def affine_map(pixels: ArrayLike, points: ArrayLike) -> Floats:
@@ -57,7 +57,7 @@ def apply(h: Floats, z: float, pixels: ArrayLike, *, projective: bool = False) -
 
 
 def focal_point(g1: ArrayLike, g2: ArrayLike) -> Floats:
-    """Return F (3,), the point nearest to the lines through rows of g1 and g2 (n, 3), least squares.
+    """Return F (3,), the point nearest to the lines through the rows of g1 and g2 (n, 3), by least squares.
 
     F = (sum (I - u u'))^-1 sum (I - u u') g1 over the unit directions u of the lines.
 
@@ -76,9 +76,9 @@ def focal_point(g1: ArrayLike, g2: ArrayLike) -> Floats:
 def image_plane(directions: ArrayLike, pixels: ArrayLike) -> tuple[Floats, Floats, Floats]:
     """Return V_R (3,), V_C (3,) and the piercing point (rho_p, gamma_p), eq. (5)-(6): X = W+ B.
 
-    directions (n, 3) are the unit vectors of (4), n >= 4. Seen under a small field the fourth column of W is
-    all but a combination of the third, which only the bend of the unit sphere tells apart: conditions of 70
-    to 500 are usual.
+    directions (n, 3) are the unit vectors of (4), n >= 4. In a small field of view the fourth column of W is
+    almost a multiple of the third; only the curvature of the unit sphere separates them. Condition numbers of
+    70 to 500 are usual.
     """
     v = np.asarray(directions, dtype=float)
     x, *_ = np.linalg.lstsq(
@@ -88,7 +88,7 @@ def image_plane(directions: ArrayLike, pixels: ArrayLike) -> tuple[Floats, Float
 
 
 def unit(vectors: Floats) -> Floats:
-    """Return rows (n, 3) at length one."""
+    """Return the rows (n, 3) scaled to length one."""
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 
 
@@ -99,5 +99,5 @@ def homogeneous(pixels: ArrayLike) -> Floats:
 
 
 def columns(h: Floats, projective: bool) -> Floats:
-    """Return the map to (x w, y w, w); w is 1 everywhere for an affine one."""
+    """Return the map to (x w, y w, w); for an affine map w is 1 everywhere."""
     return np.column_stack([h[:, :2], h[:, 2] if projective else (0.0, 0.0, 1.0)])

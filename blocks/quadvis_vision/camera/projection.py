@@ -1,4 +1,4 @@
-"""Where the target lies and how the camera sees it: poses, rays and circles.
+"""The geometry of target and camera: poses, homographies, and the ellipses that circles become.
 
 Axes: world x forward, y right, h up. Target: origin at the middle of the square on the ceiling, x forward, y
 right, z down, so that the camera's position in target axes is (x, y, ceiling - h). Camera: x to the right of
@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-# Body axes (forward, right, down) to camera axes: picture right is forward, picture down left, the axis up.
+# Body axes (forward, right, down) to camera axes: right in the picture is forward, down in the picture is
+# left, and the optical axis points up.
 CAMERA_FROM_BODY: Array = np.diag([1.0, -1.0, -1.0])
 CAMERA_FROM_BODY.flags.writeable = False
 
@@ -76,7 +77,7 @@ def plane_homography(turn: Array, shift: Array) -> Array:
 
 
 def circle_outline(centre: Sequence[float], radius: float, count: int = 64) -> Array:
-    """Return a polygon (count, 3) in m about the circle on the target; the circle touches its sides."""
+    """Return a polygon (count, 3) in m around a circle on the target; the circle touches all its sides."""
     angle = 2 * math.pi * np.arange(count) / count
     reach = radius / math.cos(math.pi / count)
     return np.column_stack(

@@ -1,8 +1,8 @@
-"""What a calibration file keeps of its making: errors, date, and points by which a reader can check it.
+"""Provenance of a calibration: its residuals, its date, and points to check it by.
 
-A digit that was changed by hand, two numbers in the wrong order (as in the printed (37)) or the lens of
-another camera leave a file that looks right. So some of the points that the camera was found with stay in the
-file, and whoever reads it projects them again.
+A file still looks right after a digit was changed by hand, after two numbers were swapped (as in the printed
+(37)), or with the lens of another camera in it. So the file keeps some of the points from which the camera
+was found, and every reader of the file projects them again.
 """
 
 from __future__ import annotations
@@ -24,27 +24,27 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 KEYS = ("rms", "errors", "date", "points")
-MOST_POINTS = 40  # that a file keeps
-LEAST_ERROR = 0.01  # px: what rounding in the file may make of a perfect calibration
-MOST_ERROR = 2.0  # times the rms of all points; that of a few of them is not quite the same
+MOST_POINTS = 40  # in a file
+LEAST_ERROR = 0.01  # px: the error that rounding in the file may give a perfect calibration
+MOST_ERROR = 2.0  # times the rms of all points: the rms of the few stored points differs somewhat
 
 
 class CalibrationError(QuadvisError):
-    """A calibration that no camera can have: `field` says which part, the text what would be right."""
+    """A calibration that no camera can have; `field` names the wrong part."""
 
     def __init__(self, field: str, problem: str, remedy: str = "") -> None:
-        """Keep the parts; the message joins them."""
+        """Keep the parts and join them to the message."""
         self.field, self.problem, self.remedy = field, problem, remedy
         super().__init__(sentence(problem, remedy))
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """How a calibration was found; all of it may be unknown.
+    """How a calibration was found; any part of it may be unknown.
 
-    `rms` is the root mean square distance of measured and predicted pixels, `errors` (m,) the same of each
-    view or plane, `date` the day, as 2026-11-22. `points` (n, 5) are some of those that were used: x, y, z in
-    the frame and unit of the calibration, u, v as measured.
+    `rms` is the root mean square distance of measured and predicted pixels, `errors` (m,) the same distance
+    in each view or plane, `date` the day, such as 2026-11-22. `points` (n, 5) are some of the points that
+    were used: x, y, z in the frame and unit of the calibration, u, v as measured.
     """
 
     rms: float | None = None
@@ -56,7 +56,7 @@ class Evidence:
     def of(
         cls, points: Sequence[ArrayLike], measured: Sequence[ArrayLike], predicted: Sequence[ArrayLike]
     ) -> Evidence:
-        """Return the evidence of points (n, 3) and pixels (n, 2), one of each a view; without a date."""
+        """Return the evidence, without a date, of the points (n, 3) and pixels (n, 2) of each view."""
         views = zip(measured, predicted, strict=True)
         squares = [np.sum((np.asarray(seen) - np.asarray(meant)) ** 2, axis=1) for seen, meant in views]
         rows = np.column_stack((np.vstack([*points]), np.vstack([*measured])))
@@ -69,7 +69,7 @@ class Evidence:
 
     @classmethod
     def read(cls, fields: Mapping[str, YamlNode] | Any) -> Evidence:
-        """Return what a file says under the `KEYS`; `DiagramError` with its place if that cannot be read."""
+        """Return the evidence under the `KEYS` of a file; `DiagramError` with the place of a wrong value."""
         return cls(
             rms=fields["rms"].number() if "rms" in fields else None,
             errors=np.array(fields["errors"].array((None,))) if "errors" in fields else None,
@@ -78,11 +78,11 @@ class Evidence:
         )
 
     def facts(self) -> dict[str, Any]:
-        """Return what is known as plain data for a file."""
+        """Return the known parts as plain data for a file."""
         return known(self)
 
     def check(self, project: Callable[[Floats], Floats]) -> None:
-        """Raise `CalibrationError` if this contradicts itself, or what `project` makes of points (n, 3)."""
+        """Raise `CalibrationError` if the parts contradict each other, or the predictions of `project`."""
         if self.rms is not None and not (np.isfinite(self.rms) and self.rms >= 0):
             raise CalibrationError("rms", f"rms is {self.rms:g}", "it must be a number of px, not negative")
         if self.errors is not None:
@@ -112,12 +112,12 @@ class Evidence:
 
 
 def _rounded(rows: Floats) -> Floats:
-    """Return numbers of seven digits, for files that people read: 1e-4 px, and no minus before a zero."""
+    """Return the numbers rounded to seven digits (1e-4 px), without a minus sign before a zero."""
     return np.array([[float(f"{number:.7g}") + 0.0 for number in row] for row in rows.tolist()])
 
 
 def _typical(squares: Floats) -> NDArray[np.int64]:
-    """Return which points to keep: as many of each size of error as there are, in their order."""
+    """Return the indices of the points to keep, in order: a sample with the same spread of errors as all."""
     if len(squares) <= MOST_POINTS:
         return np.arange(len(squares))
     order = np.argsort(squares, kind="stable")
@@ -125,7 +125,7 @@ def _typical(squares: Floats) -> NDArray[np.int64]:
 
 
 def known(evidence: Any) -> dict[str, Any]:
-    """Return the fields of a dataclass that are known as plain data, in their order."""
+    """Return the fields of a dataclass that are not None, in their order, as plain data."""
     plain = {field.name: getattr(evidence, field.name) for field in fields(evidence)}
     return {
         name: value.tolist() if isinstance(value, np.ndarray) else value
@@ -135,7 +135,7 @@ def known(evidence: Any) -> dict[str, Any]:
 
 
 def check_date(text: str) -> None:
-    """Raise `CalibrationError` if a text is no day such as 2026-11-22."""
+    """Raise `CalibrationError` if a text is not a day such as 2026-11-22."""
     try:
         date.fromisoformat(text)
     except ValueError:

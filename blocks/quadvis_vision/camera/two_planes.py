@@ -8,11 +8,11 @@ The calibration frame is the paper's: x right, y up, z from the planes toward th
 along the rows of the image, y down, z forward) follow from the maps themselves, see
 `TwoPlanesCalibration.pinhole`; for a board parallel to the image and aligned with it that is diag(1, -1, -1).
 
-Two things of the paper are not exact. An affine map (1) holds only for planes parallel to the image plane; a
-board turned by some angle turns every ray by as much, so projective maps are offered. And (5) with the unit
-vectors of (4) is not the pinhole, whose image is linear in v divided by its component along the axis: it
-costs 0.3 to 4 px, grows with the field, and V_R, V_C and the piercing point depend on the pixels they were
-fitted on. Rays use neither.
+Two equations of the paper are not exact. First, an affine map (1) holds only for planes parallel to the image
+plane. A board turned by some angle turns every ray by the same angle; projective maps avoid this. Second, (5)
+with the unit vectors of (4) is not the pinhole: the image of a pinhole is linear in v divided by the
+component of v along the axis. The difference is 0.3 to 4 px and grows with the field of view, and V_R, V_C
+and the piercing point depend on the pixels of the fit. Rays use neither equation.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
 _SHAPES = {"H1": (3, 3), "H2": (3, 3), "F": (3,), "V_R": (3,), "V_C": (3,)}
 _NUMBERS = ("z1", "z2", "rho_p", "gamma_p")
-_SIGNIFICANT = 10.0  # F ratio; noise alone gives as much in 7 of 100 000 calibrations with 20 points
+_SIGNIFICANT = 10.0  # F ratio; noise alone exceeds it in 7 of 100 000 calibrations with 20 points
 _NOTHING_KNOWN = Evidence()
 TWO_PLANES = Kind("the two planes", pattern=rb"^H1:")
 
@@ -62,9 +62,10 @@ class TwoPlanesCalibration:
     `z1`, `z2` are heights in the calibration frame, whose unit of length is the user's. The maps `H1`, `H2`
     (3, 3) are affine, (rho, gamma, 1) H = (x, y, z), or `projective`, (x w, y w, w) with w > 0. The focal
     point `F` (3,) is nearest to all lines. `V_R`, `V_C` (3,) and the piercing point `rho_p` (to the right),
-    `gamma_p` (downwards) belong to (5) and are in pixels; the printed piercing point of (37) is in the other
-    order. `evidence` says how it was found, if known, with errors of the first and the second plane by
-    `pinhole` and points in the calibration frame; `unit` is the unit of all lengths, if known.
+    `gamma_p` (downwards) belong to (5) and are in pixels; (37) prints the piercing point in the other order.
+    `evidence` says how the calibration was found, if known: its errors are those of `pinhole` on the first
+    and the second plane, its points are in the calibration frame. `unit` is the unit of all lengths, if
+    known.
     """
 
     z1: float
@@ -99,7 +100,7 @@ class TwoPlanesCalibration:
     def fit(cls, points: ArrayLike, pixels: ArrayLike, *, projective: bool = False) -> TwoPlanesCalibration:
         """Return the calibration from points (n, 3), which lie at two heights z, and their pixels (n, 2).
 
-        z1 is the smaller height. F is the point nearest to the lines of all the pixels, of both pictures.
+        z1 is the smaller height. F is the point nearest to the lines of all pixels of both pictures.
 
         `QuadvisError` if there are not two heights, too few points at one of them, or points on a line.
         """
@@ -122,7 +123,8 @@ class TwoPlanesCalibration:
 
         The file is YAML with the keys convention (row), z1, z2, H1, H2, projective, F, V_R, V_C, rho_p,
         gamma_p and, optionally, unit (of length), rms (px), errors (px, of both planes), date and points
-        (rows x, y, z, rho, gamma), which the camera must meet as well as rms says.
+        (rows x, y, z, rho, gamma). The camera must project these points to their pixels as exactly as rms
+        says.
         """
         required = ("convention", "projective", *_NUMBERS, *_SHAPES)
         fields = read_fields(path, "a two-planes calibration", required, (*KEYS, "unit"))
@@ -158,7 +160,7 @@ class TwoPlanesCalibration:
         )
 
     def rays(self, pixels: ArrayLike) -> Floats:
-        """Return unit vectors (n, 3) from F to what pixels (n, 2) see, eq. (4), in camera axes.
+        """Return the unit vectors (n, 3) of the rays from F through pixels (n, 2), eq. (4), in camera axes.
 
         Camera axes are x along the rows of the image, y down, z forward. Rows with NaN stay NaN.
         """
@@ -169,9 +171,9 @@ class TwoPlanesCalibration:
     def pinhole(self) -> tuple[Floats, Floats]:
         """The exact pinhole of these maps: K (3, 3) in pixels, R (3, 3) from calibration to camera axes.
 
-        Seen from F, either plane makes the direction of a pixel linear in (rho, gamma, 1); the mean over both
-        planes, each scaled to unit distance, is inverse to K R, and RQ takes it apart as in (10). Affine maps
-        always give an optical axis along z, for they know of no tilt.
+        By either plane the direction of a pixel, seen from F, is linear in (rho, gamma, 1). The mean over
+        both planes, each scaled to unit distance, is the inverse of K R, and RQ decomposes K R as in (10).
+        Affine maps contain no tilt, so with them the optical axis is always z.
         """
         directions = sum(self._directions(h, z) for h, z in ((self.H1, self.z1), (self.H2, self.z2)))
         k, rotation = rq(np.linalg.inv(directions))
@@ -180,8 +182,7 @@ class TwoPlanesCalibration:
     def project(self, points: ArrayLike, *, exact: bool = False) -> Floats:
         """Return the pixels (n, 2) of points (n, 3) of the calibration frame by eq. (4)-(5).
 
-        With exact they come from `pinhole` instead, and are NaN for points that are not in front of the
-        camera.
+        With exact the pixels come from `pinhole` instead, and are NaN for points not in front of the camera.
         """
         rays = np.asarray(points, dtype=float) - self.F
         if exact:
@@ -207,10 +208,10 @@ class TwoPlanesCalibration:
 
 
 def board_tilt(points: ArrayLike, pixels: ArrayLike) -> float:
-    """Return the angle in rad of the planes against the image, which affine maps cannot know; 0 if not seen.
+    """Return the angle (rad) between the planes and the image; 0 if it is not significant.
 
-    points (n, 3) lie at two heights, pixels (n, 2) belong to them. An angle counts if projective maps fit so
-    much better than affine ones that noise cannot be the reason (F test, four parameters more).
+    points (n, 3) lie at two heights, pixels (n, 2) belong to them. An angle is significant if projective maps
+    fit much better than affine maps, which have no tilt: an F test with four more parameters.
 
     `QuadvisError` as for `TwoPlanesCalibration.fit`.
     """
@@ -224,7 +225,7 @@ def board_tilt(points: ArrayLike, pixels: ArrayLike) -> float:
 
 
 def _split(points: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return which points (n, 3) are at the lower and at the upper of two heights."""
+    """Return masks (n,) of the points (n, 3) at the lower and at the upper of two heights."""
     if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all() or not len(points):
         raise QuadvisError(f"points have shape {points.shape} or hold NaN; give rows x, y, z")
     z = points[:, 2]
@@ -269,7 +270,7 @@ def _check(planes: TwoPlanesCalibration) -> None:
 
 
 def _check_points(planes: TwoPlanesCalibration, stored: Floats) -> None:
-    """Refuse numbers of (5) that fit the stored points much worse than their best ones."""
+    """Refuse V_R, V_C and a piercing point that fit the stored points much worse than the best ones do."""
     points, pixels = stored[:, :3], stored[:, 3:]
     v_r, v_c, piercing = image_plane(unit(points - planes.F), pixels)
     best = unit(points - planes.F) @ np.column_stack([v_r, v_c]) + piercing

@@ -1,4 +1,4 @@
-"""All that may be a circle in a picture: compact patches darker than the ceiling, at reduced resolution."""
+"""Find everything that may be a circle: compact patches darker than the ceiling, at reduced resolution."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from quadvis_vision.detection.square import Blob
 COLOUR_MAX = 1.0  # largest distance of a colour from the nearest of the four
 BOX_MAX = 2.2  # longer edge of a patch's bounding box over the shorter one
 FILL = (0.55, 1.25)  # area of a patch over that of the ellipse in its bounding box
-WIDE = 480  # px: a picture that is wider is first searched at a quarter of its size
-PATCHES_MAX = 500  # those with the longest outlines; the time to look at them grows with their number
-BLOBS_MAX = 20  # of one colour; the time to arrange them grows with the fourth power of their number
+WIDE = 480  # px: a wider picture is first searched at a quarter of its size
+PATCHES_MAX = 500  # patches that are examined, those with the longest outlines; their number takes time
+BLOBS_MAX = 20  # blobs of one colour; the time to arrange blobs grows with the fourth power of their number
 
 Patch = tuple[complex, float, Colour]  # centre u + iv and radius in px, colour over the ceiling's
 
 
 def reductions(pixels: Pixels) -> tuple[int, ...]:
-    """Return by which factors to reduce a picture to search it, one after the other."""
+    """Return the factors by which a picture is reduced for its searches, in their order."""
     return (4, 2) if pixels.shape[1] > WIDE else (2,)
 
 
 def find_blobs(
     pixels: Pixels, ceiling: Ceiling, target: Target, reduction: int
 ) -> tuple[list[list[Blob]], bool]:
-    """Return, by corner, what has the colour of its circle, those of the best colour first.
+    """Return, for each corner, the blobs with the colour of its circle, the best colour first.
 
-    The second value says whether there was so much in the picture that only a part of it was looked at.
+    The second value is true if the picture is so crowded that only a part of it was searched.
     """
     blobs: list[list[Blob]] = [[], [], [], []]
     limits = (target.radius_min, target.radius_max)
@@ -45,7 +45,7 @@ def find_blobs(
 def find_patches(
     pixels: Pixels, ceiling: Ceiling, threshold: float, limits: tuple[float, float], reduction: int
 ) -> tuple[list[Patch], bool]:
-    """Return what has a radius within `limits` px and a channel below `threshold` times the ceiling.
+    """Return patches with a radius within `limits` (px) and a channel below `threshold` times the ceiling.
 
     The second value is that of `find_blobs`.
     """
@@ -68,12 +68,12 @@ def find_patches(
 def _outlines(
     pixels: Pixels, ceiling: Ceiling, threshold: float, reduction: int
 ) -> tuple[Pixels, Sequence[Any]]:
-    """Return the reduced picture, and in it the outlines of what has a channel darker than the ceiling."""
+    """Return the reduced picture, and the outlines of all patches in it that are darker than the ceiling."""
     import cv2
 
-    # Odd last rows and columns are left out, so that a reduced picture is exactly that.
+    # Odd last rows and columns are left out, so that every reduced pixel stands for whole pixels.
     size = (pixels.shape[1] // reduction, pixels.shape[0] // reduction)
-    # A quarter of the size needs no more than the mean of the four pixels in the middle of sixteen.
+    # For a quarter of the size the mean of the four middle pixels of sixteen is enough.
     method = cv2.INTER_AREA if reduction == 2 else cv2.INTER_LINEAR
     whole = pixels[: reduction * size[1], : reduction * size[0]]
     small: Any = cv2.resize(whole, size, interpolation=method)
@@ -83,7 +83,7 @@ def _outlines(
 
 
 def _shape(contour: Any, low: float, high: float) -> tuple[float, float, float] | None:
-    """Return centre and radius (px) of a patch, or None if no circle looks like that."""
+    """Return the centre and radius (px) of a patch, or None if the patch cannot be a circle."""
     import cv2
 
     left, top, width, height = cv2.boundingRect(contour)

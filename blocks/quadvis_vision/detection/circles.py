@@ -1,9 +1,9 @@
-"""Measuring one coloured circle in a picture, fast and whatever the light.
+"""Measure one coloured circle in a picture, fast and in any light.
 
-The ceiling is the white reference: a pixel is compared with the local median of its surroundings, and a
-circle is told by the ratio of its colour to the ceiling's, which neither exposure, white balance nor
-vignetting changes. Centres are moments at full resolution, weighted by a soft step around half the contrast
-between circle and ceiling.
+The ceiling is the white reference: each pixel is compared with the local median of its surroundings, and a
+circle is recognised by the ratio of its colour to the ceiling's. Neither exposure, white balance nor
+vignetting changes this ratio. Centres are moments at full resolution, weighted by a soft step around half the
+contrast between circle and ceiling.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from quadvis_vision.detection.colours import Colour, ColourCalibration
 Pixels = NDArray[np.uint8]
 
 SMALLEST = 32  # px: a picture with a shorter edge holds no target
-COLUMNS = 16  # width of the reduced picture that the ceiling is taken from
+COLUMNS = 16  # width of the reduced picture from which the ceiling's colour is taken
 WINDOW = 7  # edge of its median filter: nearly half the picture, so that circles stay a minority
 STEP = (0.2, 0.8)  # the soft step, as parts of the contrast between ceiling (0) and circle (1)
-MARGIN = 2.0  # px of ceiling around a circle, and a tenth of its radius for its ellipse
+MARGIN = 2.0  # px of ceiling around a circle, plus a tenth of its radius, as it may be an ellipse
 EDGE = 1.0  # px, half the width of a circle's edge
 PASSES = 4
 EVEN = 0.05  # of the light: a ceiling that varies less needs no correction
 SPAN = 2  # columns of the reduced picture over which its slope is taken
-RAISED = 0.1  # of the contrast: by how much the step is shifted to see how wide a circle's edge is
+RAISED = 0.1  # of the contrast: the shift of the step by which the width of a circle's edge is measured
 CONTRAST_MIN = 10.0  # grey levels between circle and ceiling, as a distance of colours
 INERTIA_MAX = 1.3  # moment of inertia over that of a disc with the same area
 
-# A disc in perspective has no third moments. If a straight edge hides a tenth of its diameter, that of
-# threefold symmetry is 0.036 (area times cube of the radius); noise and blur make it 0.018 at most,
-# compression more where the contrast is low.
+# A disc in perspective has no third moments. If a straight edge hides a tenth of the diameter, the third
+# moment of threefold symmetry is 0.036 (of area times cube of the radius). Noise and blur make it at most
+# 0.018; compression makes it larger where the contrast is low.
 SKEW_MAX = (
     0.025,
     0.04,
@@ -47,7 +47,7 @@ _GAIN = 255 / (STEP[1] - STEP[0])
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """What is looked for: circles by their `colours`, radii between two limits in px.
+    """The target of a search: circles by their `colours`, with radii between two limits in px.
 
     `ratio` is a circle's radius over the square's side.
     """
@@ -61,9 +61,9 @@ class Target:
 class Disc(NamedTuple):
     """A measured circle: `centre` u + iv and `radius` in px, `ratio` its colour over the ceiling's.
 
-    `bend` is its ellipse: (square of the half axes' difference in the direction of twice the longer one)
-    over (their sum of squares), 0 for a circle. `symmetry` is 1 for a whole disc and below 0.9 for one that
-    something hides in part.
+    `bend` describes its ellipse with half axes a and b, a the longer one at the angle w: (a^2 - b^2) exp(2 i
+    w) / (a^2 + b^2), 0 for a circle. `symmetry` is 1 for a whole disc and below 0.9 for a disc that is partly
+    hidden.
     """
 
     centre: complex
@@ -100,7 +100,7 @@ class Ceiling:
         return int(x), int(y)
 
     def slope(self, place: complex) -> complex:
-        """Return by which share the light grows per px around a place: along u, and i times along v."""
+        """Return the relative growth of the light per px around a place: along u, plus i times along v."""
         x, y = self._pixel(place)
         left, right = max(x - SPAN, 0), min(x + SPAN, self._last[0])
         top, bottom = max(y - SPAN, 0), min(y + SPAN, self._last[1])
@@ -113,10 +113,10 @@ class Ceiling:
 def locate(
     pixels: Pixels, ceiling: Ceiling, centre: complex, radius: float, slack: float = 0.0
 ) -> Disc | None:
-    """Return the circle near `centre`, measured in a window that holds it whole; None if there is none.
+    """Return the circle near `centre`, measured in a window that holds it whole; None if none is there.
 
-    A window that cuts a circle displaces it, so the window follows until it does not. `slack` px are added
-    to the first one.
+    A window that cuts a circle displaces its centre, so the window moves until it holds the whole circle. The
+    first window is `slack` px larger.
     """
     for _ in range(PASSES):
         margin = MARGIN + slack + radius / 10
@@ -135,7 +135,7 @@ def measure(
     margin: float,
     colour: Colour | None = None,
 ) -> Disc | None:
-    """Return what is round in the window around `centre`, at full resolution; None if it is cut or not round.
+    """Return the round thing in the window around `centre`, at full resolution; None if cut or not round.
 
     The window reaches `margin` px beyond the expected `radius`. `colour` is that of the circle (blue,
     green, red); if it is not given, it is the mean around `centre`.
@@ -155,7 +155,7 @@ def measure(
         return None
     step = _soft_step(light, dark, contrast)
     window = pixels[top:bottom, left:right]
-    # What stands in a corner of the window is no part of the circle, if all the window is in the picture.
+    # If the whole window is in the picture, a thing in one of its corners is no part of the circle.
     inside = bool(left and top and right < width and bottom < height)
     shape = _shape(cv2.moments(_weights(window, step, inside)), contrast)
     if shape is None:
@@ -175,7 +175,7 @@ def measure(
 
 
 def mean(pixels: Pixels, x: float, y: float, reach: float) -> Colour:
-    """Return the mean colour of the pixels whose centres lie in the square that reaches that far."""
+    """Return the mean colour of the pixels with centres within -`reach` to +`reach` around (x, y)."""
     import cv2
 
     height, width = pixels.shape[:2]
@@ -187,14 +187,14 @@ def mean(pixels: Pixels, x: float, y: float, reach: float) -> Colour:
 
 
 def _interval(middle: float, reach: float, size: int) -> tuple[int, int]:
-    """Return the first of the pixels whose centres a line covers, and the one after the last."""
+    """Return the first pixel whose centre lies within `reach` of the middle, and the pixel after the last."""
     # This is called often, and comparisons take half the time of `min` and `max`.
     low, high = math.ceil(middle - reach), math.floor(middle + reach) + 1
     return low if low > 0 else 0, high if high < size else size
 
 
 def _within(place: float, last: int) -> float:
-    """Return the nearest place from 0 to the last one."""
+    """Return the place limited to 0 to `last`."""
     return place if 0 <= place <= last else last if place > 0 else 0
 
 
@@ -204,7 +204,7 @@ def over(dark: Colour, light: Colour) -> Colour:
 
 
 def _weights(window: Pixels, step: NDArray[np.float32], inside: bool) -> Any:
-    """Return the weights in a window, or in the ellipse that is inside it."""
+    """Return the weights in a window, or only in the ellipse inside it."""
     import cv2
 
     weights = cv2.transform(window, step)
@@ -214,9 +214,10 @@ def _weights(window: Pixels, step: NDArray[np.float32], inside: bool) -> Any:
 
 
 def _lag(light: Colour, dark: Colour, contrast: float) -> float:
-    """Return by how much of the contrast a circle's edge misses half of it, over the share of light missing.
+    """Return the shift of a circle's edge away from half the contrast, per share of missing light.
 
-    Both sides of the edge have more light in the same proportion, but the step is that of the middle.
+    The shift is a part of the contrast. Both sides of the edge lose light in the same proportion, but the
+    step is the one for the light in the middle.
     """
     along = sum((a - b) * a for a, b in zip(light, dark, strict=True))
     return along / (contrast * contrast) - 0.5
@@ -224,7 +225,7 @@ def _lag(light: Colour, dark: Colour, contrast: float) -> float:
 
 @lru_cache(256)
 def _round_window(width: int, height: int) -> Pixels:
-    """Return a mask (height, width), 255 in the ellipse that it holds and 0 outside."""
+    """Return a mask (height, width): 255 in the largest ellipse inside it, 0 outside."""
     v, u = np.mgrid[:height, :width]
     inside = ((2 * u + 1) / width - 1) ** 2 + ((2 * v + 1) / height - 1) ** 2 <= 1
     return np.where(inside, 255, 0).astype(np.uint8)

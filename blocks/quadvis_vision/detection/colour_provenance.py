@@ -1,7 +1,7 @@
-"""What a colour file keeps of its making: what each picture told, by which a reader can check it.
+"""Provenance of calibrated colours: the colours in each picture, by which a reader checks the file.
 
-In the spirit of `_evidence`, which does the same for cameras: a number that was changed by hand leaves a file
-that looks right, so the colours that were measured stay in it.
+`quadvis_vision.camera.provenance` does the same for cameras. A file still looks right after a number was
+changed by hand, so the file keeps the measured colours.
 """
 
 from __future__ import annotations
@@ -23,17 +23,18 @@ if TYPE_CHECKING:
 
 KEYS = ("date", "rms", "errors", "samples")
 DIGITS = 4  # of the ratios in a file
-ROUNDING = 0.001  # what they may make of a ratio or of a distance
+ROUNDING = 0.001  # the error of a ratio or of a distance by these digits
 _REMEDY = "a number was changed since; calibrate again, or take out rms, errors and samples"
 
 
 @dataclass(frozen=True, eq=False)
 class ColourEvidence:
-    """How colours were found; all of it may be unknown.
+    """How colours were found; any part of it may be unknown.
 
-    `samples` (n, 4, 3) are the ratios of circles 1..4 in each of n pictures, of which the colours are the
-    medians; `errors` (n,) the rms distances of a picture's colours from those, as `ColourCalibration.nearest`
-    measures them; `rms` the same of all pictures; `date` the day, as 2026-11-22.
+    `samples` (n, 4, 3) are the ratios of circles 1..4 in each of n pictures; the colours are their medians.
+    `errors` (n,) are the rms distances of each picture's colours from the medians, as
+    `ColourCalibration.nearest` measures them; `rms` is the same over all pictures; `date` is the day, such as
+    2026-11-22.
     """
 
     date: str | None = None
@@ -52,7 +53,7 @@ class ColourEvidence:
 
     @classmethod
     def read(cls, fields: Mapping[str, YamlNode] | Any) -> ColourEvidence:
-        """Return what a file says under the `KEYS`; `DiagramError` with its place if that cannot be read."""
+        """Return the evidence under the `KEYS` of a file; `DiagramError` with the place of a wrong value."""
         return cls(
             date=fields["date"].text() if "date" in fields else None,
             rms=fields["rms"].number() if "rms" in fields else None,
@@ -61,13 +62,13 @@ class ColourEvidence:
         )
 
     def facts(self) -> dict[str, Any]:
-        """Return what is known as plain data for a file."""
+        """Return the known parts as plain data for a file."""
         return known(self)
 
     def check(self, prototypes: Floats, distances: Callable[[Floats], Floats]) -> None:
-        """Raise `CalibrationError` if this contradicts itself, or prototypes (4, 3).
+        """Raise `CalibrationError` if the parts contradict each other, or the prototypes (4, 3).
 
-        `distances` says how far samples (n, 4, 3) are from the prototypes.
+        `distances` returns the distances (n, 4) of samples (n, 4, 3) from the prototypes.
         """
         if self.date is not None:
             check_date(self.date)
@@ -95,7 +96,7 @@ class ColourEvidence:
 
     @staticmethod
     def _check_sizes(field: str, said: Floats | float | None, found: Floats) -> None:
-        """Compare what the file says with what the samples make; dark colours magnify rounding fivefold."""
+        """Compare the file's numbers with those of the samples; dark colours magnify rounding fivefold."""
         if said is None:
             return
         if np.shape(said) != found.shape or not np.abs(said - found).max() <= 5 * ROUNDING:

@@ -1,7 +1,7 @@
-"""The colours of the four circles, as they look beside the ceiling, and the file that holds them.
+"""The colours of the four circles relative to the ceiling, and the file that holds them.
 
 A circle's colour is the ratio of its grey levels to the ceiling's, channel by channel: exposure, white
-balance and vignetting change both alike. Source: the colour calibration of section 5.
+balance and vignetting change both in the same way. Source: the colour calibration of section 5.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ Colour = tuple[float, float, float]
 NAMES = ("red", "blue", "green", "black")  # of corners 1..4 of the paper's target
 THRESHOLD = 0.74
 
-_DARK = 0.2  # a ratio far below this is as good as black
+_DARK = 0.2  # a ratio far below this counts as black
 _RATIO_MAX = 3.0
-APART = 0.3  # least distance of two colours: a step of a third in one channel
+APART = 0.3  # least distance between two colours: a step of a third in one channel
 
 NOTHING_KNOWN = ColourEvidence()
 COLOURS = Kind("the colours", pattern=rb"^circles:")
@@ -41,8 +41,8 @@ COLOURS = Kind("the colours", pattern=rb"^circles:")
 class ColourCalibration:
     """Colours of circles 1..4; impossible values raise `QuadvisError`.
 
-    `prototypes` (4, 3) are ratios circle over ceiling, blue-green-red. A pixel may belong to a circle if
-    a channel of it is below `threshold` times the ceiling. `names` serve messages only. `evidence` says how
+    `prototypes` (4, 3) are ratios of circle to ceiling, blue-green-red. A pixel may belong to a circle if one
+    of its channels is below `threshold` times the ceiling. `names` are for messages only. `evidence` says how
     the colours were found, if known.
     """
 
@@ -66,7 +66,7 @@ class ColourCalibration:
 
     @classmethod
     def load(cls, path: str | Path) -> ColourCalibration:
-        """Read a colour file; `DiagramError` with file, line and column of everything that is wrong in it.
+        """Read a colour file; `DiagramError` with file, line and column of every fault in it.
 
         The file is YAML: `threshold: 0.74` and `circles`, a list of four `{colour: red, ratio: [blue,
         green, red]}` in the order of corners 1 to 4; optionally also `date`, and `rms`, `errors: [of each
@@ -109,11 +109,10 @@ class ColourCalibration:
         return tuple((float(blue), float(green), float(red)) for blue, green, red in self.prototypes)
 
     def nearest(self, ratio: Colour) -> tuple[int, float]:
-        """Return the index of the circle whose colour is nearest to a ratio, and how far it is.
+        """Return the index of the circle whose colour is nearest to a ratio, and the distance.
 
-        The distance is about that of the logarithms, so a factor that all channels share, such as a
-        ceiling that is greyer than the calibrated one, weighs little; differences between dark tones
-        weigh little too.
+        The distance is nearly that of the logarithms. So a factor common to all channels counts little, such
+        as a ceiling that is greyer than the calibrated one, and so do differences between dark tones.
         """
         place = tone(ratio)
         distances = [math.dist(place, other) for other in self._tones]
@@ -121,7 +120,7 @@ class ColourCalibration:
         return distances.index(least), least
 
     def distances(self, ratios: Array) -> Array:
-        """Return how far ratios (n, 4, 3) of circles 1 to 4 are from theirs, (n, 4); see `nearest`."""
+        """Return the distances (n, 4) of ratios (n, 4, 3) from the colours of circles 1 to 4."""
         off = np.log(ratios + _DARK) - np.log(self.prototypes + _DARK)
         return np.asarray(np.linalg.norm(off, axis=-1))
 
@@ -131,13 +130,13 @@ class ColourCalibration:
 
 
 def tone(ratio: Colour) -> Colour:
-    """Return a ratio as a point; the distance of two of them is that of the colours, see `nearest`."""
+    """Return a ratio as a point; the distance of two points is the distance of the colours, see `nearest`."""
     blue, green, red = ratio
     return math.log(blue + _DARK), math.log(green + _DARK), math.log(red + _DARK)
 
 
 def _problems(prototypes: Array, threshold: float, names: tuple[str, ...]) -> Iterator[tuple[int, str, str]]:
-    """Give what is wrong: the circle it belongs to (4: the threshold), the problem and the remedy."""
+    """Yield for each fault the index of its circle (4: the threshold), the problem and the remedy."""
     if not 0.1 <= threshold <= 0.95:
         yield 4, f"threshold is {threshold:g}", "it must be from 0.1 to 0.95 of the ceiling's brightness"
         return

@@ -1,7 +1,7 @@
-"""From a picture to four circles: search the whole of it, or follow those of the picture before.
+"""From a picture to four circles: search the whole picture, or follow the circles of the picture before.
 
-A search takes the best square of four circles. If there is none, it takes three or two circles that can be
-nothing else; see `_partial`. Once the circles are known, three or two that moved together keep the target.
+A search takes the best square of four circles. Without a square it takes three or two circles that cannot be
+anything else; see `partial`. Once the circles are known, three or two that moved together keep the target.
 """
 
 from __future__ import annotations
@@ -29,24 +29,25 @@ QUALITY_MIN = (
     0.9  # of the median: a circle that lost a fifth of its area, or a tenth of its diameter at an edge
 )
 SIZES_MAX = math.log(1.15)  # of whole circles of a new target against their median
-CHOICES = 6  # squares that are looked at closely
-ROUGH = 1.0  # px: how badly a reduced picture may place a circle
-NEAR = 0.45  # largest distance of a colour from that of its circle where only two are seen
-FEW = 8  # circles of one colour that are looked at closely where no four make a square
-SLACK = 0.008  # of the picture's width: how far the first circle moves as a rule
-REACH = 0.025  # of the picture's width, and half a radius: how far a circle is followed
+CHOICES = 6  # squares that are measured at full resolution
+ROUGH = 1.0  # px: error of a circle's place in a reduced picture
+NEAR = 0.45  # largest distance of a colour from that of its circle where only two circles are seen
+FEW = 8  # circles of one colour that are measured at full resolution where no four form a square
+SLACK = 0.008  # of the picture's width: the usual movement of the first circle
+REACH = 0.025  # of the picture's width, plus half a radius: the distance over which a circle is followed
 GROWTH_MAX = math.log(1.33)  # of the square from one picture to the next
 TURN_MAX = 0.5  # rad, the same
-BEND_MAX = 0.08  # of the side: how far three circles may leave a motion of the whole square
+BEND_MAX = 0.08  # of the side: deviation of three circles from a motion of the whole square
 RADIUS_MAX = math.log(1.6)  # of a followed circle against its expected radius
 
 
 class Detection(NamedTuple):
-    """What a picture shows of the target, by corner 1..4.
+    """The target in a picture, by corner 1..4.
 
-    `centres` (4, 2) px with NaN rows for circles that are missing; `quality` (4,) as of the block, NaN if
-    missing; `status` as above; `places` (4, 6) what it takes to follow all four, also the missing ones: u,
-    v and expected radius in px, colour over the ceiling's (blue, green, red).
+    `centres` (4, 2) are in px, with NaN rows for missing circles; `quality` (4,) is that of the block, NaN
+    for missing circles; `status` is one of the constants above. `places` (4, 6) serve to follow all four
+    circles, missing ones too: u, v and expected radius in px, colour divided by the ceiling's (blue, green,
+    red).
     """
 
     centres: Array
@@ -55,8 +56,8 @@ class Detection(NamedTuple):
     places: Array
 
 
-class Place(NamedTuple):
-    """Where a circle is expected: `centre` u + iv and `radius` in px, `ratio` its colour over the ceiling."""
+class CirclePlace(NamedTuple):
+    """The expected place of a circle: `centre` u + iv and `radius` in px, `ratio` its colour."""
 
     centre: complex
     radius: float
@@ -64,7 +65,7 @@ class Place(NamedTuple):
 
 
 def usable(pixels: object, size: tuple[int, int] | None = None) -> bool:
-    """Return whether this is a picture that can be searched, of that width and height (px) if given."""
+    """Return whether this is a picture that can be searched and, if `size` is given, has that size (px)."""
     if not isinstance(pixels, np.ndarray) or pixels.dtype != np.uint8 or pixels.ndim != 3:
         return False
     height, width, channels = pixels.shape
@@ -79,7 +80,7 @@ def nothing(status: int) -> Detection:
 
 
 def search(pixels: Pixels, target: Target, fewest: int = 2) -> Detection:
-    """Look for the circles all over a picture; fewer than `fewest` are no target."""
+    """Search the whole picture for the circles; fewer than `fewest` are no target."""
     ceiling = Ceiling(pixels)
     status = NOT_FOUND
     blobs: Sequence[Sequence[Blob]] = ()
@@ -90,7 +91,7 @@ def search(pixels: Pixels, target: Target, fewest: int = 2) -> Detection:
             found = _four(pixels, ceiling, target, arrangements(blobs, target.ratio, CHOICES))
             if found is not None:
                 return found
-        if crowded:  # at a larger size there is only more of it
+        if crowded:  # a larger size would show even more patches
             break
     if fewest < 4 and sum(map(bool, blobs)) >= fewest:
         return _few(pixels, ceiling, target, blobs, fewest) or nothing(status)
@@ -100,7 +101,7 @@ def search(pixels: Pixels, target: Target, fewest: int = 2) -> Detection:
 def _four(
     pixels: Pixels, ceiling: Ceiling, target: Target, choices: Sequence[Sequence[Blob]]
 ) -> Detection | None:
-    """Return the best of some squares after a close look, or None."""
+    """Return the best of some squares after measuring them at full resolution, or None."""
     best, least = None, math.inf
     for corners in choices:
         discs = [locate(pixels, ceiling, blob.centre, blob.radius, ROUGH) for blob in corners]
@@ -111,7 +112,7 @@ def _four(
         if cost >= least:
             continue
         sizes = sorted(math.log(disc.radius / radius) for disc, radius in zip(known, radii, strict=True))
-        # One of the four may be hidden in part.
+        # One of the four may be partly hidden.
         if sizes[3] - sizes[1] > SIZES_MAX or sum(disc.symmetry >= QUALITY_MIN for disc in known) < 3:
             continue
         best, least = _detection(known, _places(known, radii)), cost
@@ -121,7 +122,7 @@ def _four(
 def _few(
     pixels: Pixels, ceiling: Ceiling, target: Target, blobs: Sequence[Sequence[Blob]], fewest: int
 ) -> Detection | None:
-    """Return three or two circles that can be nothing else than those of the target, or None."""
+    """Return three or two circles that can only be those of the target, or None."""
     discs: list[list[Disc]] = [[], [], [], []]
     alike: list[list[Disc]] = [[], [], [], []]
     for corner in range(4):
@@ -141,23 +142,23 @@ def _known(known: Known, target: Target) -> Detection | None:
     """Return the detection of three or two circles."""
     radius = sum(disc.radius for disc in known.values()) / len(known)
     places = [
-        Place(known[k].centre, known[k].radius, known[k].ratio)
+        CirclePlace(known[k].centre, known[k].radius, known[k].ratio)
         if k in known
-        else Place(centre, radius, target.colours.ratios[k])
+        else CirclePlace(centre, radius, target.colours.ratios[k])
         for k, centre in enumerate(whole(known))
     ]
     return _detection([known.get(k) for k in range(4)], places)
 
 
 def follow(pixels: Pixels, target: Target, places: Array, fewest: int = 2) -> Detection:
-    """Look for the circles near their `places` (4, 6), and everywhere if one is not there."""
+    """Search for the circles near their `places` (4, 6); if one is not there, search the whole picture."""
     ceiling = Ceiling(pixels)
-    known = [Place(complex(u, v), radius, (b, g, r)) for u, v, radius, b, g, r in places.tolist()]
+    known = [CirclePlace(complex(u, v), radius, (b, g, r)) for u, v, radius, b, g, r in places.tolist()]
     discs: list[Disc | None] = [None] * 4
     before: list[complex] = []
     after: list[complex] = []
     for corner, place in enumerate(known):
-        # The circles that are already found tell where to look for the next.
+        # The circles found so far predict the place of the next.
         centre, slack = place.centre, SLACK * pixels.shape[1]
         if before:
             factor, shift, _ = motion(before, after)
@@ -169,7 +170,7 @@ def follow(pixels: Pixels, target: Target, places: Array, fewest: int = 2) -> De
             after.append(disc.centre)
     moved = _moved(discs, known)
     if moved is not None:
-        # Those that were seen tell where the others went, which may be further than a circle is followed.
+        # The circles that were found predict the places of the others, even beyond the reach of following.
         for corner, place in enumerate(moved):
             discs[corner] = discs[corner] or _near(pixels, ceiling, target, corner, place, place.centre)
     seen = _square(discs, target)
@@ -179,7 +180,7 @@ def follow(pixels: Pixels, target: Target, places: Array, fewest: int = 2) -> De
     kept = None if moved is None else _detection(discs, moved)
     if kept is None:
         return search(pixels, target, fewest)
-    # Only more circles than those that were followed are a better target.
+    # The search gives a better target only if it finds more circles than were followed.
     found = search(pixels, target, max(fewest, 5 - kept.status))
     return found if found.status < kept.status else kept
 
@@ -189,14 +190,14 @@ def _near(
     ceiling: Ceiling,
     target: Target,
     corner: int,
-    place: Place,
+    place: CirclePlace,
     centre: complex,
     slack: float = 0.0,
 ) -> Disc | None:
-    """Return a corner's circle near a centre: at once if it is there, else around it by its last colour."""
+    """Return a corner's circle near a centre: at the centre, or found around it by its last colour."""
     radius = place.radius
     disc = locate(pixels, ceiling, centre, radius, slack)
-    if slack and (disc is None or disc.symmetry < QUALITY_MIN):  # there may be something else beside it
+    if slack and (disc is None or disc.symmetry < QUALITY_MIN):  # another thing may be beside the circle
         disc = locate(pixels, ceiling, centre, radius)
     if disc is not None and _same(disc, target, corner, radius):
         return disc
@@ -225,7 +226,7 @@ def _square(discs: Sequence[Disc | None], target: Target) -> Detection | None:
 
 
 def _fit(discs: Sequence[Disc], target: Target) -> tuple[Sequence[float], float]:
-    """Return the radii (px) expected of four circles, and how badly they fit a square: infinity if not."""
+    """Return the expected radii (px) of four circles, and their misfit to a square: infinity if none."""
     points = [disc.centre for disc in discs]
     radii = expected_radii(points, target.ratio)
     if radii is None:
@@ -233,12 +234,12 @@ def _fit(discs: Sequence[Disc], target: Target) -> tuple[Sequence[float], float]
     return radii, square_cost(points, [disc.radius for disc in discs], radii)
 
 
-def _places(discs: Sequence[Disc], radii: Sequence[float]) -> list[Place]:
-    return [Place(disc.centre, radius, disc.ratio) for disc, radius in zip(discs, radii, strict=True)]
+def _places(discs: Sequence[Disc], radii: Sequence[float]) -> list[CirclePlace]:
+    return [CirclePlace(disc.centre, radius, disc.ratio) for disc, radius in zip(discs, radii, strict=True)]
 
 
-def _moved(discs: Sequence[Disc | None], known: Sequence[Place]) -> list[Place] | None:
-    """Return where all circles are, if three or two moved together since the last picture; else None."""
+def _moved(discs: Sequence[Disc | None], known: Sequence[CirclePlace]) -> list[CirclePlace] | None:
+    """Return the places of all circles if three or two moved together since the last picture, else None."""
     seen = [(place, disc) for place, disc in zip(known, discs, strict=True) if disc is not None]
     if not 2 <= len(seen) <= 3:
         return None
@@ -254,9 +255,9 @@ def _moved(discs: Sequence[Disc | None], known: Sequence[Place]) -> list[Place] 
         # Radii grow with the root of the area, as a tilt shortens one direction only.
         growth = math.sqrt(abs(_area(after) / (_area(before) or math.inf))) or growth
     return [
-        Place(factor * place.centre + shift, place.radius * growth, place.ratio)
+        CirclePlace(factor * place.centre + shift, place.radius * growth, place.ratio)
         if disc is None
-        else Place(disc.centre, place.radius * growth, disc.ratio)
+        else CirclePlace(disc.centre, place.radius * growth, disc.ratio)
         for place, disc in zip(known, discs, strict=True)
     ]
 
@@ -266,8 +267,8 @@ def _area(points: Sequence[complex]) -> float:
     return ((points[1] - points[0]).conjugate() * (points[2] - points[0])).imag
 
 
-def _detection(discs: Sequence[Disc | None], places: Sequence[Place]) -> Detection | None:
-    """Return the circles except those that something hides in part; None if fewer than two are left."""
+def _detection(discs: Sequence[Disc | None], places: Sequence[CirclePlace]) -> Detection | None:
+    """Return the detection without partly hidden circles; None if fewer than two circles are left."""
     quality = [
         math.nan if disc is None else min(disc.radius / place.radius, disc.symmetry)
         for disc, place in zip(discs, places, strict=True)

@@ -1,7 +1,7 @@
-"""Knowing the target again by three or two of its circles, when the others are out of sight.
+"""Recognise the target by three or two of its circles when the others are out of sight.
 
-Few circles are easily met by chance, so they must agree in all that they show: places, radii, ellipses, and
-nothing else in the picture may fit as well. Points are complex numbers u + iv (px).
+Three or two circles easily fit by chance. So their places, radii and ellipses must all agree, and no other
+choice of circles in the picture may fit as well. Points are complex numbers u + iv (px).
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ SIZE_MAX = (
     0.03,
     0.35,
 )  # of the circles against what their places make one expect: the second is px of radius
-SPREAD_MAX = math.log(1.28)  # of one circle against another: 25 deg of tilt from near make a quarter
-BEND_MAX = 0.25  # of a circle: a tilt of 37 deg
+SPREAD_MAX = math.log(1.28)  # size of one circle relative to another: 25 deg of tilt nearby make a quarter
+BEND_MAX = 0.25  # of a circle: by a tilt of 37 deg
 BENDS_MAX = 0.18  # between the ellipses of two circles
 CORNER_MAX = 0.12  # between the mean ellipse and that of three corners
-BLUR = 5.0  # px^2: what motion adds to both, over r^2
+BLUR = 5.0  # px^2: divided by r^2, the tolerance that motion blur adds to both
 
 
 def three_of_four(discs: Sequence[Sequence[Disc]], ratio: float) -> list[Known]:
-    """Return all choices of three circles, one of a corner, that may be three corners of a square."""
+    """Return all choices of three circles, each of another corner, that may be three corners of a square."""
     found = []
     for missing in range(4):
         before, opposite, after = ((missing + k) % 4 for k in (3, 2, 1))
@@ -41,7 +41,7 @@ def three_of_four(discs: Sequence[Sequence[Disc]], ratio: float) -> list[Known]:
 
 
 def two_of_four(discs: Sequence[Sequence[Disc]], ratio: float) -> list[Known]:
-    """Return all choices of two circles, one of a corner, whose distance goes with their size and ellipse."""
+    """Return all choices of two circles, of two corners, whose distance agrees with sizes and ellipses."""
     found = []
     for i, j in combinations(range(4), 2):
         square = abs(CORNERS[j] - CORNERS[i]) ** 2
@@ -52,7 +52,7 @@ def two_of_four(discs: Sequence[Sequence[Disc]], ratio: float) -> list[Known]:
 
 
 def whole(known: Known) -> tuple[complex, complex, complex, complex]:
-    """Return the centres of all four circles; those that are not known where a square has them."""
+    """Return the centres of all four circles: known ones, and the others where a square would have them."""
     if len(known) == 3:
         (missing,) = set(range(4)) - set(known)
         before, opposite, after = (known[(missing + k) % 4].centre for k in (3, 2, 1))
@@ -73,10 +73,10 @@ def _alike(p: Disc, q: Disc) -> bool:
 
 
 def _apart(step: complex, p: Disc, q: Disc, square: float, ratio: float) -> bool:
-    """Return whether a step on the ceiling, seen as `step`, has that length (squared, in sides).
+    """Return whether a step on the ceiling, `step` in the picture, has the squared length `square`.
 
-    A circle's ellipse is the measure of lengths on the ceiling: if A maps the ceiling to the picture, A A'
-    has the ellipse's bend e and |A| = (r / ratio)^2, and the squared length is s' (A A')^-1 s =
+    A circle's ellipse measures lengths on the ceiling. If A maps the ceiling to the picture, A A' has the
+    ellipse's bend e and |A| = (r / ratio)^2, and the squared length is s' (A A')^-1 s =
     (|s|^2 - Re(conj(e) s^2)) / (|A| sqrt(1 - |e|^2)).
     """
     bend, radius = (p.bend + q.bend) / 2, (p.radius + q.radius) / 2

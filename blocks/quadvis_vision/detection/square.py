@@ -1,7 +1,7 @@
-"""A square's four corners in a picture: which four blobs they are, and how large a circle on each must look.
+"""The geometry of a square in a picture: which four blobs are its corners, and the radii of circles on them.
 
 Corners are numbered 1..4 clockwise from the upper left, as in section 5.1. Points are complex numbers u +
-iv (px, v down), for which a similarity is one multiplication.
+iv (px, v down), because a similarity is then one multiplication and one addition.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ Homography = tuple[float, float, float, float, float, float, float, float, float
 # Corners of the unit square around the origin.
 CORNERS = (complex(-0.5, -0.5), complex(0.5, -0.5), complex(0.5, 0.5), complex(-0.5, 0.5))
 
-# Limits of what is still a square with four equal circles. A tilt of 25 deg seen from 1.6 sides away
-# leaves a similarity by 0.1 side; radii differ from the expected ones by noise, blur and a ratio
-# radius/side that is not well known.
+# Limits within which four blobs count as a square with four equal circles. A tilt of 25 deg, seen from 1.6
+# sides away, deviates from a similarity by 0.1 side. Radii differ from the expected ones by noise, by blur,
+# and by an inexact ratio of radius to side.
 MISFIT_MAX = 0.2  # of the side, rms
 SIZE_MAX = math.log(1.6)  # of all circles together
-SPREAD_MAX = math.log(1.4)  # of one circle against the others
-OFFSET_MAX = 0.35  # of half a diagonal: how far a corner may be from where the opposite two put it
+SPREAD_MAX = math.log(1.4)  # size of one circle relative to the others
+OFFSET_MAX = 0.35  # of half a diagonal: distance of a corner from the place that two opposite corners predict
 
 
 class Blob(NamedTuple):
-    """What may be a circle: `centre` u + iv and `radius` in px, `distance` of its colour from a circle's."""
+    """A possible circle: `centre` u + iv and `radius` in px, `distance` of its colour from a circle's."""
 
     centre: complex
     radius: float
@@ -35,8 +35,8 @@ class Blob(NamedTuple):
 def square_homography(points: Sequence[complex]) -> Homography | None:
     """Return the homography, row by row, from the unit square (p right, q down, 0..1) to the picture.
 
-    None if the corners are not a convex figure numbered clockwise, so the target seen from behind has none.
-    Source: the closed form for a unit square (Heckbert 1989), up to the scale H33 = 1.
+    None if the corners do not form a convex figure numbered clockwise, as when the target is seen from
+    behind. Source: the closed form for a unit square (Heckbert 1989), up to the scale H33 = 1.
     """
     p1, p2, p3, p4 = points
     up, left, bend = p2 - p3, p4 - p3, p1 - p2 + p3 - p4
@@ -69,7 +69,7 @@ def expected_radii(points: Sequence[complex], ratio: float) -> tuple[float, floa
 
 
 def arrangement_cost(corners: Sequence[Blob], ratio: float) -> float:
-    """Return how badly four blobs fit a square of circles; infinity if they cannot be one."""
+    """Return the misfit of four blobs to a square of circles; infinity if they cannot be one."""
     points = [blob.centre for blob in corners]
     misfit = _misfit(points)
     if misfit > MISFIT_MAX:
@@ -82,7 +82,7 @@ def arrangement_cost(corners: Sequence[Blob], ratio: float) -> float:
 
 
 def square_cost(points: Sequence[complex], radii: Sequence[float], expected: Sequence[float]) -> float:
-    """Return how badly four circles fit a square in which these radii are expected; as `arrangement_cost`."""
+    """Return the misfit of four circles to a square with these expected radii, as `arrangement_cost` does."""
     misfit = _misfit(points)
     return math.inf if misfit > MISFIT_MAX else misfit / MISFIT_MAX + _size_cost(radii, expected)
 
@@ -97,7 +97,7 @@ def _size_cost(radii: Sequence[float], expected: Sequence[float]) -> float:
 
 
 def arrangements(blobs: Sequence[Sequence[Blob]], ratio: float, most: int) -> list[tuple[Blob, ...]]:
-    """Choose one blob for each corner out of four lists so that they fit a square; best first."""
+    """Return up to `most` choices of one blob for each corner that fit a square, the best first."""
     found: list[tuple[float, tuple[Blob, ...]]] = []
     for first in blobs[0]:
         for third in blobs[2]:
@@ -116,7 +116,7 @@ def arrangements(blobs: Sequence[Sequence[Blob]], ratio: float, most: int) -> li
 
 
 def motion(before: Sequence[complex], after: Sequence[complex]) -> tuple[complex, complex, float]:
-    """Return the similarity `factor * before + shift` nearest to `after`, and the rms distance left (px)."""
+    """Return the similarity `factor * before + shift` nearest to `after`: factor, shift, and rms (px)."""
     count = len(before)
     origin, target = sum(before) / count, sum(after) / count
     size, turned = 0.0, 0j
@@ -137,8 +137,8 @@ def motion(before: Sequence[complex], after: Sequence[complex]) -> tuple[complex
 def _misfit(points: Sequence[complex]) -> float:
     """Return the rms distance of the points from the best square, over that square's side.
 
-    Of the four parts of the points' discrete Fourier transform one is their middle and one a square; the
-    other two are what is left.
+    The discrete Fourier transform of the points has four parts: one is their middle, one is a square, and the
+    other two are the distance.
     """
     p1, p2, p3, p4 = points
     along, across = p1 - p3, 1j * (p2 - p4)
@@ -147,7 +147,7 @@ def _misfit(points: Sequence[complex]) -> float:
 
 
 def _sized(blob: Blob, half: complex, ratio: float) -> bool:
-    """Return whether the blob's radius goes with half the diagonal, with room for tilt."""
+    """Return whether the blob's radius agrees with half the diagonal, within the effect of tilt."""
     expected = ratio * abs(half) * math.sqrt(2)
     return expected < 2.2 * blob.radius and blob.radius < 2.2 * expected
 

@@ -1,1 +1,1 @@
-"""Picture files of any origin, and drawing into pictures."""
+"""Read picture files of any origin, and draw into pictures."""

@@ -1,7 +1,8 @@
-"""What the bytes of a picture say before anything is decoded: its size, where it ends, whether it is whole.
+"""Read the size and the end of a picture from its bytes before decoding, and check that it is whole.
 
-PNG, JPEG, BMP, TIFF, PNM and WebP, by their specifications. A decoder would take memory for whatever a header
-declares, fill up what is missing, and turn the picture if the file asks for it; none of that is wanted here.
+PNG, JPEG, BMP, TIFF, PNM and WebP are read by their specifications. A decoder would take as much memory as a
+header declares, would invent missing pixels, and would turn the picture if the file asks for it. These checks
+prevent all three.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ ANIMATED = "is an animation, which holds several pictures; save one of them as P
 CMYK = "has the colours of a printer (CMYK); save it as RGB or grey"
 NAMES = "PNG, JPEG, BMP, TIFF, PGM, PPM or WebP"
 
-# Of TIFF and EXIF: tags, the places and lengths of strips and tiles, and the types of whole numbers.
+# TIFF and EXIF: tags, tags for the places and lengths of strips and tiles, and types of whole numbers.
 _WIDTH, _HEIGHT, _PHOTOMETRIC, _ORIENTATION = 256, 257, 262, 274
 _PIECES = ((273, 279), (324, 325))
 _WHOLE = {3: ("H", 2), 4: ("I", 4)}
@@ -26,22 +27,23 @@ _INKS = 5
 _UPRIGHT = 1
 _TURNED = {(orientation,) for orientation in range(2, 9)}
 
-# A marker that ends the coded data of a JPEG's scan: any but stuffed zeros, fill bytes and restarts.
+# A marker that ends the coded data of a JPEG's scan: any marker except stuffed zeros, fill bytes and
+# restarts.
 _SCAN_END = re.compile(rb"\xff[^\x00\xff\xd0-\xd7]")
 _SOI, _EOI, _SOS, _APP1 = 0xD8, 0xD9, 0xDA, 0xE1
 _FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}
 
 
 class FormatFault(Exception):
-    """What is wrong with a picture, as the end of a sentence that begins with its path."""
+    """A fault of a picture; the text is the end of a sentence that begins with the picture's path."""
 
 
 @dataclass(frozen=True)
-class Layout:
-    """Width and height (px) and the bytes that belong to a picture.
+class PictureLayout:
+    """Width and height (px) of a picture, and its bytes.
 
-    `coded` is the picture alone, without what stands behind it; `turned` says whether the file asks to be
-    turned or mirrored when it is shown.
+    `coded` is the picture alone, without any bytes after its end; `turned` says whether the file asks viewers
+    to turn or mirror the picture.
     """
 
     width: int
@@ -50,20 +52,20 @@ class Layout:
     turned: bool = False
 
 
-def layout(data: bytes) -> Layout:
-    """Return what a file says of the first picture in it; FormatFault if it holds none, or not all of one."""
+def layout(data: bytes) -> PictureLayout:
+    """Return the layout of the first picture in a file; FormatFault if the file holds no whole picture."""
     if not data:
         raise FormatFault(f"is not a picture: it is empty; give a {NAMES} file")
     for head, read in _READERS:
         if re.match(head, data, re.DOTALL):
             try:
                 return read(data)
-            except (struct.error, IndexError):  # a field lies behind the end
+            except (struct.error, IndexError):  # a number lies behind the end
                 raise FormatFault(CUT) from None
     raise FormatFault(f"is not a picture; give a {NAMES} file")
 
 
-def _png(data: bytes) -> Layout:
+def _png(data: bytes) -> PictureLayout:
     width, height = struct.unpack_from(">II", data, 16)
     position, turned = 8, False
     while True:
@@ -71,11 +73,11 @@ def _png(data: bytes) -> Layout:
         end = position + 12 + length
         if end > len(data):
             raise FormatFault(CUT)
-        if kind[:1].isupper():  # the chunks without which there is no picture
+        if kind[:1].isupper():  # a critical chunk: a picture needs it
             if zlib.crc32(data[position + 4 : end - 4]) != struct.unpack_from(">I", data, end - 4)[0]:
                 raise FormatFault(DAMAGED)
             if kind == b"IEND":
-                return Layout(width, height, data[:end], turned)
+                return PictureLayout(width, height, data[:end], turned)
         elif kind == b"acTL":
             raise FormatFault(ANIMATED)
         elif kind == b"eXIf":
@@ -83,7 +85,7 @@ def _png(data: bytes) -> Layout:
         position = end
 
 
-def _jpeg(data: bytes) -> Layout:
+def _jpeg(data: bytes) -> PictureLayout:
     position, turned = 2, False
     width = height = 0
     while True:
@@ -106,11 +108,11 @@ def _jpeg(data: bytes) -> Layout:
             if found is None:
                 raise FormatFault(CUT)
             position = found.start()
-    return Layout(width, height, data[:position], turned)
+    return PictureLayout(width, height, data[:position], turned)
 
 
 def _marker(data: bytes, position: int) -> tuple[int, int]:
-    """Return the next marker of a JPEG and where it ends."""
+    """Return the next marker of a JPEG and the position after it."""
     if data[position] != 0xFF:
         raise FormatFault(DAMAGED)
     while data[position] == 0xFF:
@@ -121,14 +123,14 @@ def _marker(data: bytes, position: int) -> tuple[int, int]:
     return marker, position + 1
 
 
-def _bmp(data: bytes) -> Layout:
+def _bmp(data: bytes) -> PictureLayout:
     size, offset, header = struct.unpack_from("<I4xII", data, 2)
     if header == 12:
         width, height, _, bits = struct.unpack_from("<HHHH", data, 18)
         compression = 0
     else:
         width, height, _, bits, compression, coded = struct.unpack_from("<iiHHII", data, 18)
-    if compression in (0, 3):  # without compression, whatever the file says of its length
+    if compression in (0, 3):  # without compression; the length that the file states may be wrong
         size = offset + (width * bits + 31) // 32 * 4 * abs(height)
     elif compression in (1, 2):
         size = offset + coded
@@ -136,10 +138,10 @@ def _bmp(data: bytes) -> Layout:
         raise FormatFault("is compressed in a way that is not read here; save it as PNG")
     if len(data) < size:
         raise FormatFault(CUT)
-    return Layout(width, abs(height), data[:size])
+    return PictureLayout(width, abs(height), data[:size])
 
 
-def _tiff(data: bytes) -> Layout:
+def _tiff(data: bytes) -> PictureLayout:
     found, coded = {tag.number: tag for tag in _tiff_tags(data)}, data
     values = {number: tag.values for number, tag in found.items() if tag.values}
     if values.get(_PHOTOMETRIC) == (_INKS,):
@@ -149,17 +151,17 @@ def _tiff(data: bytes) -> Layout:
         if any(offset + count > len(data) for offset, count in pieces):
             raise FormatFault(CUT)
     turned = _is_turned(found.values())
-    if turned:  # the decoder would obey
+    if turned:  # the decoder would turn the picture
         tag = found[_ORIENTATION]
         changed = bytearray(data)
         struct.pack_into(tag.format, changed, tag.place, _UPRIGHT)
         coded = bytes(changed)
-    return Layout(values.get(_WIDTH, (0,))[0], values.get(_HEIGHT, (0,))[0], coded, turned)
+    return PictureLayout(values.get(_WIDTH, (0,))[0], values.get(_HEIGHT, (0,))[0], coded, turned)
 
 
 @dataclass(frozen=True)
 class _Tag:
-    """A field of a TIFF directory that holds whole numbers, and how and where the first of them lies."""
+    """An entry of a TIFF directory that holds whole numbers, with the type and the position of the first."""
 
     number: int
     format: str
@@ -185,7 +187,7 @@ def _tiff_tags(data: bytes) -> Iterator[_Tag]:
 
 
 def _asks_to_be_turned(exif: bytes) -> bool:
-    """Return whether an EXIF block, which is a TIFF directory, asks for it."""
+    """Return whether an EXIF block, which is a TIFF directory, asks viewers to turn the picture."""
     try:
         return _is_turned(_tiff_tags(exif))
     except struct.error:  # a damaged block asks for nothing
@@ -196,7 +198,7 @@ def _is_turned(tags: Iterable[_Tag]) -> bool:
     return any(tag.number == _ORIENTATION and tag.values[:1] in _TURNED for tag in tags)
 
 
-def _pnm(data: bytes) -> Layout:
+def _pnm(data: bytes) -> PictureLayout:
     kind, position = data[1:2], 2
     numbers: list[int] = []
     while len(numbers) < (2 if kind == b"4" else 3):
@@ -212,10 +214,10 @@ def _pnm(data: bytes) -> Layout:
     end = position + 1 + row * height * (2 if brightest == [65535] else 1)
     if end > len(data):
         raise FormatFault(CUT)
-    return Layout(width, height, data[:end])
+    return PictureLayout(width, height, data[:end])
 
 
-def _webp(data: bytes) -> Layout:
+def _webp(data: bytes) -> PictureLayout:
     end = 8 + struct.unpack_from("<I", data, 4)[0]
     if end > len(data):
         raise FormatFault(CUT)
@@ -230,7 +232,7 @@ def _webp(data: bytes) -> Layout:
             raise FormatFault(ANIMATED)
         width, height = (1 + int.from_bytes(data[place : place + 3], "little") for place in (24, 27))
         turned = _webp_turned(data[:end])
-    return Layout(width, height, data[:end], turned)
+    return PictureLayout(width, height, data[:end], turned)
 
 
 def _webp_turned(data: bytes) -> bool:
@@ -243,14 +245,14 @@ def _webp_turned(data: bytes) -> bool:
     return False
 
 
-def _refuse(problem: str) -> Callable[[bytes], Layout]:
-    def read(data: bytes) -> Layout:
+def _refuse(problem: str) -> Callable[[bytes], PictureLayout]:
+    def read(data: bytes) -> PictureLayout:
         raise FormatFault(problem)
 
     return read
 
 
-_READERS: tuple[tuple[bytes, Callable[[bytes], Layout]], ...] = (
+_READERS: tuple[tuple[bytes, Callable[[bytes], PictureLayout]], ...] = (
     (rb"\x89PNG\r\n\x1a\n", _png),
     (rb"\xff\xd8\xff", _jpeg),
     (rb"BM.{12}[\x0c\x28\x34\x38\x40\x6c\x7c]\0\0\0", _bmp),

@@ -1,4 +1,4 @@
-"""What was found in a picture, drawn into it: circles, square, axes and a caption."""
+"""Draw the detector's and the pose's results into a picture: circles, square, axes and a caption."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-# What a status of the detector means, by its number.
+# Words for the statuses of the detector, by number.
 STATUS = (
     "four circles",
     "three circles",
@@ -39,26 +39,26 @@ STATUS = (
     "no calibration",
     "not a picture",
 )
-_PARTIAL, _LOST = 1, 3  # statuses from which on something, or everything, is missing
+_PARTIAL, _LOST = 1, 3  # the first status with missing circles, and the first without any circle
 
 # Blue-green-red. Axes in the usual order red, green, blue.
 _GOOD, _WARNING, _BAD, _PLAIN = (120, 230, 120), (60, 190, 255), (90, 90, 255), (235, 235, 235)
 _SQUARE = (255, 210, 60)
 _AXES = (("x", (60, 60, 255)), ("y", (60, 220, 60)), ("z", (255, 120, 60)))
-_GROUND = 96  # grey of a picture that is none
+_GROUND = 96  # grey level in place of a frame that is not a picture
 
-_SCALE = 0.65  # of the letters in the caption; smaller if a line like this one would not fit
+_SCALE = 0.65  # of the letters in the caption; they become smaller if a line like the following would not fit
 _LONG = "t 100.00 s   picture 1000   four circles that are no square"
-_STEPS = 12  # pieces of an edge, which a lens bends
-_REDUCED = 0.9  # of the expected radius: a circle below it has something before it
+_STEPS = 12  # straight pieces of an edge, as a lens bends edges
+_REDUCED = 0.9  # of the expected radius: a smaller circle is partly hidden
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What is known of one picture: circles (4, 2) px, their quality (4,), and the pose; NaN is unknown.
+    """The results for one picture: circles (4, 2) px, their quality (4,), and the pose; NaN is unknown.
 
-    `status` is the detector's, -1 if it is not known. `position` (3,) m is that of the camera in target axes,
-    `rotation` (3, 3) from target to camera axes; `has_pose` says whether both are to be believed.
+    `status` is the detector's, -1 if unknown. `position` (3,) in m is the camera's position in target axes,
+    `rotation` (3, 3) goes from target to camera axes; `has_pose` says whether both are valid.
     """
 
     centres: Floats
@@ -82,7 +82,8 @@ class Overlay:
     def draw(self, pixels: object, found: Finding, title: str) -> Picture:
         """Return the enlarged picture with marks, and a caption of two lines below it.
 
-        What is not a picture becomes grey of the camera's size. The title begins the caption.
+        A frame that is not a picture becomes a grey picture of the camera's size. The caption begins with the
+        title.
         """
         canvas = self._canvas(pixels)
         with np.errstate(all="ignore"):  # a pose may be anything
@@ -103,7 +104,7 @@ class Overlay:
         return cv2.resize(whole, None, fx=self.zoom, fy=self.zoom, interpolation=cv2.INTER_LINEAR)
 
     def _draw_target(self, canvas: Any, found: Finding, turn: Floats, shift: Floats) -> None:
-        """Draw what the pose says: the square, its axes, and circles that were not seen."""
+        """Draw the target according to the pose: the square, its axes, and the circles that were not seen."""
         self._line(canvas, self._edges, turn, shift, _SQUARE, 1)
         reach = 0.4 * self.side
         for axis, (name, colour) in enumerate(_AXES):
@@ -123,7 +124,7 @@ class Overlay:
                     self._word(canvas, f"{number} missing", pixel, (-30, 5), _WARNING)
 
     def _draw_circles(self, canvas: Any, found: Finding) -> None:
-        """Mark the circles that were seen by a cross and their number, and what share of one is hidden."""
+        """Mark each circle that was seen by a cross and its number, and write its hidden share beside it."""
         import cv2
 
         for number, (centre, quality) in enumerate(zip(found.centres, found.quality, strict=True), 1):
@@ -140,7 +141,7 @@ class Overlay:
     def _line(
         self, canvas: Any, points: Floats, turn: Floats, shift: Floats, colour: Colour, width: int
     ) -> Floats | None:
-        """Draw a line through points (n, 3) of the target; return its last pixel, None if it has none."""
+        """Draw a line through points (n, 3) of the target; return its last pixel, or None if it has none."""
         import cv2
 
         pixels = self.camera.project(points @ turn.T + shift)
@@ -156,7 +157,7 @@ class Overlay:
 
 
 def pose_text(found: Finding) -> str:
-    """Return position (cm) and yaw (deg) in words, of what is known of them."""
+    """Return position (cm) and yaw (deg) in words, as far as they are known."""
     if not _has_position(found):
         return "no pose"
     x, y, z = (100 * found.position).tolist()
@@ -171,14 +172,14 @@ def _status(status: int) -> tuple[str, Colour]:
 
 
 def _polygon(corners: Floats) -> Floats:
-    """Return the closed outline (n, 3) of corners (m, 3), each edge in pieces."""
+    """Return the closed outline (n, 3) of corners (m, 3), each edge divided into pieces."""
     share = np.linspace(0, 1, _STEPS, endpoint=False)[:, None]
     edges = [a + share * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
     return np.vstack((*edges, corners[:1]))
 
 
 def _caption(width: int, found: Finding, title: str) -> Picture:
-    """Return the bar below the picture, of a height that depends on the width alone."""
+    """Return the bar below the picture; its height depends on the width alone."""
     said, colour = _status(found.status)
     pose = pose_text(found)
     first = f"{title}   "

@@ -1,9 +1,9 @@
-"""The one reader of pictures: pixels as the sensor gave them, or one sentence that says why not.
+"""The only reader of pictures: it returns the pixels of the sensor, or says in one sentence why it cannot.
 
-A calibration is about pixels as the sensor gave them. So the orientation that a file may ask for is ignored,
-and so are bytes behind the end of the picture, transparency and colour profiles. Grey becomes three equal
-channels where colours are wanted; of 16 bits the upper 8 count. What is cut short is refused: a decoder would
-fill it up.
+A calibration holds for pixels as the sensor gave them. So the reader ignores the orientation that a file may
+ask for, bytes after the end of the picture, transparency, and colour profiles. Where colours are wanted, grey
+becomes three equal channels; of 16 bits the upper 8 count. A picture that is cut short is refused, because a
+decoder would invent the missing pixels.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     Pixels = NDArray[np.uint8]
 
 MOST_PIXELS = 64_000_000  # in one picture: more than cameras on a craft have, and 200 MB of memory
-SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png")  # of the files in a folder that are pictures
+SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png")  # files in a folder with other suffixes are no pictures
 
 
 @dataclass(frozen=True, eq=False)
 class CodedPicture:
-    """A picture that has been read but not decoded: its size (width, height) is known, and it is whole.
+    """A picture that is read but not decoded: it is whole, and its size (width, height) is known.
 
-    `turned` says that the file asks to be turned or mirrored, which is not done.
+    `turned` says that the file asks viewers to turn or mirror the picture; `decode` does not do it.
     """
 
     path: str
@@ -62,7 +62,7 @@ class CodedPicture:
 def read_coded(path: str | Path) -> CodedPicture:
     """Read a picture's file and its header; QuadvisError, in one sentence with the path, if it is unusable.
 
-    Memory is taken for the bytes of the file alone, whatever size of a picture they declare.
+    This takes memory for the bytes of the file only, not for the size of the picture that they declare.
     """
     name = os.fspath(path)
     data = read_input(name)
@@ -80,7 +80,7 @@ def read_coded(path: str | Path) -> CodedPicture:
 
 
 def turned_note(pictures: Iterable[CodedPicture]) -> list[str]:
-    """Return what to say once about files that ask to be turned; nothing if there are none."""
+    """Return one note about all files that ask viewers to turn them; [] if no file does."""
     names = [Path(picture.path).name for picture in pictures if picture.turned]
     if not names:
         return []
@@ -92,9 +92,9 @@ def turned_note(pictures: Iterable[CodedPicture]) -> list[str]:
 
 
 def open_video(path: str | Path) -> Any:
-    """Return OpenCV's capture of a video whose frames come as the sensor gave them, too.
+    """Return OpenCV's capture of a video; its frames, too, come as the sensor gave them.
 
-    QuadvisError if there is no such file, or no video of a size that is read.
+    QuadvisError if the file does not exist, is not a video, or has frames that are too large.
     """
     import cv2
 
@@ -109,5 +109,5 @@ def open_video(path: str | Path) -> Any:
 
 
 def not_a_video(path: str | Path) -> QuadvisError:
-    """Return the sentence about a file that is not a video."""
+    """Return the error for a file that is not a video."""
     return QuadvisError(f"'{path}' is not a video that OpenCV can read; convert it, e.g. to mp4")

@@ -1,12 +1,13 @@
 """The camera's pose when its tilt is known: position and yaw in closed form from two circles or more.
 
-Rays that are turned back by roll and pitch see the target as a camera that looks straight up does, which is
-as a similarity. In level axes, forward and right at unit distance, circle i with the centre P_i appears at
+Rays that are turned back by roll and pitch are the rays of a camera that looks straight up, and such a camera
+maps the target by a similarity. In level axes, forward and right at unit distance, circle i with the centre
+P_i appears at
 
     m_i = [a -b; b a] P_i + c,    a + i b = exp(-i yaw) / z,
 
-linear in a, b and the two numbers of c. So two circles are enough, and nothing is ambiguous. Frames and signs
-are those of `_pose`.
+which is linear in a, b and the two numbers of c. So two circles are enough, and the solution is unique.
+Frames and signs are those of `quadvis_vision.pose.pose`.
 """
 
 from __future__ import annotations
@@ -28,15 +29,15 @@ _CORNERS = ((-0.5, 0.5), (0.5, 0.5), (0.5, -0.5), (-0.5, -0.5))
 
 
 def level_pose(points: Array, roll: float, pitch: float, side: float, radius: float = 0.0) -> Level | None:
-    """Return the pose from normalised points (4, 2), NaN rows missing, and a finite tilt (rad); None if none.
+    """Return the pose from normalised points (4, 2) and a finite tilt (rad); None if the points give none.
 
-    The points are the centres of the ellipses that the circles become; with a `radius` (m) above zero their
-    distance from the images of the circles' centres is taken out.
+    Rows with NaN are missing circles. The points are the centres of the ellipses that the circles become;
+    with a `radius` (m) above zero they are corrected to the images of the circles' centres.
     """
     pose = _fit(points, roll, pitch, side, 0.0)
     if not radius:
         return pose
-    for _ in range(2):  # the distance says how large a circle looks, and that moves the distance a little
+    for _ in range(2):  # the correction needs the distance, and changes the distance a little
         if pose is None:
             return None
         pose = _fit(points, roll, pitch, side, (radius / pose[2]) ** 2)
@@ -45,9 +46,9 @@ def level_pose(points: Array, roll: float, pitch: float, side: float, radius: fl
 
 @np.errstate(all="ignore")
 def level_covariance(view: View, unknowns: Array, sigma: float) -> Array | None:
-    """Return the covariance (4, 4) of x, y, z, yaw from `level_pose`; None if nothing determines them.
+    """Return the covariance (4, 4) of x, y, z, yaw from `level_pose`; None if the view is not enough.
 
-    `view` has the points that are not missing and how sure they are, `unknowns` (6,) are the pose's x, y, z,
+    `view` holds the points that are not missing and their weights, `unknowns` (6,) are the pose's x, y, z,
     yaw, roll and pitch, and `sigma` (rad) is the standard deviation of roll and of pitch.
     """
     pose = pose_of(unknowns)
@@ -69,9 +70,9 @@ def level_covariance(view: View, unknowns: Array, sigma: float) -> Array | None:
 
 
 def _fit(points: Array, roll: float, pitch: float, side: float, size: float) -> Level | None:
-    """Return the least squares pose; `size` is the square of the radius that a level camera sees.
+    """Return the least squares pose; `size` is the square of the circles' radius in a level camera's picture.
 
-    Plain numbers: on four points they are several times faster than arrays or complex numbers.
+    It uses plain numbers, which on four points are several times faster than arrays or complex numbers.
     """
     sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
     count = mx = my = px = py = real = imaginary = 0.0
@@ -81,8 +82,9 @@ def _fit(points: Array, roll: float, pitch: float, side: float, size: float) -> 
         if up > 0:
             forward, right = (cp * x - sp * w) / up, (sr - cr * y) / up
             if size:
-                # The centre of an ellipse is the pole of the picture's horizon, in level directions the line
-                # sp cr forward - sr right = cp cr, and 1 / up says how far the centre is from it.
+                # The centre of an ellipse is the pole of the picture's horizon. In level directions the
+                # horizon is the line sp cr forward - sr right = cp cr, and 1 / up is the centre's distance
+                # from it.
                 rise = 4 * size * (sp * sp * cr * cr + sr * sr)
                 shift = 2 * size / (1 / up + math.sqrt(1 / (up * up) + rise))
                 forward -= shift * sp * cr

@@ -22,7 +22,7 @@ from quadvis_vision.detection.square import Homography, square_homography
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
-_DEGENERATE = 1e-9  # a square whose two edges span less than this part of their lengths is seen edge on
+_DEGENERATE = 1e-9  # a square is seen edge on if two edges span less than this part of their lengths
 
 
 class Pose(NamedTuple):
@@ -33,12 +33,12 @@ class Pose(NamedTuple):
 
 
 def pose_from_n_points(rays: ArrayLike, side: float) -> Pose | None:
-    """Return the pose by the perspective of n points, equations (24)-(31); None if there is none.
+    """Return the pose by the perspective of n points, equations (24)-(31); None if the rays give no pose.
 
-    The corners of the square are g_i = lambda_i v_i with v_i of unit length. That opposite sides are
-    equal gives lambda_2..4 over lambda_1 by Cramer's rule, (27)-(30) with the signs put right; the known
-    side from corner 1 to 4 gives lambda_1, (31). The rotation is the one that best carries the target's
-    corners onto the g_i (Procrustes), and the camera's position is the mean of corner_i - R' g_i.
+    The corners of the square are g_i = lambda_i v_i with v_i of unit length. Opposite sides are equal; from
+    this Cramer's rule gives lambda_2..4 over lambda_1, (27)-(30) with corrected signs. The known side from
+    corner 1 to 4 gives lambda_1, (31). The rotation is the one that best turns the target's corners to the
+    g_i (Procrustes), and the camera's position is the mean of corner_i - R' g_i.
     """
     v1, v2, v3, v4 = (_unit(ray) for ray in np.asarray(rays, dtype=np.float64).tolist())
     d234 = _determinant(v2, v3, v4)
@@ -52,7 +52,7 @@ def pose_from_n_points(rays: ArrayLike, side: float) -> Pose | None:
     first = side / math.sqrt(1 - 2 * _dot(v1, v4) * fourth + fourth * fourth)
     g1, g2 = _scaled(v1, first), _scaled(v2, first * second)
     g3, g4 = _scaled(v3, first * third), _scaled(v4, first * fourth)
-    # The correlation of the points with the corners (-1, 1), (1, 1), (1, -1), (-1, -1).
+    # The correlation of the points g_i with the corners (-1, 1), (1, 1), (1, -1), (-1, -1).
     along, across = _mixed(g3, 1, g1, -1), _mixed(g2, 1, g4, -1)
     forward, right = _mixed(across, 1, along, 1), _mixed(across, 1, along, -1)
     columns = _nearest_rotation(forward, right)
@@ -63,7 +63,7 @@ def pose_from_n_points(rays: ArrayLike, side: float) -> Pose | None:
 
 
 def pose_from_plane(rays: ArrayLike, side: float) -> Pose | None:
-    """Return the pose by the plane-based method, equations (32)-(35); None if there is none.
+    """Return the pose by the plane-based method, equations (32)-(35); None if the rays give no pose.
 
     A = K^-1 T of (34) is the homography from the target's plane to normalised points. With its first two
     columns Abar = U S V', the rotation's first two are N = U V' (35), its third their cross product; then
@@ -77,11 +77,11 @@ def pose_from_plane(rays: ArrayLike, side: float) -> Pose | None:
 
 
 def pose_from_homography(h: Homography, width: float, height: float) -> Pose | None:
-    """Return the pose by equations (34)-(35) from the homography of a rectangle (m); None if there is none.
+    """Return the pose by equations (34)-(35) from the homography of a rectangle (m); None if none fits.
 
-    `h` takes the unit square (p right, q down) to normalised points, as `square_homography` gives it.
+    `h` maps the unit square (p right, q down) to normalised points, as `square_homography` returns it.
     """
-    # To target coordinates: p = x / width + 1/2, q = 1/2 - y / height.
+    # In target coordinates p = x / width + 1/2 and q = 1/2 - y / height.
     a1: Vector = (h[0] / width, h[3] / width, h[6] / width)
     a2: Vector = (-h[1] / height, -h[4] / height, -h[7] / height)
     a3: Vector = ((h[0] + h[1]) / 2 + h[2], (h[3] + h[4]) / 2 + h[5], (h[6] + h[7]) / 2 + h[8])
@@ -100,8 +100,9 @@ def camera_points(pose: Pose, points: Array) -> Array:
 def seen_centres(pose: Pose, points: Array, radius: float) -> Array:
     """Return the normalised centres (n, 2) of the ellipses that circles on the target become.
 
-    `points` (n, 3) are the circles' centres in camera axes (m); with a `radius` (m) of 0 these are seen. The
-    centre of an ellipse is the pole of the image of the plane's horizon; see also `_projection`.
+    `points` (n, 3) are the circles' centres in camera axes (m); with a `radius` (m) of 0 their images are
+    returned. The centre of an ellipse is the pole of the image of the plane's horizon; see also
+    `quadvis_vision.camera.projection.ellipse_centres`.
     """
     r = pose.rotation
     middle = points[:, 2:] * points - radius * radius * (r[:, :2] @ r[2, :2])
@@ -109,7 +110,7 @@ def seen_centres(pose: Pose, points: Array, radius: float) -> Array:
 
 
 def _nearest_rotation(a: Vector, b: Vector) -> tuple[Vector, Vector, Vector] | None:
-    """Return the columns of the rotation whose first two are nearest to a and b; None if these are parallel.
+    """Return the columns of the rotation whose first two are nearest to a and b; None if a is parallel to b.
 
     This is U V' of the singular value decomposition of [a b], written as [a b] (M)^(-1/2) with the 2 x 2
     matrix M of their products, whose root is (M + delta I) / sqrt(tr M + 2 delta), delta = sqrt(det M) =

@@ -1,8 +1,9 @@
 """The most probable pose by Gauss-Newton, from the picture alone or with a measured tilt, and its covariance.
 
-What becomes least is the sum of the squared distances in the picture of the circles from where the pose puts
-them and, with a tilt, of the squared differences of roll and pitch from it, each over its standard deviation.
-The unknowns are x, y, z (m), yaw, roll and pitch (rad), in this order. Frames and signs are those of `_pose`.
+The pose minimises a sum of squares, each divided by its variance: the distances in the picture between the
+circles as seen and as the pose predicts them and, with a tilt, the differences of roll and pitch from it. The
+unknowns are x, y, z (m), yaw, roll and pitch (rad), in this order. Frames and signs are those of
+`quadvis_vision.pose.pose`.
 """
 
 from __future__ import annotations
@@ -19,16 +20,17 @@ from quadvis_vision.pose.pose import Pose, camera_points, seen_centres
 Array = NDArray[np.float64]
 
 _STEPS = 30
-_NEAR = 1e-6  # of the sum of squares: a step that promises less, a thousandth of a deviation, is the last
-_DAMPING = 1e-3  # of the diagonal, once a step did not help; until then it is Gauss-Newton proper
+_NEAR = 1e-6  # gain in the sum of squares (a thousandth of a deviation) below which a step is the last one
+_DAMPING = 1e-3  # of the diagonal, used once a step has not helped; before that, steps are pure Gauss-Newton
 _TILT = np.array([4, 5])  # where roll and pitch are among the unknowns
 
 
 class View(NamedTuple):
-    """What was seen: `corners` (n, 3) of the target (m) at normalised `points` (n, 2).
+    """The view of a target: its `corners` (n, 3) (m) were seen at the normalised `points` (n, 2).
 
-    `weights` (n, 2, 2) turn differences of normalised points into standard deviations of the picture. With a
-    `radius` (m) the points are the centres of the ellipses that circles on the corners become.
+    `weights` (n, 2, 2) convert differences of normalised points to multiples of the picture's standard
+    deviation. With a `radius` (m) the points are the centres of the ellipses that circles on the corners
+    become.
     """
 
     corners: Array
@@ -76,7 +78,7 @@ def pose_of(unknowns: Array) -> Pose:
 def refine(view: View, start: Array, tilt: Tilt | None = None) -> Estimate | None:
     """Return the most probable pose near the unknowns `start` (6,); None if the view determines none.
 
-    Without a tilt it takes four points; with one, two determine the rest and leave the tilt as it is.
+    Without a tilt four points are needed. With a tilt two are enough; they do not change the tilt.
     """
     try:
         return _descend(view, start, tilt)
@@ -108,7 +110,7 @@ def _descend(view: View, start: Array, tilt: Tilt | None) -> Estimate | None:
 
 
 def _look(view: View, unknowns: Array, tilt: Tilt | None) -> _Place | None:
-    """Return the sum of squares and its derivatives at a pose; None if a corner is not in front of it."""
+    """Return the sum of squares and its derivatives; None if a corner is not in front of the camera."""
     pose = pose_of(unknowns)
     points = camera_points(pose, view.corners)
     if not (points[:, 2] > 0).all():
@@ -127,7 +129,7 @@ def _look(view: View, unknowns: Array, tilt: Tilt | None) -> _Place | None:
 def slopes(pose: Pose, points: Array, roll: float) -> Array:
     """Return the derivatives (n, 2, 6) of normalised points by the unknowns; `points` are in camera axes.
 
-    The radius of circles is left out: it moves their centres too little to spoil a step.
+    The effect of the circles' radius is neglected: it moves their centres too little to spoil a step.
     """
     places = (points / points[:, 2:]).tolist()
     moved = np.array(
@@ -143,7 +145,7 @@ def slopes(pose: Pose, points: Array, roll: float) -> Array:
 
 
 def _interaction(x: float, y: float, z: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the interaction matrix (2, 6) of a point at depth z: its velocity by the camera's.
+    """Return the interaction matrix (2, 6) of a point at depth z: the point's velocity by the camera's.
 
     Source: Chaumette and Hutchinson, Visual servo control, part I: basic approaches (2006).
     """

@@ -1,1 +1,1 @@
-"""Pictures of a scene that exists in numbers only, and the faults of real pictures."""
+"""Rendered pictures of a simulated scene, and the faults of real pictures."""

@@ -1,4 +1,4 @@
-"""What goes wrong in a picture: kinds by name, each a function of it, of the one before, and of chance."""
+"""The faults of pictures, by name: functions of the picture, the picture before, and a random generator."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-Pixels = Any  # mostly NDArray[np.uint8] (height, width, 3); some faults give what is no picture
+Pixels = Any  # mostly NDArray[np.uint8] (height, width, 3); some faults return values that are no pictures
 Fault = Callable[[Pixels, Pixels, np.random.Generator], Pixels]
 
 

@@ -1,8 +1,8 @@
-"""Pictures of the target as the upward camera takes them: discs on a ceiling, light, lens and sensor.
+"""Render the target as the upward camera sees it: discs on a ceiling, light, lens and sensor.
 
-Every pixel's ray is intersected with the ceiling; the share of the pixel that a disc covers follows from the
-distance of the pixel to the disc's edge and the edge's direction, which is exact for a straight edge. Only
-the surroundings of the discs are computed: the empty ceiling and the noise are made once.
+Every pixel's ray is intersected with the ceiling. The share of the pixel that a disc covers follows from the
+pixel's distance to the disc's edge and from the edge's direction; this is exact for a straight edge. For each
+picture only the surroundings of the discs are computed: the empty ceiling and the noise are made once.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ Singles = NDArray[np.float32]
 Picture = NDArray[np.uint8]
 Box = tuple[slice, slice]  # rows, columns
 
-NOISE_STARTS = 1 << 20  # places in the bank where a frame's noise can begin
+NOISE_STARTS = 1 << 20  # positions in the bank at which a frame's noise can begin
 _OUTLINE = 24
-_MARGIN = 1.5  # px around a disc: half a pixel's diagonal, and the lens bending a polygon's side
+_MARGIN = 1.5  # px around a disc: half a pixel's diagonal, plus the bend of a polygon's side by the lens
 _SUB_POSES = 16
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What is before the camera and how it is lit.
+    """The scene before the camera and its light.
 
     `side`, `radius` and `ceiling` (height) in m; `colours` (4, 3) and `background` (3,) blue-green-red grey
     levels under full light; `white_balance` (3,) gain per channel; `vignette` the light lost in the corners
@@ -61,7 +61,7 @@ class Renderer:
         u, v = np.meshgrid(np.arange(width, dtype=np.float64), np.arange(height, dtype=np.float64))
         rays = calibration.normalise(np.column_stack((u.ravel(), v.ravel()))).reshape(height, width, 2)
         self._x, self._y = rays[..., 0].astype(np.float32), rays[..., 1].astype(np.float32)
-        # [row, column, ray axis, pixel axis]: how the ray turns from one pixel to the next.
+        # [row, column, ray axis, pixel axis]: the change of the ray from one pixel to the next.
         turn = np.stack([np.gradient(rays, axis=axis) for axis in (1, 0)], axis=-1).astype(np.float32)
         self._rays: tuple[Singles, Singles, Singles] = (self._x, self._y, turn)
         self._steepest = float(np.linalg.norm(turn, axis=(2, 3)).max())
@@ -74,14 +74,15 @@ class Renderer:
     def render(self, start: Array, end: Array, light: float, noise: float) -> Picture:
         """Return the picture (height, width, 3) BGR of an exposure from one pose to another.
 
-        A pose is (x, y, h, phi, theta, psi) in m and rad; `light` scales the whole picture; `noise` from 0 to
-        1 picks the sensor's noise.
+        A pose is (x, y, h, phi, theta, psi) in m and rad; `light` scales the whole picture; `noise`, a number
+        from 0 to 1, chooses the sensor's noise.
         """
         import cv2
 
         more, less = self._noise_of(noise)
         empty = self._empty(light)
-        # Rounded and cut to 0 to 255 before the noise, which is whole: a fast sum instead of an exact one.
+        # The picture is rounded and limited to 0..255 before the whole-numbered noise is added: faster, not
+        # exact.
         picture = np.asarray(cv2.subtract(cv2.add(empty, more, dst=self._scratch), less), dtype=np.uint8)
         if max(start[2], end[2]) > self.scene.ceiling - 1e-6:
             return picture  # the discs cannot be seen from behind
@@ -105,7 +106,7 @@ class Renderer:
         return np.asarray(cv2.convertScaleAbs(self._background * self._shade, alpha=light), dtype=np.uint8)
 
     def _noise_of(self, noise: float) -> tuple[Picture, Picture]:
-        """Return what to add to a picture and what to subtract: the bank from a place on, of either sign."""
+        """Return the noise to add to a picture and to subtract from it: the bank from a position on."""
         choice = int(noise * 2 * NOISE_STARTS)
         place, swap = choice >> 1, choice & 1
         shape = self._shade.shape
@@ -133,7 +134,7 @@ class Renderer:
         images = [_image(self._outlines, homography) for homography in homographies]
         rays = np.stack([ray for ray, _ in images], axis=1)  # disc, pose, point, axis
         hidden = np.isnan(rays[..., 0])
-        # Far outside the picture the distortion polynomial folds back: keep the direction, cut the length.
+        # Far outside the picture the distortion polynomial folds back, so only the ray's length is limited.
         length = np.maximum(np.hypot(rays[..., 0], rays[..., 1]), 1e-12)
         rays = rays * np.minimum(1.0, self._widest / length)[..., None]
         pixels = self.calibration.to_pixels(rays.reshape(-1, 2)).reshape(*rays.shape[:1], -1, 2)
@@ -142,7 +143,7 @@ class Renderer:
         for disc, (low, high) in enumerate(zip(lows.tolist(), highs.tolist(), strict=True)):
             if hidden[disc].all():
                 continue
-            if hidden[disc].any():  # the disc reaches behind the camera: its picture has no bounds
+            if hidden[disc].any():  # the disc reaches behind the camera: its image is unbounded
                 low, high = (0.0, 0.0), (width, height)
             left, top = max(0, math.floor(low[0])), max(0, math.floor(low[1]))
             right, bottom = min(width, math.ceil(high[0]) + 1), min(height, math.ceil(high[1]) + 1)
@@ -151,7 +152,7 @@ class Renderer:
         return boxes
 
     def _coverages(self, homographies: list[Array], boxes: dict[int, Box]) -> dict[int, Singles]:
-        """Return for each disc in sight the share of every pixel that it covers, over the exposure."""
+        """Return, for each disc in sight, the share of every pixel that it covers during the exposure."""
         total = {disc: np.zeros(self._x[box].shape, np.float32) for disc, box in boxes.items()}
         if not boxes:
             return total
@@ -162,7 +163,7 @@ class Renderer:
                 inside, near = self._inside(back, self.discs[disc], box)
                 total[disc] += inside
                 edges.append((disc, near, inside[near]))
-            # All discs at once: the edges are few pixels, and the time goes into the number of calls.
+            # All discs together: edges have few pixels, so the number of calls takes the time.
             index = np.repeat([disc for disc, _, _ in edges], [len(inside) for _, _, inside in edges])
             rays = (np.concatenate([source[boxes[d]][near] for d, near, _ in edges]) for source in self._rays)
             shares = _edge_coverage(back, self.scene.radius, self.discs[index], *rays)
@@ -174,7 +175,7 @@ class Renderer:
         return {disc: cover / np.float32(len(homographies)) for disc, cover in total.items()}
 
     def _inside(self, back: Array, disc: Array, box: Box) -> tuple[Singles, tuple[NDArray[np.intp], ...]]:
-        """Return 1 where a pixel's centre is in the disc, and the places of pixels that may touch its edge.
+        """Return 1 where a pixel's centre is in the disc, and the indices of pixels that may touch its edge.
 
         With (a, b, w) = back (x, y, 1)', taken about the disc's centre, the ray meets the ceiling at the
         distance m / w from the centre, m = |(a, b)|; the disc's edge is where m - r w changes sign.
@@ -194,9 +195,9 @@ class Renderer:
 
 
 def _edge_coverage(back: Array, radius: float, discs: Array, x: Singles, y: Singles, turn: Singles) -> Array:
-    """Return the covered share of pixels from the distance and direction of their disc's edge, in px."""
+    """Return the covered share of pixels from the distance (px) and direction of their disc's edge."""
     p, q, w = back @ np.stack((x, y, np.ones_like(x))).astype(np.float64)
-    w = np.maximum(w, 1e-9)  # a ray that does not go up meets nothing
+    w = np.maximum(w, 1e-9)  # a ray that does not go up never meets the ceiling
     a, b = p - discs[:, 0] * w, q - discs[:, 1] * w
     m = np.maximum(np.hypot(a, b), 1e-12)
     a, b, out = a / m, b / m, (a * discs[:, 0] + b * discs[:, 1] + m * m / w) / m
@@ -205,7 +206,7 @@ def _edge_coverage(back: Array, radius: float, discs: Array, x: Singles, y: Sing
     along_u = by_x * turn[:, 0, 0] + by_y * turn[:, 1, 0]
     along_v = by_x * turn[:, 0, 1] + by_y * turn[:, 1, 1]
     steepness = np.maximum(np.hypot(along_u, along_v), 1e-12)
-    # The edge bends away from its tangent: on average over a pixel's width by 1/24 of the curvature.
+    # The edge deviates from its tangent: on average over a pixel's width by 1/24 of the curvature.
     bend = steepness / (24 * radius * w)
     return half_plane_share((m - radius * w) / steepness + bend, along_u / steepness, along_v / steepness)
 
@@ -230,7 +231,7 @@ def _meet(box: Box, other: Box) -> bool:
 
 
 def _overlap(box: Box, other: Box) -> tuple[Box, Box]:
-    """Return the common part of two boxes as places in the one and in the other."""
+    """Return the common part of two boxes, in the coordinates of the first and of the second."""
     here, there = [], []
     for mine, theirs in zip(box, other, strict=True):
         first, last = max(mine.start, theirs.start), min(mine.stop, theirs.stop)
@@ -255,7 +256,7 @@ def _shade(u: Array, v: Array, scene: Scene) -> Singles:
 
 
 def _noise_bank(sigma: float, size: int) -> tuple[Picture, Picture]:
-    """Return whole grey levels to add and to subtract; at each place one of them is zero."""
-    # RandomState: numpy promises never to change its numbers, so a run repeats on other versions too.
+    """Return whole grey levels to add and to subtract; at each position one of the two is zero."""
+    # numpy promises never to change the numbers of RandomState, so a run repeats on other versions too.
     noise = np.rint(sigma * np.random.RandomState(0).standard_normal(size + NOISE_STARTS))
     return np.clip(noise, 0, 255).astype(np.uint8), np.clip(-noise, 0, 255).astype(np.uint8)

@@ -1,1 +1,1 @@
-"""Scenes and comparisons by which the eyes are measured."""
+"""Scenes and comparisons that measure detection and pose estimation."""

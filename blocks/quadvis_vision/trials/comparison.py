@@ -1,4 +1,4 @@
-"""How far methods of pose estimation agree: the table of figure 3 and the curves of figure 2, section 6.1."""
+"""Compare methods of pose estimation: the table of figure 3 and the curves of figure 2, section 6.1."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ if TYPE_CHECKING:
 
 FIGURE = Kind("the figure", PNG.heads)
 NAMES = ("x", "y", "z", "phi", "theta", "psi")
-SCALES = np.array([100.0] * 3 + [180 / np.pi] * 3)  # from m and rad to what is shown
+SCALES = np.array([100.0] * 3 + [180 / np.pi] * 3)  # from m and rad to cm and deg
 UNITS = ("cm",) * 3 + ("deg",) * 3
 
-# Okabe and Ito's colours, which colour-blind readers tell apart.
+# Okabe and Ito's colours, which colour-blind readers can distinguish.
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
-_FEW = 60  # pictures that deserve a mark each
-_NEGLIGIBLE = 1e-3  # cm or deg: differences below it are drawn as none
-_WIDEST, _THINNEST = 4.0, 1.2  # lines; those drawn later are thinner, so that equal curves all show
+_FEW = 60  # up to so many pictures each one gets a mark
+_NEGLIGIBLE = 1e-3  # cm or deg: smaller differences are drawn as zero
+_WIDEST, _THINNEST = 4.0, 1.2  # width of lines; later lines are thinner, so that equal curves all show
 
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """What one method made of n pictures: `values` (n, 6) are x, y, z in m and roll, pitch, yaw in rad.
+    """The poses of one method in n pictures: `values` (n, 6) are x, y, z in m and roll, pitch, yaw in rad.
 
-    `times` (n,) are in s; a row with NaN is a picture without a pose.
+    `times` (n,) are in s; a row with NaN belongs to a picture without a pose.
     """
 
     name: str
@@ -45,13 +45,13 @@ class Poses:
 
     @property
     def found(self) -> NDArray[np.bool_]:
-        """Which pictures (n,) have a pose."""
+        """A mask (n,) of the pictures that have a pose."""
         return np.asarray(np.isfinite(self.values).all(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
-class Difference:
-    """First method less second, over the `count` pictures in which both have a pose.
+class PoseDifference:
+    """The first method minus the second, over the `count` pictures in which both have a pose.
 
     `rms` (6,) is in m and rad, angles taken the short way round; `ratios` (count,) are those of the distances
     z. Without a picture in common `rms` is NaN.
@@ -64,23 +64,23 @@ class Difference:
     ratios: Floats
 
 
-def difference(first: Poses, second: Poses) -> Difference:
-    """Compare two methods on the same pictures; `QuadvisError` if they have not as many."""
+def difference(first: Poses, second: Poses) -> PoseDifference:
+    """Compare two methods on the same pictures; `QuadvisError` if they have different numbers of pictures."""
     if len(first.values) != len(second.values):
         counts = f"{len(first.values)} and {len(second.values)} pictures"
         raise QuadvisError(f"'{first.name}' and '{second.name}' have {counts}; give both one rate")
     both = first.found & second.found
     a, b = first.values[both], second.values[both]
     if not both.any():
-        return Difference(first.name, second.name, 0, np.full(6, np.nan), np.zeros(0))
+        return PoseDifference(first.name, second.name, 0, np.full(6, np.nan), np.zeros(0))
     apart = a - b
     apart[:, 3:] -= 2 * np.pi * np.round(apart[:, 3:] / (2 * np.pi))
     rms = np.sqrt(np.mean(apart**2, axis=0))
-    return Difference(first.name, second.name, len(a), rms, a[:, 2] / b[:, 2])
+    return PoseDifference(first.name, second.name, len(a), rms, a[:, 2] / b[:, 2])
 
 
-def differences(methods: Sequence[Poses]) -> list[Difference]:
-    """Compare every method with every one after it."""
+def differences(methods: Sequence[Poses]) -> list[PoseDifference]:
+    """Compare every method with every later one."""
     return [difference(*pair) for pair in itertools.combinations(methods, 2)]
 
 
@@ -94,7 +94,7 @@ def spread(methods: Sequence[Poses], count: int) -> list[int]:
 
 
 def table(methods: Sequence[Poses], pictures: Sequence[int]) -> str:
-    """Return figure 3: the pose in each of these pictures (from 1), the methods beside each other."""
+    """Return figure 3: the pose in each of these pictures (from 1) by every method, side by side."""
     width = 7 * len(NAMES)
     heads = "".join(f"  {method.name:^{width}}" for method in methods)
     names = "".join("  " + "".join(f"{name:>7}" for name in NAMES) for _ in methods)
@@ -107,12 +107,12 @@ def table(methods: Sequence[Poses], pictures: Sequence[int]) -> str:
 
 
 def _cells(row: Floats) -> str:
-    # Adding zero makes -0.0 plain.
+    # Adding zero turns -0.0 into 0.0.
     return "".join(f"{round(number, 1) + 0.0:7.1f}" if np.isfinite(number) else f"{'-':>7}" for number in row)
 
 
-def sentences(found: Sequence[Difference]) -> str:
-    """Return the differences in words, a line for each pair."""
+def sentences(found: Sequence[PoseDifference]) -> str:
+    """Return the differences in words, one line for each pair."""
     lines = []
     for pair in found:
         head = f"{pair.first} - {pair.second}"
@@ -171,7 +171,7 @@ def _draw_values(axes: Axes, methods: Sequence[Poses], pictures: Sequence[int], 
 
 
 def _draw_differences(axes: Axes, methods: Sequence[Poses], column: int) -> None:
-    """Draw how far the other methods are from the first."""
+    """Draw the differences of the other methods from the first."""
     reach = _NEGLIGIBLE
     for index, method in enumerate(methods[1:], 1):
         apart = method.values[:, column] - methods[0].values[:, column]

@@ -1,4 +1,4 @@
-"""OpenCV's calibrateCamera on the same correspondences, to compare with."""
+"""OpenCV's calibrateCamera on the same correspondences, for comparison."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class OpenCVCalibration:
-    """What cv2.calibrateCamera says: K (3, 3), lens (5,), rms (px) of all corners and (m,) of each view."""
+    """The result of cv2.calibrateCamera: K (3, 3), lens (5,), rms (px) of all corners and (m,) by view."""
 
     matrix: Floats
     distortion: Floats
@@ -41,8 +41,9 @@ def calibrate_views(board: Floats, views: Sequence[Floats], size: tuple[int, int
 def calibrate_points(points: Floats, pixels: Floats, guess: Floats) -> OpenCVCalibration | None:
     """Return the camera from points in space (n, 3) and their pixels (n, 2), without a lens and without skew.
 
-    For points that are not on one plane OpenCV has no closed form: it starts from K = guess (3, 3). None
-    where it refuses that, as it does with a principal point to the left of or above the picture.
+    For points that are not in one plane OpenCV has no closed form: it starts from K = guess (3, 3). It
+    refuses some guesses, such as a principal point to the left of the picture or above it; then this returns
+    None.
     """
     import cv2
 
@@ -50,7 +51,7 @@ def calibrate_points(points: Floats, pixels: Floats, guess: Floats) -> OpenCVCal
     start[0, 1] = 0.0
     lens: Any = np.zeros(5)
     flags = cv2.CALIB_FIX_K1 | cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3 | cv2.CALIB_ZERO_TANGENT_DIST
-    size = (int(guess[0, 2]) + 2, int(guess[1, 2]) + 2)  # only checked against the principal point
+    size = (int(guess[0, 2]) + 2, int(guess[1, 2]) + 2)  # OpenCV only compares it with the principal point
     try:
         error, matrix, lens, _, _, _, _, errors = cv2.calibrateCameraExtended(
             [(points - points.mean(axis=0)).astype(np.float32)],

@@ -1,6 +1,6 @@
-"""The parts of a picture to try a detector on: discs, things beside them, and what light and camera do.
+"""The parts of a test picture for a detector: discs, things beside them, and the effects of light and camera.
 
-Discs are drawn by counting sub-pixels, so they owe nothing to the product's own renderer.
+Discs are drawn by counting sub-pixels, so they are independent of the product's own renderer.
 """
 
 from __future__ import annotations
@@ -21,20 +21,38 @@ CEILING: Colour = (204.0, 208.0, 210.0)
 
 _FINE = 8  # sub-pixels along an edge
 _LENS = 0.6  # px, sigma of the optics
-_TRIES = 1000  # to place something where there is room
-_BAR = (1.6, 1.4)  # half the length and the width of what hides a disc, in its radii
+_TRIES = 1000  # to find a free place for a thing
+_BAR = (1.6, 1.4)  # half the length, and the width, of the bar that hides a disc, in radii of the disc
 
 
 @dataclass(frozen=True)
 class Condition:
-    """How a scene differs from a clear one. Lengths in px are those of the picture, at any size.
+    """The differences of a scene from a clear one. Lengths in px are those of the picture, at any size.
 
-    Light: `noise` sigma in grey levels, `gain` per channel, `vignette` and `gradient` the share of light
-    lost in the corners and at one edge, `lamp` a bright spot, `blur` px of motion, `quality` of JPEG (0:
-    none) with `subsampled` colours. Things: `odd` in other colours and shapes, `decoys` discs in the
-    target's colours, `clutter` pieces of photographs or, without any, of made-up texture. Target: circles
-    that are `missing` (4: no target at all), `cover` the share of one disc's diameter behind a bar in the
-    ceiling's or another `covering` colour, `tilt` deg at most, `distance` m.
+    =================== ==============================================================================
+    light and camera    meaning
+    =================== ==============================================================================
+    ``noise``           standard deviation in grey levels
+    ``gain``            factor of each channel
+    ``vignette``        share of light lost in the corners
+    ``gradient``        share of light lost at one edge
+    ``lamp``            a bright spot
+    ``blur``            length of motion blur in px
+    ``quality``         of JPEG; 0 for no JPEG; with ``subsampled`` colours
+    =================== ==============================================================================
+
+    =================== ==============================================================================
+    things and target   meaning
+    =================== ==============================================================================
+    ``odd``             number of things in other colours and shapes
+    ``decoys``          number of discs in the target's colours
+    ``clutter``         number of pieces of photographs or, without photographs, of made-up texture
+    ``missing``         number of circles that are missing; 4 for no target at all
+    ``cover``           share of one disc's diameter behind a bar
+    ``covering``        colour of that bar, if it is not the ceiling's
+    ``tilt``            largest tilt in deg
+    ``distance``        distance in m
+    =================== ==============================================================================
     """
 
     noise: float = 5.0
@@ -63,7 +81,7 @@ def project(h: Array, points: NDArray[Any]) -> Array:
 
 
 class Ellipse:
-    """The image of a disc of `middle` (2,) and `radius` in m: its `centre` (2,) and radius `size` in px."""
+    """The image of a disc of `middle` (2,) and `radius` in m: `centre` (2,) and radius `size` in px."""
 
     def __init__(self, h: Array, middle: Array, radius: float) -> None:
         angle = np.linspace(0, 2 * math.pi, 32, endpoint=False)
@@ -81,7 +99,7 @@ class Ellipse:
         self.size = math.sqrt(self._inside.sum() / math.pi) / _FINE
 
     def is_in(self, size: tuple[int, int]) -> bool:
-        """Return whether all of the disc is in a picture of `size` px."""
+        """Return whether the whole disc is in a picture of `size` px."""
         return bool((self._ends[0] > -0.5).all() and (self._ends[1] < np.array(size) - 0.5).all())
 
     def paint(self, picture: Array, colour: Colour) -> None:
@@ -89,7 +107,7 @@ class Ellipse:
         self._blend(picture, self._inside, colour)
 
     def cover(self, picture: Array, share: float, direction: float, colour: Colour) -> None:
-        """Hide a share of the disc's diameter by a bar across it, on the side in that direction."""
+        """Hide a share of the disc's diameter by a bar across it, on the side toward `direction`."""
         import cv2
 
         ahead = np.array((math.cos(direction), math.sin(direction)))
@@ -133,7 +151,7 @@ class _Things:
 
     def __init__(self, rng: np.random.Generator, picture: Array, discs: Sequence[Ellipse]) -> None:
         self._rng, self._picture, self._discs = rng, picture, discs
-        self._unit = picture.shape[1] / 100  # sizes of things go with the picture
+        self._unit = picture.shape[1] / 100  # sizes of things are proportional to the picture's width
 
     def put_decoy(self, colour: Colour) -> None:
         """Paint a disc."""
@@ -143,7 +161,7 @@ class _Things:
             self._disc(place, radius, colour)
 
     def _place(self, reach: float) -> Array | None:
-        """Return a place (2,) in the picture, clear of the discs; None if there is no room."""
+        """Return a place (2,) in the picture, clear of the discs; None if no free place was found."""
         size = np.array(self._picture.shape[1::-1])
         for _ in range(_TRIES):
             place = self._rng.uniform(0, size)
@@ -174,7 +192,7 @@ class _Things:
         cv2.fillPoly(self._picture, [np.round(16 * points).astype(np.int32)], colour, cv2.LINE_AA, 4)
 
     def put_piece(self, photographs: Sequence[Picture]) -> None:
-        """Put on a piece of a photograph, or of coloured texture that is coarse or fine."""
+        """Put on a piece of a photograph, or of coarse or fine coloured texture."""
         import cv2
 
         rng = self._rng
@@ -200,7 +218,7 @@ class _Things:
 
 
 def expose(rng: np.random.Generator, picture: Array, condition: Condition) -> Picture:
-    """Return what the camera makes of a scene: optics, motion, light, noise and JPEG."""
+    """Return the camera's picture of a scene, with optics, motion, light, noise and JPEG."""
     import cv2
 
     height, width = picture.shape[:2]
@@ -228,7 +246,7 @@ def expose(rng: np.random.Generator, picture: Array, condition: Condition) -> Pi
 
 
 def _smear(length: float, direction: float) -> NDArray[np.float32]:
-    """Return the kernel of an even motion, symmetric about its middle."""
+    """Return the kernel of a uniform motion, symmetric about its middle."""
     reach = math.ceil(length / 2) + 1
     kernel = np.zeros((2 * reach + 1, 2 * reach + 1), np.float32)
     for along in np.linspace(-length / 2, length / 2, 65):

@@ -1,7 +1,7 @@
-"""Pictures to try a detector on: the target in all kinds of light, and what may disturb, with the truth.
+"""Test pictures for a detector, with the truth: the target in all kinds of light, and with disturbances.
 
-They are drawn without the product's own renderer; see `_scenery`. The tests and `tools/bench_detector` share
-the table of conditions. A random generator of the same seed gives the same pictures.
+They are drawn without the product's own renderer; see `scenery`. The tests and `tools/bench_detector` share
+the table of conditions. A random generator with the same seed gives the same pictures.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ PAINT: tuple[Colour, ...] = (  # blue, green, red
     (64.0, 138.0, 42.0),
     (30.0, 30.0, 30.0),
 )
-TOLERANCE = 0.5  # px: a circle farther from its place counts as wrong
+TOLERANCE = 0.5  # px: a circle that is farther from its true place counts as wrong
 
 _MATRIX = np.array([[430.0, 2, 226], [0, 438, 161], [0, 0, 1]])  # equation (38), 452 px wide
 
@@ -82,15 +82,15 @@ CONDITIONS = {
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """A picture and the truth: `centres` (4, 2) px of the circles, NaN where one is not seen whole."""
+    """A picture and its truth: `centres` (4, 2) px of the circles, NaN for a circle that is partly hidden."""
 
     pixels: Picture
     centres: Array
 
     def right(self, centres: Array, tolerance: float = TOLERANCE) -> bool:
-        """Return whether found centres (4, 2) are all that can be seen, and nothing else.
+        """Return whether the found centres (4, 2) are those of all visible circles and no others.
 
-        A target of which one circle is seen is not seen.
+        A target with only one visible circle must not be found.
         """
         seen = ~np.isnan(self.centres[:, 0])
         if not (~np.isnan(centres[:, 0]) == (seen & (seen.sum() > 1))).all():
@@ -98,7 +98,7 @@ class Shot:
         return bool((self.errors(centres) <= tolerance).all())
 
     def errors(self, centres: Array) -> Array:
-        """Return the distances (px) of the circles that are there and were found."""
+        """Return the distances (px) of the visible circles that were found from their true places."""
         away = np.hypot(*(centres - self.centres).T)
         return np.asarray(away[~np.isnan(away)])
 
@@ -116,8 +116,8 @@ def shoot(
 ) -> Shot:
     """Take a picture of `size` (width, height) px.
 
-    Without `pose` one is drawn from which all discs are in the picture. `hidden` circles (0..3) are not
-    there; without any, `condition` says how many are missing. `photographs` are what clutter is cut from.
+    Without `pose` a random pose is drawn from which all discs are in the picture. `hidden` circles (0..3) are
+    left out; if none is given, `condition` says how many are missing. Clutter is cut from `photographs`.
     """
     condition = condition or Condition()
     h = homography(size, pose or draw_pose(rng, size, condition))
@@ -161,7 +161,7 @@ def camera_matrix(size: tuple[int, int]) -> Array:
 
 
 def draw_pose(rng: np.random.Generator, size: tuple[int, int], condition: Condition) -> Pose:
-    """Return a pose from which all four discs are wholly in the picture."""
+    """Return a random pose from which all four discs are wholly in the picture."""
     lean = math.radians(condition.tilt)
     while True:
         z = rng.uniform(*condition.distance)
@@ -174,7 +174,7 @@ def draw_pose(rng: np.random.Generator, size: tuple[int, int], condition: Condit
 def draw_flight(
     rng: np.random.Generator, size: tuple[int, int], condition: Condition, count: int
 ) -> list[Pose]:
-    """Return poses, a tenth of a second apart, from all of which all discs are in the picture."""
+    """Return `count` poses a tenth of a second apart; from every one all discs are in the picture."""
     reach, time = np.array([0.06, 0.06, 0.06, 0.04, 0.04, 0.15]), 0.1 * np.arange(count)
     while True:
         phase, speed = rng.uniform(0, 2 * math.pi, 6), rng.uniform(0.5, 2.5, 6)
