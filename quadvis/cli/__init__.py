@@ -12,7 +12,7 @@ from quadvis.machine.interrupts import end_orderly
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command and return its exit code: 0 ok, 1 a run failed or missed what it should, 2 bad input."""
+    """Run a command and return its exit code: 0 ok, 1 a run failed or missed an expectation, 2 bad input."""
     end_orderly()
     return ended(lambda: _perform(arguments))
 

@@ -1,6 +1,6 @@
-"""Reads what is typed after `quadvis`, and says in one sentence what is wrong with it.
+"""Read the arguments of `quadvis`, and report a wrong one in one sentence.
 
-argparse writes the help and makes the options; the sentences are made here, from what the commands declare.
+argparse writes the help and makes the options. This module makes the sentences, from the declared options.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ HELP = ("-h", "--help")
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that knows what was declared: ``options`` by name, ``places`` in order, ``commands``."""
+    """A parser that keeps its declarations: ``options`` and ``commands`` by name, ``places`` in order."""
 
     def __init__(self, **more: Any) -> None:
         super().__init__(**more, allow_abbrev=False)
@@ -24,9 +24,9 @@ class Parser(argparse.ArgumentParser):
         self.commands: Mapping[str, Parser] = {}
 
     def add_argument(self, *names: Any, **more: Any) -> argparse.Action:
-        """Declare an option or a place."""
+        """Declare an option or a positional argument."""
         action = super().add_argument(*names, **more)
-        if not hasattr(self, "options"):  # of argparse itself, --help
+        if not hasattr(self, "options"):  # argparse itself declares --help
             return action
         if action.option_strings:
             self.options.update(dict.fromkeys(action.option_strings, action))
@@ -35,12 +35,12 @@ class Parser(argparse.ArgumentParser):
         return action
 
     def error(self, message: str) -> NoReturn:
-        """Refuse what `understood` let through; it should let nothing through."""
+        """Refuse an argument that `understood` should have refused."""
         raise QuadvisError(f"this is not understood; see '{self.prog} --help'")
 
 
 def understood(parser: Parser, arguments: Sequence[str]) -> argparse.Namespace:
-    """Return the options of a command; QuadvisError says what is wrong with them."""
+    """Return the options of a command; QuadvisError says which one is wrong, and why."""
     for argument in arguments:
         if "\0" in argument:
             raise QuadvisError(f"{quoted(argument)} holds a character that no name and no value can have")
@@ -66,7 +66,7 @@ def _checked(parser: Parser, words: Sequence[str]) -> list[str]:
     found: list[str] = []
     placed: list[str] = []
     waiting = list(words)
-    ended = False  # after '--' there are no options
+    ended = False  # True after '--', where words are never options
     while waiting:
         word = waiting.pop(0)
         if not ended and word in HELP:
@@ -90,7 +90,7 @@ def _checked(parser: Parser, words: Sequence[str]) -> list[str]:
 
 
 def _option(parser: Parser, word: str, waiting: list[str]) -> list[str]:
-    """Return an option as one word, its value taken from those that wait."""
+    """Return an option as one word; take its value from the waiting words."""
     name, equals, value = word.partition("=")
     if not word.startswith("--") and word[:2] in parser.options:
         name, equals, value = word[:2], word[2:3], word[2:].removeprefix("=")
@@ -113,7 +113,7 @@ def _option(parser: Parser, word: str, waiting: list[str]) -> list[str]:
 
 
 def _is_read(read: Callable[[str], Any] | argparse.FileType | str, value: str) -> bool:
-    """Return whether a value is what an option takes; those that are not texts are whole numbers."""
+    """Return whether an option takes a value; options without texts take whole numbers."""
     try:
         read(value)  # type: ignore[operator]
     except ValueError:

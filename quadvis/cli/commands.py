@@ -1,4 +1,4 @@
-"""What the commands do. They take the options as they are typed and return the exit code."""
+"""The commands. Each takes its options as they were typed and returns the exit code."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _load(options: argparse.Namespace, **more: Any) -> Any:
 
 
 def _own_blocks(options: argparse.Namespace) -> OwnBlocks:
-    """Return what is to be done about the blocks beside a diagram: refuse them, or say once that they run."""
+    """Return the treatment of the blocks beside a diagram: refuse them, or announce them once."""
     if options.no_own_blocks:
         return False
     said = set()
@@ -42,7 +42,7 @@ def _own_blocks(options: argparse.Namespace) -> OwnBlocks:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run a diagram and print how it went; 1 if it misses what is expected."""
+    """Run a diagram and print the summary; 1 if the run misses an expectation."""
     from quadvis.machine.status_line import ProgressLine
     from quadvis.run.report import summary_lines
     from quadvis.run.session import run as run_diagram
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
         raise
     if options.json:
         outputs = {"log": str(log) if log else None, "lost": result.lost or None}
-        _print_json(result.facts() | outputs | {"warnings": _told(diagram.warnings)})
+        _print_json(result.facts() | outputs | {"warnings": _plain_faults(diagram.warnings)})
     else:
         print("\n".join(summary_lines(result)))
         if log:
@@ -100,7 +100,7 @@ def sweep(options: argparse.Namespace) -> int:
 
 
 def _log_path(given: str | None, diagram: Diagram) -> Path | None:
-    """Return where the log goes: where it is wanted, or in a folder that is made for it."""
+    """Return the path of the log: the given path, or one in a folder that is made for logs."""
     if given is not None:
         return Path(given) if given else None
     from quadvis.output.log_place import claim_log
@@ -111,14 +111,14 @@ def _log_path(given: str | None, diagram: Diagram) -> Path | None:
 
 
 def _default_name(options: argparse.Namespace, variant: str | None) -> str:
-    """Return a name for what is made of a diagram: other variants and parameter files have other ones."""
+    """Return a name for the outputs of a diagram; it differs for other variants and parameter files."""
     stem = Path(options.file).stem
     name = [file_name(stem) if set(stem) & set("+,") else stem, *([file_name(variant)] if variant else [])]
     return ",".join(("+".join(name), *(file_name(Path(file).stem) for file in options.params)))
 
 
 def _runs_folder(what: str, option: str) -> Path:
-    """Return the folder for what a command leaves behind unless an option names another place."""
+    """Return the default folder for outputs; `option` can name another place."""
     path = Path("runs")
     try:
         path.mkdir(exist_ok=True)
@@ -129,7 +129,7 @@ def _runs_folder(what: str, option: str) -> Path:
 
 
 def check(options: argparse.Namespace) -> int:
-    """Tell all faults of a diagram; 2 if there are some."""
+    """Report all faults of a diagram; 2 if any are found."""
     from quadvis.diagram.load import check as check_diagram
     from quadvis.errors import DiagramError
 
@@ -142,25 +142,26 @@ def check(options: argparse.Namespace) -> int:
     except DiagramError as error:
         if not options.json:
             raise
-        _print_json({"ok": False, "faults": _told(error.faults), "warnings": []})
+        _print_json({"ok": False, "faults": _plain_faults(error.faults), "warnings": []})
         return error.exit_code
     _print_warnings(diagram, options)
     tasks = ", ".join(task.name for task in diagram.graph.tasks)
     count = len(diagram.graph.nodes)
     if options.json:
         found = {"ok": True, "diagram": diagram.name, "blocks": count, "hash": diagram.hash}
-        _print_json(found | {"warnings": _told(diagram.warnings)})
+        _print_json(found | {"warnings": _plain_faults(diagram.warnings)})
     else:
         print(f"{options.file}: {count} blocks in {tasks}: no fault")
     return 0
 
 
 def _print_warnings(diagram: Any, options: argparse.Namespace) -> None:
-    for warning in diagram.warnings if not options.json else ():
-        print(warning, file=sys.stderr)
+    if not options.json:
+        for warning in diagram.warnings:
+            print(warning, file=sys.stderr)
 
 
-def _told(faults: Iterable[Fault]) -> list[dict[str, Any]]:
+def _plain_faults(faults: Iterable[Fault]) -> list[dict[str, Any]]:
     """Return faults or warnings as plain data."""
     return [
         {"file": fault.place.file, "line": fault.place.line, "column": fault.place.column,
@@ -184,21 +185,21 @@ def list_blocks(options: argparse.Namespace) -> int:
 
 
 def _catalogue(options: argparse.Namespace) -> Catalogue:
-    """Return the blocks that a diagram in the working directory could use."""
+    """Return the catalogue for diagrams in the working directory."""
     from quadvis.library.catalogue import Catalogue
 
     return Catalogue(Path(), _own_blocks(options))
 
 
 def _all_loaded(failures: list[str]) -> int:
-    """Say after the rest which blocks could not be loaded."""
+    """Report at the end which blocks could not be loaded."""
     if failures:
         raise QuadvisError("\n".join(failures))
     return 0
 
 
 def describe(options: argparse.Namespace) -> int:
-    """Print what a block declares."""
+    """Print the declarations of a block."""
     from quadvis.library.describe import description, facts
 
     block = _catalogue(options).find(options.block)
@@ -210,7 +211,7 @@ def describe(options: argparse.Namespace) -> int:
 
 
 def analyse(options: argparse.Namespace) -> int:
-    """Print poles, margins and limits of a diagram's loop; 1 if it is not stable."""
+    """Print poles, margins and limits of a diagram's loop; 1 if the loop is not stable."""
     from quadvis.analysis.analyse import analyse as analyse_loop
     from quadvis.analysis.progress import watched
     from quadvis.analysis.questions import read_cuts, read_limits, read_time
@@ -227,7 +228,9 @@ def analyse(options: argparse.Namespace) -> int:
             for line in analysis_lines(analysis):
                 progress.clear()
                 print(line, flush=True)
-    paths = [str(path) for path in save_bode_plots(analysis, Path(options.output))] if options.output else []
+    paths: list[str] = []
+    if options.output:
+        paths = [str(path) for path in save_bode_plots(analysis, Path(options.output))]
     if options.json:
         _print_json(facts | {"plots": paths})
     elif paths:
@@ -270,7 +273,7 @@ def plot(options: argparse.Namespace) -> int:
 
 
 def schema(options: argparse.Namespace) -> int:
-    """Write the JSON schema of diagrams; 2 if a block cannot be loaded, which is left out."""
+    """Write the JSON schema of diagrams; 2 if a block cannot be loaded, which is then left out."""
     from quadvis.diagram.schema import diagram_schema
 
     blocks, failures = _catalogue(options).load_all()
@@ -298,7 +301,7 @@ def _json(data: Any, indent: int | None = None) -> str:
 
 
 def _width() -> int | None:
-    """Return the width of the terminal; None where text goes elsewhere."""
+    """Return the width of the terminal; None if the text goes elsewhere."""
     from shutil import get_terminal_size
 
     return get_terminal_size().columns if sys.stdout.isatty() else None

@@ -1,4 +1,4 @@
-"""What can be typed after `quadvis`."""
+"""The commands and options of `quadvis`."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ JSON_HELP = """\
 real_time_factor, log, lost (what the log lacks, and why);
 summary: {label: {signal, unit, and the statistics by name, final of a vector as a list}};
 expect: [{expectation, signal, kind, unit, limit, found, met, lack (why the run cannot be judged)}];
-warnings: [{file, line, column, subject, problem, remedy}], of what can be run and is surely a mistake.
-Numbers are in the unit beside them, null where there is none.
-Exit code: 0 all expectations met, 1 one is not, the run stopped or its log lacks something, 2 bad input; 130,
-129 or 143 interrupted, hung up or ended."""
+warnings: [{file, line, column, subject, problem, remedy}], about what runs but is surely a mistake.
+Numbers are in the unit beside them, null for a number that is unknown or infinite.
+Exit code: 0 all expectations met, 1 an expectation is not met, the run stopped or its log lacks something,
+2 bad input; 130, 129 or 143 interrupted, hung up or ended."""
 
 SWEEP_HELP = """\
-With several --over all combinations are run, the last one changing fastest. A name is that of a parameter as
-for --set, or seed, variant, params (files); 'none' stands for no variant and no file. A range is 0..29, or
+With several --over all combinations are run; the last one changes fastest. A name is that of a parameter, as
+for --set, or seed, variant, params (files); 'none' means no variant or no file. A range is 0..29, or
 with a step 1..3 step 0.5 rad/s. The table has the axes, the numbers of summary and expectations with their
 units, passed, failure (why a run stopped) and the hash of the diagram; it does not depend on the number of
-processes. Wall times do, so they stand in it only with --timings.
-Exit code: 0 all runs passed, 1 one did not, 2 bad input; 130, 129 or 143 interrupted, hung up or ended
-(what is done is in the table)."""
+processes. Wall times do, so it has them only with --timings.
+Exit code: 0 all runs passed, 1 a run did not, 2 bad input; 130, 129 or 143 interrupted, hung up or ended
+(finished runs are in the table)."""
 
 ANALYSE_HELP = """\
-Noise is taken away, Newton's method finds the steady state near, and the loop is linearised there;
-a sampled one is lifted over one hyperperiod. All signals of a cut are opened at once.
---json prints one object: diagram, variant, hash, hyperperiod_s (0 if all is continuous), states, stable;
+Noise is removed, Newton's method finds a steady state nearby, and the loop is linearised there;
+a sampled loop is lifted over one hyperperiod. All signals of a cut are opened together.
+--json prints one object: diagram, variant, hash, hyperperiod_s (0 for a continuous loop), states, stable;
 poles: [[real, imaginary]] in 1/s; cuts: {name: {signals, gain_up, gain_down, phase_lag, phase_lead,
-delay, crossover}} in factors, rad, s and rad/s, null where nothing limits;
+delay, crossover}} in factors, rad, s and rad/s, null for no limit;
 limits: {name: {vary, unit, stable_to, reached, reason}}.
 Exit code: 0 stable, 1 not stable, 2 bad input, or a loop that cannot be linearised."""
 
 
 def parser() -> Parser:
-    """Return what reads a command and its options."""
+    """Return the parser of all commands and their options."""
     made = Parser(prog="quadvis", description="Block diagrams in YAML that fly a four-rotor craft.")
     made.add_argument("--version", action="version", version=f"quadvis {__version__}")
     subparsers = made.add_subparsers(required=True, metavar="COMMAND")
@@ -64,7 +64,7 @@ def parser() -> Parser:
     )
     run.add_argument("--json", action="store_true", help="print one JSON object instead of the summary")
     _sweep_options(add("sweep", commands.sweep, "run a diagram at every point of a grid", SWEEP_HELP))
-    check = add("check", commands.check, "check a diagram and tell all its faults")
+    check = add("check", commands.check, "check a diagram and report all its faults")
     _diagram_options(check)
     check.add_argument("--json", action="store_true", help="print the faults and warnings as JSON")
     blocks = add("list", commands.list_blocks, "list all blocks")
@@ -78,11 +78,11 @@ def parser() -> Parser:
         "analyse", commands.analyse, "linearise the closed loop: poles, margins, limits", ANALYSE_HELP
     )
     _diagram_options(analyse)
-    words = "a cut point more: one signal or several, such as torque=control/roll.torque; repeat it for more"
+    words = "another cut point: one signal or several, such as torque=control/roll.torque; may be repeated"
     analyse.add_argument("--cut", action="append", default=[], metavar="[NAME=]SIGNAL,...", help=words)
-    words = "how far a parameter can go, such as eyes/camera.latency='100 ms..2 s'; repeat it for more"
+    words = "how far a parameter can go, such as eyes/camera.latency='100 ms..2 s'; may be repeated"
     analyse.add_argument("--vary", action="append", default=[], metavar="PARAM=FROM..TO", help=words)
-    analyse.add_argument("--at", metavar="T", help="run so long before the operating point is sought")
+    analyse.add_argument("--at", metavar="T", help="time at which the operating point is sought")
     analyse.add_argument("--json", action="store_true", help="print one JSON object instead of the tables")
     analyse.add_argument("--output", "-o", metavar="FOLDER", help="write Bode plots there, as PNG")
     draw = add("draw", commands.draw, "draw a diagram as SVG")
@@ -108,7 +108,7 @@ def parser() -> Parser:
 
 
 def _own_block_option(parser: Parser) -> None:
-    words = "refuse the code in the folder blocks beside the diagram, which is run otherwise"
+    words = "refuse to run the code in the folder blocks beside the diagram"
     parser.add_argument("--no-own-blocks", action="store_true", help=words)
 
 
@@ -119,9 +119,9 @@ def _diagram_options(parser: Parser) -> None:
 
 
 def _setting_options(parser: Parser) -> None:
-    words = "file of such settings, which apply before --set; repeat it for more, applied in their order"
+    words = "file of settings, applied before --set; may be repeated, later files win"
     parser.add_argument("--params", action="append", default=[], metavar="FILE", help=words)
-    words = "replace a parameter, such as control/roll.bandwidth='2 rad/s'; repeat it for more"
+    words = "replace a parameter, such as control/roll.bandwidth='2 rad/s'; may be repeated"
     parser.add_argument("--set", action="append", default=[], metavar="BLOCK.PARAM=VALUE", help=words)
     _own_block_option(parser)
 
@@ -129,7 +129,7 @@ def _setting_options(parser: Parser) -> None:
 def _sweep_options(parser: Parser) -> None:
     parser.add_argument("file", metavar="FILE", help="the diagram")
     words = (
-        "seed=0..29, craft.lag='20 ms,50 ms', bandwidth='1..3 step 0.5 rad/s', variant=A,B; repeat for more"
+        "seed=0..29, craft.lag='20 ms,50 ms', bandwidth='1..3 step 0.5 rad/s', variant=A,B; may be repeated"
     )
     parser.add_argument("--over", action="append", default=[], metavar="NAME=VALUES", help=words)
     words = "one of the diagram's variants; several are swept over"

@@ -1,4 +1,4 @@
-"""What a diagram requires of a run, and what its summary shows: selections of signals, criteria, limits.
+"""The requirements of a diagram on a run, and the lines of its summary: signals, stretches, limits.
 
 Selections with several elements count element by element: the RMS of ``craft.position[0:2]`` is over both
 axes together, its maximum is the larger of the two, its final value is one number for each.

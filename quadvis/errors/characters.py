@@ -1,7 +1,7 @@
 """Characters that look like others: a no-break space for a space, a Cyrillic letter for a Latin one.
 
-Names, numbers, units and the signs of YAML are ASCII. In a `doc` or a title every character is welcome, so a
-text is searched only once it has turned out not to be what was wanted there.
+Names, numbers, units and the signs of YAML are ASCII. A `doc` or a title may contain any character, so a text
+is searched for odd characters only after it was found to be wrong.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import re
 import unicodedata
 from collections.abc import Iterator
 
-# What people type, or what a word processor makes of it, by the ASCII that was meant.
+# Characters that people type, or that word processors insert, by the ASCII that was meant.
 _MEANT = {
     "-": "\u2010\u2011\u2012\u2013\u2014\u2015\u2212\u207b\u2043\u02d7\ufe58\ufe63",
     "'": "\u2018\u2019\u201a\u201b\u2032\u2039\u203a\u02b9\u02bc\u0060\u00b4",
@@ -23,7 +23,7 @@ _MEANT = {
     "*": "\u2217\u22c6\u066d",
     "#": "\u266f",
     "$": "\ufe69",
-    # Cyrillic, Greek, Armenian and Latin letters that print like ASCII ones.
+    # Cyrillic, Greek, Armenian and Latin letters that look like ASCII letters.
     "a": "\u0430\u03b1\u0251", "b": "\u044c", "c": "\u0441\u03f2", "d": "\u0501", "e": "\u0435\u0454",
     "g": "\u0261", "h": "\u04bb\u0570", "i": "\u0456\u03b9\u0131", "j": "\u0458\u03f3", "k": "\u043a\u03ba",
     "l": "\u04cf", "m": "\u043c", "n": "\u0578\u03b7", "o": "\u043e\u03bf\u0585", "p": "\u0440\u03c1",
@@ -44,7 +44,7 @@ _CANDIDATE = re.compile(r"[^\x00-\x08\x0a-\x7f]")  # a tab is a candidate, too
 
 
 def meant(character: str) -> str | None:
-    """Return the ASCII text for which a character was taken ("" if it shows nothing), None if for none."""
+    """Return the ASCII text that a character looks like ("" if it is invisible), or None."""
     if character in _ASCII:
         return _ASCII[character]
     if character == "\t" or unicodedata.category(character) == "Zs":
@@ -58,7 +58,7 @@ def meant(character: str) -> str | None:
 
 
 def odd_characters(text: str, start: int = 0, end: int | None = None) -> Iterator[tuple[int, str]]:
-    """Yield where in a text a character stands that was taken for ASCII, and the character."""
+    """Yield the offset of each character of a text that looks like ASCII, and the character."""
     if text.isascii() and "\t" not in text:
         return
     for match in _CANDIDATE.finditer(text, start, len(text) if end is None else end):
@@ -67,14 +67,14 @@ def odd_characters(text: str, start: int = 0, end: int | None = None) -> Iterato
 
 
 def cleaned(text: str) -> str:
-    """Return a text with the ASCII that was meant in place of every odd character."""
+    """Return a text with every odd character replaced by the ASCII that was meant."""
     if text.isascii():
         return text
     return "".join(char if (plain := meant(char)) is None else plain for char in text).strip()
 
 
 def first_odd(text: str) -> str | None:
-    """Return the first odd character of a text, None if there is none."""
+    """Return the first odd character of a text, or None."""
     return next((char for _, char in odd_characters(text)), None)
 
 
@@ -92,7 +92,7 @@ def with_article(character: str) -> str:
 
 
 def replacement(character: str) -> str:
-    """Return the remedy where the character is named already: "write a space"."""
+    """Return the remedy if the problem already names the character: "write a space"."""
     plain = meant(character)
     if not plain:
         return "remove it, it does not show"

@@ -1,7 +1,7 @@
-"""Whose contents a message may quote: a diagram of others can name any file as a part, and shall not show it.
+"""Decide which files a message may quote: a diagram from elsewhere may name any file, but must not show it.
 
-While a diagram is loaded, only files in its own folder, and those that its user named, are quoted. Places in
-other files are still given, with dots in place of every text that stands in them.
+While a diagram is loaded, messages quote only files in its own folder and files that its user named. For
+other files they give places, with dots in place of every text from the file.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-LARGEST = 1_000_000  # bytes; no larger file is read for a diagram
+LARGEST = 1_000_000  # bytes; larger files are never read for a diagram
 DOTS = "'...'"
 _SEGMENT = re.compile(r"'(?:[^'\\]|\\.)*'|\"(?:[^\"\\]|\\.)*\"|\{value:.*\}")
 _OWN_WORDS = re.compile(r"[\w./: -]{0,40}", re.ASCII)
@@ -22,7 +22,7 @@ _allowed: ContextVar[tuple[str, ...] | None] = ContextVar("allowed", default=Non
 
 @contextmanager
 def quoting_only(paths: Iterable[str | os.PathLike[str]]) -> Iterator[None]:
-    """Let messages quote only what stands in these files, and in the files of these folders."""
+    """Let messages quote only these files, and the files in these folders."""
     token = _allowed.set(tuple(os.path.realpath(path) for path in paths))
     try:
         yield
@@ -31,7 +31,7 @@ def quoting_only(paths: Iterable[str | os.PathLike[str]]) -> Iterator[None]:
 
 
 def is_foreign(file: str) -> bool:
-    """Say whether no text of a file may be quoted."""
+    """Return whether a file must not be quoted."""
     allowed = _allowed.get()
     if allowed is None:
         return False
@@ -43,7 +43,7 @@ def is_foreign(file: str) -> bool:
 
 
 def without_quotes(words: str, file: str) -> str:
-    """Return a message with dots for everything in it that stands in a file."""
+    """Return a message with dots in place of every text from a file."""
     text = _text(file)
 
     def shown(match: re.Match[str]) -> str:
@@ -62,7 +62,7 @@ def without_quotes(words: str, file: str) -> str:
 
 
 def _text(file: str) -> str | None:
-    """Return all that stands in a file, without blanks, since messages show texts with other ones."""
+    """Return the contents of a file without blanks, because messages show texts with other blanks."""
     try:
         if not os.path.isfile(file):
             return None

@@ -1,7 +1,7 @@
-"""Faults that a user can put right: where they are, what is wrong, what would be right.
+"""Faults that a user can correct: their places, their problems and their remedies.
 
-Everything that a user's mistake can cause derives from `QuadvisError` and is shown as plain sentences, never
-as a traceback. A check reports all faults at once: collect them in `Faults`, then call `Faults.check`.
+Every error that a user's mistake can cause derives from `QuadvisError` and is shown as plain sentences, never
+as a traceback. A check reports all faults together: it collects them in `Faults`, then calls `Faults.check`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class QuadvisError(Exception):
 
 
 class Odd(NamedTuple):
-    """A character that was taken for an ASCII one, and where it stands."""
+    """A character that looks like an ASCII one, and its place."""
 
     line: int
     column: int
@@ -38,9 +38,11 @@ class Odd(NamedTuple):
 class Place:
     """A position in a file; lines and columns count from 1, line 0 means the file as a whole.
 
-    Of options of one name on a command line, ``column`` is the number, and ``line`` is 0.
+    For options with the same name on a command line, ``column`` is the number of the option and ``line`` is
+    0.
 
-    ``odd`` is a character of the text that begins there: should the text turn out to be wrong, that is why.
+    ``odd`` is an odd character of the text that begins here: if the text is wrong, this character is the
+    cause.
     """
 
     file: str
@@ -55,7 +57,7 @@ class Place:
 
 @dataclass(frozen=True, order=True, slots=True)
 class Fault:
-    """One thing that is wrong at one place; `subject` is a phrase such as "block 'velocity'"."""
+    """One fault at one place; `subject` is a phrase such as "block 'velocity'"."""
 
     place: Place
     subject: str
@@ -68,7 +70,7 @@ class Fault:
         return on_one_line(f"{self.place}: {subject}{sentence(self.problem, self.remedy)}")
 
     def explained(self) -> Fault:
-        """Return the fault at the odd character of the text, if it holds one, with what to write for it."""
+        """Return the fault at the odd character of the text, with the remedy for it, if the text has one."""
         odd = self.place.odd
         if odd is None:
             return self
@@ -78,7 +80,7 @@ class Fault:
         return Fault(Place(self.place.file, line, column), self.subject, self.problem, remedy)
 
     def discreet(self) -> Fault:
-        """Return the fault without a word of its file, if that is one whose contents are none of ours."""
+        """Return the fault without any text of its file, if the file must not be quoted."""
         file = self.place.file
         if not self.place.line or not is_foreign(file):
             return self
@@ -88,7 +90,7 @@ class Fault:
 
 @dataclass(frozen=True, order=True, slots=True)
 class Doubt(Fault):
-    """What can be run, and is surely not what was meant."""
+    """A warning: the diagram runs, but this is surely not what was meant."""
 
     def __str__(self) -> str:
         """Return `file:line:column: warning: block 'x': what is odd; what would be right`."""
@@ -97,16 +99,16 @@ class Doubt(Fault):
 
 
 class DiagramError(QuadvisError):
-    """Everything that is wrong with a diagram, one fault a line in the order of the files."""
+    """All faults of a diagram, one a line, in the order of the files."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
-        """Keep the faults, sorted by place and without repetitions."""
+        """Keep the faults, sorted by place, without duplicates."""
         self.faults: list[Fault] = sorted({fault.explained().discreet() for fault in faults})
         super().__init__("\n".join(str(fault) for fault in self.faults))
 
 
 class RunError(QuadvisError):
-    """A run that had to stop: which block and port, at which time (s), and why."""
+    """A run that had to stop: the block, the port, the time (s) and the reason."""
 
     exit_code: ClassVar[int] = 1
 
@@ -120,9 +122,9 @@ class RunError(QuadvisError):
 
 
 class Faults(list[Fault]):
-    """The faults found so far; a check goes on after the first one, but not for ever.
+    """The faults found so far; a check goes on after the first fault, up to a limit.
 
-    A file that is wrong everywhere would otherwise cost minutes and pages: at `LIMIT` faults `append` raises.
+    At `LIMIT` faults `append` raises, because a file full of faults would cost minutes and pages.
     """
 
     LIMIT = 200
@@ -135,24 +137,24 @@ class Faults(list[Fault]):
         self._explained: set[str] = set()
 
     def append(self, fault: Fault) -> None:
-        """Keep a fault; raise `DiagramError` with all of them once there are too many to go on."""
+        """Keep a fault; raise `DiagramError` with all faults once they are too many."""
         super().append(fault)
         if len(self) >= self.LIMIT:
             raise DiagramError(self)
 
     def add(self, place: Place, problem: str, remedy: str = "", *, subject: str | None = None) -> None:
-        """Keep a fault about the present subject, or about the one given."""
+        """Keep a fault about the present subject, or about ``subject``."""
         self.append(Fault(place, self.subject if subject is None else subject, problem, remedy))
 
     def once(self, rule: str) -> str:
-        """Return a sentence that explains a rule the first time, and nothing after that."""
+        """Return a sentence that explains a rule the first time, and "" after that."""
         if rule in self._explained:
             return ""
         self._explained.add(rule)
         return rule
 
     def warn(self, place: Place, problem: str, remedy: str = "", *, subject: str | None = None) -> None:
-        """Keep a warning; it does not keep a diagram from running."""
+        """Keep a warning; the diagram can still run."""
         self.warnings.append(Doubt(place, self.subject if subject is None else subject, problem, remedy))
 
     def collect(

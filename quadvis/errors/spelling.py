@@ -1,4 +1,4 @@
-"""The word that was most likely meant by one that is unknown."""
+"""Find the known word that was most likely meant by an unknown one."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ def suggestion(word: str, candidates: Iterable[str]) -> str:
     return f"use {quoted(names[0])}" if len(names) == 1 else f"choose from {', '.join(map(quoted, names))}"
 
 
-# Costs of one slip, in tenths of a changed letter. Swapped neighbours are the likeliest slip of the hand.
+# Costs of one slip, in tenths of a changed letter. Swapped neighbours are the likeliest typing error.
 _EDIT, _SWAP, _PREFIX, _NO_GROUP, _OTHER_GROUP = 10, 7, 15, 2, 15
 _LONGEST = 64
 
 
 def closest(word: str, candidates: Iterable[str]) -> str | None:
-    """Return the candidate that was most likely meant by a mistyped word, or None when none is near.
+    """Return the candidate that was most likely meant by a mistyped word, or None if no candidate is near.
 
     Nearness is the edit distance with swapped neighbours counted as one slip; case and `-` for `_` do not
-    count, and a dotted name (`signal.derivative`) is also found by its last part alone. On equal terms the
-    same first letter wins, then the order of the candidates. Where none is near, a word that other programs
-    use for one of them is taken.
+    count, and a dotted name (`signal.derivative`) is also found by its last part alone. Of equally near
+    candidates the one with the same first letter wins, then the first one. If no candidate is near, a word of
+    other programs for one of the candidates counts.
     """
     if not 0 < len(word) <= _LONGEST:
         return None
@@ -50,7 +50,7 @@ def _plain(word: str) -> str:
 
 
 def _cost(word: str, candidate: str, limit: int) -> int | None:
-    """Return how unlikely it is that `candidate` was meant, or None if it is above the limit."""
+    """Return the cost of reading `word` as `candidate`, or None if it is above the limit."""
     whole = _distance(word, candidate, limit)
     if "." not in candidate:
         return whole
@@ -69,7 +69,7 @@ def _distance(a: str, b: str, limit: int) -> int | None:
     if short >= 3 and (a.startswith(b) or b.startswith(a)):
         cost = min(_PREFIX, _EDIT * (long - short))
         return cost if cost <= limit else None
-    # A word that shares no letter is another word, however short.
+    # A word that shares no letter is another word, even if it is short.
     limit = min(limit, _EDIT * max(1, (len(a) + 1) // 3), _EDIT * long - 1)
     letters, others = set(a), set(b)
     least = max(long - short, len(letters - others), len(others - letters))

@@ -1,6 +1,7 @@
-"""Words of other programs for what is called otherwise here: "sample_time" for a rate, "Mux" for a stack.
+"""Words of other programs for things that quadvis calls otherwise: "sample_time" for rate, "Mux" for stack.
 
-A word is looked up without case, blanks, `-` and `_`; what it stands for depends on what may stand there.
+A word is looked up without case, blanks, `-` and `_`; its meaning depends on the words that are allowed
+there.
 """
 
 from __future__ import annotations
@@ -83,6 +84,6 @@ for _ours, _theirs in _MEANT.items():
 
 
 def synonym(word: str, candidates: Collection[str]) -> str | None:
-    """Return the candidate for which other programs use this word, None if there is none."""
+    """Return the candidate for which other programs use this word, or None."""
     plain = re.sub(r"[-_ ]", "", word.rpartition(".")[2]).casefold()
     return next((ours for ours in _STANDS_FOR.get(plain, ()) if ours in candidates), None)

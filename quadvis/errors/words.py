@@ -1,15 +1,20 @@
-"""How messages are put together: problem and remedy, quoted texts, always one line."""
+"""The parts of messages: problem and remedy, quoted texts, counts, always on one line."""
 
 from __future__ import annotations
 
 
 def sentence(problem: str, remedy: str = "") -> str:
-    """Join what is wrong and what would be right."""
+    """Join a problem and its remedy."""
     return f"{problem}; {remedy}" if remedy else problem
 
 
+def counted(count: int, word: str) -> str:
+    """Return "1 row", "2 rows", "0 rows"."""
+    return f"{count} {word}" if count == 1 else f"{count} {word}s"
+
+
 def on_one_line(text: str) -> str:
-    """Return a text with everything written out that does not show, or would begin a new line."""
+    """Return a text with escapes for line breaks and for all characters that do not show."""
     return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 

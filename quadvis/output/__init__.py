@@ -1,1 +1,1 @@
-"""What is made of a run: log, verdicts, words, figures; and drawings of diagrams."""
+"""The results of a run - log, verdicts, words, figures - and drawings of diagrams."""

@@ -1,7 +1,7 @@
-"""Blank sheets for figures, the same whatever surrounds matplotlib.
+"""Blank sheets for figures, independent of the settings of matplotlib around them.
 
-A notebook's MPLBACKEND, somebody's matplotlibrc, styles that the caller has set: none of them changes a
-figure, keeps one from being drawn, or is changed by it. Sheets are drawn by Agg directly, without a backend.
+Neither MPLBACKEND of a notebook, nor a user's matplotlibrc, nor styles that the caller has set change or
+prevent a figure, and no figure changes them. Agg draws sheets directly, without a backend.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 RESOLUTION = 120  # dots an inch
 POINTS = 72.0  # an inch
-TYPEFACE = "DejaVu Sans"  # matplotlib's own, which comes with it
-_BACKEND = ("backend", "backend_fallback")  # reading or setting these would load it
+TYPEFACE = "DejaVu Sans"  # it comes with matplotlib
+_BACKEND = ("backend", "backend_fallback")  # reading or setting these would load a backend
 
 
 @contextmanager
@@ -43,7 +43,7 @@ def blank_sheet(width: float, height: float, style: Mapping[Any, Any], **more: A
 
 @lru_cache(4096)
 def text_width(text: str, size: float, *, bold: bool = False) -> float:
-    """Return how wide (inches) a text of a size (points) is on such a sheet."""
+    """Return the width (inches) of a text of a size (points) on such a sheet."""
     with _quiet():
         _matplotlib()
         from matplotlib.font_manager import FontProperties
@@ -55,8 +55,8 @@ def text_width(text: str, size: float, *, bold: bool = False) -> float:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Drop what matplotlib says about its surroundings and about letters that its typeface lacks."""
-    import logging  # here, since whoever checks a diagram draws no figure
+    """Drop matplotlib's warnings about its settings and about letters that its typeface lacks."""
+    import logging  # imported here, because a check of a diagram draws no figure
     import warnings
 
     logger = logging.getLogger("matplotlib")
@@ -71,7 +71,7 @@ def _quiet() -> Iterator[None]:
 
 
 def _matplotlib() -> ModuleType:
-    """Import matplotlib as always, so that its other users find it as they wish; else without rc file."""
+    """Import matplotlib with its usual settings, for its other users; if this fails, without an rc file."""
     if "matplotlib" not in sys.modules and not any(map(_is_no_file, _rc_files())):
         try:
             import matplotlib
@@ -88,7 +88,7 @@ def _matplotlib() -> ModuleType:
 
 
 def _forget() -> None:
-    """Take back what a failed import has left, except for compiled modules, which load but once."""
+    """Remove the modules of a failed import, except compiled modules, which load only once."""
     for name, module in list(sys.modules.items()):
         if f"{name}.".startswith("matplotlib.") and str(getattr(module, "__file__", "")).endswith(".py"):
             del sys.modules[name]
@@ -114,7 +114,7 @@ def _without_surroundings() -> Iterator[None]:
     os.environ["MATPLOTLIBRC"] = os.devnull
     folder = os.open(".", os.O_RDONLY) if os.path.exists("matplotlibrc") else None
     try:
-        if folder is not None:  # the file in the current folder comes before all others
+        if folder is not None:  # a file in the current folder has precedence
             os.chdir(os.path.dirname(os.path.abspath(__file__)))
         yield
     finally:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 
-LEAST = 20  # columns left for the words about a port, however narrow the terminal
+LEAST = 20  # least width in characters of the last column, even on a narrow terminal
 
 
 def table(rows: Sequence[Sequence[str]], width: int | None = None) -> list[str]:
-    """Return rows with aligned columns; empty columns take no room, and the last wraps at a width."""
+    """Return lines with aligned columns; empty columns are left out, the last wraps at the width."""
     if not rows:
         return []
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]

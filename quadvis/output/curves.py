@@ -1,4 +1,4 @@
-"""The curves of a panel, out of the recorded signals: one for each element, in the unit of the panel."""
+"""The curves of a panel from the recorded signals: one for each element, in the unit of the panel."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from quadvis.units import Unit, parse_units
 
 @dataclass(frozen=True)
 class Curve:
-    """The samples of one number in a stretch of the run, in the unit that is shown.
+    """The samples of one number in a stretch of the run, in the unit of the panel.
 
-    Between samples a ``held`` one stands still, others are joined by lines; ``before`` is what it held when
-    the stretch began. ``whole`` numbers are counts, levels and truths.
+    A ``held`` curve stands still between samples, the samples of other curves are joined by lines. ``before``
+    is the value held when the stretch begins. ``whole`` numbers are counts, levels and truth values.
     """
 
     label: str
@@ -35,7 +35,7 @@ class Curve:
 
 
 def panel_curves(recorded: Recorded, figure: Figure, panel: Panel) -> list[Curve]:
-    """Return a panel's curves over the figure's stretch of the run, in the unit that the panel shows."""
+    """Return a panel's curves over the figure's stretch of the run, in the unit of the panel."""
     found = [curve for trace in panel.traces for curve in _elements(recorded, trace)]
     if not found:
         raise QuadvisError(f"panel {quoted(panel.title)} has no signals; name one")

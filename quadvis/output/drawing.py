@@ -18,7 +18,7 @@ MARGIN, LINE, HEADER, ROW, INDENT, BETWEEN, ARROW = 24.0, 26.0, 38.0, 17.0, 7.0,
 _LONGEST_MARK = 28
 
 # Fill and line of the solver and of each task in the order of the legend: tints on which black text stays
-# legible, lines that the colour-blind can tell apart (after Okabe and Ito, darkened).
+# legible, lines that the colour-blind can distinguish (after Okabe and Ito, darkened).
 _SOLVER_COLOURS = ("#ffffff", "#222222")
 _TASK_COLOURS = (
     ("#dcecf8", "#005f9e"),
@@ -197,7 +197,7 @@ def _part_node(path: str, parts: dict[str, dict[str, Any]]) -> dict[str, Any]:
 
 
 def row_height(row: int) -> float:
-    """Return how far below the top of a box a row of ports lies."""
+    """Return the distance of a row of ports from the top of its box."""
     return HEADER + (row + 0.5) * ROW
 
 

@@ -1,4 +1,4 @@
-"""What is drawn of a run: figures of panels, panels of traces.
+"""The figures of a run: figures of panels, panels of traces.
 
 A diagram asks for figures under its key `figures`; without that there is one figure per block.
 """
@@ -18,7 +18,7 @@ from quadvis.units import Unit, parse_units
 
 @dataclass(frozen=True)
 class Trace:
-    """A signal or some of its elements, and what the legend calls it."""
+    """A signal or some of its elements, with its label in the legend."""
 
     signal: Wire
     label: str = ""
@@ -26,7 +26,7 @@ class Trace:
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes; without a unit it shows that of its first signal. The reference is in that unit."""
+    """One pair of axes; without a unit it has the unit of its first signal. The reference is in that unit."""
 
     traces: tuple[Trace, ...]
     title: str = ""
@@ -45,7 +45,7 @@ class Figure:
 
 
 def block_figures(recorded: Recorded) -> list[Figure]:
-    """Return a figure for every block, with a panel for every port, or for every unit in it."""
+    """Return a figure for every block, with a panel for every port, or for every unit of a port."""
     blocks: dict[str, list[Panel]] = {}
     for name, text in recorded.units.items():
         block, _, port = name.rpartition(".")

@@ -1,4 +1,4 @@
-"""What becomes of the rows of a run: some are judged and forgotten, some kept, the others wait in the log."""
+"""The rows of a run: some are judged and dropped, some kept in memory, the others read from the log."""
 
 from __future__ import annotations
 
@@ -13,41 +13,41 @@ from numpy.typing import NDArray
 
 from quadvis.errors import QuadvisError, quoted
 from quadvis.output.log_reader import read_log
-from quadvis.output.recording import Channel, Recording, Slots
+from quadvis.output.recording import RecordedBlock, Recording, Slots
 
 ALL = "*"
-PIECE = 1 << 16  # bytes of rows that are judged at a time
+PIECE = 1 << 16  # bytes of rows that are judged together
 
 
 class Judge(Protocol):
-    """What judges a run while it goes on."""
+    """A judge of a run, which takes rows as they come."""
 
     @property
     def names(self) -> Iterable[str]:
-        """The signals that it looks at."""
+        """The signals that are judged."""
 
     def take(self, name: str, number: int, rows: NDArray[Any]) -> None:
-        """Take rows of a signal; ``number`` counts those before, from the first row of the run."""
+        """Take rows of a signal; ``number`` is the number of rows before them since the start of the run."""
 
 
 class RowJudge:
-    """Hands the rows of a block to what judges them, some at a time."""
+    """Collects the rows of a block and hands them to the judging, many at a time."""
 
-    def __init__(self, channel: Channel, judging: Judge) -> None:
-        self._channel, self._judging = channel, judging
+    def __init__(self, block: RecordedBlock, judging: Judge) -> None:
+        self._block, self._judging = block, judging
         self._waiting = bytearray()
-        self._first = self._count = 0  # number of the first row that waits, and how many do
-        self._fields = []
+        self._first = self._count = 0  # number of the first waiting row, and count of waiting rows
+        self._ports = []
         start = 0
-        for field in channel.fields:
-            if channel.signal(field) in judging.names:
-                self._fields.append((channel.signal(field), field, start))
-            start += field.size
+        for port in block.ports:
+            if block.signal(port) in judging.names:
+                self._ports.append((block.signal(port), port, start))
+            start += port.size
 
     @property
     def names(self) -> list[str]:
         """The signals of the block that are judged."""
-        return [name for name, _, _ in self._fields]
+        return [name for name, _, _ in self._ports]
 
     def __call__(self, stamp: int, row: bytes) -> None:
         """Take the next row."""
@@ -57,22 +57,22 @@ class RowJudge:
             self.flush()
 
     def flush(self) -> None:
-        """Hand on what waits."""
-        slots = self._channel.slots(bytes(self._waiting), self._count)
-        for name, field, start in self._fields:
-            self._judging.take(name, self._first, field.rows(slots, start))
+        """Hand on the waiting rows."""
+        slots = self._block.slots(bytes(self._waiting), self._count)
+        for name, port, start in self._ports:
+            self._judging.take(name, self._first, port.rows(slots, start))
         self._first += self._count
         self._waiting.clear()
         self._count = 0
 
 
 class RunSignals(Recording):
-    """The signals of a run: those that a pattern names are in memory, the others are read from its log."""
+    """The signals of a run: signals that a pattern names are in memory, the others are read from the log."""
 
     def __init__(
-        self, channels: Sequence[Channel], ports: Mapping[str, str], patterns: Iterable[str]
+        self, blocks: Sequence[RecordedBlock], ports: Mapping[str, str], patterns: Iterable[str]
     ) -> None:
-        super().__init__(channels, ports)
+        super().__init__(blocks, ports)
         self.kept: set[int] = set()
         for pattern in patterns:
             self.kept |= self._named(pattern)
@@ -82,7 +82,7 @@ class RunSignals(Recording):
         self._read: Recording | None = None
 
     def _named(self, pattern: str) -> set[int]:
-        """Return the blocks that a pattern names by a signal, by themselves, or by the name of one signal."""
+        """Return the blocks that a pattern names by their signals, by themselves, or by one signal."""
         if pattern in self:
             return {self._find(pattern)[0]}
         found = {
@@ -90,18 +90,18 @@ class RunSignals(Recording):
             if fnmatchcase(name, pattern) or fnmatchcase(name.rpartition(".")[0], pattern)
         }  # fmt: skip
         if not found and pattern != ALL:
-            self._find(pattern)  # says what is wrong with it
+            self._find(pattern)  # raises an error that says what is wrong with the pattern
         return found
 
     def written(self, log: Path, loss: str) -> None:
-        """Say that the rows are in a log that is finished now, and what it lacks."""
+        """Note that the finished log holds the rows, and what it lacks."""
         self._log, self._loss = log, loss
         self._file = _identity(log)
 
-    def _arrays(self, channel: int) -> tuple[NDArray[np.int64], Slots]:
-        if channel in self.kept:
-            return super()._arrays(channel)
-        path = self.channels[channel].path.strip("/")
+    def _arrays(self, block: int) -> tuple[NDArray[np.int64], Slots]:
+        if block in self.kept:
+            return super()._arrays(block)
+        path = self.blocks[block].path.strip("/")
         if self._log is None:
             remedy = f"name it, as in keep=[{quoted(f'{path}.*')}], or write a log"
             raise QuadvisError(f"the rows of {quoted(path)} were not kept; {remedy}")
@@ -114,11 +114,11 @@ class RunSignals(Recording):
                     f"{problem}; keep the rows of {quoted(path)} in memory, or the log as it is"
                 )
             self._read = read_log(self._log)
-        return self._read.arrays(self.channels[channel].path)
+        return self._read.arrays(self.blocks[block].path)
 
 
 def _identity(path: Path) -> tuple[int, ...]:
-    """Return what changes when a file is written again; nothing if there is none."""
+    """Return numbers of a file that change when it is written again; () if it does not exist."""
     try:
         found = os.stat(path)
     except OSError:

@@ -1,10 +1,10 @@
 """Lay out large diagrams: boxes in columns, columns in bands like the lines of a text, wires between them.
 
-The engine in `elkjs` finds better pictures, but takes minutes for some hundred boxes and fails above. This
-one takes a time that grows with the diagram and no faster. It takes and gives the same graphs.
+The engine in `elkjs` gives better pictures, but takes minutes for some hundred boxes and fails for more. The
+time of this one grows only in proportion to the diagram. Both read and return the same graphs.
 
-A part is laid out by itself and then stands in its surroundings like a box, whose wires enter at its left
-side and leave at its right one. How the boxes of one level are placed and wired: see `quadvis.output.bands`.
+A part is laid out by itself and then stands in its surroundings like a box: wires enter at its left side and
+leave at its right side. `quadvis.output.bands` places and wires the boxes of one level.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class _Level:
             self.boxes.append(box)
 
     def trails(self, outer: list[tuple[_Level, Box]]) -> Iterator[tuple[str, list[tuple[_Level, Box]]]]:
-        """Yield by port the levels around it, the outermost first, with the box on each that it is in."""
+        """Yield each port with the levels around it, outermost first, and the box on each that holds it."""
         for box in self.boxes:
             trail = [*outer, (self, box)]
             if box.id in self.inner:
@@ -71,11 +71,11 @@ class _Level:
                 yield from ((port, trail) for port in box.ports)
 
     def net(self, port: str, source: Box | None) -> Net:
-        """Return what an output drives on this level; without a source it enters the part."""
+        """Return the net of an output on this level; a net without a source enters the part."""
         return self.nets.setdefault(port, Net(port, source))
 
     def measure(self) -> None:
-        """Place the boxes, those inside of parts first, and find the size."""
+        """Place the boxes, first those inside parts, and find the size."""
         for box in self.boxes:
             if level := self.inner.get(box.id):
                 level.measure()
@@ -88,7 +88,7 @@ class _Level:
             sheet.route(self.width)
 
     def _groups(self) -> Iterator[tuple[list[Box], list[Net]]]:
-        """Yield boxes that hang together with their nets; first those whose wires pass the frame."""
+        """Yield groups of connected boxes with their nets; first the groups whose wires pass the frame."""
         parent = {box.id: box.id for box in self.boxes}
 
         def root(name: str) -> str:
@@ -114,7 +114,7 @@ class _Level:
             yield group, nets.get(name, [])
 
     def _pack(self, sheets: list[Sheet]) -> tuple[float, float]:
-        """Put the sheets side by side on shelves; return the size of it all."""
+        """Put the sheets side by side on shelves; return the size of the whole."""
         area = sum(sheet.width * (sheet.height + GAP) for sheet in sheets)
         room = max([math.sqrt(area * ASPECT), *(sheet.width for sheet in sheets)])
         left, top, bottom, right = 0.0, self.top, self.top, self.least
@@ -127,7 +127,7 @@ class _Level:
         return right, bottom + EDGE
 
     def shapes(self, x: float, y: float) -> Iterator[Shape]:
-        """Yield all boxes in the coordinates of the picture, parts before what is in them."""
+        """Yield all boxes in the coordinates of the picture, each part before the boxes in it."""
         self.x, self.y = x, y
         for box in self.boxes:
             yield {"id": box.id, "x": x + box.x, "y": y + box.y, "width": box.width, "height": box.height}
@@ -136,19 +136,19 @@ class _Level:
 
 
 def _least_width(node: Shape) -> float:
-    """Return the width that the title of a part asks for."""
+    """Return the width that the title of a part needs."""
     wanted = str(node.get("layoutOptions", {}).get("elk.nodeSize.minimum", ""))
     found = re.match(r"\(([\d.]+),", wanted)
     return float(found[1]) if found else 0.0
 
 
 def _common(one: list[tuple[_Level, Box]], other: list[tuple[_Level, Box]]) -> int:
-    """Return the place of the innermost level that two ports share."""
+    """Return the index of the innermost level that two ports share."""
     return sum(a[0] is b[0] for a, b in zip(one, other, strict=False)) - 1
 
 
 def _take(trails: dict[str, list[tuple[_Level, Box]]], source: str, target: str) -> None:
-    """Take a wire into the nets of all levels that it passes."""
+    """Add a wire to the nets of all levels that it passes."""
     out, into = trails[source], trails[target]
     common = _common(out, into)
     for place, (level, box) in enumerate(out[common:], common):
@@ -176,7 +176,7 @@ def _moved(level: _Level, way: Iterable[Point]) -> Iterator[Point]:
 
 
 def _simplified(way: list[Point]) -> list[Point]:
-    """Leave out the corners where a way does not turn."""
+    """Leave out the corners at which the way does not turn."""
     kept = way[:1]
     for here, after in pairwise(way[1:]):
         before = kept[-1]

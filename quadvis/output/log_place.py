@@ -1,4 +1,4 @@
-"""Where a log goes if nothing is said: none takes the place of another diagram's, also side by side."""
+"""The default place of a log: no log replaces that of another diagram, even if both run at the same time."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pathlib import Path
 from quadvis.machine.files import LONGEST
 from quadvis.output.log_reader import log_facts
 
-SAME = ("name", "variant", "params")  # what the runs share whose logs replace each other
+SAME = ("name", "variant", "params")  # facts that are equal for runs whose logs replace each other
 
 
 def claim_log(folder: Path, name: str, facts: Mapping[str, str]) -> Path:
-    """Return where the log of a run with such facts goes: `name`, as far as files can be called so.
+    """Return the path of the log of a run with these facts: `name`, as far as a file can have this name.
 
-    If that is, or is about to be, the log of another diagram, variant or parameter set whose name comes to
-    the same, a few digits of a hash follow.
+    If the path is, or is about to be, the log of another diagram, variant or parameter set, a few digits of a
+    hash follow the name.
     """
     plain = re.sub(r"[^A-Za-z0-9_.-]+", "-", name).strip("-.")[:LONGEST] or "run"
     path = folder / f"{plain}.mcap"
@@ -30,7 +30,7 @@ def claim_log(folder: Path, name: str, facts: Mapping[str, str]) -> Path:
 
 
 def _is_new(path: Path) -> bool:
-    """Take a name that nothing has, before another run can; whoever writes the log tells if it cannot be."""
+    """Claim an unused name before another run can; the writer of the log reports if this is impossible."""
     try:
         os.close(os.open(path, os.O_CREAT | os.O_EXCL, 0o666))
     except FileExistsError:

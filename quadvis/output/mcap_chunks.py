@@ -10,14 +10,14 @@ CHUNK_HEAD = struct.Struct("<QQQII")  # first and last time, size unpacked, its 
 
 
 def packing_of(body: memoryview) -> str | None:
-    """Return by what a chunk is packed, "" if by nothing; None for what nobody can unpack."""
+    """Return the packing of a chunk, "" if it is not packed; None if the packing is unknown."""
     length = CHUNK_HEAD.unpack_from(body)[4]
     name = bytes(body[CHUNK_HEAD.size : CHUNK_HEAD.size + min(length, 8)])
     return name.decode() if name in (b"", b"lz4", b"zstd") and len(name) == length else None
 
 
 def unpacked(packing: str, packed: memoryview, size: int) -> bytes | None:
-    """Return what a chunk unpacks to, but no more than one byte above `size`; None if it is damaged."""
+    """Return the unpacked chunk, at most one byte more than `size`; None if it is damaged."""
     try:
         return (_unpack_lz4 if packing == "lz4" else _unpack_zstd)(bytes(packed), size + 1)
     except (ImportError, RuntimeError, EOFError, ValueError, MemoryError):
@@ -32,7 +32,7 @@ def _unpack_lz4(packed: bytes, most: int) -> bytes:
 def _unpack_zstd(packed: bytes, most: int) -> bytes:
     import zstandard
 
-    # What the format recommends that every decoder can hold, or what a frame of this size may ask for.
+    # The window that the format recommends for every decoder, or that a frame of this size may need.
     window = min(max(8 << 20, 1 << most.bit_length()), 1 << 31)
     parts = []
     try:

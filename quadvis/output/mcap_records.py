@@ -1,8 +1,8 @@
-"""The records of an MCAP file that may be cut, damaged, or made to harm: nothing in it is believed unchecked.
+"""Read the records of an MCAP file that may be cut, damaged or hostile: everything is checked before use.
 
-A record is a byte (what it is), its length in eight bytes, and its contents; a chunk holds records. Where a
-record is not what its own numbers say, the next one that is gets looked for. Lengths are compared with what
-is there before anything is copied, and what unpacks to much more than a log does is not unpacked.
+A record is a byte (its kind), its length in eight bytes, and its contents; a chunk holds records. Where a
+record contradicts its own numbers, the reader searches for the next sound record. It compares lengths with
+the data before it copies anything, and does not unpack data that would become much larger than a log.
 
 Format: https://mcap.dev/spec
 """
@@ -21,9 +21,9 @@ MAGIC = b"\x89MCAP0\r\n"
 HEADER, FOOTER, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX = 0x01, 0x02, 0x04, 0x05, 0x06, 0x07
 ATTACHMENT, METADATA, DATA_END, LAST, PRIVATE = 0x09, 0x0C, 0x0F, 0x0F, 0x80
 HEAD = struct.Struct("<BQ")
-FREE, RATIO = 4 << 20, 64  # bytes that any file may unpack to, and times its size
+FREE, RATIO = 4 << 20, 64  # bytes that any file may unpack to, plus a multiple of its size
 
-# Where a record can be recognised in the middle of anything: chunks, and what begins and ends a log.
+# Records that can be recognised in the middle of other data: chunks, and the first and last records of a log.
 KNOWN = re.compile(
     rb"\x06.{5}\0{3}.{28}(?:\0{4}|\x03\0{3}lz4|\x04\0{3}zstd)"
     rb"|\x0c.{5}\0{3}\x07\0{3}(?:quadvis|summary)"
@@ -34,28 +34,28 @@ KNOWN = re.compile(
 
 
 class BrokenError(ValueError):
-    """A record is not what its numbers say."""
+    """A record contradicts its own numbers."""
 
 
 @dataclass(frozen=True)
-class Attachment:
-    """A file inside the log."""
+class AttachmentRecord:
+    """A file inside the log: its name and contents."""
 
     name: str
     data: bytes
 
 
 @dataclass(frozen=True)
-class Metadata:
-    """Names and texts about the run."""
+class MetadataRecord:
+    """Names and texts about the run, under a common name."""
 
     name: str
     entries: dict[str, str]
 
 
 @dataclass(frozen=True)
-class Channel:
-    """What messages of a number are about."""
+class ChannelRecord:
+    """The description of all messages with one number: their topic and further entries."""
 
     number: int
     topic: str
@@ -63,7 +63,7 @@ class Channel:
 
 
 @dataclass(frozen=True, slots=True)
-class Message:
+class MessageRecord:
     """One row: the channel's number, the time (ns), and the bytes."""
 
     channel: int
@@ -71,13 +71,13 @@ class Message:
     data: bytes
 
 
-Record = Attachment | Metadata | Channel | Message
+Record = AttachmentRecord | MetadataRecord | ChannelRecord | MessageRecord
 
 
-class Scan:
-    """Goes through a file once; afterwards ``damaged`` pieces were left out, and ``ended`` tells of its end.
+class RecordScan:
+    """Reads a file once; then ``damaged`` counts the parts left out, ``ended`` says if it has its end.
 
-    ``whole`` is true if the part with the rows came to its end.
+    ``whole`` is true if the part with the rows is complete.
     """
 
     def __init__(self, data: bytes) -> None:
@@ -88,7 +88,7 @@ class Scan:
         self._left = FREE + RATIO * len(data)
 
     def records(self) -> Iterator[Record]:
-        """Yield what belongs to a log, in the order of the file."""
+        """Yield the records of a log, in the order of the file."""
         position = len(MAGIC)
         while not self.ended:
             try:
@@ -112,7 +112,7 @@ class Scan:
             yield from found
 
     def _frame(self, position: int) -> tuple[int, int]:
-        """Return what stands at a place and where it ends."""
+        """Return the kind of the record at a position, and the position of its end."""
         if position + HEAD.size > len(self.data):
             raise BrokenError
         kind, length = HEAD.unpack_from(self.data, position)
@@ -122,7 +122,7 @@ class Scan:
         return kind, end
 
     def _next(self, position: int) -> int | None:
-        """Return where the next record stands that can be nothing else."""
+        """Return the position of the next unmistakable record."""
         for found in KNOWN.finditer(self.data, position):
             try:
                 kind, end = self._frame(found.start())
@@ -133,13 +133,13 @@ class Scan:
         return None
 
     def _is_end(self, footer: memoryview, end: int) -> bool:
-        """Return whether the file ends here, and its index is what was written."""
+        """Return whether the file ends here with a sound index."""
         start, _, crc = struct.unpack("<QQI", footer)
         index = self.data[start : end - 4] if start else b""
         return bytes(self.data[end : end + len(MAGIC)]) == MAGIC and (not crc or zlib.crc32(index) == crc)
 
     def _contents(self, body: memoryview) -> memoryview:
-        """Return the records of a chunk; BrokenError if they are not what they were, or too many."""
+        """Return the records of a chunk, unpacked; BrokenError if they are damaged or too large."""
         size, crc = CHUNK_HEAD.unpack_from(body)[2:4]
         data = self._unpacked(body)
         if data is None or len(data) != size or (crc and zlib.crc32(data) != crc):
@@ -147,22 +147,22 @@ class Scan:
         return memoryview(data)
 
     def _cut_chunk(self, position: int) -> Iterator[Record]:
-        """Yield the records at the beginning of a chunk that the file ends in."""
+        """Yield the first records of a chunk that is cut off by the end of the file."""
         body = self.data[position + HEAD.size :]
         if self.data[position : position + 1] != bytes([CHUNK]) or len(body) < CHUNK_HEAD.size:
             return
         if HEAD.unpack_from(self.data, position)[1] <= len(body):
-            return  # it is all there, but not what it was
+            return  # the chunk is complete but damaged
         packing = packing_of(body)
         if packing is None or len(body) < CHUNK_HEAD.size + len(packing) + 8:
             return
         try:
             yield from _inside(memoryview(self._unpacked(body) or b""))
         except BrokenError:
-            return  # there the file ends
+            return  # the file ends here
 
     def _unpacked(self, body: memoryview) -> bytes | memoryview | None:
-        """Return the contents of a chunk, or as much as there is; None if it is damaged or too large."""
+        """Return the contents of a chunk, as far as they exist; None if they are damaged or too large."""
         size, packing = CHUNK_HEAD.unpack_from(body)[2], packing_of(body)
         packed = body[CHUNK_HEAD.size + len(packing or "") + 8 :]
         if not packing:
@@ -174,7 +174,7 @@ class Scan:
 
 
 def _check(kind: int, body: memoryview) -> None:
-    """Raise BrokenError if the lengths inside a record are not those of the record."""
+    """Raise BrokenError if the lengths inside a record contradict the length of the record."""
     if kind == CHUNK:
         packing = packing_of(body) if len(body) >= CHUNK_HEAD.size else None
         start = CHUNK_HEAD.size + len(packing or "")
@@ -199,7 +199,7 @@ def _check(kind: int, body: memoryview) -> None:
 
 
 def _inside(data: memoryview) -> Iterator[Record]:
-    """Yield the records of a chunk's contents; BrokenError where one is not whole."""
+    """Yield the records of a chunk's contents; BrokenError at an incomplete record."""
     position = 0
     while position < len(data):
         if position + HEAD.size > len(data):
@@ -213,27 +213,27 @@ def _inside(data: memoryview) -> Iterator[Record]:
 
 
 def _read(kind: int, body: memoryview) -> Iterator[Record]:
-    """Yield the record if it is one that a log needs; BrokenError if it contradicts itself."""
+    """Yield the record if a log needs this kind; BrokenError if it contradicts itself."""
     if kind == MESSAGE:
         if len(body) < 22:
             raise BrokenError
         channel, _, time = struct.unpack_from("<HIQ", body)
-        yield Message(channel, time, bytes(body[22:]))
+        yield MessageRecord(channel, time, bytes(body[22:]))
     elif kind == CHANNEL:
         number, _ = struct.unpack("<HH", _slice(body, 0, 4))
         topic, place = _text(body, 4)
         _, place = _text(body, place)
-        yield Channel(number, topic, _entries(body, place))
+        yield ChannelRecord(number, topic, _entries(body, place))
     elif kind == METADATA:
         name, place = _text(body, 0)
-        yield Metadata(name, _entries(body, place))
+        yield MetadataRecord(name, _entries(body, place))
     elif kind == ATTACHMENT:
         name, place = _text(body, 16)
         _, place = _text(body, place)
         length = int.from_bytes(_slice(body, place, 8), "little")
         if place + 8 + length + 4 != len(body):
             raise BrokenError
-        yield Attachment(name, bytes(body[place + 8 : place + 8 + length]))
+        yield AttachmentRecord(name, bytes(body[place + 8 : place + 8 + length]))
 
 
 def _slice(body: memoryview, start: int, length: int) -> memoryview:
@@ -243,7 +243,7 @@ def _slice(body: memoryview, start: int, length: int) -> memoryview:
 
 
 def _text(body: memoryview, place: int) -> tuple[str, int]:
-    """Return a text with its length before it, and where it ends."""
+    """Return a text that follows its own length, and the position of its end."""
     length = int.from_bytes(_slice(body, place, 4), "little")
     try:
         return bytes(_slice(body, place + 4, length)).decode(), place + 4 + length
@@ -252,7 +252,7 @@ def _text(body: memoryview, place: int) -> tuple[str, int]:
 
 
 def _entries(body: memoryview, place: int) -> dict[str, str]:
-    """Return pairs of texts, which fill the rest of a record."""
+    """Return the pairs of texts that fill the rest of a record."""
     length = int.from_bytes(_slice(body, place, 4), "little")
     place += 4
     if place + length != len(body):

@@ -1,4 +1,4 @@
-"""One pair of axes: curves that can be told apart, and a legend that fits above them."""
+"""One pair of axes: distinguishable curves, and a legend that fits above them."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from quadvis.output.style import COLOURS, DASHES, POINT, STYLE, fitted, measure,
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MOST_CURVES = len(COLOURS) * len(DASHES)  # that a legend can name
-FEW_SAMPLES = 40  # that deserve a mark each
-LEAST_LABEL = 1.1  # inches; labels are not cut shorter to have one column more
-ROWS_INSIDE = 4  # rows that a legend may have before its labels are made shorter
-ROOM_INSIDE = 5.0  # times the size of its letters; so much of a legend fits into the height of a panel
-LINE = 1.25  # from line to line, in that size
-BESIDE, BETWEEN = (  # inches: what a label has beside it, and columns between them
+MOST_CURVES = len(COLOURS) * len(DASHES)  # curves that a legend can name
+FEW_SAMPLES = 40  # up to so many samples each one gets a mark
+LEAST_LABEL = 1.1  # inches; labels are not cut below this length to gain a column
+ROWS_INSIDE = 4  # rows of a legend above which its labels are made shorter
+ROOM_INSIDE = 5.0  # times the size of the letters: the height of a legend for which a panel has room
+LINE = 1.25  # distance of lines, times the size of the letters
+BESIDE, BETWEEN = (  # inches: the width of a label's sample line, and of the gap between columns
     STYLE["legend.fontsize"] * POINT * factor
     for factor in (
         STYLE["legend.handlelength"] + STYLE["legend.handletextpad"],
         STYLE["legend.columnspacing"],
     )
 )
-MARGIN = 0.95  # inches beside the axes: numbers, unit, and the space to the neighbour
+MARGIN = 0.95  # inches beside the axes, for numbers, unit, and the gap to the neighbour
 
 
 @dataclass(frozen=True)
 class Legend:
-    """The labels of the curves as they fit, in columns under a title; none if there are too many to name.
+    """The labels of the curves, cut to fit, in columns under a title; without labels if there are too many.
 
-    ``height`` (inches) is what it takes beyond what a panel has room for.
+    ``height`` (inches) is the height that it needs in addition to the room of a panel.
     """
 
     title: str
@@ -47,7 +47,7 @@ class Legend:
 
 
 def legend_of(title: str, curves: Sequence[Curve], reference: float | None, room: float) -> Legend:
-    """Return the legend of a panel that is so wide (inches), its margin included."""
+    """Return the legend of a panel whose width, margin included, is ``room`` (inches)."""
     size, head_size = STYLE["legend.fontsize"], STYLE["legend.title_fontsize"]
     room -= MARGIN
     names, notes = [curve.label for curve in curves], [_note(curve, reference) for curve in curves]
@@ -70,7 +70,7 @@ def legend_of(title: str, curves: Sequence[Curve], reference: float | None, room
 
 
 def _columns(names: Sequence[str], notes: Sequence[str], room: float) -> tuple[int, bool]:
-    """Return in how many columns labels stand, and whether some are broken, to save rows or for room."""
+    """Return the number of columns of labels, and whether some labels are broken into two lines."""
     width = measure(STYLE["legend.fontsize"])
     widest = max((width(name + note) for name, note in zip(names, notes, strict=True)), default=0.0)
 
@@ -84,13 +84,13 @@ def _columns(names: Sequence[str], notes: Sequence[str], room: float) -> tuple[i
 
 
 def _shared(names: Sequence[str]) -> str:
-    """Return what all names begin with, up to the last joint of a signal's name."""
+    """Return the common beginning of all names, up to the last joint of a signal's name."""
     alike = takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
     return re.sub(r"[^./\[]*$", "", "".join(letters[0] for letters in alike)).rstrip("[")
 
 
 def _note(curve: Curve, reference: float | None) -> str:
-    """Return the RMS of a curve's distance from the reference, if there is one."""
+    """Return the RMS of a curve's distance from the reference as text; "" without a reference."""
     distance = curve.values[np.isfinite(curve.values)] - (reference or 0.0)
     if reference is None or curve.whole or not distance.size:
         return ""
@@ -100,7 +100,7 @@ def _note(curve: Curve, reference: float | None) -> str:
 
 
 def _label(name: str, note: str, room: float) -> str:
-    """Return a name in two lines at most, and the note behind it or below."""
+    """Return a name in two lines at most, with the note after it or below it."""
     width = measure(STYLE["legend.fontsize"])
     label = fitted(name, room, width)
     if width(label.rpartition("\n")[2] + note) <= room:
@@ -132,17 +132,17 @@ def draw_panel(
         words = f"{len(curves)} signals, from dark to light"
         axes.set_title("\n".join(filter(None, (legend.title, words))), loc="left")
         return
-    # Above the axes, so that it never hides a curve; the panel's title heads it.
+    # The legend stands above the axes, so that it never hides a curve; the panel's title is its heading.
     made = axes.legend(
         handles, [" "] * len(handles), title=legend.title or None, alignment="left", loc="lower left",
         bbox_to_anchor=(0.0, 1.0), ncols=legend.columns,
     )  # fmt: skip
     for text, label in zip(made.get_texts(), legend.labels, strict=True):
-        text.set_text(label)  # not above, where one that begins with '_' is left out
+        text.set_text(label)  # set here, because matplotlib leaves out labels that begin with '_'
 
 
 def _look(number: int, count: int) -> dict[str, Any]:
-    """Return what a curve among so many looks like; no two look alike."""
+    """Return the style of a curve out of ``count``; no two curves look alike."""
     if count <= MOST_CURVES:
         dashes, colour = divmod(number, len(COLOURS))
         return {"color": COLOURS[colour], "linestyle": DASHES[dashes]}
@@ -152,7 +152,7 @@ def _look(number: int, count: int) -> dict[str, Any]:
 
 
 def _draw_curve(axes: Axes, curve: Curve, start: float, end: float, look: dict[str, Any]) -> Any:
-    """Draw a curve; a held one from where the stretch begins to the last sample of all (s; NaN if none)."""
+    """Draw a curve; a held curve reaches from the start of the stretch to ``end``, the last sample."""
     times, values = curve.times, curve.values
     few = np.count_nonzero(np.isfinite(values)) <= FEW_SAMPLES
     marks = list(range(len(times)))

@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from quadvis.output.log_reader import Log
 
 HEIGHT = 3.6  # inches of a row
-TITLE = 0.5  # inches for the title of a picture, and for each line more half of it
-LONGEST_NAME = 200  # bytes of a file's name before its number and ending
-SIDE = 0.5  # inches that a title leaves free
+TITLE = 0.5  # inches for the title of a picture; each further line needs half of it
+LONGEST_NAME = 200  # bytes of a file's name without its number and suffix
+SIDE = 0.5  # inches that stay free beside a title
 
 
 def plot_log(log: Log, figures: Sequence[Figure], output: Path | None = None) -> list[Path]:
-    """Draw figures of a log, or one per block if there are none; return the PNG files.
+    """Draw figures of a log, or one for each block if none are given; return the PNG files.
 
     They are in ``output`` or in a folder beside the log. QuadvisError if the log lacks signals.
     """
@@ -44,8 +44,8 @@ def plot_figures(
 ) -> list[Path]:
     """Draw every figure as `<number>-<title>.png` in `folder` and return the files.
 
-    QuadvisError names, before anything is drawn, all signals that are not there or do not fit their panel;
-    files that are `inputs`, or no pictures, are not replaced.
+    Before anything is drawn, QuadvisError names all signals that do not exist or do not fit their panel.
+    Files that are `inputs`, or that are no pictures, are not replaced.
     """
     found: list[tuple[Figure, list[list[Curve]]]] = []
     problems: list[str] = []
@@ -77,7 +77,7 @@ def _file_name(title: str) -> str:
     name = re.sub(r"\W+", "-", title.lower()).strip("-")[:60]
     try:
         os.fsencode(name)
-    except UnicodeError:  # the system's names have no such letters
+    except UnicodeError:  # the names of the system cannot hold these letters
         name = re.sub(r"[^a-z0-9_]+", "-", name).strip("-")
     while len(os.fsencode(name)) > LONGEST_NAME:
         name = name[:-1]
@@ -90,7 +90,7 @@ def _draw(figure: Figure, panels: list[list[Curve]], path: Path, inputs: Sequenc
     pairs = list(zip(figure.panels, panels, strict=True))
     legends = [legend_of(panel.title, curves, panel.reference, width / columns) for panel, curves in pairs]
     title = fitted(figure.title, width - SIDE, measure(STYLE["figure.titlesize"], bold=True), lines=3)
-    # A row is as high as its highest legend asks for, so that the axes keep their height.
+    # The highest legend of a row decides the height of the row, so that all axes have the same height.
     rows = [legends[start : start + columns] for start in range(0, len(legends), columns)]
     heights = [HEIGHT + max(legend.height for legend in row) for row in rows]
     height = TITLE * (1.0 + 0.5 * title.count("\n")) + sum(heights)

@@ -1,4 +1,4 @@
-"""Recorded signals in memory: rows of blocks as they lie in the engine's memory, and signals by name."""
+"""Recorded signals in memory: rows of blocks, copied from the engine's memory, and signals by name."""
 
 from __future__ import annotations
 
@@ -34,18 +34,18 @@ class Recorded(Protocol):
         """Return the rows of a signal."""
 
     def times(self, name: str) -> NDArray[np.float64]:
-        """Return the times (s) of its rows."""
+        """Return the times (s) of a signal's rows."""
 
     def rate(self, name: str) -> str:
-        """Return the name of the rate at which its block works; "" if that is not known."""
+        """Return the name of the rate of a signal's block; "" if it is not known."""
 
     def stamps(self, name: str) -> NDArray[np.int64]:
         """Return the stamps (ns) of its rows."""
 
 
 @dataclass(frozen=True)
-class Field:
-    """One output port in a log: its type ("float64", "int64" or "bool"), shape and unit."""
+class RecordedPort:
+    """One output port in a recording: its type ("float64", "int64" or "bool"), shape and unit."""
 
     name: str
     type: str = "float64"
@@ -54,42 +54,42 @@ class Field:
 
     @property
     def size(self) -> int:
-        """How many slots it takes: one for every element."""
+        """The number of its slots: one for every element."""
         return math.prod(self.shape)
 
     def rows(self, slots: Slots, start: int) -> NDArray[Any]:
-        """Return its rows, (N, *shape), out of those of its block, (N, slots), where it begins at a slot."""
+        """Return the port's rows (N, *shape) from its block's rows (N, slots); `start` is its first slot."""
         values = slots[:, start : start + self.size].view(SLOT_TYPES[self.type])
         return (values != 0 if self.type == "bool" else values).reshape(len(slots), *self.shape)
 
 
 @dataclass(frozen=True)
-class Channel:
-    """One logged block: its path ("/vision/detector"), outputs in the order of memory, and rate."""
+class RecordedBlock:
+    """One recorded block: its path ("/vision/detector"), its ports in the order of memory, its rate."""
 
     path: str
-    fields: tuple[Field, ...]
+    ports: tuple[RecordedPort, ...]
     rate: str = ""
 
     @property
     def size(self) -> int:
-        """Bytes in a row."""
-        return SLOT * sum(field.size for field in self.fields)
+        """The bytes of a row."""
+        return SLOT * sum(port.size for port in self.ports)
 
-    def signal(self, field: Field) -> str:
-        """Return a field's name among all signals, such as "vision/detector.centres"."""
-        return f"{self.path.strip('/')}.{field.name}"
+    def signal(self, port: RecordedPort) -> str:
+        """Return a port's name among all signals, such as "vision/detector.centres"."""
+        return f"{self.path.strip('/')}.{port.name}"
 
     def slots(self, rows: Buffer, count: int) -> Slots:
-        """Return so many rows that lie one after another as (N, slots)."""
+        """Return `count` rows that lie one after another as an array (N, slots)."""
         return np.frombuffer(rows, np.dtype("<i8")).reshape(count, self.size // SLOT)
 
 
 class Rows:
     """The rows of one block, packed, with their stamps (ns)."""
 
-    def __init__(self, channel: Channel) -> None:
-        self._channel = channel
+    def __init__(self, block: RecordedBlock) -> None:
+        self._block = block
         self._stamps = array("q")
         self._bytes = bytearray()
         self._whole: tuple[NDArray[np.int64], Slots] | None = None
@@ -100,16 +100,16 @@ class Rows:
         self._bytes += row
 
     def arrays(self) -> tuple[NDArray[np.int64], Slots]:
-        """Return the stamps (N,) and the rows (N, slots); nothing is copied until rows come after that."""
+        """Return the stamps (N,) and the rows (N, slots) without a copy; further rows go to new arrays."""
         if self._whole is None or self._stamps:
             stamps = np.frombuffer(self._stamps, np.int64)
-            slots = self._channel.slots(self._bytes, len(stamps))
+            slots = self._block.slots(self._bytes, len(stamps))
             if self._whole is not None:
                 stamps = np.concatenate((self._whole[0], stamps))
                 slots = np.concatenate((self._whole[1], slots))
             for whole in (stamps, slots):
                 whole.flags.writeable = False
-            # What is handed out can grow no more: the next rows begin anew.
+            # The arrays that were returned cannot grow: the next rows begin new ones.
             self._stamps, self._bytes, self._whole = array("q"), bytearray(), (stamps, slots)
         return self._whole
 
@@ -117,33 +117,33 @@ class Rows:
 class Recording:
     """Signals in memory: `recording["plant.position"]` is an array with a leading time axis.
 
-    A name may have an index, `"plant.position[0:2]"`, and may be a port of a part: `ports` says what is
-    behind those.
+    A name may have an index, `"plant.position[0:2]"`, and may be a port of a part: `ports` names the source
+    of each.
     """
 
     def __init__(
-        self, channels: Iterable[Channel] = (), ports: Mapping[str, str] = MappingProxyType({})
+        self, blocks: Iterable[RecordedBlock] = (), ports: Mapping[str, str] = MappingProxyType({})
     ) -> None:
         """Begin without rows."""
-        self.channels: list[Channel] = []
+        self.blocks: list[RecordedBlock] = []
         self.ports = ports
         self._rows: list[Rows] = []
-        self._signals: dict[str, tuple[int, int, Field]] = {}
-        for channel in channels:
-            self.add(channel)
+        self._signals: dict[str, tuple[int, int, RecordedPort]] = {}
+        for block in blocks:
+            self.add(block)
 
-    def add(self, channel: Channel) -> None:
-        """Make room for the rows of one more block."""
-        index, start = len(self.channels), 0
-        self.channels.append(channel)
-        self._rows.append(Rows(channel))
-        for field in channel.fields:
-            self._signals[channel.signal(field)] = (index, start, field)
-            start += field.size
+    def add(self, block: RecordedBlock) -> None:
+        """Add a block whose rows will follow."""
+        index, start = len(self.blocks), 0
+        self.blocks.append(block)
+        self._rows.append(Rows(block))
+        for port in block.ports:
+            self._signals[block.signal(port)] = (index, start, port)
+            start += port.size
 
-    def append(self, channel: int, time: int, row: Buffer) -> None:
-        """Keep one row: the outputs of `channels[channel]` at `time` (ns) as in memory."""
-        self._rows[channel].append(time, row)
+    def append(self, block: int, time: int, row: Buffer) -> None:
+        """Keep one row: the outputs of `blocks[block]` at `time` (ns) as in memory."""
+        self._rows[block].append(time, row)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -153,7 +153,7 @@ class Recording:
     @property
     def units(self) -> dict[str, str]:
         """The unit of every signal."""
-        return {name: field.unit for name, (_, _, field) in self._signals.items()}
+        return {name: port.unit for name, (_, _, port) in self._signals.items()}
 
     def stamps(self, name: str) -> NDArray[np.int64]:
         """Return the stamps (ns) of a signal's N rows: exact times, rounded down."""
@@ -164,13 +164,13 @@ class Recording:
         return self.stamps(name) / 1e9
 
     def rate(self, name: str) -> str:
-        """Return the name of the rate at which a signal's block works; "" if that is not known."""
-        return self.channels[self._find(name)[0]].rate
+        """Return the name of the rate of a signal's block; "" if it is not known."""
+        return self.blocks[self._find(name)[0]].rate
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         """Return a signal of N rows, shape (N, *shape of the port): float64, int64 or bool."""
-        channel, start, field, index = self._find(name)
-        return field.rows(self._arrays(channel)[1], start)[(slice(None), *index)]
+        block, start, port, index = self._find(name)
+        return port.rows(self._arrays(block)[1], start)[(slice(None), *index)]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._signals)
@@ -189,18 +189,18 @@ class Recording:
         return f"<{type(self).__name__} of {len(self)} signals>"
 
     def arrays(self, path: str) -> tuple[NDArray[np.int64], Slots]:
-        """Return the stamps (ns) and the rows of a block by its channel's path; none if it has none."""
-        for index, channel in enumerate(self.channels):
-            if channel.path == path:
+        """Return the stamps (ns) and the rows of a block by its path; none if the recording lacks it."""
+        for index, block in enumerate(self.blocks):
+            if block.path == path:
                 return self._arrays(index)
         return np.zeros(0, np.int64), np.zeros((0, 0), np.int64)
 
-    def _arrays(self, channel: int) -> tuple[NDArray[np.int64], Slots]:
+    def _arrays(self, block: int) -> tuple[NDArray[np.int64], Slots]:
         """Return the stamps and the rows of a block."""
-        return self._rows[channel].arrays()
+        return self._rows[block].arrays()
 
-    def _find(self, name: str) -> tuple[int, int, Field, Index]:
-        """Return the block, first slot, port and index that a name means; QuadvisError if it means none."""
+    def _find(self, name: str) -> tuple[int, int, RecordedPort, Index]:
+        """Return the block, first slot, port and index of a name; QuadvisError if no signal has this name."""
         if name in self._signals:
             return *self._signals[name], ()
         source, index = self._source(name)
@@ -211,16 +211,16 @@ class Recording:
             some = f"there are {', '.join(self.names[:8])}, ..." if self._signals else "nothing was recorded"
             remedy = suggestion(plain, [*self._signals, *self.ports]) or some
             raise QuadvisError(f"there is no signal {quoted(name)}; {remedy}")
-        channel, start, field = self._signals[source]
+        block, start, port = self._signals[source]
         try:
-            selected(field.shape, index)
+            selected(port.shape, index)
         except IndexError:
-            shape = f"the shape {list(field.shape)}, count from 0" if field.shape else "one element only"
+            shape = f"the shape {list(port.shape)}, count from 0" if port.shape else "one element only"
             raise QuadvisError(f"there is no {quoted(name)}: {quoted(source)} has {shape}") from None
-        return channel, start, field, index
+        return block, start, port, index
 
     def _source(self, name: str) -> tuple[str, Index]:
-        """Return the block's port that a name means, and which part of it."""
+        """Return the name of the block's port that a name means, and the index of its elements."""
         named = read_name(name)
         if named is None:
             return name, ()

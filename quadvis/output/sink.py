@@ -1,4 +1,4 @@
-"""A file that a thread of its own writes: whoever fills it does not wait for the disk, and outlives it."""
+"""A file that its own thread writes: the run that fills it never waits for the disk, and survives it."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from typing import BinaryIO
 
 from quadvis.machine.files import reason
 
-ROOM = 8 << 20  # bytes that may wait for the disk
-HUNG = 5.0  # s after which a disk that takes nothing at all is given up at the end
+ROOM = 8 << 20  # bytes that may wait to be written
+HUNG = 5.0  # s without any progress of the disk after which `drain` gives up
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Bytes that are written together, and what is in them: so many rows from a stamp (ns) on."""
+    """Bytes that are written together, with the number of their rows and the stamp (ns) of the first."""
 
     data: bytes
     rows: int = 0
@@ -26,14 +26,14 @@ class Batch:
 
 
 class Sink:
-    """Takes what a file is made of, as a binary stream; `hand_on` gives it to the thread as one batch.
+    """A binary stream that takes the contents of a file; `hand_on` gives them to the thread as one batch.
 
-    When the disk refuses, `failure` says why, and nothing is written any more: the file ends with the last
-    whole batch. `lost` counts the rows that are not in it, from `lost_from` (ns) on.
+    When the disk refuses, `failure` says why, and writing ends: the file ends with the last whole batch.
+    `lost` counts the rows that are missing from `lost_from` (ns) on.
     """
 
     def __init__(self, file: BinaryIO) -> None:
-        """Write to a file that is open and empty, and close it in the end."""
+        """Write to an open, empty file, and close it at the end."""
         self.failure = ""
         self.lost = 0
         self.lost_from: int | None = None
@@ -41,7 +41,7 @@ class Sink:
         self._parts: list[bytes] = []
         self._taken = 0
         self._queue: deque[Batch] = deque()
-        self._waiting = self._written = self._whole = 0  # bytes; the last are those of whole batches
+        self._waiting = self._written = self._whole = 0  # in bytes; `_whole` counts whole batches only
         self._ending = False
         self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._work, name="log", daemon=True)
@@ -54,14 +54,14 @@ class Sink:
         return len(data)
 
     def tell(self) -> int:
-        """Return how many bytes were taken in all."""
+        """Return the number of bytes taken so far."""
         return self._taken
 
     def flush(self) -> None:
         """Do nothing: batches are ended by `hand_on`."""
 
     def hand_on(self, rows: int = 0, first: int = 0) -> None:
-        """Hand what was taken to the thread as one batch, in which there are so many rows from a stamp on."""
+        """Hand the bytes taken to the thread as one batch; `first` is the stamp (ns) of its first row."""
         batch = Batch(b"".join(self._parts), rows, first)
         self._parts.clear()
         with self._changed:
@@ -73,25 +73,25 @@ class Sink:
                 self._changed.notify_all()
 
     def lose(self, rows: int, first: int) -> None:
-        """Count rows that do not get into the file."""
+        """Count rows that are left out of the file."""
         if rows:
             self.lost += rows
             self.lost_from = first if self.lost_from is None else min(first, self.lost_from)
 
     @property
     def full(self) -> bool:
-        """Whether so much waits for the disk that nothing should be added, or nothing is written any more."""
+        """True if too many bytes wait for the disk, or if writing has ended."""
         return self._waiting > ROOM or bool(self.failure)
 
     def wait_for_room(self, longest: float) -> float:
-        """Wait until there is room, but no longer than so many seconds; return how long it took."""
+        """Wait until there is room, at most `longest` (s); return the time that it took (s)."""
         began = monotonic()
         with self._changed:
             self._changed.wait_for(lambda: self._waiting <= ROOM or bool(self.failure), longest)
         return monotonic() - began
 
     def drain(self) -> None:
-        """Wait until all is with the operating system, or until the disk has taken nothing for `HUNG` s."""
+        """Wait until the operating system has all bytes, or until the disk has taken none for `HUNG` s."""
         with self._changed:
             while self._waiting and not self.failure:
                 before = self._written
@@ -100,7 +100,7 @@ class Sink:
                     self._give_up("the disk takes nothing any more")
 
     def close(self) -> None:
-        """Write what waits, and close the file; a disk that hangs keeps it."""
+        """Write the waiting bytes and close the file; if the disk hangs, the file stays open."""
         self.drain()
         with self._changed:
             self._ending = True
@@ -117,7 +117,7 @@ class Sink:
             try:
                 self._put(batch.data)
             except OSError as error:
-                # A part of a batch is of no use, and would make the count of what is lost wrong.
+                # Part of a batch is useless, and would make the count of lost rows wrong.
                 with suppress(OSError):
                     os.ftruncate(self._file.fileno(), self._whole)
                 with self._changed:
@@ -143,7 +143,7 @@ class Sink:
                 self._changed.notify_all()
 
     def _give_up(self, why: str) -> None:
-        """Write nothing any more; called with the lock held."""
+        """End writing; called with the lock held."""
         self.failure = self.failure or why
         while self._queue:
             batch = self._queue.popleft()

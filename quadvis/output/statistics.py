@@ -1,8 +1,8 @@
-"""Statistics of samples that come piece by piece, to the bit those of all samples at once.
+"""Statistics of samples that come piece by piece, equal to the bit to those of all samples together.
 
-Samples are (N, elements). RMS, mean and the extremes are over all elements of all samples together, ``max``
-is the largest magnitude; ``count`` is that of samples of which any element is not 0; ``final`` is the last
-sample, element by element. A NaN among the samples makes all but ``final`` NaN.
+Samples are (N, elements). RMS, mean and the extremes are over all elements of all samples together. ``max``
+is the largest magnitude, ``count`` the number of samples with any element other than 0, ``final`` the last
+sample, element by element. A NaN among the samples makes every statistic but ``final`` NaN.
 """
 
 from __future__ import annotations
@@ -15,28 +15,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 Samples = NDArray[np.float64]
-Value = float | tuple[float, ...]  # of several elements, one for each
+Value = float | tuple[float, ...]  # a tuple has one number for each element
 
-COUNT, FINAL = "count", "final"  # the one without a unit, and the one that has a value for each element
+COUNT, FINAL = "count", "final"  # COUNT has no unit; FINAL has a value for each element
 
 
 class Statistic(Protocol):
-    """Takes samples as they come; none of them may be empty. Before the first its value is NaN."""
+    """Takes samples as they come, never an empty piece. Before the first samples its value is NaN."""
 
     def add(self, samples: Samples) -> None:
         """Take more samples."""
 
     @property
     def value(self) -> Value:
-        """What the samples so far give."""
+        """The statistic of the samples so far."""
 
 
-class Sum:
-    """The sum of ``size`` numbers, to the bit the one that numpy makes of them in one array.
+class RunningSum:
+    """The sum of ``size`` numbers, equal to the bit to numpy's sum of one array with all of them.
 
-    To lose few digits numpy adds the sums of two halves, each a sum of two halves itself. Halves of at most
-    LEAF numbers are left to numpy when they are complete, so that no more than those are kept. Fewer numbers
-    than were promised give their sum too, with the rounding of another order.
+    To lose few digits, numpy adds the sums of two halves, each of which is again a sum of two halves. When a
+    half of at most LEAF numbers is complete, numpy adds it, so only such a half is kept. If fewer numbers
+    come than ``size``, their sum is right too, but rounded in another order.
     """
 
     LEAF = 1 << 13
@@ -68,7 +68,7 @@ class Sum:
 
     @staticmethod
     def _half(size: int) -> int:
-        """Return how many numbers numpy's first half has: it adds eight at a time."""
+        """Return the size of numpy's first half; numpy adds eight numbers at a time."""
         return size // 2 - size // 2 % 8
 
     def _sizes(self, size: int) -> Iterator[int]:
@@ -85,10 +85,10 @@ class Sum:
 
 
 class Mean:
-    """The mean, or its root, of what a function makes of the samples; ``size`` is how many elements come."""
+    """The mean, or its square root, of a function of the samples; ``size`` is the number of elements."""
 
     def __init__(self, size: int, of: Callable[[Samples], Samples], root: bool = False) -> None:
-        self._sum, self._of, self._root, self._count = Sum(size), of, root, 0
+        self._sum, self._of, self._root, self._count = RunningSum(size), of, root, 0
 
     def add(self, samples: Samples) -> None:
         """Take more samples."""
@@ -105,7 +105,7 @@ class Mean:
 
 
 class Extreme:
-    """The largest or smallest of what a function makes of the samples."""
+    """The largest or smallest value of a function of the samples."""
 
     def __init__(self, choose: np.ufunc, of: Callable[[Samples], Samples]) -> None:
         self._choose, self._of = choose, of
@@ -123,21 +123,21 @@ class Extreme:
 
 
 class Count:
-    """How many samples are not 0."""
+    """The number of samples that are not 0."""
 
     def __init__(self) -> None:
-        self._found, self._missing, self._some = 0, False, False
+        self._found, self._missing, self._any = 0, False, False
 
     def add(self, samples: Samples) -> None:
         """Take more samples."""
         self._found += int(np.count_nonzero(samples.any(axis=1)))
         self._missing = self._missing or bool(np.isnan(samples).any())
-        self._some = True
+        self._any = True
 
     @property
     def value(self) -> float:
-        """How many there were so far."""
-        return float(self._found) if self._some and not self._missing else math.nan
+        """The number of such samples so far."""
+        return float(self._found) if self._any and not self._missing else math.nan
 
 
 class Final:
@@ -161,7 +161,7 @@ def _same(samples: Samples) -> Samples:
     return samples
 
 
-# By name; made for so many samples of so many elements.
+# Constructors by name; each takes the number of samples and the number of elements.
 STATISTICS: Mapping[str, Callable[[int, int], Statistic]] = {
     "rms": lambda count, elements: Mean(count * elements, np.square, root=True),
     "max": lambda count, elements: Extreme(np.maximum, np.abs),

@@ -1,4 +1,4 @@
-"""How figures look: type, colours, sizes, and how texts are made to fit."""
+"""The style of figures: type, colours, sizes, and the fitting of texts."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import Any
 from quadvis.output.canvas import text_width
 from quadvis.units import Unit
 
-# Okabe and Ito's colours, which colour-blind readers tell apart.
+# Okabe and Ito's colours, which colour-blind readers can distinguish.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#222222", "#B8A800")
-# What tells curves apart once the colours have run out.
+# Dashes distinguish curves when all colours are used.
 DASHES: tuple[Any, ...] = (
     "solid",
     (0, (5, 1.5)),
@@ -50,20 +50,20 @@ STYLE: Mapping[Any, Any] = {
 WIDTHS = (8.0, 10.0, 13.0)  # inches, by the number of columns
 POINT = 1.0 / 72.0  # inches
 ELLIPSIS = "…"
-JOINTS = " /.,_-"  # a text may be broken behind these
+JOINTS = " /.,_-"  # a text may be broken after these
 
 Measure = Callable[[str], float]  # the width of a text (inches)
 
 
 def measure(size: float, *, bold: bool = False) -> Measure:
-    """Return what measures texts of a size (points) in the typeface of the figures."""
+    """Return a function that measures texts of a size (points) in the typeface of the figures."""
     return partial(text_width, size=size, bold=bold)
 
 
 def fitted(text: str, room: float, width: Measure, lines: int = 2) -> str:
-    """Return a text in so many lines at most, none wider than the room (inches).
+    """Return a text in at most ``lines`` lines, none wider than ``room`` (inches).
 
-    Lines break behind joints; what is too long loses its middle, since names differ at their ends.
+    Lines break after joints. A text that is too long loses its middle, because names differ at their ends.
     """
     text = re.sub(r"[\t\n\v\f\r]", " ", text)
     found: list[str] = []
@@ -82,7 +82,7 @@ def fitted(text: str, room: float, width: Measure, lines: int = 2) -> str:
 
 
 def _fitting(text: str, room: float, width: Measure) -> int:
-    """Return how many letters fit, one at least."""
+    """Return the number of letters that fit, at least one."""
     low, high = 1, len(text)
     while low < high:
         middle = (low + high + 1) // 2
@@ -91,6 +91,6 @@ def _fitting(text: str, room: float, width: Measure) -> int:
 
 
 def pretty(unit: Unit) -> str:
-    """Return a unit as it stands beside an axis."""
+    """Return a unit as it is written beside an axis."""
     text = str(unit)
     return "" if text == "1" else text.replace("^2", "²").replace("^3", "³").replace("*", "\u00b7")

@@ -1,4 +1,4 @@
-"""Write SVG: elements, escaped text, and how wide a text becomes."""
+"""Write SVG: elements, escaped text, and the width of a text."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def element(tag: str, content: str | None = None, /, **attributes: str | float) 
 
 
 def opening(tag: str, **attributes: str | float) -> str:
-    """Return the opening tag of an element that has others inside."""
+    """Return the opening tag of an element that contains others."""
     return element(tag, **attributes).removesuffix("/>") + ">"
 
 
@@ -31,7 +31,7 @@ def text(
     anchor: str = "start",
     fill: str = "#111111",
 ) -> str:
-    """Return a text whose base line starts, ends or has its middle at (x, y), as `anchor` says."""
+    """Return a text whose base line starts, ends or has its middle at (x, y), according to `anchor`."""
     weight = {"font_weight": "bold"} if bold else {}
     return element("text", content, x=x, y=y, font_size=size, text_anchor=anchor, fill=fill, **weight)
 
@@ -42,7 +42,7 @@ def points(corners: Iterable[tuple[float, float]]) -> str:
 
 
 def text_width(content: str, size: float, *, bold: bool = False) -> float:
-    """Return a width (px) that the text stays within in every usual sans-serif face, DejaVu Sans included."""
+    """Return a width (px) that the text does not exceed in any usual sans-serif face, DejaVu Sans too."""
     return round(sum(map(_ems, content)) * size * (1.12 if bold else 1.0), 1)
 
 
@@ -63,5 +63,5 @@ def _number(value: float) -> str:
 
 
 def _printable(content: str) -> str:
-    """Replace what XML cannot hold: control characters and halves of surrogate pairs."""
+    """Replace the characters that XML cannot hold: control characters and halves of surrogate pairs."""
     return re.sub("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "\ufffd", content)

@@ -1,1 +1,1 @@
-"""One run of a diagram, and the words in which it is reported."""
+"""One run of a diagram, and its report."""

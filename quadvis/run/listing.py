@@ -1,4 +1,4 @@
-"""A program as a table for people: what is called at which ticks, in which order, from which signals."""
+"""A program as text: the calls of each tick in order, with their signals."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Row = tuple[str, ...]
 
 
 def program_lines(program: Program) -> list[str]:
-    """Return the lines of the table: each task with its phases, then what the solver calls."""
+    """Return the lines of the table: each task with its phases, then the calls of the solver."""
     names = _Names(program)
     slots = len(program.image) // 8
     lines = [
@@ -49,7 +49,7 @@ def program_lines(program: Program) -> list[str]:
 
 
 def _sections(rows: Iterable[Row]) -> Iterator[str]:
-    """Yield aligned rows, each title on a line of its own with a blank line before it."""
+    """Yield aligned rows, each title on its own line after a blank line."""
     body = [row for row in rows if row[0].startswith(" ")]
     aligned = iter(table(body))
     first = True
@@ -72,7 +72,7 @@ def _phase(phase: str, ops: Iterable[Op], names: _Names) -> Iterator[Row]:
 
 
 class _Names:
-    """What the slots of a program are called."""
+    """The names of the slots of a program."""
 
     def __init__(self, program: Program) -> None:
         self.program = program
@@ -96,7 +96,7 @@ class _Names:
             self._slots[slot.position + element] = (name, slot, element)
 
     def of(self, slot: Slot) -> str:
-        """Return a slot's signal, perhaps a part of it; the value of a constant."""
+        """Return the signal of a slot, with an index if necessary; or the value of a constant."""
         if slot == TIME:
             return "time"
         if slot.scalar == "frame":

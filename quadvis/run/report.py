@@ -9,7 +9,7 @@ from quadvis.run.verdict import Outcome, Verdict
 
 
 def summary_lines(result: Result) -> list[str]:
-    """Return the summary of a run, for people."""
+    """Return the summary of a run as lines of text."""
     diagram, outcome = result.diagram, result.outcome
     variant = f" ({diagram.variant})" if diagram.variant else ""
     sets = ", ".join(file.name for file in diagram.parameter_files)

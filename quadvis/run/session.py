@@ -21,7 +21,7 @@ from quadvis.engine.engine import Engine
 from quadvis.engine.graph import Node
 from quadvis.output.kept import ALL, RowJudge, RunSignals
 from quadvis.output.log import PORTS, LogWriter
-from quadvis.output.recording import Channel, Field, Recording
+from quadvis.output.recording import RecordedBlock, RecordedPort, Recording
 from quadvis.output.statistics import finite
 from quadvis.output.stretch import NANOSECONDS
 from quadvis.run.verdict import Judging, Outcome
@@ -30,17 +30,18 @@ from quadvis.version import __version__
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
 
-Taker = Callable[[int, bytes], object]  # of a stamp (ns) and a row
+Taker = Callable[[int, bytes], object]  # takes a stamp (ns) and a row
 Progress = Callable[[float, float], None]  # simulated time reached, wall time spent (s)
-SLICE = 0.2  # s of wall time between two calls of the progress, and the longest wait for Ctrl-C
+SLICE = 0.2  # s of wall time between two calls of the progress; Ctrl-C waits no longer
 
 
 @dataclass(frozen=True)
 class Result:
-    """What a run gave: ``result["plant.position"]`` is an array with a leading time axis.
+    """The result of a run: ``result["plant.position"]`` is an array with a leading time axis.
 
-    ``duration`` is the simulated time (s), ``wall`` the time that took, ``cpu`` the processor time. ``lost``
-    says what the log lacks because the disk refused it; empty if there is no log or nothing is missing.
+    ``duration`` is the simulated time (s), ``wall`` the wall time (s), ``cpu`` the processor time (s).
+    ``lost`` says which rows the log lacks because the disk refused them; "" without a log or without lost
+    rows.
     """
 
     diagram: Diagram
@@ -72,7 +73,7 @@ class Result:
         return self.signals.times(name)
 
     def rate(self, name: str) -> str:
-        """Return the name of the rate at which a signal's block works."""
+        """Return the name of the rate of a signal's block."""
         return self.signals.rate(name)
 
     @property
@@ -87,18 +88,19 @@ class Result:
 
     @property
     def real_time_factor(self) -> float:
-        """Simulated time by wall time."""
+        """Simulated time divided by wall time."""
         return self.duration / self.wall if self.wall else float("inf")
 
     def facts(self) -> dict[str, Any]:
         """Return the outcome as plain data: what `quadvis run --json` prints.
 
-        ``diagram``, ``variant`` (or None), ``params`` (the parameter files), ``hash``, ``seed``: what was
-        run. ``passed``: whether all expectations are met. ``duration_s`` simulated, in ``wall_s`` of wall
-        time and ``cpu_s`` of processor time; ``real_time_factor``. ``summary``: by label ``{signal, unit,
-        rms, max, ...}``, ``final`` of several elements as a list. ``expect``: list of ``{expectation,
-        signal, kind, unit, limit, found, met, lack}``, where ``lack`` says why the run cannot be judged.
-        Numbers are in the unit beside them, None where there is none.
+        ``diagram``, ``variant`` (or None), ``params`` (the parameter files), ``hash`` and ``seed`` identify
+        the run. ``passed`` says whether all expectations are met. ``duration_s`` is the simulated time,
+        ``wall_s`` the wall time, ``cpu_s`` the processor time; ``real_time_factor`` their ratio. ``summary``
+        holds ``{signal, unit, rms, max, ...}`` by label; ``final`` of several elements is a list. ``expect``
+        is a list of ``{expectation, signal, kind, unit, limit, found, met, lack}``; ``lack`` says why the run
+        cannot be judged. Numbers are in the unit beside them; None stands for a number that is unknown or
+        infinite.
         """
         summary = {
             entry.label: {
@@ -131,25 +133,25 @@ def run(
     progress: Progress | None = None,
     keep: Sequence[str] | None = None,
 ) -> Result:
-    """Run a diagram to its stop time; RunError if a block fails, with the log readable up to there.
+    """Run a diagram to its stop time; RunError if a block fails, with a log that is readable up to that time.
 
-    ``keep`` are the signals whose rows stay in memory, as patterns such as "craft.*"; None is all of them if
-    no log is written, and none if one is: then the result reads what is asked for back from the log. What
-    the diagram expects, and its summary, needs no rows. A log that the disk refuses does not stop the run.
+    ``keep`` names the signals whose rows stay in memory, by patterns such as "craft.*". By default these are
+    all signals without a log, and no signals with a log: then the result reads signals back from the log.
+    Expectations and summary need no rows. A log that the disk refuses does not stop the run.
     """
     engine = Engine(diagram.graph, diagram.seed)
     logged = [node for node in diagram.graph.nodes if diagram.logs(node.path) and _fields(node)]
-    channels = [Channel(f"/{node.path}", _fields(node), node.task.name) for node in logged]
+    recorded = [RecordedBlock(f"/{node.path}", _fields(node), node.task.name) for node in logged]
     patterns = ((ALL,) if log is None else ()) if keep is None else tuple(keep)
-    signals = RunSignals(channels, diagram.ports, patterns)
+    signals = RunSignals(recorded, diagram.ports, patterns)
     judging = Judging(diagram.summary, diagram.expectations)
     wall, cpu = time.perf_counter(), time.process_time()
     with ExitStack() as stack:
         stack.enter_context(diagram.guarded(log))
-        writer = stack.enter_context(LogWriter(log, channels, metadata(diagram))) if log is not None else None
+        writer = stack.enter_context(LogWriter(log, recorded, metadata(diagram))) if log is not None else None
         judges = []
         for index, node in enumerate(logged):
-            judge = RowJudge(channels[index], judging)
+            judge = RowJudge(recorded[index], judging)
             takers = _takers(index, signals, writer, judge)
             if takers:
                 engine.attach(_RowTap(node.path, diagram.decimation(node.path), engine.period, takers))
@@ -168,7 +170,7 @@ def run(
 
 
 def _takers(index: int, signals: RunSignals, writer: LogWriter | None, judge: RowJudge) -> list[Taker]:
-    """Return who wants the rows of a block, as functions of the stamp (ns) and the row."""
+    """Return the consumers of a block's rows, as functions of the stamp (ns) and the row."""
     takers: list[Taker] = []
     if index in signals.kept:
         takers.append(partial(signals.append, index))
@@ -180,7 +182,7 @@ def _takers(index: int, signals: RunSignals, writer: LogWriter | None, judge: Ro
 
 
 def _advance(engine: Engine, ticks: int, progress: Progress | None) -> None:
-    """Run in slices, so that the progress is shown and an interruption is noticed between two ticks."""
+    """Run in slices; between slices show the progress and notice an interruption."""
     began = time.perf_counter()
     count = 1
     while engine.tick < ticks:
@@ -193,7 +195,7 @@ def _advance(engine: Engine, ticks: int, progress: Progress | None) -> None:
 
 
 class _RowTap:
-    """Hands the rows of a block to all who want them, with the stamp (ns)."""
+    """Hands the rows of a block with their stamps (ns) to all its consumers."""
 
     def __init__(self, block: str, every: int, period: Fraction, takers: Sequence[Taker]) -> None:
         self.block, self.every = block, every
@@ -207,17 +209,17 @@ class _RowTap:
             take(stamp, data)
 
 
-def _fields(node: Node) -> tuple[Field, ...]:
+def _fields(node: Node) -> tuple[RecordedPort, ...]:
     outputs = node.block.interface.outputs
     return tuple(
-        Field(name, port.signal.scalar, node.shape(name), node.unit(name))
+        RecordedPort(name, port.signal.scalar, node.shape(name), node.unit(name))
         for name, port in outputs.items()
         if port.signal.scalar != "frame"
     )
 
 
 def metadata(diagram: Diagram) -> dict[str, str]:
-    """Return what a log says of its run, in words: see ``quadvis.output.log``."""
+    """Return the facts of a run for its log as texts; see ``quadvis.output.log``."""
     return {
         "quadvis": __version__,
         "name": diagram.name,

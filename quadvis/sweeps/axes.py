@@ -1,4 +1,4 @@
-"""What a sweep goes over: `seed=0..29`, `craft.lag=20 ms,50 ms`, `bandwidth=1..3 step 0.5 rad/s`."""
+"""The axes of a sweep: `seed=0..29`, `craft.lag=20 ms,50 ms`, `bandwidth=1..3 step 0.5 rad/s`."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from quadvis.errors import QuadvisError, quoted
 from quadvis.units import Unit, UnitError, split_quantity
 
 SEED, VARIANT, PARAMS = "seed", "variant", "params"
-NONE = "none"  # no variant, no parameter file
+NONE = "none"  # a value that means no variant, or no parameter file
 MOST_RUNS = 100_000
-LARGEST = 18  # digits of the ends of a range
+LARGEST = 18  # most digits of the ends of a range
 
 _RANGE = re.compile(r"(?P<first>.+?)\.\.(?P<last>.+?)(?:\s+step\s+(?P<step>.+))?", re.DOTALL)
 _PAIRS = {"[": "]", "{": "}", "(": ")", "'": "'", '"': '"'}
@@ -33,10 +33,10 @@ Over = Mapping[str, Any] | Sequence[str]
 
 @dataclass(frozen=True)
 class Axis:
-    """One thing that differs between runs: a parameter, the seed, the variant or the parameter file.
+    """One axis of the grid: a parameter, the seed, the variant or the parameter file, with its values.
 
-    ``values`` are texts as ``--set`` takes them. ``numbers`` are the same in ``unit`` where all are single
-    quantities of one kind: then the column of the table is numeric and carries the unit.
+    ``values`` are texts, as for ``--set``. If all of them are single quantities of one dimension, ``numbers``
+    are their values in ``unit``, and the column of the table is numeric and names the unit.
     """
 
     name: str
@@ -46,11 +46,11 @@ class Axis:
 
     @property
     def column(self) -> str:
-        """The name of its column."""
+        """The name of the axis's column."""
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
     def cells(self, indices: Sequence[int]) -> NDArray[Any]:
-        """Return the column: whole numbers, numbers or texts, one for each index of a value."""
+        """Return the column - integers, numbers or texts - for these indices of values."""
         found: Sequence[Any] = self.numbers or self.values
         kind: Any = np.float64 if self.numbers else np.str_
         if self.numbers and all(re.fullmatch(r"[+-]?\d{1,18}", value) for value in self.values):
@@ -58,13 +58,13 @@ class Axis:
         return np.array([found[index] for index in indices], dtype=kind)
 
     def label(self, index: int) -> str:
-        """Return a value for people: a parameter file by its name alone."""
+        """Return a value as a short text: of a parameter file its name without the folder."""
         value = self.values[index]
         return Path(value).stem if self.name == PARAMS else value
 
 
 def read_axes(over: Over) -> tuple[Axis, ...]:
-    """Return the axes, in their order; QuadvisError if one of them says nothing or is given twice."""
+    """Return the axes in their order; QuadvisError if an axis has no values or is given twice."""
     given: Iterable[tuple[str, Any]]
     given = over.items() if isinstance(over, Mapping) else [_split_name(text) for text in over]
     axes: dict[str, Axis] = {}
@@ -82,7 +82,7 @@ def read_axes(over: Over) -> tuple[Axis, ...]:
 
 
 def points(axes: Sequence[Axis]) -> list[tuple[int, ...]]:
-    """Return the indices of the values of every run; the last axis changes fastest."""
+    """Return, for every run, the index of its value on each axis; the last axis changes fastest."""
     return list(itertools.product(*(range(len(axis.values)) for axis in axes)))
 
 
@@ -107,7 +107,7 @@ def _read(name: str, text: str) -> list[str]:
 
 
 def _split_commas(text: str) -> Iterator[str]:
-    """Yield what stands between commas, but not those inside brackets and quotes."""
+    """Yield the texts between commas; commas inside brackets and quotes do not split."""
     closing: list[str] = []
     start = 0
     for position, sign in enumerate(text):
@@ -122,10 +122,12 @@ def _split_commas(text: str) -> Iterator[str]:
 
 
 def _expand(name: str, text: str) -> list[str]:
-    """Return the values of a range such as ``1..3 step 0.5 rad/s``, or the one value that the text is."""
+    """Return the values of a range such as ``1..3 step 0.5 rad/s``, or the text itself as one value."""
     match = _RANGE.fullmatch(text)
-    ends = [split_quantity(match[end] or "") for end in ("first", "last", "step")] if match else []
-    if match is None or not (ends[0][0] and ends[1][0]):
+    if match is None:
+        return [text]
+    ends = [split_quantity(match[end] or "") for end in ("first", "last", "step")]
+    if not (ends[0][0] and ends[1][0]):
         return [text]  # such as ../sets/s1.yaml
     units = list(dict.fromkeys(unit for _, unit in ends if unit))
     if len(units) > 1:
@@ -152,7 +154,7 @@ def _expand(name: str, text: str) -> list[str]:
 
 
 def _plain(value: Decimal) -> str:
-    """Return a decimal number without an exponent and without zeros at its end."""
+    """Return a decimal number without an exponent and without trailing zeros."""
     text = f"{value:f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
 
@@ -172,7 +174,7 @@ def _axis(name: str, values: Sequence[str]) -> Axis:
 
 
 def _numeric(axis: Axis) -> Axis:
-    """Return an axis with its numbers, in the unit of the first, if all are quantities of a kind."""
+    """Return the axis with its numbers in the unit of the first value, if all have the same dimension."""
     pairs = [split_quantity(value) for value in axis.values]
     try:
         units = [Unit.parse(unit or "1") for _, unit in pairs]

@@ -1,4 +1,4 @@
-"""The runs of a sweep as jobs: which diagram, which settings, which seed at which point of the grid."""
+"""The grid of a sweep: the diagram, the settings and the seed of each run, as jobs."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from quadvis.library.catalogue import OwnBlocks
 from quadvis.sweeps.axes import NONE, PARAMS, SEED, VARIANT, Axis
 from quadvis.sweeps.worker import Configuration, Job
 
-CHECKED = 50  # values at each end of an axis
-NOT_SET = (SEED, VARIANT, PARAMS)  # axes that are no parameters of the diagram
+CHECKED = 50  # values that are checked at each end of an axis
+NOT_SET = (SEED, VARIANT, PARAMS)  # axes that are not parameters of the diagram
 
 
-class Plan:
-    """The runs of a sweep as jobs for the workers."""
+class Grid:
+    """The grid of a sweep, which makes the jobs for the workers."""
 
     def __init__(
         self,
         axes: Sequence[Axis],
-        grid: Sequence[tuple[int, ...]],
+        points: Sequence[tuple[int, ...]],
         base: Configuration,
         seed: int | None,
         own_blocks: OwnBlocks,
     ) -> None:
-        self.axes, self.grid, self.base, self.seed = axes, grid, base, seed
-        self.inputs: set[Path] = set()  # the files that the runs depend on, as far as diagrams were loaded
-        self.files: dict[str, str] = {}  # SHA-256 of what the diagrams were read from, by path
+        self.axes, self.points, self.base, self.seed = axes, points, base, seed
+        self.inputs: set[Path] = set()  # the files on which the runs depend, as far as diagrams were loaded
+        self.files: dict[str, str] = {}  # SHA-256 of the files of the diagrams, by path
         self.own_blocks = own_blocks
 
     def configuration(self, point: Sequence[int]) -> Configuration:
@@ -50,9 +50,10 @@ class Plan:
         )
 
     def check(self) -> Diagram:
-        """Load the diagram with each value of each axis, the others at their first; return the first one.
+        """Load the diagram with each value of each axis, other axes at their first; return the first diagram.
 
-        Of a long axis only the ends are looked at; what is wrong elsewhere becomes a row of the table.
+        Of a long axis only the values at the ends are checked; a fault of another value becomes a row of the
+        table.
         """
         first = [0] * len(self.axes)
         diagram = self._load(first)
@@ -72,14 +73,14 @@ class Plan:
             return diagram
         except DiagramError as error:
             found = DiagramError(self._placed(fault, point) for fault in error.faults)
-            if str(found) == str(error):  # no fault says which value of which axis brought it about
+            if str(found) == str(error):  # no fault names the value and the axis that caused it
                 for axis, index in zip(self.axes, point, strict=True):
                     if index and axis.name not in NOT_SET:
                         found.add_note(f"with --over {axis.name}={axis.values[index]}")
             raise found from None
 
     def _placed(self, fault: Fault, point: Sequence[int]) -> Fault:
-        """Return a fault of a value that is swept over with the place where it was given."""
+        """Return the fault; a fault of an axis's value gets the place where the value was given."""
         for axis, index in zip(self.axes, point, strict=True):
             parameter = axis.name.rpartition(".")[2]
             if fault.place.file == COMMAND_LINE and axis.name not in NOT_SET and parameter in str(fault):
@@ -88,7 +89,7 @@ class Plan:
 
     def jobs(self, folder: Path | None) -> Iterator[Job]:
         """Yield all runs in the order of the table."""
-        for row, point in enumerate(self.grid):
+        for row, point in enumerate(self.points):
             chosen = {axis.name: index for axis, index in zip(self.axes, point, strict=True)}
             seeds = next((axis.values for axis in self.axes if axis.name == SEED), ())
             seed = int(seeds[chosen[SEED]]) if seeds else self.seed
@@ -96,7 +97,7 @@ class Plan:
             yield Job(row, self.configuration(point), seed, log, self.files)
 
     def _log_name(self, row: int, point: Sequence[int]) -> str:
-        """Return the number of the row and the values of the axes, fit for the name of a file."""
+        """Return the name of a log: the number of the row and the values of the axes."""
         values = [f"{axis.name}={axis.label(index)}" for axis, index in zip(self.axes, point, strict=True)]
-        digits = len(str(len(self.grid) - 1))
+        digits = len(str(len(self.points) - 1))
         return re.sub(r"[^A-Za-z0-9_.=-]+", "-", "-".join([f"{row:0{digits}}", *values]))[:120]

@@ -1,4 +1,4 @@
-"""The picture of a sweep: the first axis goes across, the other ones are told apart by colour."""
+"""The picture of a sweep: the first axis goes from left to right, colours distinguish the other axes."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from quadvis.sweeps.summary import extent, shown_quantities
 from quadvis.sweeps.table import FAILURE, PASSED, Table
 from quadvis.sweeps.worker import Quantity
 
-Rows = list[list[NDArray[np.intp]]]  # by series, then by place
+Rows = list[list[NDArray[np.intp]]]  # by series, then by position along the first axis
 
 
 def draw(table: Table, path: Path, inputs: Iterable[Path] = ()) -> None:
-    """Draw the numbers that people look at; QuadvisError if the file cannot be written."""
+    """Draw the numbers of the summary; QuadvisError if the file cannot be written."""
     others = [axis for axis in table.axes if axis.name != SEED]
     across = max(others, key=lambda axis: len(axis.values), default=None)
     number = others.index(across) if across else 0
@@ -48,7 +48,7 @@ def draw(table: Table, path: Path, inputs: Iterable[Path] = ()) -> None:
 
 
 def _sorted_out(table: Table) -> tuple[list[Quantity], list[str]]:
-    """Return the numbers that differ between runs, and in words those that do not."""
+    """Return the quantities that differ between runs, and sentences about those that do not."""
     varied, same = [], []
     for quantity in shown_quantities(table):
         values = table[quantity.column]
@@ -60,7 +60,7 @@ def _sorted_out(table: Table) -> tuple[list[Quantity], list[str]]:
 
 
 def _places(axis: Axis) -> list[str]:
-    """Return the labels along an axis; its unit stands in its title."""
+    """Return the labels along an axis; the axis's title names the unit."""
     if axis.numbers:
         return [f"{number:g}" for number in axis.numbers]
     return [axis.label(index) for index in range(len(axis.values))]

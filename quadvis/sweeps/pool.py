@@ -1,8 +1,8 @@
-"""The processes of a sweep: started, fed, ended with the sweep however it ends.
+"""The processes of a sweep: start them, give them jobs, and end them whenever the sweep ends.
 
-Workers are spawned: each begins as a fresh interpreter, so nothing of the first process (locks, threads of
-OpenCV, a diagram that was run before) leaks into a run, and the limits on threads stand before numpy is
-imported. A fork server would start them some 0.2 s earlier, but with what it had imported and set before.
+Workers are spawned: each begins as a fresh interpreter. So nothing of the first process (locks, OpenCV's
+threads, an earlier diagram) leaks into a run, and the limits on threads are set before numpy is imported. A
+fork server would start workers some 0.2 s earlier, but with its own imports and settings.
 """
 
 from __future__ import annotations
@@ -23,25 +23,25 @@ from quadvis.errors import RunError
 from quadvis.machine.interrupts import held_back
 from quadvis.sweeps.worker import ONE_THREAD, Job, Row, begin, perform
 
-IDLE = 1.0  # s without a row after which the caller has its turn all the same
+IDLE = 1.0  # s without a row after which the caller gets None
 
 
 def processors() -> int:
-    """Return how many processors this process may use."""
+    """Return the number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def perform_all(jobs: Sequence[Job], workers: int) -> Generator[Row | None, None, None]:
-    """Yield the rows as they come, and None after a second without one; closing it ends the workers at once.
+    """Yield the rows as they come, and None after a second without one; closing it ends the workers.
 
     RunError if a worker is killed.
     """
     if not jobs:
         return
     before = set(multiprocessing.active_children())
-    with held_back():  # Python's own helper shall outlive the terminal as well
+    with held_back():  # Python's own helper process must survive the terminal, too
         resource_tracker.ensure_running()
     executor = ProcessPoolExecutor(
         min(workers, len(jobs)), multiprocessing.get_context("spawn"), initializer=begin
@@ -68,17 +68,18 @@ def perform_all(jobs: Sequence[Job], workers: int) -> Generator[Row | None, None
     finally:
         children: set[BaseProcess] = set(multiprocessing.active_children()) - before
         executor.shutdown(wait=finished, cancel_futures=True)
-        for child in children if not finished else ():
-            child.kill()
+        if not finished:
+            for child in children:
+                child.kill()
         for child in children:
             child.join()
 
 
 @contextmanager
 def _launching() -> Iterator[None]:
-    """Let processes begin with one thread for each library, deaf to the terminal, without the main script.
+    """Start processes with one thread for each library, without the terminal's signals and the main script.
 
-    The workers need nothing of the script, which then works without `if __name__ == "__main__":`.
+    The workers do not need the script, so a script works without `if __name__ == "__main__":`.
     """
     environment = {name: os.environ.get(name) for name in ONE_THREAD}
     main = sys.modules["__main__"]

@@ -1,4 +1,4 @@
-"""Pictures of many runs: each number's spread over the values that were swept over, one panel a number."""
+"""Pictures of many runs: one panel for each number, with its spread at each value of the axis."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Sheet
 
-HEIGHT, TOP, BOTTOM = 2.9, 0.7, 0.5  # inches of a row, and of what is above and below all of them
-MARGIN = 0.012  # of the width
+HEIGHT, TOP, BOTTOM = 2.9, 0.7, 0.5  # inches: height of a row, and of the spaces above and below all rows
+MARGIN = 0.012  # of the picture's width
 PERCENTILES = (5.0, 25.0, 75.0, 95.0)
-FEW = 5  # runs that have a spread worth a box
-MOST_LABELS = 12  # along an axis
-LONGEST_LABEL = 64  # characters of all labels of an axis, before they are turned
+FEW = 5  # fewer runs get no box
+MOST_LABELS = 12  # labels along an axis
+LONGEST_LABEL = 64  # characters of all labels of an axis; longer ones are turned
 FAILED = "#C0392B"
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
-NEAR = 2.0  # a limit is drawn up to this many spreads of the values away
+NEAR = 2.0  # a limit is drawn if it is at most so many spreads away from the values
 KEY = "dot: a run   cross: a run that failed   box: middle half   whiskers: 5 to 95 %   black line: mean"
 
 
 @dataclass(frozen=True)
 class Cloud:
-    """The values of one number at one place of the axis, and which of the runs passed."""
+    """The values of one number at one position of the axis, and whether each run passed."""
 
     values: NDArray[np.floating]
     passed: NDArray[np.bool_]
@@ -42,7 +42,7 @@ class Cloud:
 
 @dataclass(frozen=True)
 class StripPanel:
-    """One number: ``clouds`` by series, then by place; ``limit`` is what is expected of it."""
+    """The panel of one number: ``clouds`` by series, then by position; ``limit`` of its expectation."""
 
     title: str
     unit: str
@@ -52,7 +52,7 @@ class StripPanel:
 
 @dataclass(frozen=True)
 class Strips:
-    """A whole picture: the places along the axes of all panels, and the series that they tell apart."""
+    """A whole picture: its panels, and the positions and series that they all share."""
 
     title: str
     subtitle: str
@@ -65,7 +65,7 @@ class Strips:
 
 
 def draw_strips(strips: Strips, path: Path, inputs: Iterable[Path] = ()) -> None:
-    """Write a PNG; QuadvisError if it cannot be written, as where there is something else or an input."""
+    """Write a PNG; QuadvisError if it cannot be written, or replaces an input or another kind of file."""
     count = len(strips.panels)
     columns = 2 if count == 4 else min(len(WIDTHS), max(1, count))
     rows = max(1, math.ceil(count / columns))
@@ -84,12 +84,12 @@ def draw_strips(strips: Strips, path: Path, inputs: Iterable[Path] = ()) -> None
 
 
 def _frame(sheet: Sheet, strips: Strips, height: float) -> None:
-    """Put title, legend and key around the panels."""
+    """Write title, legend and key around the panels."""
     sheet.text(MARGIN, 1.0 - 0.1 / height, strips.title, fontsize=13, fontweight="bold", va="top")
     sheet.text(MARGIN, 1.0 - 0.36 / height, strips.subtitle, color="#555555", va="top")
     spread = any(len(cloud.values) > 1 for panel in strips.panels for row in panel.clouds for cloud in row)
-    notes = [KEY] * spread + [strips.note] * bool(strips.note)
-    sheet.text(MARGIN, 0.06 / height, "\n".join(notes), color="#555555", fontsize=8.5, linespacing=1.5)
+    notes = "\n".join(filter(None, (KEY if spread else "", strips.note)))
+    sheet.text(MARGIN, 0.06 / height, notes, color="#555555", fontsize=8.5, linespacing=1.5)
     if len(strips.series) > 1 and sheet.axes:
         named = list(zip(*sheet.axes[0].get_legend_handles_labels(), strict=True))[:MOST_LABELS]
         sheet.legend(
@@ -119,7 +119,7 @@ def _draw_panel(axes: Axes, strips: Strips, panel: StripPanel) -> None:
 
 
 def _draw_cloud(axes: Axes, position: float, width: float, cloud: Cloud, colour: str) -> None:
-    """Draw the dots of one place, over a box of their quartiles if there are enough."""
+    """Draw the dots of one position, over a box of their quartiles if they are enough."""
     from matplotlib.patches import Rectangle
 
     good = np.isfinite(cloud.values)
@@ -154,12 +154,12 @@ def _draw_failed(axes: Axes, positions: NDArray[np.floating], row: Sequence[Clou
 
 
 def _offsets(count: int, width: float) -> NDArray[np.floating]:
-    """Return where the dots of a place stand: spread evenly, neighbours far apart, always the same."""
+    """Return the offsets of dots: evenly spread, neighbours far apart, always the same."""
     return ((np.arange(count) * GOLDEN + 0.5) % 1.0 - 0.5) * 0.8 * width
 
 
 def _finish(axes: Axes, strips: Strips, panel: StripPanel) -> None:
-    """Put labels, title and limit; leave room for all of them."""
+    """Write labels and title, draw the limit, and leave room for all of them."""
     count = len(strips.places)
     step = math.ceil(count / MOST_LABELS)
     shown = range(0, count, step)
@@ -182,7 +182,7 @@ def _finish(axes: Axes, strips: Strips, panel: StripPanel) -> None:
 
 
 def _limits(panel: StripPanel, values: NDArray[np.floating]) -> Iterator[float]:
-    """Yield what is expected if it lies so near to the values that it does not flatten them."""
+    """Yield the limit if it is near enough to the values not to flatten their picture."""
     if panel.limit is None:
         return
     least, most = min(values.min(), 0.0), max(values.max(), 0.0)

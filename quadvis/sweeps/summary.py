@@ -1,4 +1,4 @@
-"""What `quadvis sweep` shows: a line of progress while it goes on, the spread over the seeds at the end."""
+"""The texts of `quadvis sweep`: a line of progress, and at the end the spread over the seeds."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from quadvis.errors import counted
 from quadvis.machine.status_line import StatusLine
 from quadvis.output.columns import table as aligned
 from quadvis.sweeps.axes import SEED
@@ -16,19 +17,19 @@ from quadvis.sweeps.worker import Quantity
 
 LOW, HIGH = 5, 95  # percentiles
 MOST_LINES = 40
-WIDTH = 110  # where there is no terminal
+WIDTH = 110  # characters, without a terminal
 
 
 class SweepLine(StatusLine):
-    """How many runs are finished, how fast they go, and how long the rest will take."""
+    """A status line: the number of finished runs, their speed, and the time for the others."""
 
     def __init__(self) -> None:
         super().__init__()
         self.began = time.monotonic()
-        self.known: int | None = None  # runs that were there before
+        self.known: int | None = None  # runs that were finished before
 
     def __call__(self, finished: int, count: int, failed: int) -> None:
-        """Show how far the sweep is."""
+        """Show the progress of the sweep."""
         self.known = finished - 1 if self.known is None else self.known
         left = duration_text((count - finished) * (time.monotonic() - self.began) / (finished - self.known))
         words = f"  {failed} failed" if failed else ""
@@ -36,19 +37,19 @@ class SweepLine(StatusLine):
 
 
 def duration_text(seconds: float) -> str:
-    """Return a time for people: 40 s, 12 min, 3.5 h."""
+    """Return a time as a short text: 40 s, 12 min, 3.5 h."""
     if seconds < 100:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
 def shown_quantities(table: Table) -> list[Quantity]:
-    """Return what people look at: the numbers of the summary, or those of expectations if it has none."""
+    """Return the numbers to show: those of the summary or, if it has none, of the expectations."""
     return [quantity for quantity in table.quantities if quantity.summary] or list(table.quantities)
 
 
 def sweep_lines(table: Table, width: int | None = None) -> list[str]:
-    """Return the summary of a sweep, for people: a line for every point of the grid, columns as they fit."""
+    """Return the summary of a sweep as text: one line for each point of the grid, as many columns as fit."""
     groups = table.groups()
     others = [axis for axis in table.axes if axis.name != SEED]
     heads = [[*(axis.name for axis in others), "passed"]]
@@ -59,7 +60,7 @@ def sweep_lines(table: Table, width: int | None = None) -> list[str]:
         [quantity.column, *(_spread(table[quantity.column][rows]) for _, rows in groups[:MOST_LINES])]
         for quantity in shown_quantities(table)
     ]
-    lines = [f"{table.name}: {_counted(table.runs, 'run')}, {extent(table, len(groups))}"]
+    lines = [f"{table.name}: {counted(table.runs, 'run')}, {extent(table, len(groups))}"]
     for chunk in _chunks(heads, columns, width or WIDTH):
         lines += ["", *(f"  {line}" for line in chunk)]
     if len(groups) > MOST_LINES:
@@ -70,14 +71,13 @@ def sweep_lines(table: Table, width: int | None = None) -> list[str]:
 
 
 def extent(table: Table, points: int) -> str:
-    """Return how many seeds and points of the grid there are, in words."""
+    """Return the numbers of seeds and of points of the grid as text."""
     seeds = next((len(axis.values) for axis in table.axes if axis.name == SEED), 0)
-    words = [_counted(seeds, "seed")] * bool(seeds) + [_counted(points, "point")] * (points > 1 or not seeds)
-    return " at ".join(words)
-
-
-def _counted(count: int, word: str) -> str:
-    return f"{count} {word}{'s' * (count != 1)}"
+    if not seeds:
+        return counted(points, "point")
+    if points <= 1:
+        return counted(seeds, "seed")
+    return f"{counted(seeds, 'seed')} at {counted(points, 'point')}"
 
 
 def _passed(table: Table, rows: NDArray[np.intp]) -> str:
@@ -85,7 +85,7 @@ def _passed(table: Table, rows: NDArray[np.intp]) -> str:
 
 
 def _spread(values: NDArray[np.float64]) -> str:
-    """Return the mean and the range of what there is."""
+    """Return the mean and the range of the values that are not NaN as text."""
     found = values[~np.isnan(values)]
     if not found.size:
         return "none"
@@ -97,7 +97,7 @@ def _spread(values: NDArray[np.float64]) -> str:
 
 
 def _chunks(heads: Sequence[list[str]], columns: Sequence[list[str]], width: int) -> list[list[str]]:
-    """Return tables that are as wide as the terminal, each with the heads of the rows."""
+    """Return tables as wide as the terminal, each with the heads of the rows."""
     chunks: list[list[str]] = []
     rest = list(columns)
     while rest or not chunks:
@@ -114,7 +114,7 @@ def _chunks(heads: Sequence[list[str]], columns: Sequence[list[str]], width: int
 
 
 def _failures(table: Table) -> list[str]:
-    """Return why runs stopped: each reason once, with the first run that it stopped and how many more."""
+    """Return why runs stopped: each reason once, with the first such run and the number of further ones."""
     found: dict[str, list[int]] = {}
     for row, failure in enumerate(table[FAILURE].tolist()):
         if failure:
@@ -132,4 +132,4 @@ def _failures(table: Table) -> list[str]:
 
 def _verdict(table: Table) -> str:
     count = int(np.count_nonzero(table[PASSED]))
-    return f"{'PASSED' if table.passed else 'FAILED'}: {count} of {_counted(table.runs, 'run')} passed"
+    return f"{'PASSED' if table.passed else 'FAILED'}: {count} of {counted(table.runs, 'run')} passed"

@@ -1,4 +1,4 @@
-"""Many runs of one diagram in parallel processes: one table that depends on nothing but the diagram."""
+"""Many runs of one diagram in parallel processes: one table that depends only on the diagram."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from quadvis.errors import QuadvisError, quoted
 from quadvis.library.catalogue import OwnBlocks
 from quadvis.machine.files import PLOT, Claim, check_output
 from quadvis.sweeps.axes import SEED, VARIANT, Axis, Over, points, read_axes
-from quadvis.sweeps.grid import Plan
+from quadvis.sweeps.grid import Grid
 from quadvis.sweeps.picture import draw
 from quadvis.sweeps.pool import perform_all, processors
 from quadvis.sweeps.table import FAILURE, HASH, PASSED, WALL, Table, read_rows, table_kind
 from quadvis.sweeps.worker import Configuration, Job, Quantity, Row, diagram_of, quantities
 
-SAVE = 1.0  # s between two writings of what is finished
+SAVE = 1.0  # s between two writings of finished runs
 
-Progress = Callable[[int, int, int], None]  # runs finished, runs in all, runs that did not pass
+Progress = Callable[[int, int, int], None]  # takes the numbers of runs: finished, all, not passed
 
 
 def sweep(
@@ -48,35 +48,35 @@ def sweep(
     own_blocks: OwnBlocks = True,
     progress: Progress | None = None,
 ) -> Table:
-    """Run a diagram at every point of a grid, and return what the runs gave as a table.
+    """Run a diagram at every point of a grid, and return a table of the results.
 
-    ``over`` maps what differs between the runs to its values: ``{"seed": range(30), "craft.lag": ["20 ms",
-    "50 ms"], "bandwidth": "1..3 step 0.5 rad/s"}``, or texts ``seed=0..29``. A name is that of a parameter
-    as in ``settings``, or ``seed``, ``variant``, ``params``; with several, all combinations are run, the last
-    one changing fastest. The other arguments are those of `quadvis.load`, for every run.
+    ``over`` maps each axis to its values: ``{"seed": range(30), "craft.lag": ["20 ms", "50 ms"], "bandwidth":
+    "1..3 step 0.5 rad/s"}``, or is a list of texts such as ``seed=0..29``. An axis is a parameter, named as
+    in ``settings``, or ``seed``, ``variant`` or ``params``. With several axes all combinations are run; the
+    last axis changes fastest. The other arguments are those of `quadvis.load`, for every run.
 
-    ``workers`` processes share the runs (as many as there are processors); the table is the same to the bit
-    for any number of them. It is written to ``output`` (.csv or .parquet), and what is finished also when the
-    sweep is interrupted, a worker is killed (RunError), or this process is: all but the last two seconds.
-    ``resume`` takes what that file has for diagrams of the same hash, and runs the rest. ``plot`` is a
-    picture of the summary (PNG), ``logs`` a folder for a log of every run.
+    ``workers`` processes share the runs (by default one for each processor); the table is the same to the bit
+    for any number of workers. It is written to ``output`` (.csv or .parquet). If the sweep is interrupted, or
+    a worker (RunError) or this process is killed, the file keeps all finished runs but those of the last two
+    seconds. ``resume`` takes over the runs of that file with the same hash, and does the others. ``plot`` is
+    the file for a picture of the summary (PNG), ``logs`` a folder for a log of every run.
 
     A run that stops with an error is a row that says so. QuadvisError if a value does not fit the diagram, or
-    if a file cannot be written: where an input is, something else, or what another sweep writes.
+    if a file cannot be written because it is an input, another kind of file, or the output of another sweep.
     """
     axes, processes = read_axes(over), _workers(workers)
     _refuse_conflicts(axes, variant, settings, seed)
     given = (str(path), variant, _texts(settings), _paths(params), stop_time, bool(own_blocks))
-    grid = points(axes)
-    plan = Plan(axes, grid, Configuration(*given), seed, own_blocks)
-    diagram = plan.check()
+    places = points(axes)
+    grid = Grid(axes, places, Configuration(*given), seed, own_blocks)
+    diagram = grid.check()
     target = Path(output) if output else None
     if plot is not None:
-        check_output(plot, PLOT, plan.inputs)
+        check_output(plot, PLOT, grid.inputs)
     found = quantities(diagram)
-    jobs = list(plan.jobs(_folder(logs)))
-    collection = _Collection(diagram.name, axes, grid, found)
-    with _Saving(collection, target, timings, plan.inputs) as save:
+    jobs = list(grid.jobs(_folder(logs)))
+    collection = _Collection(diagram.name, axes, places, found)
+    with _Saving(collection, target, timings, grid.inputs) as save:
         if resume and target is not None and target.stat().st_size:
             jobs = _not_known(jobs, _earlier(target, found), collection)
         try:
@@ -85,19 +85,19 @@ def sweep(
                     if row is not None:
                         collection.add(row)
                         if progress:
-                            progress(len(collection.rows), len(grid), collection.failed)
+                            progress(len(collection.rows), len(places), collection.failed)
                     save.now_and_then()
         except BaseException as error:
-            error.add_note(f"{len(collection.rows)} of {len(grid)} runs are finished{save.words}")
+            error.add_note(f"{len(collection.rows)} of {len(places)} runs are finished{save.words}")
             raise
     table = collection.table()
     if plot is not None:
-        draw(table, Path(plot), plan.inputs)
+        draw(table, Path(plot), grid.inputs)
     return table
 
 
 class _Saving:
-    """Writes what is finished to a file, if there is one: as it comes, at last in the order of the grid."""
+    """Writes finished rows to a file, if one is given: as they come, at the end in the grid's order."""
 
     def __init__(
         self, collection: _Collection, path: Path | None, timings: bool, inputs: Iterable[Path]
@@ -120,12 +120,12 @@ class _Saving:
 
     @property
     def words(self) -> str:
-        """How a sweep that was stopped goes on."""
+        """The advice on how to continue a stopped sweep."""
         kept = self.path is not None and self.collection.rows
         return f" and in {self.path}; --resume does the rest" if kept else ""
 
     def now_and_then(self) -> None:
-        """Add what is new if the last time is a while ago: so much is left of a sweep after `kill -9`."""
+        """Append new rows if the last time is long enough ago; after `kill -9` these rows are left."""
         count = len(self.collection.rows)
         if self.claim is None or count == self.saved or time.monotonic() - self.last < SAVE:
             return
@@ -167,7 +167,7 @@ def _folder(logs: str | Path | None) -> Path | None:
 
 
 def _refuse_conflicts(axes: Sequence[Axis], variant: str | None, settings: Given, seed: int | None) -> None:
-    """Refuse what is swept over and given a value as well; an axis of parameter files adds to those given."""
+    """Refuse an axis that also has a fixed value; an axis of parameter files is added to the given files."""
     names = {text.partition("=")[0].strip() for text in _texts(settings)}
     names |= {SEED} if seed is not None else set()
     names |= {VARIANT} if variant is not None else set()
@@ -177,13 +177,13 @@ def _refuse_conflicts(axes: Sequence[Axis], variant: str | None, settings: Given
 
 
 def _not_known(jobs: Sequence[Job], earlier: Mapping[str, Row], collection: _Collection) -> list[Job]:
-    """Put the rows of an earlier table, by the hash of the diagram, where they belong; return the rest."""
+    """Take over the rows of an earlier table with the hash of a job's diagram; return the other jobs."""
     rest = []
     for job in jobs:
         try:
             row = earlier.get(diagram_of(job).hash)
         except QuadvisError:
-            row = None  # the run will tell
+            row = None  # the run will report the error
         if row is None:
             rest.append(job)
         else:
@@ -192,7 +192,7 @@ def _not_known(jobs: Sequence[Job], earlier: Mapping[str, Row], collection: _Col
 
 
 def _earlier(path: Path, quantities: Sequence[Quantity]) -> dict[str, Row]:
-    """Return the runs of an earlier table by hash; those that stopped with an error are done again."""
+    """Return the rows of an earlier table by hash, without runs that stopped with an error."""
     found = {}
     for cells in read_rows(path):
         names = (HASH, FAILURE, PASSED, *(quantity.column for quantity in quantities))
@@ -216,7 +216,7 @@ def _number(cell: Any) -> float:
 
 
 class _Collection:
-    """The rows that there are so far, and the table of them in the order of the grid."""
+    """The rows so far, and their table in the order of the grid."""
 
     def __init__(
         self,
@@ -231,14 +231,14 @@ class _Collection:
         self.failed = 0
 
     def add(self, row: Row) -> None:
-        """Take what one run gave."""
+        """Add the row of one run."""
         if not row.failure and row.units != self.units:
             row = Row(row.index, row.hash, failure="its numbers have other units than those of the first run")
         self.rows[row.index] = row
         self.failed += not row.passed
 
     def table(self, after: int = 0) -> Table:
-        """Return the table of the rows that are there, but for those that came first."""
+        """Return the table of the rows so far, without the first ``after`` rows that came."""
         rows = [self.rows[index] for index in sorted(list(self.rows)[after:])]
         indices = np.array([self.grid[row.index] for row in rows], np.int64).reshape(-1, len(self.axes))
         columns = {

@@ -1,4 +1,4 @@
-"""The table of a sweep: columns in memory, and files that other tools read, written whole or not at all."""
+"""The table of a sweep: columns in memory, and files for other tools, written whole or not at all."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ KINDS = {
 class Table(Mapping[str, NDArray[Any]]):
     """The runs of a sweep, one a row: ``table["xy.rms [cm]"]`` is a column of N values.
 
-    The columns are the axes, the quantities (NaN where a run gave none), ``passed``, ``failure`` (why a run
-    stopped, or empty) and ``hash`` (of the resolved diagram, seed included). ``wall`` (s) is how long each
-    run took; it stands apart because it is the only thing that two sweeps do not share to the bit.
+    The columns are the axes, the quantities (NaN for a run without results), ``passed``, ``failure`` (why a
+    run stopped, or "") and ``hash`` (of the resolved diagram, seed included). ``wall`` (s) is the wall time
+    of each run. It is not a column, because it alone differs between two sweeps of the same runs.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class Table(Mapping[str, NDArray[Any]]):
         columns: Mapping[str, NDArray[Any]],
         wall: NDArray[np.float64],
     ) -> None:
-        """Keep the columns; ``indices`` (N, axes) say which value of its axes a run has."""
+        """Keep the columns; ``indices`` (N, axes) are each run's indices of values on the axes."""
         self.name, self.axes, self.quantities = name, tuple(axes), tuple(quantities)
         self.indices, self.columns, self.wall = indices, dict(columns), wall
 
@@ -61,7 +61,7 @@ class Table(Mapping[str, NDArray[Any]]):
 
     @property
     def passed(self) -> bool:
-        """True if every run met all that is expected of it."""
+        """True if every run met all its expectations."""
         return bool(self.columns[PASSED].all())
 
     def groups(self) -> list[tuple[tuple[int, ...], NDArray[np.intp]]]:
@@ -75,20 +75,20 @@ class Table(Mapping[str, NDArray[Any]]):
     def save(self, path: str | Path, *, timings: bool = False, inputs: Iterable[Path] = ()) -> None:
         """Write a CSV or Parquet file, by the name's ending; ``timings`` adds the column ``wall [s]``.
 
-        The file is there when it is whole; before, what was there stays. QuadvisError if it cannot be
-        written, or is one of ``inputs`` or no table.
+        An older file stays until the new one is complete. QuadvisError if the file cannot be written, if it
+        is one of ``inputs``, or if an older file there is no table.
         """
         path = Path(path)
         write_output(path, table_kind(path), self.content(path.suffix, timings=timings), inputs)
 
     def content(self, suffix: str, *, timings: bool = False, head: bool = True) -> bytes:
-        """Return the contents of a file whose name ends in ``suffix``, of CSV also without its first line."""
+        """Return the contents of a file with this suffix; CSV without its first line if ``head`` is false."""
         columns = self.columns | ({WALL: self.wall} if timings else {})
         return _csv(columns, head) if suffix == ".csv" else _parquet(columns)
 
 
 def table_kind(path: Path) -> Kind:
-    """Return what such a file holds; QuadvisError if no table can be written to it."""
+    """Return the kind of a table's file; QuadvisError if its suffix is not that of a table."""
     if path.suffix not in KINDS:
         raise QuadvisError(f"cannot write the table '{path}': its name must end in .csv or .parquet")
     if path.suffix == ".parquet":
@@ -106,7 +106,7 @@ def _pyarrow() -> Any:
 
 
 def _csv(columns: Mapping[str, NDArray[Any]], head: bool) -> bytes:
-    """Return rows of which numbers read back to the same bits."""
+    """Return the rows as CSV; numbers read back to the same bits."""
     file = StringIO(newline="")
     writer = csv.writer(file, lineterminator="\n")
     if head:
@@ -138,9 +138,9 @@ def _arrow_type(column: NDArray[Any]) -> Any:
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
-    """Return the rows of a table that was written before; QuadvisError if the file is none.
+    """Return the rows of an existing table; QuadvisError if the file is no table.
 
-    Of a CSV file all cells are texts.
+    All cells of a CSV file are texts.
     """
     try:
         if path.suffix == ".parquet":

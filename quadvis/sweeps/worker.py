@@ -1,4 +1,4 @@
-"""One run of a sweep, as a worker process does it: it depends on file, settings and seed alone."""
+"""One run of a sweep in a worker process: it depends only on file, settings and seed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from quadvis.library.catalogue import OwnBlocks
     from quadvis.run.verdict import Outcome
 
-# Where runs share the processors, threads inside a run only take turns.
+# When runs share the processors, threads inside a run only wait for each other.
 ONE_THREAD = dict.fromkeys(
     (
         "MKL_NUM_THREADS",
@@ -35,7 +35,7 @@ ONE_THREAD = dict.fromkeys(
 
 @dataclass(frozen=True)
 class Configuration:
-    """A diagram as it is to be loaded; the runs of one configuration differ in their seeds alone."""
+    """A file and its settings, from which a diagram is loaded; its runs differ only in their seeds."""
 
     file: str
     variant: str | None = None
@@ -45,7 +45,7 @@ class Configuration:
     own_blocks: bool = True
 
     def load(self, own_blocks: OwnBlocks = True) -> Diagram:
-        """Return the diagram; DiagramError tells its faults. ``own_blocks`` may be told what is run."""
+        """Return the diagram; DiagramError reports its faults. ``own_blocks`` as in `quadvis.load`."""
         from quadvis.diagram.load import load
 
         return load(
@@ -60,9 +60,9 @@ class Configuration:
 
 @dataclass(frozen=True)
 class Job:
-    """One run: ``index`` is its row in the table, ``seed`` None stands for the diagram's.
+    """One run: ``index`` is its row in the table; ``seed`` None means the diagram's seed.
 
-    ``files`` has the SHA-256 of the files that the sweep began with, by path.
+    ``files`` holds the SHA-256 of files at the start of the sweep, by path.
     """
 
     index: int
@@ -74,9 +74,9 @@ class Job:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number that every run gives: a statistic of the summary, or what an expectation looks at.
+    """A number that every run gives: a statistic of the summary, or the value found for an expectation.
 
-    ``limit`` is what an expectation demands of this very number, in the same unit.
+    ``limit`` is the limit of an expectation of this very number, in the same unit.
     """
 
     label: str
@@ -86,15 +86,15 @@ class Quantity:
 
     @property
     def column(self) -> str:
-        """The name of its column."""
+        """The name of the quantity's column."""
         return f"{self.label} [{self.unit}]" if self.unit else self.label
 
 
 @dataclass(frozen=True)
 class Row:
-    """What one run gave; no numbers if it stopped with an error.
+    """The results of one run; without numbers if it stopped with an error.
 
-    ``failure`` says why it stopped, or what its log lacks: then it should be run again.
+    ``failure`` says why it stopped, or what its log lacks; then the run should be repeated.
     """
 
     index: int
@@ -107,7 +107,7 @@ class Row:
 
 
 def quantities(diagram: Diagram) -> list[Quantity]:
-    """Return what the runs of a diagram give, in the order of `numbers`; of vectors one for each element."""
+    """Return the quantities of a diagram's runs, in the order of `numbers`; of vectors one per element."""
     found = [
         Quantity(
             f"{entry.label}.{name}{element}",
@@ -126,7 +126,7 @@ def quantities(diagram: Diagram) -> list[Quantity]:
 
 
 def numbers(diagram: Diagram, outcome: Outcome) -> list[float]:
-    """Return what a run gave, in the units in which people read it."""
+    """Return the numbers of a run, in the units of texts."""
     found = []
     for entry in diagram.summary:
         for name in entry.show:
@@ -147,7 +147,7 @@ def _scale(selection: Selection, statistic: str) -> float:
 
 
 def _limit(diagram: Diagram, selection: Selection, statistic: str) -> float | None:
-    """Return what is expected of a number of the summary, if an expectation is about the same."""
+    """Return the limit of a number of the summary, if an expectation judges the same number."""
     for expectation in diagram.expectations:
         same = replace(expectation.selection, shown=selection.shown, text=selection.text) == selection
         if same and expectation.statistic == statistic:
@@ -165,7 +165,7 @@ def begin() -> None:
 
 
 def _end_with_parent() -> None:
-    """End when the first process has gone, however it ended: nobody is left to take the results."""
+    """End this process when the first one has ended, because nobody is left to take the results."""
     parent = parent_process()
     if parent is not None:
         parent.join()
@@ -173,7 +173,7 @@ def _end_with_parent() -> None:
 
 
 def perform(job: Job) -> Row:
-    """Do one run. What is wrong with it, or stops it, becomes its row."""
+    """Do one run. A fault of the diagram, or an error that stops the run, becomes its row."""
     from quadvis.run.session import run
 
     digest = ""
@@ -190,9 +190,9 @@ def perform(job: Job) -> Row:
 
 
 def diagram_of(job: Job) -> Diagram:
-    """Return the diagram of a run; it is read once for runs of one configuration that follow each other.
+    """Return the diagram of a run; successive runs of one configuration share it.
 
-    QuadvisError if a file is not what it was when the sweep began: one table is about one diagram.
+    QuadvisError if a file has changed since the sweep began, because one table is about one diagram.
     """
     global _loaded
     if _loaded is None or _loaded[0] != job.configuration:

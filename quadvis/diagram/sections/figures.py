@@ -2,14 +2,14 @@
 
     figures:
       - title: Position estimate           # in lower case also the name of the file
-        from: 40 s                         # stretch of the run; all of it if absent
+        from: 40 s                         # stretch of the run; the whole run if absent
         to: 140 s
         panels:                            # side by side, three in a row
           - title: x
             signals:
               - plant.position[0]          # a signal, an element [2,1], or elements [0:2]
               - {signal: "vision/pose.position[0]", label: camera}
-            unit: cm                       # of the axis; the first signal's own if absent
+            unit: cm                       # of the axis; the unit of the first signal if absent
             reference: 0                   # dashed line; the legend has the RMS of the distance from it
       - title: Yaw angle                   # a figure of one panel may have the panel's keys
         signals: plant.attitude[2]
@@ -167,7 +167,7 @@ class FigureReader:
 
 
 def _some(node: YamlNode) -> list[YamlNode]:
-    """Return the entries of a list that must not be empty."""
+    """Return the entries of a list, which must not be empty."""
     if not node.items():
         raise node.fault("the list is empty", "write its entries, or leave the key out")
     return node.items()

@@ -12,7 +12,7 @@ from quadvis.errors import QuadvisError
 
 
 class LayoutError(QuadvisError):
-    """The engine gave up: too much to lay out for its stack, its time or the memory there is."""
+    """The layout engine gave up: the diagram needs too much stack, time or memory."""
 
 
 TIME_LIMIT = 120.0
