@@ -5,7 +5,7 @@ try:
     import gc
     import os
 
-    # Nothing of what is made to start a command is garbage; looking for it takes a twentieth of the start.
+    # The objects made at the start are no garbage; collecting garbage would take a twentieth of the start.
     gc.disable()
     # One BLAS thread: matrices are small here, and a pool of threads costs more than importing numpy.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

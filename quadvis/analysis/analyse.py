@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 class Analysis:
     """The closed loop of a diagram around its operating point.
 
-    ``linear`` are its matrices, ``loops`` the same opened, by the names of the cut points; ``limits`` say how
-    far parameters can go.
+    ``linear`` holds its matrices, ``loops`` the loops opened at the cut points, by name; ``limits`` holds the
+    tolerances of parameters.
     """
 
     diagram: Diagram
@@ -41,22 +41,22 @@ class Analysis:
 
     @property
     def period(self) -> float:
-        """The hyperperiod (s) over which a sampled loop is lifted; 0 if all is continuous."""
+        """The hyperperiod (s) over which a sampled loop is lifted; 0 for a continuous loop."""
         return self.linear.period
 
     @cached_property
     def poles(self) -> NDArray[np.complex128]:
-        """The closed loop's poles (1/s), slowest first; a lifted loop's by their logarithms."""
+        """The closed loop's poles (1/s), slowest first; those of a lifted loop by their logarithms."""
         return rates(self.linear)
 
     @property
     def stable(self) -> bool:
-        """Whether all of them decay."""
+        """True if all poles decay."""
         return bool((self.poles.real < STABLE).all())
 
     @cached_property
     def system(self) -> Any:
-        """The closed loop as `control.StateSpace`, from what disturbs the cut signals to these signals."""
+        """The closed loop as `control.StateSpace`, from disturbances of the cut signals to these signals."""
         return closed_loop(self.linear)
 
     def facts(self) -> dict[str, Any]:
@@ -96,12 +96,12 @@ def analyse(
     limits: Mapping[str, tuple[str, str, str]] = MappingProxyType({}),
     at: float | None = None,
 ) -> Analysis:
-    """Linearise a diagram's closed loop, and answer what its section ``analyse`` and the arguments ask.
+    """Linearise a diagram's closed loop, and answer the questions of its section ``analyse`` and the caller.
 
-    ``cuts`` are signals by the name of the cut point; ``limits`` are by name a parameter, the value where the
-    search begins and the one where it ends: ``("eyes/camera.latency", "50 ms", "2 s")``. ``at`` (s) is when
-    the operating point is sought. AnalysisError if there is none, or if the loop has no derivative;
-    DiagramError if a cut or a limit names nothing.
+    ``cuts`` maps names of cut points to signals. ``limits`` maps names to a parameter and the first and last
+    value of its search: ``("eyes/camera.latency", "50 ms", "2 s")``. ``at`` (s) is the time at which the
+    operating point is sought. AnalysisError if no operating point is found, or if the loop has no derivative;
+    DiagramError if a cut or a limit names nothing that exists.
     """
     opened, sought = diagram.questions.more(cuts, limits)
     at = diagram.questions.at if at is None else at
@@ -123,14 +123,14 @@ def _loop(linear: Linear, cut: Cut, stable: bool) -> Loop:
 
 
 def _check_pictures(diagram: Diagram) -> None:
-    """Refuse pictures that are read: they change in steps of a pixel's value, so they have no derivative."""
+    """Refuse loops through pictures, which change in steps of a pixel's value and have no derivative."""
     if (block := _seen(diagram.graph)) is not None:
         problem = f"block '{block}' gives pictures, and these cannot be linearised"
         raise AnalysisError(f"{problem}; {_way_out(diagram)}")
 
 
 def _seen(graph: Graph) -> str | None:
-    """Return the first block whose pictures another one reads."""
+    """Return the first block whose pictures another block reads."""
     read = {(wire.block, wire.port) for node in graph.nodes for _, wire in node.wires()}
     for node in graph.nodes:
         for name, port in node.block.interface.outputs.items():
@@ -144,7 +144,7 @@ def _way_out(diagram: Diagram) -> str:
 
     for variant in diagram.variants:
         params = [file.path for file in diagram.parameter_files]
-        with suppress(DiagramError):  # it may not fit what is set for this one
+        with suppress(DiagramError):  # the variant may not fit the settings of this diagram
             other = load(diagram.path, variant=variant, settings=diagram.settings, params=params)
             if _seen(other.graph) is None:
                 return f"the variant '{variant}' has none: --variant {variant}"

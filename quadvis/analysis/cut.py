@@ -1,4 +1,4 @@
-"""The signals of a graph where an analysis opens it: each passes a block that adds what one wants."""
+"""The signals at which an analysis opens a graph: each passes a block that adds a disturbance."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from quadvis.engine.graph import Constant, Graph, Node, Wire
 
 
 class Break(Block):
-    """A signal with something added on its way to all who read it."""
+    """A signal to which a disturbance is added on the way to all its readers."""
 
     u = In("float64[*]", unit="a", doc="the signal as its block gives it")
     added = In("float64[*]", unit="a", default=0.0, doc="what is added to it")
@@ -25,12 +25,12 @@ class Break(Block):
 
 
 def break_path(block: str, port: str) -> str:
-    """Return the path of the block in a signal's wires; no block of a diagram can have it."""
+    """Return the path of the block in a signal's wires; no block of a diagram can have this path."""
     return f"{block}.{port}"
 
 
 def with_breaks(graph: Graph, signals: Iterable[tuple[str, str]]) -> Graph:
-    """Return the graph with a break behind each of the signals (block, port), else the same."""
+    """Return the graph with a break after each of the signals (block, port), otherwise unchanged."""
     opened = set(signals)
     nodes = []
     for node in graph.nodes:

@@ -1,9 +1,9 @@
-"""A diagram's closed loop as matrices, by central differences of what the engine runs.
+"""A diagram's closed loop as matrices, by central differences of the engine's own run.
 
-A wholly continuous loop gives the derivative of its states. Any other is lifted over one hyperperiod: its
-state is all that lives in memory between two hyperperiods and that a disturbance of some signal can reach.
-Delay lines, queues of measurements and held values count like any other; stamps, counters and random streams
-follow the clock and do not.
+A wholly continuous loop gives the derivative of its states. Any other loop is lifted over one hyperperiod:
+its state is that part of memory which lasts from one hyperperiod to the next and which a disturbance of some
+signal can reach. Delay lines, queues of measurements and held values belong to the state; stamps, counters
+and random streams follow the clock and do not belong to it.
 
 Source: lifting of multirate loops, Kranc (1957); Meyer and Burrus (1975).
 """
@@ -28,21 +28,21 @@ from quadvis.analysis.probe import (
     blocks_on_loops,
     silence,
 )
-from quadvis.analysis.progress import tell
+from quadvis.analysis.progress import announce
 from quadvis.diagram.sections.analyse import Cut
 from quadvis.engine.engine import Engine
 from quadvis.engine.graph import Graph
 
 Matrix = NDArray[np.float64]
-Columns = dict[int, tuple[Vector, Vector]]  # by slot: derivatives of the memory afterwards, of the channels
-SETTLED = 1e-6  # of the state's size: what may still move at an operating point
+Columns = dict[int, tuple[Vector, Vector]]  # by slot: the derivatives of the later memory and of the channels
+SETTLED = 1e-6  # of the state's size: the largest change at an operating point
 TRIALS = 12
 LATER = 8.0
-CHECKED = 4  # hyperperiods that the matrix must foretell
+CHECKED = 4  # hyperperiods that the matrix must predict
 CLOSE = 0.01
 IDLE = 1e-9
-MENTIONED = 8  # blocks in a message
-CHUNK = 32  # slots that are tried together
+MENTIONED = 8  # blocks that a message names
+CHUNK = 32  # slots that are changed together
 
 
 class Unsettled(AnalysisError):
@@ -51,9 +51,10 @@ class Unsettled(AnalysisError):
 
 @dataclass(frozen=True)
 class Linear:
-    """x+ = a x + b d, y = c x + d d over a hyperperiod ``period`` (s); x' = a x + b d if that is 0.
+    """x+ = a x + b d, y = c x + d d over a hyperperiod ``period`` (s); x' = a x + b d if the period is 0.
 
-    Each channel is disturbed by its element of d on the way to its readers; y is what comes back there.
+    Its element of d disturbs each channel on the way to the channel's readers; y is the signal that comes
+    back.
     """
 
     a: Matrix
@@ -66,10 +67,10 @@ class Linear:
 
 
 def linearised(graph: Graph, cuts: Sequence[Cut], at: float) -> Linear:
-    """Return the loop at its operating point, which Newton's method seeks from the state at a time (s).
+    """Return the loop at its operating point, found by Newton's method from the state at a time (s).
 
-    If it does not find one, it tries again from a later time. AnalysisError if there is no steady state near,
-    if the loop is not smooth there, if a cut is not on it, or if there is neither a loop nor a state.
+    If the method fails, it starts again from a later time. AnalysisError if no steady state is near, if the
+    loop is not smooth there, if a cut is not on the loop, or if the graph has neither a loop nor a state.
     """
     try:
         return _linearised(graph, cuts, at)
@@ -84,7 +85,7 @@ def _linearised(graph: Graph, cuts: Sequence[Cut], at: float) -> Linear:
     engine = Engine(with_breaks(graph, signals))
     silence(engine)
     with engine:
-        tell("running to the operating point")
+        announce("running to the operating point")
         probe = Probe(engine, cuts, at)
         linear = _linearise(probe)
     if not looped and not linear.states:
@@ -93,18 +94,20 @@ def _linearised(graph: Graph, cuts: Sequence[Cut], at: float) -> Linear:
 
 
 def _check_cuts(graph: Graph, looped: set[str], cuts: Sequence[Cut]) -> None:
-    """Refuse to open what is not closed."""
+    """Refuse cuts that are not on a closed loop."""
     for cut in cuts:
         for signal in cut.signals:
             if signal.block not in looped:
                 problem = f"cut '{cut.label}': '{signal.text}' comes from a block that is on no loop"
                 known = [node.path for node in graph.nodes if node.path in looped]
-                remedy = f"open the loop behind one of {_some(known)}" if known else "the diagram has none"
+                remedy = (
+                    f"open the loop behind one of {_few_names(known)}" if known else "the diagram has none"
+                )
                 raise AnalysisError(f"{problem}; {remedy}")
 
 
-def _some(names: Sequence[str]) -> str:
-    """Name a few blocks."""
+def _few_names(names: Sequence[str]) -> str:
+    """Return the first few names, followed by dots if more exist."""
     return ", ".join(names[:MENTIONED]) + (", ..." if len(names) > MENTIONED else "")
 
 
@@ -125,7 +128,7 @@ def _linearise(probe: Probe) -> Linear:
 
 
 def _solved(matrix: Matrix, vector: Vector) -> Vector:
-    """Return the least solution: what nothing holds in place stays where it is."""
+    """Return the least-norm solution: a state that nothing determines stays where it is."""
     return np.asarray(np.linalg.lstsq(matrix, vector, rcond=None)[0], np.float64)
 
 
@@ -144,17 +147,17 @@ def _is_continuous(probe: Probe, places: Positions) -> bool:
 
 
 def _columns(probe: Probe) -> tuple[Positions, Columns]:
-    """Return the slots of the state, and by slot the derivatives of what follows."""
+    """Return the slots of the state, and for each slot the derivatives of the memory and of the channels."""
     still = probe.after(probe.positions[:0], 0.0)
     columns: Columns = {}
     slots, rounds = _reached(probe, still)
     known = set(slots.tolist())
-    fresh = np.setdiff1d(slots, _forgotten(probe, slots, rounds, still))
+    fresh = np.setdiff1d(slots, _unread(probe, slots, rounds, still))
     while fresh.size:
         reached: set[int] = set()
         passing = np.isin(fresh, probe.signals)
         for place in [*fresh[~passing].tolist(), *_influential(probe, fresh[passing], still)]:
-            tell(f"{len(columns)} states disturbed")
+            announce(f"{len(columns)} states disturbed")
             step = STEP * probe.scale[place]
             one = np.array([place], np.intp)
             above, below = (probe.after(one, sign * step) for sign in (1.0, -1.0))
@@ -164,11 +167,11 @@ def _columns(probe: Probe) -> tuple[Positions, Columns]:
                 reached.update(changed.tolist())
         fresh = np.array(sorted(reached - known), np.intp)
         known |= reached
-    return _heard(np.array(sorted(columns), np.intp), columns), columns
+    return _observable(np.array(sorted(columns), np.intp), columns), columns
 
 
-def _heard(places: Positions, columns: Columns) -> Positions:
-    """Leave out, from the far end, the slots that matter to no channel and to no other slot left."""
+def _observable(places: Positions, columns: Columns) -> Positions:
+    """Drop, until no more can be dropped, the slots on which no channel and no remaining slot depends."""
     a, c = _stacked(columns, places)
     left = np.arange(places.size)
     while left.size:
@@ -180,7 +183,7 @@ def _heard(places: Positions, columns: Columns) -> Positions:
 
 
 def _reached(probe: Probe, still: tuple[Vector, Vector]) -> tuple[Positions, int]:
-    """Return the slots that a disturbance of some signal comes to, and after how many hyperperiods."""
+    """Return the slots that a disturbance of some signal reaches, and after how many hyperperiods."""
     found = np.union1d(_changed(probe, probe.shaken(), still[0]), probe.continuous).astype(np.intp)
     rounds, known = 1, found[:0]
     while found.size > known.size:
@@ -190,17 +193,17 @@ def _reached(probe: Probe, still: tuple[Vector, Vector]) -> tuple[Positions, int
 
 
 def _nudged(probe: Probe, places: Positions, count: int = 1) -> tuple[Vector, Vector]:
-    """Return what comes of a small random change of all these slots together."""
+    """Return the effects of a small random change of all these slots together."""
     random = np.random.default_rng(2)
     return probe.after(
         places, STEP * probe.scale[places] * random.uniform(0.5, 1.0, places.size), count=count
     )
 
 
-def _forgotten(probe: Probe, places: Positions, rounds: int, still: tuple[Vector, Vector]) -> Positions:
-    """Return slots that only hand on what nothing reads, as the far end of a long shift register does.
+def _unread(probe: Probe, places: Positions, rounds: int, still: tuple[Vector, Vector]) -> Positions:
+    """Return slots whose value no block reads any more, such as the tail of an overlong shift register.
 
-    They matter to no channel and to no other slot, and their poles are at zero.
+    No channel and no other slot depends on them, and their poles are at zero.
     """
     chunks: list[Positions] = []
     for _, array in groupby(places.tolist(), lambda place: probe.names[place].partition("[")[0]):
@@ -222,19 +225,19 @@ def _forgotten(probe: Probe, places: Positions, rounds: int, still: tuple[Vector
     return places[:0]
 
 
-@np.errstate(invalid="ignore")  # a parameter may be infinite, and a signal missing
+@np.errstate(invalid="ignore")  # a parameter may be infinite, and a signal NaN
 def _slope(above: Vector, below: Vector, step: float) -> Vector:
     return np.asarray((above - below) / (2 * step), np.float64)
 
 
 def _changed(probe: Probe, one: Vector, other: Vector) -> Positions:
-    """Return the slots that hold other bits."""
+    """Return the slots whose bits differ."""
     places = probe.positions
     return np.asarray(places[one[places].view(np.int64) != other[places].view(np.int64)], np.intp)
 
 
 def _influential(probe: Probe, places: Positions, still: tuple[Vector, Vector]) -> list[int]:
-    """Return those of the signals that matter a hyperperiod later, by halves: most are computed anew."""
+    """Return the signals with an effect a hyperperiod later, found by halving, as most signals have none."""
     found: list[int] = []
     waiting = [places] if places.size else []
     while waiting:
@@ -270,7 +273,7 @@ def _lifted(probe: Probe, places: Positions, columns: Columns) -> Linear:
 
 
 def _without_idle(linear: Linear) -> Linear:
-    """Leave out the states that never move and matter to nothing, such as that of a lag of zero."""
+    """Leave out the states that never move and have no effect, such as the state of a lag of zero."""
     moves = linear.a - (np.eye(len(linear.a)) if linear.period else 0.0)
     busy = [(np.abs(part) > IDLE).any(axis=axis) for part, axis in
             ((moves, 0), (moves, 1), (linear.b, 1), (linear.c, 0))]  # fmt: skip
@@ -282,7 +285,7 @@ def _without_idle(linear: Linear) -> Linear:
 
 
 def _continuous(probe: Probe, places: Positions) -> Linear:
-    """Return the derivative where nothing is sampled."""
+    """Return the derivative of a loop without sampling."""
     for _ in range(TRIALS):
         linear = _derivative(probe, places)
         residual = probe.slopes(places[:0], 0.0, np.zeros(len(probe.channels)))[0][places]
@@ -316,7 +319,7 @@ def _states(probe: Probe, places: Positions) -> tuple[str, ...]:
 
 
 def _check(probe: Probe, places: Positions, a: Matrix) -> None:
-    """Refuse a loop that does not go where its matrix says: one with an edge at its operating point."""
+    """Refuse a loop that its matrix does not predict: one with an edge at its operating point."""
     if not places.size:
         return
     size = STEP * probe.scale[places]

@@ -1,8 +1,8 @@
-"""The loop opened at a cut point: its frequency response and how much it tolerates there.
+"""The loop opened at a cut point: its frequency response and its margins.
 
-A cut may hold several signals, and a lifted loop has several instants in one hyperperiod. Everything at the
-cut is scaled, turned or delayed at once, so the margins are those of the eigenvalues of the loop's transfer
-matrix, the characteristic loci of MacFarlane and Postlethwaite (1977). With one signal and one rate that is
+A cut may hold several signals, and a lifted loop has several instants in one hyperperiod. All of them are
+scaled, turned or delayed together, so the margins are those of the eigenvalues of the loop's transfer matrix,
+the characteristic loci of MacFarlane and Postlethwaite (1977). For one signal at one rate the eigenvalue is
 the loop's transfer function itself.
 """
 
@@ -23,19 +23,19 @@ from quadvis.analysis.systems import library, state_space
 
 Complexes = NDArray[np.complex128]
 DENSITY = 120  # frequencies in a decade
-FAINT = 1e-4  # a locus below is never critical: its gain margin is above 1e4
+FAINT = 1e-4  # a locus below this gain is never critical: its gain margin is above 1e4
 VISIBLE = 1e-3
 PRECISION = 1e-11
 
 
 @dataclass(frozen=True)
 class Margins:
-    """How far the loop is from instability at one cut point, and where it crosses gain 1.
+    """The distance of the loop from instability at one cut point, and its crossover of gain 1.
 
-    Gains are factors, infinite (up) or 0 (down) where nothing limits them. ``phase_lag`` and ``phase_lead``
-    (rad) are what may be taken from the phase and added to it; the lesser is the phase margin of the
-    textbooks. ``delay`` in s; the three are infinite if the gain never is 1. ``crossover`` (rad/s) is where
-    the lag is found, NaN without any. All are NaN for a loop that is not stable.
+    Gains are factors, infinite (up) or 0 (down) if unlimited. ``phase_lag`` and ``phase_lead`` (rad) may be
+    subtracted from the phase and added to it; the smaller one is the phase margin of the textbooks. ``delay``
+    is in s. These three are infinite if the gain is never 1. ``crossover`` (rad/s) is the frequency of the
+    phase lag, NaN if no lag is found. All are NaN for an unstable loop.
     """
 
     gain_up: float = math.nan
@@ -48,14 +48,14 @@ class Margins:
 
 @dataclass(frozen=True)
 class Loop:
-    """The loop opened at a cut: from what its readers are given (w) to what comes back (y), as -y / w.
+    """The loop opened at a cut: from the signal that its readers get (w) to the returning one (y), as -y / w.
 
-    The sign is that of negative feedback, as `control.margin` takes it.
+    The sign is that of negative feedback, as for `control.margin`.
     """
 
     label: str
     signals: tuple[str, ...]
-    closed: Linear  # with the channels of this cut alone
+    closed: Linear  # with the channels of this cut only
     stable: bool
 
     @cached_property
@@ -84,7 +84,7 @@ class Loop:
         return grid, np.array(rows).reshape(len(grid), -1)
 
     def bode(self) -> tuple[NDArray[np.float64], Complexes]:
-        """Return frequencies (rad/s) and the loop's response there, as far as it is not lost below others."""
+        """Return frequencies (rad/s) and the loop's response there, where larger loci do not hide it."""
         found: dict[float, complex] = {}
         for omega in self._grid().tolist():
             for value, true in self._unfolded(omega):
@@ -105,22 +105,22 @@ class Loop:
         return np.geomspace(low, high, max(50, int(DENSITY * math.log10(high / low))))
 
     def _response(self, omega: float) -> Complexes:
-        """Return what comes back (y) of a disturbance (d) of the closed loop."""
+        """Return the response (y) of the closed loop to a disturbance (d)."""
         closed = self.closed
         point = np.exp(1j * omega * closed.period) if closed.period else 1j * omega
         inner = point * np.eye(len(closed.a)) - closed.a
         return np.asarray(closed.c @ np.linalg.solve(inner, closed.b.astype(complex)) + closed.d)
 
     def _values(self, omega: float) -> Complexes:
-        """Return the eigenvalues of the open loop from those of the closed one, which are well behaved."""
+        """Return the open loop's eigenvalues, computed from those of the closed loop, which stay finite."""
         values = np.linalg.eigvals(self._response(omega))
-        with np.errstate(all="ignore"):  # a pole on the way: the gain is infinite there
+        with np.errstate(all="ignore"):  # at a pole the gain is infinite
             return np.asarray(-values / (1.0 + values))
 
     def _unfolded(self, omega: float) -> list[tuple[complex, float]]:
-        """Return the eigenvalues with their true frequencies, which the lifting folds into the lowest band.
+        """Return the eigenvalues with their true frequencies; lifting folds these into the lowest band.
 
-        The eigenvectors tell: each is a wave over the instants of the hyperperiod.
+        Each eigenvector is a wave over the instants of the hyperperiod and so shows the true frequency.
         """
         if self._instants == 1:
             return [(value, omega) for value in self._values(omega).tolist()]
@@ -148,7 +148,7 @@ class Loop:
         return min(found, key=lambda one: min(abs(one[0] - value), abs(one[0].conjugate() - value)))
 
     def _crossings(self) -> Iterator[tuple[str, float, complex]]:
-        """Yield where a locus crosses gain 1 or the negative real axis: which, true frequency, value."""
+        """Yield each crossing of gain 1 or of the negative real axis: its kind, true frequency and value."""
         grid, loci = self.loci
         for column in loci.T.tolist():
             for (left, before), (right, after) in pairwise(zip(grid.tolist(), column, strict=True)):
@@ -164,7 +164,7 @@ class Loop:
                         yield "phase", omega, value
 
     def _ends(self) -> Iterator[tuple[str, float, complex]]:
-        """Yield the negative real values at the ends of the band, where loci turn back on themselves."""
+        """Yield the negative real values at the ends of the band, where the loci turn back."""
         for omega in (0.0, math.pi / self.closed.period) if self.closed.period else (0.0,):
             for value in self._values(omega).tolist():
                 if -1.0 / FAINT < value.real < -FAINT and abs(value.imag) < 1e-6 * abs(value.real):
@@ -173,7 +173,7 @@ class Loop:
     def _refined(
         self, left: float, before: complex, right: float, after: complex, measure: Any
     ) -> tuple[float, complex]:
-        """Return the point between two where a measure of the locus is zero."""
+        """Return the frequency and value between two points at which a measure of the locus is zero."""
         while right - left > PRECISION * right:
             middle = 0.5 * (left + right)
             if not left < middle < right:
@@ -196,7 +196,7 @@ def _imaginary(value: complex) -> float:
 
 
 def _matched(before: Complexes, after: Complexes) -> NDArray[np.intp]:
-    """Return the order of the eigenvalues that carries each locus on."""
+    """Return the order of the later eigenvalues that continues each locus."""
     if len(before) == 1:
         return np.zeros(1, np.intp)
     size = np.abs(before)[:, None] + np.abs(after)[None, :] + FAINT
@@ -220,9 +220,9 @@ def _margins(crossings: list[tuple[str, float, complex]]) -> Margins:
 
 
 def rates(linear: Linear) -> Complexes:
-    """Return the closed loop's poles as continuous ones (1/s): the logarithm by the period if it is lifted.
+    """Return the closed loop's poles (1/s); for a lifted loop the logarithms divided by the period.
 
-    Those that a lifted loop forgets within a hyperperiod are left out.
+    Poles that decay within one hyperperiod of a lifted loop are left out.
     """
     values = np.linalg.eigvals(linear.a).astype(complex) if linear.a.size else np.zeros(0, complex)
     if linear.period:
@@ -231,6 +231,6 @@ def rates(linear: Linear) -> Complexes:
 
 
 def growth(linear: Linear) -> float:
-    """Return how fast a disturbance grows at worst (1/s); negative if the loop is stable."""
+    """Return the fastest growth of a disturbance (1/s); negative if the loop is stable."""
     found: Matrix = rates(linear).real
     return float(found.max()) if found.size else -math.inf

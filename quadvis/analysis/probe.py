@@ -1,4 +1,4 @@
-"""An engine that is asked, again and again, what comes of a small change to its memory."""
+"""An engine that returns, again and again, the effect of a small change of its memory."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from quadvis.errors import QuadvisError
 
 Vector = NDArray[np.float64]
 Positions = NDArray[np.intp]  # of slots
-STEP = 1e-5  # of a central difference, relative to values above 1: errors near 1e-10
-LONGEST = 20_000  # ticks of a hyperperiod
+STEP = 1e-5  # of a central difference, relative to values above 1; it gives errors near 1e-10
+LONGEST = 20_000  # ticks of the longest hyperperiod
 
 
 class AnalysisError(QuadvisError):
-    """A diagram that cannot be linearised: what stands in the way, and the way out."""
+    """A diagram that cannot be linearised: the obstacle, and the way out."""
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One element of a cut signal at one tick of the hyperperiod: where it is read and where it is disturbed.
+    """One element of a cut signal at one tick of the hyperperiod: its slot to read and its slot to disturb.
 
     ``time`` (s) counts from the start of the hyperperiod.
     """
@@ -46,7 +46,7 @@ class Channel:
 
 
 def silence(engine: Engine) -> None:
-    """Take the noise away: a random stream of zeros stays zero and gives 2e-5 sigma at every draw."""
+    """Remove the noise: a random stream of zeros stays zero and gives 2e-5 sigma at every draw."""
     for node in engine.graph.nodes:
         for name, state in node.block.interface.states.items():
             if isinstance(state, Random):
@@ -54,7 +54,7 @@ def silence(engine: Engine) -> None:
 
 
 def hyperperiod(graph: Graph, tasks: Iterable[Task]) -> int:
-    """Return after how many ticks these tasks are due together again."""
+    """Return the number of ticks after which these tasks are due together again."""
     span = lcm(*(graph.ticks(task.period) for task in tasks))
     if span > LONGEST:
         time = float(span * graph.tick)
@@ -64,9 +64,9 @@ def hyperperiod(graph: Graph, tasks: Iterable[Task]) -> int:
 
 
 class Probe:
-    """Answers what a hyperperiod makes of the memory; the run stands at its beginning, without noise.
+    """Computes the effect of a hyperperiod on the memory; the run stands at its beginning, without noise.
 
-    ``positions`` are the 8-byte slots that can hold a part of the loop's state, with ``names`` for people.
+    ``positions`` are the 8-byte slots that can hold the loop's state; ``names`` are their names in texts.
     """
 
     def __init__(self, engine: Engine, cuts: Sequence[Cut], at: float) -> None:
@@ -98,13 +98,13 @@ class Probe:
         return float(self.span * self.graph.tick)
 
     def keep(self) -> None:
-        """Take the present memory as that from which all questions start."""
+        """Make the present memory the starting point of all later calls."""
         self._start = self.engine.snapshot()
         self.start: Vector = self.floats.copy()
         self.scale: Vector = np.maximum(1.0, np.abs(np.nan_to_num(self.start)))
 
     def move(self, places: Positions, deltas: Vector) -> None:
-        """Change the memory from which all questions start."""
+        """Change the memory at the starting point."""
         self.engine.restore(self._start)
         self.floats[places] += deltas
         self.keep()
@@ -112,9 +112,9 @@ class Probe:
     def after(
         self, places: Positions, deltas: Vector | float, added: Vector | None = None, count: int = 1
     ) -> tuple[Vector, Vector]:
-        """Return the memory some hyperperiods after a change, and what the channels read in the first.
+        """Return the memory some hyperperiods after a change, and the values of the channels in the first.
 
-        ``added`` is what the channels are disturbed by, in the first.
+        ``added`` holds the disturbances of the channels in the first hyperperiod.
         """
         engine, floats = self.engine, self.floats
         engine.restore(self._start)
@@ -131,7 +131,7 @@ class Probe:
         return floats.copy(), found
 
     def slopes(self, places: Positions, deltas: Vector | float, added: Vector) -> tuple[Vector, Vector]:
-        """Return the derivatives of the continuous states after a change, and what the channels read."""
+        """Return the derivatives of the continuous states after a change, and the values of the channels."""
         self.engine.restore(self._start)
         self.floats[TIME.position] = self.engine.time
         self.floats[places] += deltas
@@ -154,13 +154,13 @@ class Probe:
             self._shaken = False
 
     def _disturb(self, added: Vector, tick: int) -> None:
-        """Add to the channels that are read at a tick, and to no other."""
+        """Add the disturbances to the channels of a tick, and to no others."""
         now = self._ticks == tick
         self.floats[self._added] = 0.0
         np.add.at(self.floats, self._added[now], added[now])  # two cuts may share a signal
 
     def _events(self) -> list[tuple[int, int, NDArray[np.intp]]]:
-        """Return the ticks at which channels are read, how far it is to the next, and which channels."""
+        """Return the ticks at which channels are read, the number of ticks to the next, and the channels."""
         ticks = sorted({0, *self._ticks.tolist()})
         following = [*ticks[1:], self.span]
         return [
@@ -180,9 +180,9 @@ class Probe:
                     yield Channel(cut.label, signal.text, read + element, added + element, tick, time)
 
     def _named(self) -> Iterator[tuple[int, str]]:
-        """Yield the slots of real numbers that blocks of the loop own, with their names.
+        """Yield the slots of real numbers of the blocks of the loop, with their names.
 
-        Signals in seconds are instants and ages. They follow the clock, so they are no part of the state.
+        Signals in seconds are instants and ages. They follow the clock, so they do not belong to the state.
         """
         for node, block in zip(self.graph.nodes, self.program.blocks, strict=True):
             if node.path not in self.loop:
@@ -207,7 +207,7 @@ class Probe:
         return next(op.targets[0] for op in delays if op.sources[0] == output)
 
     def _continuous(self) -> Positions:
-        """Return where the continuous states of the loop are."""
+        """Return the slots of the loop's continuous states."""
         return np.array(
             [
                 position
@@ -220,7 +220,7 @@ class Probe:
         )
 
     def _shake(self) -> None:
-        """Have every signal and all Work of the loop disturbed at each tick, when it is asked for."""
+        """Prepare the random disturbance of every signal and all Work of the loop; `shaken` turns it on."""
         by_task: dict[str, list[int]] = {}
         for node, block in zip(self.graph.nodes, self.program.blocks, strict=True):
             found = by_task.setdefault(block.task, [])

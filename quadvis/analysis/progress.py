@@ -1,4 +1,4 @@
-"""What an analysis is doing just now, for whoever watches; nobody does unless asked."""
+"""The present step of an analysis, reported to a watcher if one is set."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _task: ContextVar[str] = ContextVar("task", default="")
 
 @contextmanager
 def watched(watcher: Watcher) -> Iterator[None]:
-    """Have the watcher called with what is being done, often."""
+    """Call the watcher with each step that begins inside."""
     token = _watcher.set(watcher)
     try:
         yield
@@ -24,7 +24,7 @@ def watched(watcher: Watcher) -> Iterator[None]:
 
 @contextmanager
 def task(name: str) -> Iterator[None]:
-    """Name what the steps inside are done for, after what that itself is done for."""
+    """Name the purpose of the steps inside; it follows the purposes around it."""
     token = _task.set(_joined(name))
     try:
         yield
@@ -32,8 +32,8 @@ def task(name: str) -> Iterator[None]:
         _task.reset(token)
 
 
-def tell(step: str) -> None:
-    """Say what is being done."""
+def announce(step: str) -> None:
+    """Report the step that begins."""
     watcher = _watcher.get()
     if watcher is not None:
         watcher(_joined(step))

@@ -1,4 +1,4 @@
-"""Cuts and limits as the command line writes them."""
+"""Read the cuts and limits of the command line."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from quadvis.errors import QuadvisError
 
 
 def read_cuts(texts: Sequence[str]) -> dict[str, list[str]]:
-    """Read ``torque=control/roll.torque`` or ``a.y,b.y``, which is its own name."""
+    """Read ``torque=control/roll.torque``, or ``a.y,b.y``, which is also the name of the cut."""
     found: dict[str, list[str]] = {}
     for text in texts:
         name, equals, signals = text.partition("=")
@@ -21,11 +21,14 @@ def read_cuts(texts: Sequence[str]) -> dict[str, list[str]]:
 
 
 def _listed(text: str) -> list[str]:
-    """Split at the commas that stand in no index."""
+    """Split at the commas outside of indices."""
     parts = [""]
     depth = 0
     for letter in text:
-        depth += (letter == "[") - (letter == "]")
+        if letter == "[":
+            depth += 1
+        elif letter == "]":
+            depth -= 1
         if letter == "," and depth == 0:
             parts.append("")
         else:
@@ -34,7 +37,7 @@ def _listed(text: str) -> list[str]:
 
 
 def read_limits(texts: Sequence[str]) -> dict[str, tuple[str, str, str]]:
-    """Read ``eyes/camera.latency=100 ms..2 s``; QuadvisError if it is something else."""
+    """Read ``eyes/camera.latency=100 ms..2 s``; QuadvisError for any other text."""
     found = {}
     for text in texts:
         name, _, span = (part.strip() for part in text.partition("="))
@@ -47,5 +50,5 @@ def read_limits(texts: Sequence[str]) -> dict[str, tuple[str, str, str]]:
 
 
 def read_time(text: str | None) -> float | None:
-    """Read ``5 s``; DiagramError if it is no time."""
+    """Read ``5 s``; DiagramError if the text is not a time."""
     return None if text is None else float(read_duration(YamlScalar(text, False, "--at", 0, 0)))

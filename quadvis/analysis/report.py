@@ -1,4 +1,4 @@
-"""What `quadvis analyse` prints, and its Bode plots."""
+"""The text that `quadvis analyse` prints, and its Bode plots."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SECOND = Unit.parse("s")
-SHOWN = 8  # poles
+SHOWN = 8  # poles in the table
 REAL = 1e-3
 HEADS = ("loop opened at", "crossover", "phase margin", "delay margin", "gain margin")
 
 
 def analysis_lines(analysis: Analysis) -> Iterator[str]:
-    """Yield the analysis for people, line by line: limits take their time."""
+    """Yield the lines of the report one by one, because limits take some time."""
     diagram = analysis.diagram
     variant = f" ({diagram.variant})" if diagram.variant else ""
     count = len(analysis.linear.states)
@@ -50,7 +50,7 @@ def analysis_lines(analysis: Analysis) -> Iterator[str]:
         yield "STABLE"
     else:
         worst = float(analysis.poles.real.max())
-        yield f"NOT STABLE: a disturbance grows by {worst:.3g} 1/s, in {_grows(analysis)}"
+        yield f"NOT STABLE: a disturbance grows by {worst:.3g} 1/s, in {_growing_states(analysis)}"
 
 
 def _indented(rows: list[tuple[str, ...]]) -> Iterator[str]:
@@ -59,9 +59,9 @@ def _indented(rows: list[tuple[str, ...]]) -> Iterator[str]:
 
 
 def _poles(analysis: Analysis) -> tuple[list[tuple[str, ...]], int]:
-    """Return the slowest poles, a pair in one row, and how many more there are.
+    """Return rows for the slowest poles, one row for a pair, and the number of further poles.
 
-    A pole that is there many times is known to 1e-3 only.
+    The value of a multiple pole is known to 1e-3 only.
     """
     upper = [pole for pole in analysis.poles.tolist() if pole.imag >= -REAL * abs(pole)]
     rows: list[tuple[str, ...]] = []
@@ -72,8 +72,8 @@ def _poles(analysis: Analysis) -> tuple[list[tuple[str, ...]], int]:
     return rows, max(0, len(upper) - SHOWN)
 
 
-def _grows(analysis: Analysis) -> str:
-    """Return the states that the fastest growing mode moves most."""
+def _growing_states(analysis: Analysis) -> str:
+    """Return the names of the states that the fastest growing mode moves most."""
     values, vectors = np.linalg.eig(analysis.linear.a)
     worst = int(np.argmax(np.abs(values) if analysis.period else values.real))
     order = np.argsort(-np.abs(vectors[:, worst]), kind="stable")[:3]
@@ -103,9 +103,9 @@ def _degrees(angle: float) -> str:
 
 
 def save_bode_plots(analysis: Analysis, folder: Path) -> list[Path]:
-    """Draw the response of each opened loop as ``NAME-bode-CUT.png``; return where they are.
+    """Draw the response of each opened loop as ``NAME-bode-CUT.png``; return the paths.
 
-    QuadvisError if one of them would replace what the diagram reads, or is no picture.
+    QuadvisError if one of them would replace an input of the diagram, or a file that is no picture.
     """
     diagram = analysis.diagram
     name = file_name(*filter(None, (diagram.name, diagram.variant)))
@@ -140,7 +140,7 @@ def _draw(loop: Loop, gain: Axes, phase: Axes) -> None:
     omega, values = loop.bode()
     angles = np.degrees(np.unwrap(np.angle(values)))
     middle = int(np.argmin(np.abs(np.log(np.abs(values) + 1e-300))))
-    angles -= 360.0 * round((angles[middle] + 180.0) / 360.0)  # near the crossover between -360 and 0
+    angles -= 360.0 * round((angles[middle] + 180.0) / 360.0)  # between -360 and 0 near the crossover
     gain.loglog(omega, np.abs(values), color=COLOURS[0])
     phase.semilogx(omega, angles, color=COLOURS[0])
     gain.axhline(1.0, color="#666666", linewidth=0.8, linestyle="--")

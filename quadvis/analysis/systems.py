@@ -10,7 +10,7 @@ from quadvis.errors import QuadvisError
 
 
 def library(name: str = "control") -> Any:
-    """Return python-control, or a module of scipy that comes with it; QuadvisError says how to install it."""
+    """Import python-control, or a module of scipy that comes with it; QuadvisError says how to install it."""
     try:
         return import_module(name)
     except ImportError as error:
@@ -20,7 +20,7 @@ def library(name: str = "control") -> Any:
 def state_space(linear: Linear, a: Matrix, b: Matrix, c: Matrix, d: Matrix) -> Any:
     """Return a `control.StateSpace` with names of states and channels; dt is the hyperperiod if lifted.
 
-    The names have ':' where diagrams have '.', which python-control keeps for itself.
+    The names have ':' where diagrams have '.', because python-control reserves the '.'.
     """
     names = [_name(channel.text, channel.read, channel.time, linear) for channel in linear.channels]
     return library().StateSpace(
@@ -32,7 +32,7 @@ def state_space(linear: Linear, a: Matrix, b: Matrix, c: Matrix, d: Matrix) -> A
 
 
 def closed_loop(linear: Linear) -> Any:
-    """Return the closed loop: from what disturbs the cut signals to what these are without it."""
+    """Return the closed loop, from the disturbances of the cut signals to the signals without disturbance."""
     return state_space(linear, linear.a, linear.b, linear.c, linear.d)
 
 

@@ -1,4 +1,4 @@
-"""How far a parameter can go before the loop is unstable: the diagram is loaded again for each value."""
+"""Find the value of a parameter at which the loop becomes unstable, loading the diagram for each value."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from quadvis.errors import RunError
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
 
-STEPS = 10  # of the search for an unstable value
-PRECISION = 1e-5  # of the value found, relative to it and to the range
-STABLE = -1e-6  # 1/s; slower decay is none
+STEPS = 10  # in the search for an unstable value
+PRECISION = 1e-5  # of the value found, relative to the value and to the range
+STABLE = -1e-6  # 1/s; a pole that decays more slowly counts as unstable
 
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How far a parameter can go: the last stable ``value`` (SI).
+    """The tolerance of a parameter: its last stable ``value`` (SI).
 
-    That is the end of the range if all of it is stable, and NaN if its start is not. ``reason`` says why
-    there is nothing to analyse beyond, if it is that and not a loop that becomes unstable.
+    The value is the end of the range if the whole range is stable, and NaN if its start is unstable. If the
+    loop does not become unstable but cannot be analysed beyond the value, ``reason`` says why.
     """
 
     limit: Limit
@@ -42,7 +42,7 @@ class Tolerance:
 
     @property
     def reached(self) -> bool:
-        """Whether the loop is lost within the range."""
+        """True if the loop is lost within the range."""
         return self.value != self.limit.end
 
     @property
@@ -60,14 +60,14 @@ class Tolerance:
 def tolerance(diagram: Diagram, limit: Limit, at: float) -> Tolerance:
     """Search from the start of a range for the first value at which the loop is lost.
 
-    Coarsely first, so an unstable stretch shorter than a tenth of the range may be stepped over, then by
-    Brent's method. AnalysisError if there is no loop to analyse at the start; DiagramError if the diagram
-    refuses a value.
+    The search first goes in ten steps, so it may miss an unstable stretch that is shorter than a step; then
+    it uses Brent's method. AnalysisError if the loop cannot be analysed at the start; DiagramError if the
+    diagram refuses a value.
     """
     excess = functools.cache(lambda value: _growth_at(diagram, limit, at, value) - STABLE)
     if excess(limit.start) >= 0.0:
         return Tolerance(limit, math.nan)
-    reasons: dict[float, str] = {}  # why there is nothing to analyse at a value
+    reasons: dict[float, str] = {}  # by value, why the loop cannot be analysed there
 
     def distance(value: float) -> float:
         try:
@@ -94,13 +94,13 @@ def _growth_at(diagram: Diagram, limit: Limit, at: float, value: float) -> float
 
 
 def shown(limit: Limit, value: float) -> str:
-    """Return a value of the parameter for people."""
+    """Return a value of the parameter as text."""
     number = f"{value / limit.shown.scale:.4g}"
     return f"{number} {limit.shown}" if limit.shown.symbols else number
 
 
 class Limits(Mapping[str, Tolerance]):
-    """The answers to all questions about limits, by their names; each is sought when it is first wanted."""
+    """The answers to all questions about limits, by name; each is computed when it is first read."""
 
     def __init__(self, diagram: Diagram, limits: Sequence[Limit], at: float) -> None:
         self._diagram, self._at = diagram, at

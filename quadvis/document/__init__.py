@@ -1,4 +1,4 @@
-"""YAML files that may be wrong or hostile: read within limits, as untyped nodes with their places."""
+"""Read YAML files that may be wrong or hostile, within limits, as untyped nodes with their places."""
 
 from quadvis.document.nodes import YamlList, YamlMap, YamlNode, YamlScalar, measure
 from quadvis.document.reader import MAX_BYTES, dump_yaml, parse_yaml, read_yaml

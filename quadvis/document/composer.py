@@ -1,4 +1,4 @@
-"""From the events of a YAML parser to nodes, without recursion; what is refused on the way is kept."""
+"""Compose nodes from the events of a YAML parser, without recursion, and collect the faults."""
 
 from __future__ import annotations
 
@@ -27,26 +27,26 @@ MAX_NODES = 100_000
 MAX_DEPTH = 50
 MAX_KEY = 200
 
-# Control characters; line breaks that editors do not count; signs that reorder the text that people see.
+# Control characters, line breaks that editors do not count, and signs that reorder the visible text.
 FORBIDDEN = re.compile(
     "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufeff"
     "\ufffe\uffff]"
 )
 LINE_END = re.compile("\r\n|\r|\n")
 _NO_BLANK = re.compile(r"([A-Za-z_]\w*)([:\u2236\ua789\ufe55\uff1a])([^\s/\\].*| .*)", re.ASCII)
-# In a block, the beginning of a list or map, or a blank that is none, makes the key go on behind its ':'.
+# In a block, a beginning list or map, or a blank that YAML does not know, makes the key go on after its ':'.
 _RUN_ON = re.compile("[A-Za-z_][A-Za-z0-9_]*:(?=[{\\[\u00a0\u1680\u2000-\u200a\u202f\u205f\u3000])")
 _FRACTION = re.compile(r"[0-9]+(?:[eE][+-]?[0-9]+)?(?: *[A-Za-z%/°µ].*)?")
 _WHOLE = re.compile(r"[+-]?[0-9]+")
-_MOST_LINES = 5  # named for a key that is there again and again
+_MOST_LINES = 5  # lines that are named for a repeated key
 
 
 class MisreadError(Exception):
-    """A list of numbers was part of a longer text, or too long."""
+    """A list of numbers was part of a longer text, or was too long."""
 
 
 class RunOnError(Exception):
-    """A key goes on behind its ':' at this line and column, from 0."""
+    """A key goes on after its ':' at this line and column, from 0."""
 
     def __init__(self, line: int, column: int) -> None:
         super().__init__(line, column)
@@ -54,7 +54,7 @@ class RunOnError(Exception):
 
 
 class Position:
-    """Turns lines and columns of the parser, from 0, into places; ``blanks`` were put in for a repair."""
+    """Converts lines and columns of the parser, from 0, to places; ``blanks`` were inserted by repairs."""
 
     def __init__(self, name: str, blanks: list[tuple[int, int]]) -> None:
         self.name, self.blanks = name, blanks
@@ -67,17 +67,17 @@ class Position:
 
 @dataclass
 class _Level:
-    """A list or map that is not complete: the key that waits for its value, and keys that are there twice."""
+    """An incomplete list or map, with the key that waits for its value, and its repeated keys."""
 
     node: YamlList | YamlMap
     is_flow: bool
     key: YamlScalar | None = None
     doubles: list[tuple[YamlScalar, YamlNode]] = field(default_factory=list)
-    in_key: bool = False  # it stands in place of a key, which has been reported
+    in_key: bool = False  # it stands in place of a key; this fault has been reported
 
 
 class Composer:
-    """Builds nodes from events, on a stack of its own."""
+    """Builds nodes from events on its own stack."""
 
     def __init__(
         self,
@@ -96,7 +96,7 @@ class Composer:
         self.documents = self.nodes = 0
 
     def compose(self, events: Iterator[Any]) -> YamlNode:
-        """Return the root; raise if there is none."""
+        """Return the root; raise an error for an empty file."""
         for event in events:
             kind = type(event)
             if kind is yaml.ScalarEvent:
@@ -137,7 +137,7 @@ class Composer:
             found, source = self.lists[mark.line, mark.column]
             self.nodes += found.count
             if self.nodes >= MAX_NODES:
-                raise MisreadError  # read it again, to say at which element it is too much
+                raise MisreadError  # read it again element by element, to find where it exceeds the limit
             return Numbers(found, source, *self._position(event))
         if value.isascii() and "\t" not in value:
             return YamlScalar(value, plain, *self._position(event))
@@ -146,7 +146,7 @@ class Composer:
         return YamlScalar(value, plain, *self._position(event), odd=self._odd(event))
 
     def _odd(self, event: Any) -> Odd | None:
-        """Return the first character of a text that was taken for an ASCII one, with its place."""
+        """Return the first character of a text that looks like an ASCII one, with its place."""
         if event.style in ("|", ">"):
             return None
         start, end = event.start_mark, event.end_mark
@@ -184,7 +184,7 @@ class Composer:
             self._refuse_doubles(level.node, level.doubles)
 
     def _add(self, node: YamlNode, event: Any) -> None:
-        """Put a node where it belongs: below the waiting key, at the end of the list, or as a key itself."""
+        """Put a node in its place: under the waiting key, at the end of the list, or as a key itself."""
         self.nodes += 1
         if self.nodes > MAX_NODES:
             raise self._fatal(event, f"the file holds more than {MAX_NODES} values", "split it")
@@ -205,7 +205,7 @@ class Composer:
                 self._put(level, parent, key, node)
 
     def _put(self, level: _Level, parent: YamlMap, key: YamlScalar, node: YamlNode) -> None:
-        """Put a value under its key; a key without one in ``{}`` may be a slip with ':' or ','."""
+        """Put a value under its key; a key without a value in ``{}`` may be a slip with ':' or ','."""
         if level.is_flow and key.plain and isinstance(node, YamlScalar) and node.plain and not node.value:
             if self._is_fraction(parent, key):
                 return
@@ -217,7 +217,7 @@ class Composer:
             parent.keys[key.value], parent.values[key.value] = key, node
 
     def _is_fraction(self, parent: YamlMap, key: YamlScalar) -> bool:
-        """Refuse the second half of ``0,5 m``, which stands as a key behind the value 0."""
+        """Refuse the second half of ``0,5 m``, which YAML reads as a key after the value 0."""
         before = next(reversed(parent.values.values()), None)
         if (
             not isinstance(before, YamlScalar)
@@ -233,7 +233,7 @@ class Composer:
         return True
 
     def _split(self, key: YamlScalar, node: YamlScalar) -> tuple[YamlScalar, YamlScalar]:
-        """Return the two halves of ``c:10 Hz``, which is refused."""
+        """Refuse ``c:10 Hz`` and return its two halves."""
         match = _NO_BLANK.fullmatch(key.value)
         if match is None:
             return key, node
@@ -246,7 +246,7 @@ class Composer:
         elif value == rest:
             problem = f"a blank is missing behind {quoted(name + ':')}"
             self.faults.add(Place(*_where(key)), problem, f"write {quoted(f'{name}: {value}')}")
-        else:  # a blank that YAML takes for a letter
+        else:  # a blank character that YAML reads as a letter
             problem = f"this is {with_article(rest[0])}"
             self.faults.add(Place(key.file, key.line, column + 1), problem, replacement(rest[0]))
         odd = key.odd if first_odd(value) else None
@@ -256,14 +256,15 @@ class Composer:
         )
 
     def _refuse_doubles(self, parent: YamlMap, doubles: list[tuple[YamlScalar, YamlNode]]) -> None:
-        """Refuse keys that were there before, each once; what else stands below them is read, too."""
+        """Refuse repeated keys, each once; the other values under them are read, too."""
         again: dict[str, list[YamlScalar]] = {}
         for key, node in doubles:
             again.setdefault(key.value, []).append(key)
             _merge(parent.values[key.value], node)
         for name, keys in again.items():
             lines = [str(key.line) for key in keys[1 : 1 + _MOST_LINES]]
-            lines += ["..."] * (len(keys) > 1 + _MOST_LINES)
+            if len(keys) > 1 + _MOST_LINES:
+                lines.append("...")
             more = f", and again in line {', '.join(lines)}" if lines else ""
             problem = f"key {quoted(name)} is already in line {parent.keys[name].line}{more}"
             self.faults.add(Place(*_where(keys[0])), problem, "keep one of them")
@@ -284,7 +285,7 @@ class Composer:
             self._refuse(event, f"the tag {quoted(tag)} is not allowed", remedy)
 
     def _key(self, node: YamlNode, event: Any) -> YamlScalar:
-        """Return the key to put the next value under, `_NO_KEY` if it is refused."""
+        """Return the key for the next value, or `_NO_KEY` if the key is refused."""
         if type(event) is yaml.AliasEvent:
             return _NO_KEY
         problem, remedy = _wrong_key(node)
@@ -304,7 +305,7 @@ class Composer:
 
 
 def forbidden(found: re.Match[str]) -> tuple[str, str]:
-    """Return what is wrong with a character that is allowed nowhere, and what would be right."""
+    """Return the problem and the remedy for a forbidden character."""
     char = found.group()
     name = character_name(char).partition(" (")[0]
     remedy = "remove it" if name == NAMELESS else f"remove this {name}"
@@ -316,7 +317,7 @@ def _where(node: YamlNode) -> tuple[str, int, int]:
 
 
 def _merge(first: YamlNode, second: YamlNode) -> None:
-    """Add what stands under a key the second time, unless that describes another thing of the same name."""
+    """Add the values under a repeated key, unless they describe another thing of the same name."""
     if not isinstance(first, YamlMap) or not isinstance(second, YamlMap) or not _agree(first, second):
         return
     for key, node in second.pairs():
@@ -327,7 +328,7 @@ def _merge(first: YamlNode, second: YamlNode) -> None:
 
 
 def _agree(first: YamlMap, second: YamlMap) -> bool:
-    """Say whether the texts under common keys are the same."""
+    """Return whether the texts under common keys are equal."""
     pairs = [(first[key], second[key]) for key in second if key in first]
     return all(
         one.value == other.value
@@ -338,7 +339,7 @@ def _agree(first: YamlMap, second: YamlMap) -> bool:
 
 
 def _wrong_key(node: YamlNode) -> tuple[str, str]:
-    """Return what is wrong with a key, and what would be right; nothing if it will do."""
+    """Return the problem and the remedy for a key; ("", "") if it is right."""
     if not isinstance(node, YamlScalar):
         return "a key must be a text", "put a text that begins with '{' or '[' in quotes"
     if not node.value:

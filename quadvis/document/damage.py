@@ -1,8 +1,8 @@
-"""What is wrong where a YAML parser stopped, in our own words, and how to read on behind it.
+"""Explain in our own words the fault at which a YAML parser stopped, and repair it to read on.
 
-Parsers differ in their words and change them; from them only places are taken. What stands there is looked at
-by `Scan`. Where it is plain what was meant, a repair of the same length lets the rest be read: the fault is
-kept, no place moves, and the other faults of the file come in the same go.
+Parsers differ in their words and change them, so only places are taken from them. `Scan` examines the text at
+such a place. If the intention is clear, a repair of the same length lets the rest be read: the fault is kept,
+no place moves, and the other faults of the file are reported in the same run.
 """
 
 from __future__ import annotations
@@ -11,13 +11,14 @@ import re
 from dataclasses import dataclass
 
 from quadvis.document.scan import Scan
+from quadvis.errors import counted
 from quadvis.errors.characters import meant, odd_characters, replacement, with_article
 from quadvis.units import Unit, UnitError
 
-# An element of a signal, which ends a text inside {...} and [...].
+# The index of a signal, whose bracket ends a text inside {...} and [...].
 _INDEX = re.compile(r"\[[^\[\]{}'\"\r\n]*+\]")
 _NAME_END = re.compile(r"[^\s{}\[\],:'\"]")
-# What may stand before the first word of a line in place of plain spaces.
+# Characters that may precede the first word of a line in place of plain spaces.
 _LEAD = re.compile("[ \t\u00a0\u00ad\u1680\u2000-\u200d\u202f\u205f\u2060\u3000]*")
 _PATH = re.compile(r"[\w.~ -]+(?:\\[\w.~ -]+)+")
 _NO_BLANK = re.compile(r"[ ]*(?:- +)*(?P<key>[A-Za-z_]\w*):(?P<value>[^\s:/\\].*)", re.ASCII)
@@ -26,7 +27,7 @@ _ESCAPE = re.compile(
 )
 _CLOSING = {"[": "]", "{": "}"}
 _NAMES = {"[": "list", "{": "map"}
-# One of these stands for a sign that the parser must not see; whoever composes the nodes puts it back.
+# One of these replaces a sign that the parser must not see; the composer puts the sign back.
 STAND_INS = {":": "\ue001", "[": "\ue002", "]": "\ue003", ",": "\ue004", "@": "\ue005", "`": "\ue006",
              "%": "\ue007", "*": "\ue008", "&": "\ue009", "!": "\ue00a", "\\": "\ue00b"}  # fmt: skip
 ORIGINALS = str.maketrans({stand_in: sign for sign, stand_in in STAND_INS.items()})
@@ -34,17 +35,17 @@ ORIGINALS = str.maketrans({stand_in: sign for sign, stand_in in STAND_INS.items(
 
 @dataclass(frozen=True)
 class Trouble:
-    """A fault at an offset of the text; ``repaired`` is the text to read on with, None if it cannot be."""
+    """A fault at an offset of the text; ``repaired`` is the text for reading on, None if no repair exists."""
 
     at: int
     problem: str
     remedy: str = ""
     repaired: str | None = None
-    blank: int | None = None  # where the repair put a blank in, which moves the rest of its line
+    blank: int | None = None  # the offset of a blank that the repair inserted; it moves the rest of its line
 
 
 def explain(text: str, at: int, opened: int | None, limit: int) -> Trouble:
-    """Return what is wrong with a text that was refused at an offset, in a part that was opened before it."""
+    """Return the fault of a text that was refused at an offset, in a part that was opened before it."""
     scan = Scan(text, at, limit)
     for look in (
         _depth,
@@ -67,7 +68,7 @@ def explain(text: str, at: int, opened: int | None, limit: int) -> Trouble:
 
 
 def run_on(text: str, at: int) -> Trouble:
-    """Return what is wrong with a key that goes on behind its ':', since no blank stands there."""
+    """Return the fault of a key that goes on after its ':', because no blank follows the ':'."""
     char = text[at]
     if char in "[{":
         remedy = f"write ': {char}'"
@@ -77,7 +78,7 @@ def run_on(text: str, at: int) -> Trouble:
 
 
 def _replaced(text: str, start: int, end: int) -> str:
-    """Return the text with every sign of a stretch hidden from the parser."""
+    """Return the text with all signs from ``start`` to ``end`` hidden from the parser."""
     hidden = "".join(STAND_INS.get(char, char) for char in text[start:end])
     return text[:start] + hidden + text[end:]
 
@@ -100,7 +101,7 @@ def _tab(scan: Scan, at: int, opened: int | None) -> Trouble | None:
 
 
 def _odd(scan: Scan, at: int, opened: int | None) -> Trouble | None:
-    """Look for a character that was taken for a sign of YAML, in this line or in the one above it."""
+    """Look for a character that looks like a sign of YAML, in this line or in the line above it."""
     text, line = scan.text, scan.line(at)
     above = line - 1
     while above > 0 and not scan.line_text(above).strip(" \t"):
@@ -120,7 +121,7 @@ def _odd(scan: Scan, at: int, opened: int | None) -> Trouble | None:
     if where < leads[scan.line(where)]:
         where, char = next((w, c) for w, c in found if scan.line(w) == scan.line(where))
         repaired, more = _indent_repaired(scan)
-        lines = f"; so in {more} more line{'s' * (more > 1)}" if more else ""
+        lines = f"; so in {counted(more, 'more line')}" if more else ""
         problem = f"{with_article(char)} cannot indent a line"
         return Trouble(where, problem, replacement(char) + lines, repaired)
     plain = meant(char)
@@ -137,7 +138,7 @@ def _lead_end(scan: Scan, number: int) -> int:
 
 
 def _indent_repaired(scan: Scan) -> tuple[str | None, int]:
-    """Return the text with plain spaces in all indentations, and how many lines but one had others."""
+    """Return the text with plain spaces in all indentations, and the number of further repaired lines."""
     pieces, last, lines = [], 0, 0
     for number, start in enumerate(scan.starts):
         end = _lead_end(scan, number)
@@ -196,7 +197,7 @@ def _bad_escape(text: str, start: int, end: int, bad: list[int]) -> Trouble:
 
 
 def _brackets(scan: Scan, at: int, opened: int | None) -> Trouble | None:
-    """Look at a bracket around the place: what stands where a ',' or the end should."""
+    """Look at a bracket around the place, for a text where a ',' or the closing bracket should be."""
     if not scan.open:
         return None
     text, start = scan.text, scan.open[-1]
@@ -230,7 +231,7 @@ def _brackets(scan: Scan, at: int, opened: int | None) -> Trouble | None:
 
 
 def _word_start(text: str, at: int) -> int:
-    """Return where the text begins that stands at a place."""
+    """Return the offset of the beginning of the text at an offset."""
     at = min(at, len(text) - 1)
     if at > 0 and text[at].isspace() and not text[at - 1].isspace():
         at -= 1
@@ -240,7 +241,7 @@ def _word_start(text: str, at: int) -> int:
 
 
 def _start(scan: Scan, at: int, opened: int | None) -> Trouble | None:
-    """Look at signs with which no text can begin."""
+    """Look for a sign with which no text can begin."""
     text = scan.text
     for where in (at, opened if opened is not None else at, _word_start(text, at) if text else 0):
         sign = text[where : where + 1]
@@ -268,7 +269,7 @@ def _block_text(scan: Scan, at: int, opened: int | None) -> Trouble | None:
 
 
 def _no_blank(scan: Scan, at: int, opened: int | None) -> Trouble | None:
-    """Look for ``key:value``, in this line, in the one where the part began, or in the one above."""
+    """Look for ``key:value``, in this line, in the line where the part began, or in the line above."""
     lines = {scan.line(at), scan.line(at) - 1, scan.line(opened) if opened is not None else scan.line(at)}
     for number in sorted(line for line in lines if line >= 0):
         match = _NO_BLANK.fullmatch(scan.line_text(number))
@@ -307,7 +308,7 @@ def _indent(line: str) -> int:
 
 
 def _unit(scan: Scan, at: int, opened: int | None) -> Trouble | None:
-    """Look for a unit behind a list: each number has its own."""
+    """Look for a unit after a list: each number needs its own."""
     text = scan.text
     last = len(text[:at].rstrip(" \t"))
     start = next((start for start, end in scan.brackets if end == last and text[start] == "["), None)
@@ -320,7 +321,7 @@ def _unit(scan: Scan, at: int, opened: int | None) -> Trouble | None:
 
 
 def _behind(scan: Scan, at: int, opened: int | None) -> Trouble | None:
-    """Look for what stands behind a list, a map or a text in quotes that is complete."""
+    """Look for a text after a complete list, map or text in quotes."""
     text = scan.text
     last = len(text[:at].rstrip(" \t"))
     for kind, spans in (("", scan.brackets), ("text in quotes", scan.quotes)):
@@ -344,7 +345,7 @@ def _is_unit(text: str) -> bool:
 
 
 def _signs(scan: Scan, at: int, opened: int | None) -> Trouble | None:
-    """Look at a sign that stands where it cannot."""
+    """Look for a sign in an impossible place."""
     text = scan.text
     sign, line = text[at : at + 1], scan.line(at)
     before = text[scan.starts[line] : at]

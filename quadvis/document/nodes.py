@@ -1,9 +1,8 @@
-"""What a YAML file holds: untyped nodes with their places, typed by whoever reads them.
+"""The values of a YAML file: untyped nodes with their places; the reader of a node decides its type.
 
-YAML itself decides nothing about types here: `on`, `1e-3`, `010` and `12:30` are texts until a reading asks
-for a truth value, a number or a quantity, in quotes or not. A reading that fails raises `DiagramError` with
-the place; to go on and report everything at once, read through `Faults.collect`:
-`period = faults.collect(node.period)`.
+YAML's own types never apply: `on`, `1e-3`, `010` and `12:30`, in quotes or not, are texts until a method asks
+for a truth value, a number or a quantity. A method that fails raises `DiagramError` with the place. To go on
+and report all faults together, call it through `Faults.collect`: `period = faults.collect(node.period)`.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from fractions import Fraction
 from typing import Any, TypeVar
 
 from quadvis import units
-from quadvis.errors import DiagramError, Fault, Faults, Odd, Place, closest, quoted, suggestion
+from quadvis.errors import DiagramError, Fault, Faults, Odd, Place, closest, counted, quoted, suggestion
 from quadvis.errors.characters import first_odd, meant, replacement, with_article
 from quadvis.units import Unit, UnitError
 
@@ -33,7 +32,7 @@ _TRUTH_ELSEWHERE = {
 
 
 class YamlNode:
-    """A value in a file; `key` is the name it stands under ("rate", "value[2]"), for messages."""
+    """A value in a file; `key` is its name in messages ("rate", "value[2]")."""
 
     __slots__ = ("column", "file", "key", "line")
 
@@ -42,7 +41,7 @@ class YamlNode:
 
     @property
     def place(self) -> Place:
-        """Where the value begins."""
+        """The place at which the value begins."""
         return Place(self.file, self.line, self.column)
 
     def to_python(self) -> Any:
@@ -66,7 +65,7 @@ class YamlNode:
         raise self.wrong(expected)
 
     def text(self) -> str:
-        """Return a text; only one in quotes may be empty."""
+        """Return a text; only a text in quotes may be empty."""
         value = self._scalar("a text")
         if not value and isinstance(self, YamlScalar) and self.plain:
             raise self.wrong("a text", "write one, or leave the key out")
@@ -122,7 +121,7 @@ class YamlNode:
         raise self.wrong(expected, f"did you mean {quoted(near)}?" if near else "")
 
     def quantity(self, unit: Unit = ONE, *, bare: bool = True) -> float:
-        """Return "50 ms" as a number of `unit`; a bare number is one already, unless `bare` is false."""
+        """Return "50 ms" as a number of `unit`; a bare number counts as such, unless `bare` is false."""
         return self.read(lambda text: units.read_quantity(text, unit, bare=bare))
 
     def exact(self, unit: Unit) -> Fraction:
@@ -142,11 +141,11 @@ class YamlNode:
         return self.read(units.parse_units)
 
     def read(self, read: Callable[[str], _Result]) -> _Result:
-        """Return what `read` makes of a quantity; its `UnitError` is raised with the place."""
+        """Return the result of `read` for a quantity; its `UnitError` is raised with the place."""
         text = self._scalar("a text such as '50 ms'")
         label = f"{quoted(self.key)}: " if self.key else ""
         odd = first_odd(text)
-        if odd is not None and meant(odd) == " ":  # blanks pass elsewhere
+        if odd is not None and meant(odd) == " ":  # odd blanks are accepted elsewhere
             raise self.fault(f"{label}{quoted(text)} holds {with_article(odd)}", replacement(odd))
         try:
             return read(text)
@@ -159,9 +158,9 @@ class YamlNode:
             raise self.fault(label + problem, remedy) from None
 
     def array(self, shape: Sequence[int | None] | None = None, unit: Unit | Sequence[Unit] = ONE) -> Any:
-        """Return nested lists of floats, each in its unit, all faults of the elements raised together.
+        """Return nested lists of floats, each in its unit; all faults of the elements are raised together.
 
-        In `shape`, None stands for any size; without a shape any regular one is taken. Several units belong
+        In `shape`, None means any size; without `shape` any regular shape is accepted. Several units belong
         to the elements along the last axis.
         """
         found = measure(self)
@@ -187,10 +186,10 @@ class YamlNode:
     def fields(
         self, required: Collection[str] = (), optional: Collection[str] = (), faults: Faults | None = None
     ) -> YamlMap:
-        """Return a map of which the keys are known: missing and unknown ones are faults.
+        """Return a map with known keys only: missing and unknown keys are faults.
 
-        With `faults` those of the keys are kept there, and the map is returned with what it has; the value
-        of a misspelt key is found under the one that was meant.
+        With `faults`, faults of the keys are added there, and the map is returned as far as it is right; a
+        misspelt key is replaced by the one that was meant.
         """
         result = self.mapping()
         found = Faults() if faults is None else faults
@@ -201,7 +200,7 @@ class YamlNode:
 
 
 class YamlScalar(YamlNode):
-    """A text; `plain` says that it stands without quotes."""
+    """A text; `plain` says that it has no quotes."""
 
     __slots__ = ("odd", "plain", "value")
 
@@ -220,11 +219,11 @@ class YamlScalar(YamlNode):
 
     @property
     def place(self) -> Place:
-        """Where the value begins, and the odd character in it if there is one."""
+        """The place at which the value begins, with the odd character in it, if any."""
         return Place(self.file, self.line, self.column, self.odd)
 
     def to_python(self) -> Any:
-        """Return the text, or what it looks like if it stands without quotes."""
+        """Return the text or, without quotes, the value that it looks like."""
         return plain_value(self.value) if self.plain else self.value
 
     def _described(self) -> str:
@@ -251,12 +250,12 @@ class YamlList(YamlNode):
         return self._values
 
     def _make(self) -> list[YamlNode]:
-        """Return the nodes of a list that was read as a whole."""
+        """Make the nodes of a list that was read as a whole."""
         raise NotImplementedError
 
     @property
     def shape(self) -> tuple[int, ...] | None:
-        """The sizes along the axes, if they are known without a look at the elements."""
+        """The sizes along the axes, if they are known without looking at the elements."""
         return None
 
     def to_python(self) -> Any:
@@ -309,7 +308,7 @@ class YamlMap(YamlNode):
         return list(zip(self.keys.values(), self.values.values(), strict=True))
 
     def renamed(self, key: str, name: str) -> YamlMap:
-        """Return a map in which a value is found under another key; the place of the key stays."""
+        """Return a map with one key renamed; the place of the key stays."""
         keys = {name if old == key else old: node for old, node in self.keys.items()}
         values = {name if old == key else old: node for old, node in self.values.items()}
         return YamlMap(keys, values, self.file, self.line, self.column, self.key)
@@ -328,7 +327,7 @@ class YamlMap(YamlNode):
 
 
 def _map_remedy(node: YamlNode) -> str:
-    """Return what to write where a text stands in place of a map: "name:value" lacks a blank."""
+    """Return the remedy for a text in place of a map: "name:value" lacks a blank."""
     match = _NO_BLANK.match(node.value) if isinstance(node, YamlScalar) and node.plain else None
     return f"write a blank behind {quoted(match.group())}" if match else "write 'name: value' lines below it"
 
@@ -350,7 +349,7 @@ def plain_value(text: str) -> Any:
 def _check_keys(
     found: YamlMap, required: Collection[str], optional: Collection[str], faults: Faults
 ) -> YamlMap:
-    """Keep a fault for each unknown key and each missing one; return the map with misspelt keys as meant."""
+    """Add a fault for each unknown and each missing key; return the map with misspelt keys corrected."""
     known = list(dict.fromkeys((*required, *optional)))
     free = [name for name in known if name not in found]
     result = found
@@ -370,7 +369,7 @@ def _check_keys(
 
 
 def measure(node: YamlNode) -> tuple[int, ...]:
-    """Return the shape of nested lists, () for anything else; all elements of a list must have the same."""
+    """Return the shape of nested lists, () for other values; elements of one list must have one shape."""
     if not isinstance(node, YamlList):
         return ()
     if node.shape is not None:
@@ -392,8 +391,7 @@ def _sized(shape: Sequence[int | None]) -> str:
     if not shape:
         return "a number"
     if len(shape) == 1:
-        count = "" if shape[0] is None else f"{shape[0]} "
-        return f"a list of {count}number{'s' * (shape[0] != 1)}"
+        return "a list of numbers" if shape[0] is None else f"a list of {counted(shape[0], 'number')}"
     return f"a {' x '.join('any' if size is None else str(size) for size in shape)} list of numbers"
 
 

@@ -1,7 +1,7 @@
-"""Long lists of plain numbers, which are read as a whole: a node for each would take most of the time.
+"""Read long lists of plain numbers as a whole, because a node for each number would take most of the time.
 
-They are found in the text before it is parsed. A sign of the same length stands for each while the parser
-runs, so that no place moves; the nodes of the elements are made when somebody asks for one.
+The lists are found in the text before it is parsed. For the parser each list is replaced by a mark of the
+same length, so that no place moves. The nodes of the elements are made when the first one is read.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from quadvis.document.nodes import YamlList, YamlNode, YamlScalar
 from quadvis.units import Unit
 
 MARK = "\ue000"
-SHORTEST = 400  # characters; shorter lists are read like everything else
+SHORTEST = 400  # characters; shorter lists are read by the parser
 DEEPEST = 4
 
 # Numbers that JSON and `units.parse_number` read alike, none near the limits of a float.
@@ -28,7 +28,7 @@ _DECODER = json.JSONDecoder()
 
 @dataclass(frozen=True)
 class NumberList:
-    """A list in a text: its stretch, its values as nested lists, and how many nodes are in it."""
+    """A list in a text: its start and end, its values as nested lists, and the number of its nodes."""
 
     start: int
     end: int
@@ -37,7 +37,7 @@ class NumberList:
 
 
 def find_lists(text: str) -> list[NumberList]:
-    """Return the long lists of plain numbers, in order."""
+    """Return the long lists of plain numbers of a text, in order."""
     found: list[NumberList] = []
     if len(text) < SHORTEST or MARK in text:
         return found
@@ -56,7 +56,7 @@ def find_lists(text: str) -> list[NumberList]:
 
 
 def _depth(values: list[Any]) -> int:
-    """Return how deep regular lists are nested, 0 for others."""
+    """Return the depth of regular nested lists, 0 for other lists."""
     depth, level = 0, values
     while level:
         depth += 1
@@ -70,7 +70,7 @@ def _depth(values: list[Any]) -> int:
 
 
 def hide_lists(text: str, lists: list[NumberList]) -> str:
-    """Return the text with a mark and blanks in place of each list; lines stay lines."""
+    """Return the text with a mark and blanks in place of each list; line breaks stay."""
     pieces, last = [], 0
     for found in lists:
         inside = re.split("([\r\n]+)", text[found.start + 1 : found.end])
@@ -81,9 +81,9 @@ def hide_lists(text: str, lists: list[NumberList]) -> str:
 
 
 class Numbers(YamlList):
-    """A regular list of numbers, with a unit for all of them or for each along the last axis.
+    """A regular list of numbers, with one unit for all numbers or one for each along the last axis.
 
-    ``element_units`` is empty where the text has none; ``numbers`` are nested lists of int and float.
+    ``element_units`` is empty if the text has no units; ``numbers`` are nested lists of int and float.
     """
 
     __slots__ = ("element_units", "numbers", "source")
@@ -103,7 +103,7 @@ class Numbers(YamlList):
         self._values = None
 
     def with_units(self, units: tuple[Unit, ...], key: str) -> Numbers:
-        """Return the same list under another name, with units behind its numbers."""
+        """Return the same list under another key, with units after its numbers."""
         found = NumberList(0, 0, self.numbers, 0)
         return Numbers(found, self.source, self.file, self.line, self.column, key, units)
 
@@ -130,7 +130,7 @@ class Numbers(YamlList):
     def _make(self) -> list[YamlNode]:
         """Make the nodes of all elements, with their places."""
         stack: list[tuple[YamlList, list[YamlNode]]] = []
-        line, start = self.line, -(self.column - 1)  # where the line begins in the text of the list
+        line, start = self.line, -(self.column - 1)  # offset of the line's beginning in the list's text
         written = 0
         for match in _ELEMENT.finditer(self.source):
             token, column = match.group(), match.start() - start + 1

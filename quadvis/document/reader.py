@@ -1,7 +1,7 @@
-"""Reading YAML files that may be wrong or hostile: located faults, bounded cost, no types guessed.
+"""Read YAML files that may be wrong or hostile: faults have places, costs are bounded, types are not guessed.
 
-Nodes are composed from the event stream of PyYAML's C parser, without recursion. The loaders of PyYAML are
-not used: they die on deep nesting, expand aliases without bound, and forget duplicate keys and places.
+Nodes are composed from the event stream of PyYAML's C parser, without recursion. PyYAML's own loaders are not
+used: they fail on deep nesting, expand aliases without bound, and lose duplicate keys and places.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ MAX_BYTES = 1_000_000
 _Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _Dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
-# Directives, of which libyaml compares each with all before it.
+# Directives: libyaml compares each with all earlier ones.
 _DIRECTIVE = re.compile("(?:^|[\r\n])%")
 
-# Repairs of a text that was refused; each costs one more reading.
+# Repairs of a refused text; each one costs a further reading.
 _MOST_REPAIRS, _MOST_READ = 50, 3 * MAX_BYTES
 
 
 def read_yaml(path: str | os.PathLike[str], faults: Faults | None = None) -> YamlNode:
-    """Read a YAML file of at most 1 MB; see `parse_yaml`. Everything that is wrong raises `DiagramError`."""
+    """Read a YAML file of at most 1 MB; see `parse_yaml`. Any fault raises `DiagramError`."""
     name = os.fspath(path)
     try:
         problem, remedy = file_trouble(name)
@@ -69,9 +69,9 @@ def read_yaml(path: str | os.PathLike[str], faults: Faults | None = None) -> Yam
 def parse_yaml(text: str, name: str = "<text>", faults: Faults | None = None) -> YamlNode:
     """Return the root node of one YAML document.
 
-    Aliases, anchors, merge keys, tags, duplicate keys, keys that are no texts, and all that exceeds the
-    limits above are refused. With `faults`, what leaves the rest readable is kept there and the rest is
-    returned; a text that is no YAML always raises `DiagramError`.
+    Aliases, anchors, merge keys, tags, duplicate keys, keys that are no texts, and everything beyond the
+    limits above are refused. With `faults`, a fault that leaves the rest readable is added there and the rest
+    is returned; a text that is no YAML always raises `DiagramError`.
     """
     text = text.removeprefix("\ufeff")
     if len(text) > MAX_BYTES:
@@ -93,7 +93,7 @@ def parse_yaml(text: str, name: str = "<text>", faults: Faults | None = None) ->
 
 
 def _read_on(text: str, name: str) -> tuple[Faults, YamlNode]:
-    """Return the root and what was wrong on the way; what stops the parser is repaired where it can be."""
+    """Return the faults and the root; a fault that stops the parser is repaired if possible."""
     kept: list[Fault] = []
     blanks: list[tuple[int, int]] = []
     may_repair = not any(stand_in in text for stand_in in STAND_INS.values())
@@ -122,7 +122,7 @@ def _read_on(text: str, name: str) -> tuple[Faults, YamlNode]:
 
 
 def _explained(error: yaml.YAMLError, text: str) -> Trouble:
-    """Take the places of a complaint, none of its words."""
+    """Return the fault at the place of the parser's error, without the parser's words."""
     marks = (getattr(error, "context_mark", None), getattr(error, "problem_mark", None))
     opened, at = (None if mark is None else _offset(text, mark.line, mark.column) for mark in marks)
     return explain(text, (opened or 0) if at is None else at, opened, MAX_DEPTH)
@@ -134,7 +134,7 @@ def _offset(text: str, line: int, column: int) -> int:
 
 
 def _compose(text: str, position: Position, faults: Faults) -> YamlNode:
-    """Return the root; long lists of numbers are kept from the parser, unless it stumbles over that."""
+    """Return the root; long lists of numbers are hidden from the parser, unless this makes it fail."""
     repaired = bool(faults)
     lists = find_lists(text)
     if lists:
@@ -167,13 +167,13 @@ def _fault(place: Place, problem: str, remedy: str = "") -> DiagramError:
 
 
 def _place(before: str, name: str) -> Place:
-    """Return the place after a beginning of the text; every kind of line break counts once."""
+    """Return the place after the beginning ``before`` of a text; every kind of line break counts once."""
     lines = re.split("\r\n|\r|\n", before)
     return Place(name, len(lines), len(lines[-1].removeprefix("\ufeff")) + 1)
 
 
 def dump_yaml(data: Any) -> str:
-    """Return plain data as YAML that `parse_yaml` reads back to the same."""
+    """Return plain data as YAML that `parse_yaml` reads back to equal data."""
     try:
         text = yaml.dump(data, None, _Writer, sort_keys=False, allow_unicode=True, default_flow_style=None)
     except (yaml.YAMLError, UnicodeError):
@@ -188,7 +188,7 @@ class _Writer(_Dumper):  # type: ignore[misc]
 
 
 def _write_text(writer: Any, text: str) -> Any:
-    """Put quotes around a text that would read as a number or a truth value."""
+    """Put quotes around a text that looks like a number or a truth value."""
     looks = plain_value(text)
     style = '"' if "\n" in text else "'" if not isinstance(looks, str) else None
     return writer.represent_scalar("tag:yaml.org,2002:str", text, style=style)

@@ -1,6 +1,6 @@
-"""Our own look at a text that a YAML parser refused: where quotes, brackets and levels begin and end.
+"""Scan a text that a YAML parser refused: find the beginnings and ends of quotes, brackets and levels.
 
-It decides nothing about texts that are right, and knows just enough of YAML to say what is wrong in others.
+The scan is never used for right texts, and knows just enough of YAML to explain wrong ones.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from bisect import bisect_right
 
 _SINGLE = re.compile(r"'(?:[^']|'')*+('?)")
 _DOUBLE = re.compile(r'"(?:[^"\\]|\\.)*+("?)', re.DOTALL)
-# All of these take what they can and give nothing back: hostile texts cost no more than others.
+# These patterns never backtrack, so hostile texts cost no more than others.
 _PLAIN_BLOCK = re.compile(r"(?:[^\s:#]|:(?=\S)|(?<!\s)#|[ \t]++(?![\s#]))*+")
 _PLAIN_FLOW = re.compile(r"(?:[^\s:#,\[\]{}]|:(?=[^\s,\[\]{}])|(?<!\s)#|[ \t]++(?![\s#,\[\]{}]))*+")
 _BREAK = re.compile("\r\n|\r|\n")
@@ -23,11 +23,11 @@ _KEY = re.compile(
 
 
 class Scan:
-    """What stands where in a text; ``at`` is where the parser stopped.
+    """The structure of a text; ``at`` is the offset at which the parser stopped.
 
-    ``quotes`` and ``brackets`` are closed stretches, ``hidden`` those and all comments and ``|`` texts;
-    ``open_quote`` is a quote that nothing closes, ``open`` the brackets around ``at``, outermost first;
-    ``deep`` is the first place that is nested deeper than ``limit``.
+    ``quotes`` and ``brackets`` hold the start and end of closed ones; ``hidden`` holds quotes, comments and
+    ``|`` texts. ``open_quote`` is a quote that is never closed; ``open`` are the brackets around ``at``,
+    outermost first; ``deep`` is the first offset that is nested deeper than ``limit``.
     """
 
     def __init__(self, text: str, at: int, limit: int) -> None:
@@ -37,7 +37,7 @@ class Scan:
         self.brackets: list[tuple[int, int]] = []
         self.hidden: list[tuple[int, int]] = []
         self.open_quote: int | None = None
-        self.open: list[int] | None = None  # found when the walk comes to ``at``
+        self.open: list[int] | None = None  # set when the scan reaches ``at``
         self.deep: int | None = None
         self._flow: list[int] = []
         self._levels: list[tuple[int, str]] = []
@@ -46,16 +46,16 @@ class Scan:
             self.open = list(self._flow)
 
     def line(self, at: int) -> int:
-        """Return the number of the line in which a place lies, from 0."""
+        """Return the number of the line of an offset, from 0."""
         return bisect_right(self.starts, at) - 1
 
     def line_text(self, number: int) -> str:
-        """Return a line, without its end."""
+        """Return a line without its line break."""
         end = self.starts[number + 1] if number + 1 < len(self.starts) else len(self.text)
         return self.text[self.starts[number] : end].rstrip("\r\n")
 
     def is_hidden(self, at: int) -> bool:
-        """Say whether a place lies in a comment, or in a text in quotes or behind ``|``."""
+        """Return whether an offset lies in a comment, in a text in quotes, or in a ``|`` text."""
         index = bisect_right(self.hidden, (at, len(self.text) + 1)) - 1
         return index >= 0 and self.hidden[index][0] <= at < self.hidden[index][1]
 
@@ -105,7 +105,7 @@ class Scan:
                 pos, fresh = max(match.end() if match else 0, pos + 1), False
 
     def _is_separator(self, pos: int) -> bool:
-        """Say whether a ',' or ':' is none of a plain text."""
+        """Return whether a ',' or ':' is a separator and not a part of a plain text."""
         text, flow = self.text, bool(self._flow)
         return (text[pos] == "," and flow) or (
             text[pos] == ":" and text[pos + 1 : pos + 2] in _after_colon(flow)
@@ -117,7 +117,7 @@ class Scan:
         return end
 
     def _line_start(self, pos: int) -> int:
-        """Pass the indentation, and the ``- `` that begin lists; keep the level at which the line stands."""
+        """Skip the indentation and each ``- `` that begins a list; keep the level of the line."""
         text = self.text
         match = _INDENT.match(text, pos)
         start, pos = pos, match.end() if match else pos
@@ -145,7 +145,7 @@ class Scan:
             self._enter(at)
 
     def _block_text(self, pos: int) -> int:
-        """Pass a text behind ``|`` or ``>``: the lines that are indented deeper than what it belongs to."""
+        """Skip a text after ``|`` or ``>``: all lines that are indented deeper than its key."""
         outer = self._levels[-1][0] if self._levels else -1
         number = self.line(pos) + 1
         while number < len(self.starts):

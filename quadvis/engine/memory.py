@@ -46,7 +46,7 @@ class Slot:
 
 
 def packed(scalar: str, shape: Shape) -> np.dtype[Any]:
-    """Return the type of the elements of a field or signal if they are to fill their slots without gaps."""
+    """Return the element type that fills whole slots: arrays of bool become int64."""
     return np.dtype("int64" if shape and scalar == "bool" else scalar)
 
 

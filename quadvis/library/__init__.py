@@ -1,1 +1,1 @@
-"""Blocks by their names: found, described, and begun."""
+"""Find blocks by name, describe them, and write skeletons of new ones."""

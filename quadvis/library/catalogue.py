@@ -1,10 +1,10 @@
-"""From the name of a block to its class: no list to edit, nothing imported that a diagram does not use.
+"""Find the class of a block by its name, without a list to edit, importing only the blocks in use.
 
 ``signal.derivative`` is class ``Derivative`` in module ``quadvis_blocks.signal.derivative``. ``acme:slope``
 is block ``slope`` of the library that another distribution registered as ``acme`` in the entry point group
 ``quadvis.libraries``. A folder ``blocks`` beside a diagram adds the user's own: ``blocks/wind/fan.py`` is
-``wind.fan``. Those are Python code that comes with the diagram, so whoever loads it may be told of it first,
-or refuse it: see `OwnBlocks`.
+``wind.fan``. The user's own blocks are Python code that comes with the diagram, so the caller may be notified
+before they run, or refuse them: see `OwnBlocks`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ NAME = re.compile(r"(?:(?P<library>[a-z]\w*):)?(?P<path>[a-z]\w*(?:\.[a-z]\w*)*)
 
 
 class CatalogueError(QuadvisError):
-    """A block that cannot be had: ``problem`` and ``remedy`` are the two halves of the sentence."""
+    """A block that cannot be loaded: ``problem`` and ``remedy`` are the two halves of the sentence."""
 
     def __init__(self, problem: str, remedy: str = "") -> None:
         super().__init__(sentence(problem, remedy))
@@ -42,11 +42,11 @@ class CatalogueError(QuadvisError):
 
 
 class Catalogue:
-    """Finds blocks by name; ``folder`` is where the diagram lies, whose own blocks may be refused."""
+    """Finds blocks by name; ``folder`` is the folder of the diagram, whose own blocks may be refused."""
 
     def __init__(self, folder: Path | None = None, own_blocks: OwnBlocks = True) -> None:
         own = None if folder is None else folder / "blocks"
-        # In quadvis's own repository the folder of that name is the standard library's.
+        # In the repository of quadvis the folder of this name holds the standard library.
         self.own = None if own is None or (own / STANDARD).is_dir() else own
         self.own_blocks = own_blocks
         self._found: dict[str, type[Block]] = {}
@@ -99,7 +99,7 @@ class Catalogue:
         return found
 
     def _permit(self, file: Path, name: str) -> None:
-        """Refuse to run the code of an own block, or say that it will be run."""
+        """Refuse to run the code of an own block, or announce that it will run."""
         if not self.own_blocks:
             problem = (
                 f"block '{name}' is code of this diagram's own, in {str(file)!r}, and such code is refused"
@@ -125,17 +125,17 @@ class Catalogue:
 
 def _libraries() -> dict[str, str]:
     """Return the packages of the other libraries, by the names under which they are registered."""
-    from importlib.metadata import entry_points  # takes longer than reading a diagram
+    from importlib.metadata import entry_points  # this import takes longer than reading a diagram
 
     return {entry.name: entry.value for entry in entry_points(group=GROUP) if entry.value != STANDARD}
 
 
 def _exists(module: str) -> bool:
-    """Return whether a module is there, without importing it; one whose package fails to import is."""
+    """Return whether a module exists, without importing it; its package may fail to import."""
     try:
         return importlib.util.find_spec(module) is not None and not _is_package(module)
     except ModuleNotFoundError as error:
-        return not f"{module}.".startswith(f"{error.name}.")  # True: it is something else that is missing
+        return not f"{module}.".startswith(f"{error.name}.")  # True if another module is missing
     except Exception:
         return True
 

@@ -1,4 +1,4 @@
-"""Words about blocks, made from their declarations: `quadvis list` and `quadvis describe`."""
+"""Describe blocks from their declarations: `quadvis list` and `quadvis describe`."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from quadvis.block import TAGS, Block, Declared, In, Out, Param, Safe, State
 from quadvis.library.catalogue import Catalogue
 from quadvis.output.columns import table
 
-WIDEST = 30  # columns for a default value
-MANY = 60  # characters of choices beside each other
-LINE = 90  # columns of an example
+WIDEST = 30  # characters of a default value
+MANY = 60  # characters of choices on one line
+LINE = 90  # characters of a line of an example
 
 
 def first_line(block: type[Block]) -> str:
-    """Return the sentence that says what a block does."""
+    """Return the first sentence of a block's docstring."""
     return (inspect.getdoc(block) or "").partition("\n")[0]
 
 
 def catalogue_lines(catalogue: Catalogue, width: int | None = None) -> tuple[list[str], list[str]]:
-    """Return one line per block, and one per block that cannot be loaded: those are told, never skipped."""
+    """Return one line for each block, and one for each block that cannot be loaded."""
     blocks, failures = catalogue.load_all()
     return table([(name, first_line(block)) for name, block in blocks.items()], width), failures
 
 
 def description(name: str, block: type[Block], width: int | None = None) -> str:
-    """Return a block's docstring, ports, parameters and states as text, and how a diagram uses it."""
+    """Return a block's docstring, ports, parameters and states as text, with an example of its use."""
     interface = block.interface
     lines = [name, "", *(inspect.getdoc(block) or "").splitlines(), ""]
     if tags := _tags(block):
@@ -71,7 +71,7 @@ def _param_row(param: Param) -> tuple[str, ...]:
     given = "required" if default is None else f"= {default}"
     choices = " | ".join(param.choices)
     doc = param.doc
-    if len(choices) > MANY:  # into the column that wraps
+    if len(choices) > MANY:  # they go into the column that wraps
         choices, doc = f"{len(param.choices)} choices", f"{doc}: {', '.join(param.choices)}"
     words = [choices, bounds(param), "tunable" if param.tune else ""]
     words += [f"safe value of {param.input}"] if isinstance(param, Safe) else []
@@ -88,14 +88,14 @@ def _short(text: str) -> str:
 
 
 def _kind(item: Declared) -> str:
-    """Return what a port holds, as short as it is clear: "m", "[3] m", "bool"."""
+    """Return a short text for the type of a port: "m", "[3] m", "bool"."""
     kind = item.type.removeprefix("float64")
     unit = textwrap.shorten(item.unit, WIDEST, placeholder=" ...") if item.unit != "1" else ""
     return " ".join(filter(None, (kind, unit))) or "number"
 
 
 def example(name: str, block: type[Block]) -> list[str]:
-    """Return an entry of a diagram with all that must be given."""
+    """Return the entry of a diagram for a block, with all required inputs and parameters."""
     interface = block.interface
     lines = [f"{name.rpartition('.')[2].rpartition(':')[2]}:", f"  block: {name}"]
     lines += [] if interface.continuous else ["  rate: ..."]
@@ -116,7 +116,7 @@ def _sample(param: Param) -> str:
 
 
 def facts(name: str, block: type[Block]) -> dict[str, Any]:
-    """Return the same as plain data."""
+    """Return a block's declarations as plain data."""
 
     def plain(items: Iterable[Declared]) -> dict[str, Any]:
         return {item.name: {"type": item.type, "unit": item.unit, "doc": item.doc} for item in items}
@@ -145,7 +145,7 @@ def facts(name: str, block: type[Block]) -> dict[str, Any]:
 
 
 def default_text(param: Param) -> str | None:
-    """Return a parameter's default as a diagram would write it; None if it must be given."""
+    """Return a parameter's default as written in a diagram; None if the parameter is required."""
     if param.required:
         return None
     if param.is_text or param.choices:
@@ -154,7 +154,7 @@ def default_text(param: Param) -> str | None:
 
 
 def value_text(declared: Declared, value: Any) -> str:
-    """Return a value as a diagram would write it; units that are left open are left out."""
+    """Return a value as written in a diagram; open units are left out."""
     text = _plain_text(np.asarray(value).tolist())
     unit = declared.unit
     if unit == "1" or any(each.variables for each in declared.units) or not np.any(value):
@@ -175,6 +175,6 @@ def _is_nan(value: Any) -> bool:
 
 
 def bounds(param: Param) -> str:
-    """Return what a parameter's value must keep to."""
+    """Return the limits and choices of a parameter as text."""
     marks = ((param.min, ">="), (param.above, ">"), (param.max, "<="), (param.below, "<"))
     return ", ".join(f"{mark} {bound:g}" for bound, mark in marks if bound is not None)

@@ -1,4 +1,4 @@
-"""Skeletons that run at once: `quadvis new block GROUP.NAME` and `quadvis new diagram FILE`."""
+"""Write skeletons that run at once: `quadvis new block GROUP.NAME` and `quadvis new diagram FILE`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from quadvis.library.catalogue import STANDARD, Catalogue
 from quadvis.machine.files import Kind, reason, write_output
 
 SKELETON = Kind("the skeleton")
-TAKEN = ("Any", "Block", "In", "Out", "Param", "State", "Work")  # what the skeleton imports
+TAKEN = ("Any", "Block", "In", "Out", "Param", "State", "Work")  # names that the skeleton imports
 
 BLOCK = '''"""{title}."""
 
@@ -117,8 +117,8 @@ figures:
 def new_block(name: str) -> list[Path]:
     """Write a block and its test below the working directory, and return both paths.
 
-    In a folder that holds the standard library they go there, else into ``blocks/`` and ``tests/``.
-    QuadvisError if the name is no block's, is taken, or a file is there already.
+    In a folder with the standard library they go there, otherwise into ``blocks/`` and ``tests/``.
+    QuadvisError if the name is not a valid name of a block or is in use, or if a file exists.
     """
     if re.fullmatch(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*", name) is None:
         raise QuadvisError(
@@ -147,7 +147,7 @@ def new_block(name: str) -> list[Path]:
 
 
 def new_diagram(file: str) -> list[Path]:
-    """Write a small diagram that runs, and return its path; QuadvisError if the file is there already."""
+    """Write a small diagram that runs, and return its path; QuadvisError if the file exists."""
     path = Path(file)
     if path.suffix not in (".yaml", ".yml"):
         raise QuadvisError(f"'{file}' is not a YAML file; write a name such as loop.yaml")

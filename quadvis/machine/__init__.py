@@ -1,1 +1,1 @@
-"""The machine around a program: its files, its memory, its terminal, and how a command ends."""
+"""The machine around a program: files, memory, terminal, signals, and the end of a command."""

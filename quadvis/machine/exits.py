@@ -1,8 +1,8 @@
-"""The one door through which commands and tools end, whatever surrounds them.
+"""The common end of commands and tools: failures of the surroundings become a sentence and an exit code.
 
-What surrounds a command is no fault of a diagram: Ctrl-C, streams that are closed or full, a folder that is
-gone, little memory, names that the system does not take. Each becomes one sentence on standard error and an
-exit code, never a traceback. Other exceptions are faults of the program and pass through.
+Such failures are no fault of a diagram: Ctrl-C, streams that are closed or full, a folder that was deleted,
+too little memory, names that the system refuses. Each becomes one sentence on standard error and an exit
+code, never a traceback. Other exceptions are faults of the program and pass through.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ from quadvis.machine.failures import MEMORY, surroundings
 from quadvis.machine.files import reason
 
 FAILED, REFUSED, INTERRUPTED, PIPE_BROKEN = 1, 2, 130, 141
-AGAIN = 0.01  # s until an interruption that was dropped is repeated
+AGAIN = 0.01  # s until a dropped interruption is repeated
 
-_heard = False  # whether Ctrl-C was pressed
+_ctrl_c = False  # True after Ctrl-C
 
 
 class OutputError(QuadvisError):
-    """Standard output takes no more: what was to be printed is lost, and nothing else."""
+    """Standard output takes no more: the text to print is lost, and nothing else."""
 
     exit_code = FAILED
 
 
 def listen() -> None:
-    """Note Ctrl-C from now on, and open the standard streams that are closed.
+    """Note Ctrl-C from now on, and open any closed standard streams.
 
-    A library may turn the interruption of its import into an error of its own; `ended` then knows better. A
-    closed stream would lend its number to the next file, such as a log, and what is printed would go there.
+    A library may turn the interruption of its import into its own error; then `ended` still knows the cause.
+    The number of a closed stream would go to the next file, such as a log, and printed text would go there.
     """
     for descriptor in range(3):
         try:
             os.fstat(descriptor)
         except OSError:
-            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)  # takes the lowest number that is free
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)  # takes the lowest free number
     with suppress(ValueError):  # signals belong to the main thread
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # it may be ignored
             signal.signal(signal.SIGINT, _interrupt)
@@ -48,13 +48,13 @@ def listen() -> None:
 
 
 def _interrupt(*_: object) -> None:
-    global _heard
-    _heard = True
+    global _ctrl_c
+    _ctrl_c = True
     raise KeyboardInterrupt
 
 
 def _unraisable(lost: Any) -> None:
-    """Interrupt again where Python had to drop it, such as in a callback or while an object is deleted."""
+    """Repeat an interruption that Python had to drop, such as in a callback or while it deletes an object."""
     if lost.exc_type is KeyboardInterrupt and hasattr(signal, "setitimer"):
         signal.signal(signal.SIGALRM, _interrupt)
         signal.setitimer(signal.ITIMER_REAL, AGAIN)
@@ -65,14 +65,14 @@ def _unraisable(lost: Any) -> None:
 def ended(command: Callable[[], int], name: str = "", enough: int = PIPE_BROKEN) -> int:
     """Run a command and return its exit code; ``name`` stands before its sentences.
 
-    ``enough`` is the code where the reader of its output has seen enough and gone.
+    ``enough`` is the exit code if the reader of the output has seen enough and has ended.
     """
-    global _heard
-    _heard = False
+    global _ctrl_c
+    _ctrl_c = False
     with _streams():
         try:
             code = _flushed(command)
-        except BrokenPipeError:  # the reader, such as head
+        except BrokenPipeError:  # the reader, such as head, has ended
             _discard(1)
             return enough
         except BaseException as error:
@@ -87,10 +87,10 @@ def ended(command: Callable[[], int], name: str = "", enough: int = PIPE_BROKEN)
 
 
 def _flushed(command: Callable[[], int]) -> int:
-    """Return the code of a command all of whose output has gone out."""
+    """Run a command, flush its output, and return its exit code."""
     try:
         code = command()
-    except SystemExit:  # of --help, whose text may still wait
+    except SystemExit:  # by --help, whose text may not be flushed yet
         sys.stdout.flush()
         raise
     sys.stdout.flush()
@@ -98,8 +98,8 @@ def _flushed(command: Callable[[], int]) -> int:
 
 
 def _ending(error: BaseException) -> tuple[str, int]:
-    """Return what to say of an exception and the exit code; no words if it is not for the user."""
-    if isinstance(error, KeyboardInterrupt) or (_heard and isinstance(error, Exception)):
+    """Return the sentence for an exception, and the exit code; "" if the exception is not for the user."""
+    if isinstance(error, KeyboardInterrupt) or (_ctrl_c and isinstance(error, Exception)):
         return "interrupted", INTERRUPTED
     if isinstance(error, QuadvisError):
         return str(error), error.exit_code
@@ -109,7 +109,7 @@ def _ending(error: BaseException) -> tuple[str, int]:
 
 @contextmanager
 def _streams() -> Iterator[None]:
-    """Have standard output and error tell or forget what they cannot take."""
+    """Let standard output report, and standard error ignore, text that they cannot take."""
     before = sys.stdout, sys.stderr
     with open(os.devnull, "w", encoding="utf-8") as nowhere:
         sys.stdout = _Stream(before[0] or nowhere, 1)
@@ -122,7 +122,7 @@ def _streams() -> Iterator[None]:
 
 
 def _calm() -> None:
-    """Show the warnings of libraries that PYTHONWARNINGS would turn into errors."""
+    """Show warnings of libraries even if PYTHONWARNINGS would turn them into errors."""
     if any(option.startswith("e") for option in sys.warnoptions):
         import warnings
 
@@ -130,22 +130,24 @@ def _calm() -> None:
 
 
 def _discard(descriptor: int) -> None:
-    """Send what a stream still holds nowhere; at its end Python would complain about it."""
+    """Discard the unwritten text of a stream; Python would complain about it at its end."""
     with suppress(AttributeError, OSError, ValueError):
         stream = sys.stdout if descriptor == 1 else sys.stderr
-        number = stream.fileno()  # another one than the descriptor where output is caught, as in a test
+        number = stream.fileno()  # it differs from the descriptor if output is captured, as in a test
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, number)
         os.close(nowhere)
 
 
 class _Stream:
-    """A text stream whose refusals are sentences; those of standard error are dropped, as nobody reads it."""
+    """A text stream whose errors are sentences; those of standard error are dropped, as nobody reads them."""
 
     def __init__(self, stream: Any, descriptor: int) -> None:
         self._stream, self._descriptor = stream, descriptor
         if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="backslashreplace")  # a name may hold what the terminal cannot show
+            stream.reconfigure(
+                errors="backslashreplace"
+            )  # a name may hold characters unknown to the terminal
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
@@ -155,7 +157,7 @@ class _Stream:
         return self._guarded(self._stream.write, text) or len(text)
 
     def flush(self) -> None:
-        """Hand all of it on; OutputError as above."""
+        """Hand all text on; OutputError as for `write`."""
         self._guarded(self._stream.flush)
 
     def _guarded(self, method: Callable[..., Any], *arguments: str) -> Any:

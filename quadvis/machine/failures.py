@@ -1,6 +1,6 @@
-"""What an exception of Python or of a library means, in words for the user.
+"""Explain exceptions of Python and of libraries in words for the user.
 
-By its type, its number or what the system has left; never by another library's phrases.
+The explanation depends on the exception's type and number and on free memory, never on a library's phrases.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from collections.abc import Callable
 from quadvis.errors import quoted
 from quadvis.machine.files import reason
 
-ROOM = 1 << 28  # bytes; where so much cannot be had, it is for lack of memory that something failed
-LONGEST = 200  # characters of another library's words
+ROOM = 1 << 28  # bytes; if so much cannot be allocated, lack of memory is the cause of a failure
+LONGEST = 200  # characters that are quoted from a library's message
 OPENCV_NO_MEMORY = -4
 _PERHAPS = (
     ImportError,
     RuntimeError,
     SystemError,
-)  # a library that does not fit, a thread that does not start
+)  # raised by a library that does not fit into memory, or a thread that does not start
 _NEVER = (ModuleNotFoundError, NotImplementedError, RecursionError)
 MEMORY = "there is not enough memory; free some, or raise the limit (ulimit -v)"
 
 
 def surroundings(error: BaseException) -> str:
-    """Return what around the program failed it, or "" if that is not it."""
+    """Return which part of the surroundings failed, or "" if the cause is elsewhere."""
     if isinstance(error, MemoryError) or (isinstance(error, Exception) and is_short_of_memory(error)):
         return MEMORY
     if isinstance(error, RecursionError):
@@ -42,7 +42,7 @@ def surroundings(error: BaseException) -> str:
 
 
 def arithmetic(error: Exception) -> str:
-    """Return which calculation has no result that is a finite number, or "" if none failed."""
+    """Return which calculation has no finite result, or "" if the error is no failed calculation."""
     if isinstance(error, ZeroDivisionError):
         return "a division by zero"
     if isinstance(error, OverflowError):
@@ -58,7 +58,7 @@ def arithmetic(error: Exception) -> str:
 
 
 def one_line(error: BaseException) -> str:
-    """Return the first words of an error or of its cause; those of a failed import can fill a page."""
+    """Return the first line of an error or of its cause; the text of a failed import can fill a page."""
     while isinstance(error.__cause__, Exception):
         error = error.__cause__
     lines = [line for line in map(str.strip, str(error).splitlines()) if line]
@@ -66,7 +66,7 @@ def one_line(error: BaseException) -> str:
 
 
 def is_short_of_memory(error: Exception) -> bool:
-    """Return whether an error comes from want of memory, which libraries tell in many ways."""
+    """Return whether lack of memory caused an error; libraries report it in many ways."""
     if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.ENOMEM):
         return True
     if getattr(error, "code", None) == OPENCV_NO_MEMORY:
@@ -99,7 +99,7 @@ def _folder_is_gone() -> bool:
 
 
 def _arguments(function: Callable[[float], object], value: float) -> tuple[object, ...]:
-    """Return what Python says where a function has no value."""
+    """Return the arguments of Python's error for a function without a value."""
     try:
         function(value)
     except ValueError as error:

@@ -1,9 +1,9 @@
-"""Files that are written: none takes the place of an input, of another kind of file, or of a run's open log.
+"""Write files; no output replaces an input, another kind of file, or the open log of a run.
 
 A file is known by its identity, not by its name: another spelling, a symbolic link or a hard link is the same
-file. Whoever writes states what kind of file it is and what is read beside it; everything that speaks against
-writing raises one `QuadvisError` before the first byte of the old file is lost. What a run reads is stated
-once, by `reading`, and holds for all that is written meanwhile, whoever writes it.
+file. The writer states the kind of the file and the inputs of the same command. Every reason against writing
+raises one `QuadvisError` before the first byte of the old file is lost. The inputs of a run are stated once,
+by `reading`, and protected from all writers meanwhile.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from typing import BinaryIO
 
 from quadvis.errors import QuadvisError
 
-HEAD = 1 << 16  # bytes at the beginning of a file by which its kind is known
-LONGEST = 100  # characters of a file's name that is made of other names
+HEAD = 1 << 16  # bytes at the beginning of a file that show its kind
+LONGEST = 100  # characters of a file's name that is joined from other names
 
 PathLike = str | os.PathLike[str]
-Content = bytes | str | Callable[[BinaryIO], object]  # or what writes it into a file
+Content = bytes | str | Callable[[BinaryIO], object]  # or a function that writes the content into a file
 Identity = tuple[int, int]  # device and number of a file
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of file: a phrase such as "the log", and how such files are known.
+    """A kind of file: a phrase such as "the log", and the marks of such files.
 
-    They begin with one of `heads`, and `pattern` (a regular expression, ^ at each line) is found near their
-    beginning. A kind without both fits any file.
+    Files of the kind begin with one of `heads`, and contain `pattern` (a regular expression, ^ at each line)
+    near their beginning. A kind without both fits any file.
     """
 
     name: str
@@ -45,7 +45,7 @@ class Kind:
     pattern: bytes = b""
 
     def holds(self, head: bytes) -> bool:
-        """Return whether a file that begins like this is of the kind; an empty one is of every kind."""
+        """Return whether a file with this beginning is of the kind; an empty file is of every kind."""
         text = head.removeprefix(b"\xef\xbb\xbf").lstrip() if head[:1] != b"\x89" else head
         begins = not self.heads or text.startswith(self.heads)
         return not head or (begins and re.search(self.pattern, head, re.MULTILINE) is not None)
@@ -63,7 +63,7 @@ _read = ContextVar("files that are read now", default=_NOTHING)
 
 @contextmanager
 def reading(inputs: Iterable[PathLike]) -> Iterator[None]:
-    """Let these files, and those in these folders, be inputs for all that is written meanwhile."""
+    """Protect these files, and the files in these folders, from all writers inside."""
     token = _read.set({**_read.get(), **_identities(inputs)})
     try:
         yield
@@ -72,10 +72,10 @@ def reading(inputs: Iterable[PathLike]) -> Iterator[None]:
 
 
 def check_output(path: PathLike, kind: Kind, inputs: Iterable[PathLike] = ()) -> None:
-    """Raise QuadvisError if `path` cannot be written, or if writing it would destroy what it must not.
+    """Raise QuadvisError if `path` cannot be written, or if writing it would destroy a protected file.
 
-    Refused: a name without a folder, a folder, a device or pipe; a file that is one of `inputs`; a file that
-    holds something else than `kind`.
+    Refused are: a path in a missing folder; a folder, a device or a pipe; one of `inputs`; a file of another
+    kind than `kind`.
     """
     path = Path(path)
     if not path.parent.is_dir():
@@ -95,9 +95,9 @@ def check_output(path: PathLike, kind: Kind, inputs: Iterable[PathLike] = ()) ->
 
 
 def write_output(path: PathLike, kind: Kind, data: Content, inputs: Iterable[PathLike] = ()) -> None:
-    """Write a whole file: what was there stays until the new one is complete. QuadvisError as `check_output`.
+    """Write a whole file; an old file stays until the new one is complete. QuadvisError as `check_output`.
 
-    A symbolic link stays a link: the file that it names is replaced, and its permissions stay.
+    A symbolic link stays a link: its target is replaced and keeps its permissions.
     """
     check_output(path, kind, inputs)
     try:
@@ -107,7 +107,7 @@ def write_output(path: PathLike, kind: Kind, data: Content, inputs: Iterable[Pat
 
 
 def _replace(target: Path, data: Content) -> BinaryIO:
-    """Put a whole file in the place of `target`, and return it open, locked for this process."""
+    """Replace `target` by a whole new file; return the file open and locked for this process."""
     temporary = target.with_name(f".{target.name[:60]}.{os.getpid()}.tmp")
     try:
         temporary.write_bytes(_bytes(data))
@@ -135,10 +135,10 @@ def _bytes(data: Content) -> bytes:
 
 
 def open_output(path: PathLike, kind: Kind, inputs: Iterable[PathLike] = ()) -> BinaryIO:
-    """Open a file that grows while others may read it, empty, for this process alone. QuadvisError as above.
+    """Open an empty file that grows while others read it, for this process alone. QuadvisError as above.
 
-    It is locked until it is closed or the process ends: a second one that opens it is refused, and what the
-    first one writes stays whole.
+    The file is locked until it is closed or the process ends: a second writer is refused, so the output of
+    the first one stays whole.
     """
     file = _open_locked(Path(path), kind, inputs)
     file.truncate(0)
@@ -146,7 +146,7 @@ def open_output(path: PathLike, kind: Kind, inputs: Iterable[PathLike] = ()) -> 
 
 
 def _open_locked(path: Path, kind: Kind, inputs: Iterable[PathLike]) -> BinaryIO:
-    """Open a file, with what is in it, for this process alone."""
+    """Open a file, with its contents, for this process alone."""
     check_output(path, kind, inputs)
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NONBLOCK, 0o666)
@@ -154,7 +154,7 @@ def _open_locked(path: Path, kind: Kind, inputs: Iterable[PathLike]) -> BinaryIO
         raise _refusal(path, kind, reason(error)) from error
     file = os.fdopen(descriptor, "r+b")
     try:
-        # Between the check and here the name may have come to mean another file.
+        # Since the check the name may have become the name of another file.
         _check_found(path, kind, os.fstat(descriptor), inputs)
         if not _try_lock(descriptor) or not os.path.samestat(os.fstat(descriptor), path.stat()):
             raise _refusal(path, kind, "another run is writing it; choose another name")
@@ -169,10 +169,10 @@ def _open_locked(path: Path, kind: Kind, inputs: Iterable[PathLike]) -> BinaryIO
 
 
 class Claim:
-    """A file that is this process's alone, rewritten or lengthened again and again, and whole at each moment.
+    """A file of this process alone, which is rewritten or extended again and again, and whole at each moment.
 
-    What was there stays until something is written; a file that the claim made and never wrote goes away. A
-    second claim is refused, as `open_output` is.
+    An old file stays until the first write; a file that the claim made and never wrote is removed. A second
+    claim is refused, as for `open_output`.
     """
 
     def __init__(self, path: PathLike, kind: Kind, inputs: Iterable[PathLike] = ()) -> None:
@@ -182,21 +182,21 @@ class Claim:
         self._file = _open_locked(self.path, kind, inputs)
 
     def write(self, data: Content) -> None:
-        """Put this in the place of all that is there."""
+        """Replace the whole content."""
         with self._reasons():
             file = _replace(self.path.resolve(), data)
         self._file.close()
         self._file, self._fresh = file, False
 
     def append(self, data: bytes) -> None:
-        """Add this at the end."""
+        """Append to the content."""
         with self._reasons():
             self._file.seek(0, os.SEEK_END)
             self._file.write(data)
             self._file.flush()
 
     def close(self) -> None:
-        """Let others have the file."""
+        """Release the file."""
         if self._fresh:
             self._fresh = False
             with suppress(OSError):
@@ -212,10 +212,10 @@ class Claim:
 
 
 def file_name(*names: str) -> str:
-    """Return names joined by '+', fit for the name of a file: other names never give the same one.
+    """Return names joined by '+', as a valid file name; different names give different file names.
 
-    Letters without accents, digits, '_', '-' and '.' stay; where anything else was replaced or cut off, a few
-    digits of a hash follow.
+    Letters without accents, digits, '_', '-' and '.' stay; if other characters were replaced or the name was
+    cut, a few digits of a hash follow.
     """
     plain = "+".join(re.sub(r"[^A-Za-z0-9_.-]+", "-", name).strip("-.") for name in names)
     if plain == "+".join(names) and all(names) and len(plain) <= LONGEST:
@@ -225,7 +225,7 @@ def file_name(*names: str) -> str:
 
 
 def same_file(path: PathLike, others: Iterable[PathLike]) -> Path | None:
-    """Return that one of `others` which is the same file as `path`, by whatever name; None if none is."""
+    """Return the one of `others` that is the same file as `path`, under any name; None if no other is."""
     try:
         return _identities(others).get(_identity(os.stat(path)))
     except (OSError, ValueError):
@@ -233,7 +233,7 @@ def same_file(path: PathLike, others: Iterable[PathLike]) -> Path | None:
 
 
 def reason(error: OSError | ValueError) -> str:
-    """Return why the system refused, as a part of a sentence."""
+    """Return the system's reason for an error, as a part of a sentence."""
     if isinstance(error, FileNotFoundError):
         return "there is no such file or folder"
     return ((error.strerror if isinstance(error, OSError) else None) or str(error)).lower()
@@ -244,7 +244,7 @@ def _identity(found: os.stat_result) -> Identity:
 
 
 def _identities(paths: Iterable[PathLike]) -> dict[Identity, Path]:
-    """Return who the files are; a folder stands for the files in it."""
+    """Return the identities of files; a folder stands for the files in it."""
     found: dict[Identity, Path] = {}
     for path in map(Path, paths):
         with suppress(OSError, ValueError):
@@ -255,7 +255,7 @@ def _identities(paths: Iterable[PathLike]) -> dict[Identity, Path]:
 
 
 def _check_found(path: Path, kind: Kind, found: os.stat_result, inputs: Iterable[PathLike]) -> None:
-    """Refuse what is no file, and what is read beside the output."""
+    """Refuse an output that is not a regular file, or that is an input."""
     if stat.S_ISDIR(found.st_mode):
         raise _refusal(path, kind, "it is a folder")
     if not stat.S_ISREG(found.st_mode):
@@ -273,7 +273,7 @@ def _check_head(path: Path, kind: Kind, head: bytes) -> None:
 
 
 def _try_lock(descriptor: int) -> bool:
-    """Take the file for this process, or return False; a system without locks goes without."""
+    """Lock the file for this process, or return False; on a system without locks return True."""
     try:
         import fcntl
     except ImportError:  # not a Unix

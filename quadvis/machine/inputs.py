@@ -1,7 +1,7 @@
-"""Files that are read: each one once, whole, within bounds, and known by the SHA-256 of what was read.
+"""Read input files: each one once, whole, within bounds, and note the SHA-256 of its contents.
 
-What flies must be what was checked. So whoever reads a file says so with `note_input`, and whoever loads a
-diagram keeps the digests that were noted: a file that changes between two readings is refused.
+A run must use the same files that were checked. So every reader of a file calls `note_input`, and the loader
+of a diagram keeps the noted digests: a file that changes between two readings is refused.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ _noted: ContextVar[dict[str, str] | None] = ContextVar("noted", default=None)
 
 
 def read_input(path: PathLike, most: int | None = MOST_BYTES, what: str = "") -> bytes:
-    """Return a file's contents; QuadvisError if it is none, cannot be read, or has more than `most` bytes.
+    """Return a file's contents; QuadvisError if it is no file, unreadable, or longer than `most` bytes.
 
-    `what` is what the error calls it, such as "the log". Neither a pipe nor a device is waited for.
+    `what` names the file in the error, such as "the log". Pipes and devices are refused without waiting.
     """
     with open_input(path, what) as file:
         try:
@@ -39,7 +39,7 @@ def read_input(path: PathLike, most: int | None = MOST_BYTES, what: str = "") ->
 
 
 def open_input(path: PathLike, what: str = "") -> BufferedReader:
-    """Open a file for reading. QuadvisError if there is none; a pipe or device is refused without waiting."""
+    """Open a file for reading. QuadvisError if it is missing, or a pipe or device, without waiting."""
     try:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
     except (OSError, ValueError) as error:
@@ -53,13 +53,13 @@ def open_input(path: PathLike, what: str = "") -> BufferedReader:
 
 
 def note_input(path: PathLike, data: bytes) -> None:
-    """Note that this is what was read of a file; QuadvisError if it was something else before."""
+    """Note the contents that were read from a file; QuadvisError if an earlier reading gave others."""
     if _noted.get() is not None:
         note_digest(path, hashlib.sha256(data).hexdigest())
 
 
 def note_digest(path: PathLike, digest: str) -> None:
-    """Do the same for what is known by a digest alone."""
+    """Note the SHA-256 of a file's contents; QuadvisError if an earlier reading gave another one."""
     noted = _noted.get()
     if noted is not None and noted.setdefault(os.fspath(path), digest) != digest:
         raise QuadvisError(f"'{os.fspath(path)}' was changed while it was being read; try again")
@@ -78,7 +78,7 @@ def file_digest(path: PathLike) -> str:
 
 @contextmanager
 def noted_inputs() -> Iterator[Mapping[str, str]]:
-    """Collect the SHA-256 of all that is read inside, by path."""
+    """Collect the SHA-256 of all files that are read inside, by path."""
     found: dict[str, str] = {}
     token = _noted.set(found)
     try:

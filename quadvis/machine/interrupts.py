@@ -1,7 +1,7 @@
-"""Signals that end a program: it leaves by the door of an error, so that every block and file is closed.
+"""Signals that end a program: they raise an exception, so that every block and file is closed.
 
-SIGTERM asks for an end, SIGHUP tells that the terminal is gone. Whoever starts a program with one of them
-ignored, as nohup does, wants it to go on.
+SIGTERM asks for an end, SIGHUP reports that the terminal has closed. A program that was started with one of
+them ignored, as by nohup, goes on.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 ENDS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
-KEYS = {signal.SIGINT, *ENDS} - {signal.SIGTERM}  # what a terminal sends to all processes that it started
+KEYS = {signal.SIGINT, *ENDS} - {signal.SIGTERM}  # sent by a terminal to all its processes
 
 
 def end_orderly() -> None:
@@ -23,13 +23,13 @@ def end_orderly() -> None:
 
 
 def _end(number: int, _: object) -> None:
-    for each in ENDS:  # a second one, as terminals send, would tear what is being closed
+    for each in ENDS:  # terminals send a second signal, which would interrupt the closing
         signal.signal(each, signal.SIG_IGN)
     raise SystemExit(128 + number)
 
 
 def leave_to_parent() -> None:
-    """Be deaf to the terminal: the process that started this one hears it, and ends this one."""
+    """Ignore the terminal's signals: the parent process receives them and ends this process."""
     with suppress(ValueError):
         for number in KEYS:
             signal.signal(number, signal.SIG_IGN)
@@ -38,7 +38,7 @@ def leave_to_parent() -> None:
 
 @contextmanager
 def held_back() -> Iterator[None]:
-    """Put off what a terminal sends; processes begun inside are deaf to it until `leave_to_parent`."""
+    """Delay the terminal's signals; processes begun inside ignore them until `leave_to_parent`."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, KEYS)
     try:
         yield

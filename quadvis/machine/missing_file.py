@@ -1,4 +1,4 @@
-"""Files that are named but cannot be read: what is there in their place, and what was meant."""
+"""Explain why a named file cannot be read, and suggest the name that was meant."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ RELATIVE = "a path is relative to the file in which it stands"
 
 
 def file_trouble(name: str, shown: str = "", but: Container[str] = ()) -> tuple[str, str]:
-    """Return why there is no file to read under a name, and what would be right; nothing if there is one.
+    """Return why no file can be read under a name, and the remedy; ("", "") if the file can be read.
 
-    ``shown`` is how the name was written, relative to another file. None of the real paths in ``but`` is
+    ``shown`` is the name as it was written, relative to another file. Real paths in ``but`` are not
     suggested.
     """
     missing = f"there is no file '{shown}'" if shown else "there is no such file"
@@ -35,12 +35,12 @@ def file_trouble(name: str, shown: str = "", but: Container[str] = ()) -> tuple[
 
 
 def system_reason(error: OSError | ValueError) -> str:
-    """Return why the system refused a file; a name that it cannot hold raises ValueError."""
+    """Return the system's reason for refusing a file; ValueError is its error for an impossible name."""
     return (error.strerror if isinstance(error, OSError) else None) or "embedded null byte"
 
 
 def _near_file(name: str, shown: str, but: Container[str]) -> str:
-    """Return the remedy for a file that is not there: other slashes, or a name that is close to it."""
+    """Return the remedy for a missing file: other slashes, or an existing file with a similar name."""
     written = shown or name
     if "\\" in written:
         slashed = written.replace("\\", "/")
@@ -55,7 +55,7 @@ def _near_file(name: str, shown: str, but: Container[str]) -> str:
         others = sorted(os.listdir(folder or "."))[:1000]
     except (OSError, ValueError):
         others = []
-    # What only ends alike is another file: the stem must be near, too.
+    # A name with only the same suffix is another file: the stem must be similar, too.
     stems = {
         other: os.path.splitext(other)[0]
         for other in others

@@ -1,4 +1,4 @@
-"""A line on the terminal that says what is going on."""
+"""A status line on the terminal."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from time import monotonic
 from types import TracebackType
 from typing import Self, TextIO
 
-PATIENCE, RENEWED = 2.0, 0.1  # s until a line is shown at all, and until it is shown again
+PATIENCE, RENEWED = 2.0, 0.1  # s until a line is shown first, and until it is renewed
 
 
 class StatusLine:
-    """One line on standard error that is rewritten while something goes on; nothing where no one watches.
+    """A status line, rewritten in place on standard error; silent if that is no terminal.
 
-    A terminal that takes nothing, or has gone, holds up nobody: the line is not shown then.
+    A terminal that takes no text, or has closed, never delays the program: then the line is not shown.
     """
 
     def __init__(self, stream: TextIO | None = None) -> None:
@@ -26,7 +26,7 @@ class StatusLine:
         return self
 
     def show(self, text: str) -> None:
-        """Put a text in place of the one before."""
+        """Show a text in place of the previous one."""
         self._put(f"\r\x1b[K{text} ")
 
     def _put(self, text: str) -> None:
@@ -39,13 +39,13 @@ class StatusLine:
             else:
                 os.write(self._terminal, text.encode(errors="replace"))
         except BlockingIOError:
-            pass  # there is no room now; the next text may find some
-        except (OSError, ValueError):  # the terminal has gone; what goes on does not end with it
+            pass  # the terminal is full now; the next text may succeed
+        except (OSError, ValueError):  # the terminal has closed; the program goes on
             self.shown = False
 
     @staticmethod
     def bar(part: float) -> str:
-        """Return a bar that is filled up to a part of 0 to 1."""
+        """Return a bar that is filled to a share from 0 to 1."""
         filled = int(24 * min(1.0, part))
         return f"[{'#' * filled}{'.' * (24 - filled)}]"
 
@@ -60,7 +60,7 @@ class StatusLine:
 
 
 def _open_terminal(stream: TextIO) -> int | None:
-    """Open the terminal behind a stream anew, to be written without waiting; None where that cannot be."""
+    """Open the terminal behind a stream again for writing without waiting; None if this is impossible."""
     try:
         return os.open(os.ttyname(stream.fileno()), os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
     except (OSError, ValueError, AttributeError):
@@ -68,32 +68,32 @@ def _open_terminal(stream: TextIO) -> int | None:
 
 
 class AnalysisLine(StatusLine):
-    """What an analysis is doing, once it has taken a while."""
+    """The present step of an analysis, shown once the analysis has taken a while."""
 
     def __init__(self, stream: TextIO | None = None) -> None:
         super().__init__(stream)
         self.next = monotonic() + PATIENCE
 
     def __call__(self, text: str) -> None:
-        """Show what is being done just now."""
+        """Show the present step."""
         if monotonic() >= self.next:
             self.show(text)
             self.next = monotonic() + RENEWED
 
     def clear(self) -> None:
-        """Make room for a line that stays."""
+        """Clear the status line, to make room for a permanent line."""
         self._put("\r\x1b[K")
 
 
 class ProgressLine(StatusLine):
-    """How far a run of so many seconds is, and how fast it goes."""
+    """The progress of a run of ``duration`` (s), and its speed."""
 
     def __init__(self, duration: float, stream: TextIO | None = None) -> None:
         super().__init__(stream)
         self.duration = duration
 
     def __call__(self, time: float, wall: float) -> None:
-        """Show the simulated time reached and how fast it goes. The next tick may lie beyond the end."""
+        """Show the simulated time reached and the speed. The next tick may lie beyond the end."""
         time = min(time, self.duration)
         bar = self.bar(time / self.duration if self.duration else 1.0)
         self.show(f"{bar} {time:6.1f} / {self.duration:g} s  {time / max(wall, 1e-9):.0f} x real time")

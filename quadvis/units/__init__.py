@@ -1,4 +1,4 @@
-"""Units, and quantities as people write them: "50 ms", "1/30 s", "2.5 rad/s", "90 %"."""
+"""Units, and quantities in text: "50 ms", "1/30 s", "2.5 rad/s", "90 %"."""
 
 from quadvis.units.quantity import (
     format_quantity,

@@ -1,16 +1,16 @@
-"""The names of units: those that exist, and what people write in their place."""
+"""The names of units, and names from elsewhere that people write in their place."""
 
 from __future__ import annotations
 
 VARIABLES = ("a", "b", "c")
 BASES = ("m", "kg", "s", "rad", "px", "A", "K", *VARIABLES)
 
-# A scale is a product of powers of these, so that nothing is ever rounded; the large ones are for the pound.
+# A scale is a product of powers of these numbers, so it is never rounded; the large ones are for the pound.
 PRIMES = {str(prime): prime for prime in (2, 3, 5, 7, 11, 97, 127, 463, 6073)}
 SCALES = frozenset((*PRIMES, "pi"))
 
-# Every other unit by what it is made of; each line uses only names above it. Sources: SI brochure (9th
-# edition), tables 4, 7 and 8; the international yard and pound of 1959: 0.3048 m and 0.45359237 kg.
+# Every other unit, as a product; each line uses only names above it. Sources: SI brochure (9th edition),
+# tables 4, 7 and 8; the international yard and pound of 1959: 0.3048 m and 0.45359237 kg.
 DERIVED = {
     "%": "2^-2*5^-2", "ppm": "2^-6*5^-6", "Hz": "s^-1", "N": "kg*m/s^2", "J": "N*m", "W": "J/s", "V": "W/A",
     "ohm": "V/A", "C": "A*s", "F": "C/V", "H": "V*s/A", "Wb": "V*s", "Pa": "N/m^2", "T": "N/A/m",
@@ -33,7 +33,7 @@ SPELLINGS = str.maketrans({
 })
 # fmt: on
 
-# What people write, without case, and the unit that it is.
+# Names that people write, in any case, and their units.
 WORDS = {
     "sec": "s", "secs": "s", "second": "s", "msec": "ms", "usec": "us", "hr": "h", "hrs": "h", "hour": "h",
     "minute": "min", "meter": "m", "metre": "m", "hertz": "Hz", "fps": "Hz", "degree": "deg",
@@ -47,7 +47,7 @@ WORDS = {
 }  # fmt: skip
 PREFIX_WORDS = {"nano": "n", "micro": "u", "milli": "m", "centi": "c", "kilo": "k", "mega": "M", "giga": "G"}
 
-# What is no unit here: why, and what to write. Names of one or two letters count as they are written.
+# Names that are no units here: why, and the remedy. The case counts for names of one or two letters.
 ELSEWHERE = {
     "dB": (", since it is a logarithm", "write the ratio, such as 10 for an amplitude of 20 dB"),
     "degC": (", since its zero is not 0", "write 20 degC as 293.15 K, and a difference of 1 degC as 1 K"),

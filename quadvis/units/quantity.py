@@ -1,4 +1,4 @@
-"""Quantities as people write them: "50 ms", "1/30 s", "2.5 rad/s", "90 %"; and the units from `dimension`."""
+"""Quantities in text: "50 ms", "1/30 s", "2.5 rad/s", "90 %"."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _RATIO = re.compile(r"([0-9]+) */ *([0-9]+)(?![0-9.])")
 
 
 def _exact(number: str, text: str) -> Fraction:
-    """Return a decimal number or ratio exactly; what no float can hold is refused."""
+    """Return a decimal number or ratio exactly; a number beyond the range of floats is refused."""
     ratio = _RATIO.fullmatch(number)
     if ratio is not None:
         if len(number) > LONGEST or not int(ratio[2]):
@@ -27,7 +27,7 @@ def _exact(number: str, text: str) -> Fraction:
 
 
 def parse_number(text: str) -> float:
-    """Return a decimal number: 2, -0.5, .5, 1e-3; nothing that YAML or Python would read as another."""
+    """Return a decimal number: 2, -0.5, .5, 1e-3; refuse what YAML or Python read as another number."""
     match = _NUMBER.fullmatch(text)
     if match is None or len(text) > LONGEST:
         raise _not_a_number(text)
@@ -73,8 +73,8 @@ def parse_quantity(text: str) -> tuple[float, Unit]:
 def parse_rational(text: str, unit: Unit | None = None) -> Fraction:
     """Return the exact SI value of "33.3 ms", "10 Hz" or "1/30 s".
 
-    A `unit` demands its dimension, and that a number which is not 0 has a unit. Units whose scale is
-    irrational (deg) are refused.
+    With `unit`, the text must have its dimension, and a number other than 0 must have a unit. Units with an
+    irrational scale (deg) are refused.
     """
     number, written = _parts(text, unit)
     ratio, rest = written.exact_scale
@@ -99,7 +99,7 @@ def parse_period(text: str) -> Fraction:
 
 
 def read_quantity(text: str, unit: Unit, *, bare: bool = True) -> float:
-    """Return a quantity as a number of `unit`; a bare number is one already, unless `bare` is false."""
+    """Return a quantity as a number of `unit`; a bare number counts as such, unless `bare` is false."""
     if bare and _NUMBER.fullmatch(text):
         return parse_number(text)
     number, written = _parts(text, None if unit.variables else unit)
@@ -114,7 +114,7 @@ def read_quantity(text: str, unit: Unit, *, bare: bool = True) -> float:
 
 @lru_cache(maxsize=1024)
 def _quotient(written: Unit, unit: Unit) -> Unit:
-    """Return the quotient of two units; a diagram has few pairs of them and many quantities."""
+    """Return the quotient of two units, cached: a diagram has few pairs of units and many quantities."""
     return written / unit
 
 
@@ -130,7 +130,7 @@ def require_unit(text: str, unit: Unit) -> None:
 
 
 def format_quantity(value: float, unit: Unit, digits: int = 4) -> str:
-    """Return an SI value for people: (0.05, s) gives "50 ms", (0.032, m) "3.2 cm", (0.5236, deg) "30 deg"."""
+    """Return an SI value as text: (0.05, s) gives "50 ms", (0.032, m) "3.2 cm", (0.5236, deg) "30 deg"."""
     rounded = float(f"{value:.{digits}g}")
     if unit.scale == 1.0 and rounded and math.isfinite(rounded):
         for name in reversed(_ladder(str(unit))):
@@ -142,13 +142,13 @@ def format_quantity(value: float, unit: Unit, digits: int = 4) -> str:
     return number if not unit.symbols else f"{number} {unit}"
 
 
-# Units that people read a bare dimension in, smallest first.
+# Usual units of each dimension, smallest first.
 _LADDERS = ("us ms s", "um mm cm m km", "Hz kHz MHz", "mV V kV", "mA A", "mN N kN", "mW W kW", "Pa kPa")
 
 
 @lru_cache(maxsize=64)
 def _ladder(unit: str) -> tuple[str, ...]:
-    """Return the names to choose from for a unit; none if it is a product of its own."""
+    """Return the usual units of its kind, small to large (mm, cm, m, km); () if it has none."""
     for names in map(str.split, _LADDERS):
         if unit in names:
             return tuple(names)
@@ -156,13 +156,13 @@ def _ladder(unit: str) -> tuple[str, ...]:
 
 
 def _likely(value: float, unit: Unit) -> str:
-    """Guess the unit that was left out, from the size of the number."""
+    """Guess the missing unit from the size of the number."""
     small = {"s": ("ms", 10.0), "m": ("mm", 20.0), "rad": ("deg", 6.3)}.get(str(unit))
     return small[0] if small and value >= small[1] else str(unit)
 
 
 def _parts(text: str, *wanted: Unit | None) -> tuple[Fraction, Unit]:
-    """Return the number and the unit; advice for a text that is none goes by what is wanted, if known."""
+    """Return the number and the unit of a text; advice on a wrong text depends on the wanted units."""
     number, unit = split_quantity(text)
     if not number:
         raise UnitError(f"{quoted(text)} does not begin with a number", "write it as in '50 ms'")
@@ -190,7 +190,7 @@ def _require_dimension(text: str, written: Unit, unit: Unit) -> None:
 
 
 def _to_si(number: Fraction, unit: Unit, text: str) -> float:
-    """Return the float nearest to the number of units, rounded once where the scale is rational."""
+    """Return the SI value as the nearest float, rounded only once if the scale is rational."""
     ratio, rest = unit.exact_scale
     try:
         value = float(number * ratio) * rest

@@ -1,4 +1,4 @@
-"""Spellings that are close to a unit that was mistyped: "Nm" is N*m, "m/s2" m/s^2, "milliseconds" ms."""
+"""Correct spellings for mistyped units: "Nm" is N*m, "m/s2" is m/s^2, "milliseconds" is ms."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from quadvis.units.names import ELSEWHERE, PREFIX_WORDS, PREFIXED, VARIABLES, WO
 _PIECE = re.compile(
     r"(?P<word>[A-Za-z%]+)(?P<power> *-?[0-9]+(?![0-9.])|\^\(?-?[0-9./]+\)?)?|(?P<sign>[^A-Za-z%])"
 )
-_FACTORS = 3  # of a product that is written in one word
+_FACTORS = 3  # factors of a product that is written as one word
 _TRIED = 64
 
 
 def elsewhere(text: str) -> tuple[str, str, str] | None:
-    """Return a name that people know and that is no unit here, why, and what to write in its place."""
+    """Return a known name that is no unit here, the reason, and what to write in its place."""
     for word in re.findall(r"[A-Za-z]+", text):
         found = ELSEWHERE.get(word if len(word) <= 2 else word.lower())
         if found:
@@ -26,10 +26,10 @@ def elsewhere(text: str) -> tuple[str, str, str] | None:
 
 
 def spellings(text: str, names: Collection[str], likely: Collection[str]) -> Iterator[str]:
-    """Yield what may have been meant by a text that is no unit, the likeliest first.
+    """Yield units that a text may mean that is no unit, the likeliest first.
 
-    ``names`` are those of all units, ``likely`` those of the dimension that is wanted. The unit variables of
-    declarations are never meant. Not every text is a unit: the caller tries.
+    ``names`` are the names of all units, ``likely`` the names of units of the wanted dimension. The unit
+    variables of declarations are never suggested. Some of the texts are no units: the caller tries them.
     """
     known = [name for name in names if name not in VARIABLES]
     plain = re.sub(r"\s+per\s+|\s*/\s*", "/", text.replace("**", "^").strip())
@@ -48,7 +48,7 @@ def _choices(match: re.Match[str], names: Collection[str], likely: Collection[st
 
 
 def _joined(pieces: tuple[str, ...]) -> str:
-    """Return the pieces as one text; a product below a fraction line needs brackets."""
+    """Return the pieces as one text; a product after '/' gets brackets."""
     text = ""
     for piece in pieces:
         text += f"({piece})" if "*" in piece and text.endswith("/") and piece != "*" else piece
@@ -56,7 +56,7 @@ def _joined(pieces: tuple[str, ...]) -> str:
 
 
 def _meant(word: str, names: Collection[str], likely: Collection[str]) -> Iterator[str]:
-    """Yield the units, or products of them, that a word may stand for."""
+    """Yield the units, or products of units, that a word may mean."""
     if word in names:
         yield word
         return
@@ -64,7 +64,7 @@ def _meant(word: str, names: Collection[str], likely: Collection[str]) -> Iterat
     if word[-1:] == "s" and len(word) > 3 and word[:-1] in names:
         yield word[:-1]
     products = ["*".join(parts) for parts in _split(word, names, _FACTORS)]
-    if word != word.lower() or word.startswith("kg"):  # Nm, but no mistyped 'hm'
+    if word != word.lower() or word.startswith("kg"):  # Nm, but not a mistyped 'hm'
         yield from products
     near = closest(word, WORDS) if len(word) > 3 else None
     if near is not None:
@@ -89,7 +89,7 @@ def _spelt_out(word: str, names: Collection[str]) -> Iterator[str]:
 
 
 def _split(word: str, names: Collection[str], most: int) -> list[list[str]]:
-    """Return the ways to read a word as a product of at most so many units, the likeliest first.
+    """Return the ways to read a word as a product of at most ``most`` units, the likeliest first.
 
     In "Nms" the m is the metre, though ms is a unit as well; in "kNm" the k belongs to the newton.
     """

@@ -1,8 +1,8 @@
 """Physical units of ports and parameters: reading, comparing, combining and unifying them.
 
-A unit is a product of powers. Its scale to SI is kept exactly, as powers of primes and pi, beside the powers
-of the dimensions m, kg, s, rad, px, A, K and of the unit variables a, b, c; hence nothing is ever rounded.
-Angles have a dimension of their own, so that Hz and rad/s are told apart.
+A unit is a product of powers: of primes and pi for its scale to SI, of the dimensions m, kg, s, rad, px, A,
+K, and of the unit variables a, b, c. So scales are exact and never rounded. Angles have their own dimension,
+so that Hz and rad/s differ.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ _AROUND_OPERATOR = re.compile(r"\s*([*/^])\s*")
 
 
 class UnitError(QuadvisError):
-    """A text that is not a unit or not a quantity: the problem, and what would be right."""
+    """A text that is not a unit or not a quantity: the problem and the remedy."""
 
     def __init__(self, problem: str, remedy: str = "") -> None:
-        """Keep both halves of the sentence apart, for messages that name a place."""
+        """Keep both halves of the sentence separately, for messages that name a place."""
         self.problem, self.remedy = problem, remedy
         super().__init__(sentence(problem, remedy))
 
 
 def _powers(items: Iterable[tuple[str, Fraction]]) -> tuple[tuple[str, Fraction], ...]:
-    """Return the sum of the exponents of each symbol, in the order of first mention."""
+    """Return the sum of the exponents of each symbol, in the order of first occurrence."""
     total: dict[str, Fraction] = {}
     for symbol, exponent in items:
         total[symbol] = total.get(symbol, Fraction(0)) + exponent
@@ -57,7 +57,7 @@ def _powers(items: Iterable[tuple[str, Fraction]]) -> tuple[tuple[str, Fraction]
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit; equal to every other with the same dimensions and scale (Hz and 1/s), however written."""
+    """A unit; it equals every unit with the same dimensions and scale, such as Hz and 1/s."""
 
     exponents: frozenset[tuple[str, Fraction]] = frozenset()
     symbols: tuple[tuple[str, Fraction], ...] = field(default=(), compare=False, repr=False)
@@ -66,7 +66,7 @@ class Unit:
     def parse(text: str, *wanted: Unit) -> Unit:
         """Return the unit written as "rad/s^2", "N*m", "1/s", "deg/s", "%", "Hz^0.5", "W/(m*K)" or "1".
 
-        UnitError if it is none; what it then suggests has the dimension of a unit that is ``wanted``.
+        UnitError if the text is no unit; its suggestion has the dimension of a ``wanted`` unit.
         """
         try:
             return _parse(text)
@@ -102,9 +102,9 @@ class Unit:
 
     @cached_property
     def exact_scale(self) -> tuple[Fraction, float]:
-        """The scale as an exact ratio, and the irrational rest (pi, roots)."""
+        """The scale as an exact ratio and an irrational factor (pi, roots)."""
         ratio, rest = Fraction(1), 1.0
-        for symbol, exponent in sorted(self.exponents):  # sets differ in order from one process to the next
+        for symbol, exponent in sorted(self.exponents):  # sets are ordered differently in each process
             if symbol in PRIMES and exponent.denominator == 1:
                 ratio *= Fraction(PRIMES[symbol]) ** int(exponent)
             elif symbol in SCALES:
@@ -118,20 +118,20 @@ class Unit:
 
     @cached_property
     def variables(self) -> frozenset[str]:
-        """The unit variables that it holds."""
+        """The unit variables in this unit."""
         return frozenset(symbol for symbol, _ in self.exponents if symbol in VARIABLES)
 
     def dimension_equals(self, other: Unit) -> bool:
-        """Say whether a quantity in one unit can be converted into the other: m and mm."""
+        """Return whether a quantity can be converted from one unit to the other, such as m and mm."""
         return self.dimension == other.dimension
 
     @cached_property
     def reduced(self) -> Unit:
-        """The same unit in fewer names, where those that came together say it at length: s*N/kg/m is 1/s."""
+        """The same unit with fewer names, if a shorter product exists: s*N/kg/m is 1/s."""
         return _reduced(self.exponents, self.symbols)
 
     def substitute(self, bindings: Mapping[str, Unit]) -> Unit:
-        """Return the unit with the variables replaced that are bound."""
+        """Return the unit with all bound variables replaced."""
         result = _unit(
             (item for item in self.exponents if item[0] not in bindings),
             (item for item in self.symbols if item[0] not in bindings),
@@ -146,15 +146,15 @@ def _unit(exponents: Iterable[tuple[str, Fraction]], symbols: Iterable[tuple[str
     return Unit(frozenset(_powers(exponents)), _powers(symbols))
 
 
-# Names that stand for a product of dimensions, the best known first.
+# Names for products of dimensions, the best known first.
 _ORDER = (*VARIABLES, "kg", "m", "A", "K", "rad", "px", "s")
-_SHORT = 3  # factors of a unit that only a single name replaces: N*s/m stays, N/kg/m is 1/s^2
+_SHORT = 3  # only a single name replaces a unit of up to so many factors: N*s/m stays, N/kg/m is 1/s^2
 _NAMED = ("N", "W", "V", "ohm", "Pa", "T", "H", "F", "C")
 
 
 @lru_cache(maxsize=4096)
 def _reduced(exponents: frozenset[tuple[str, Fraction]], symbols: tuple[tuple[str, Fraction], ...]) -> Unit:
-    """Return the shortest product of bases and a power of one name; the unit if it is as short."""
+    """Return the shortest product of bases and a power of one name; the unit itself if it is as short."""
     unit = Unit(exponents, symbols)
     if unit.exponents != unit.dimension or len(symbols) < 2:
         return unit
@@ -167,13 +167,13 @@ def _reduced(exponents: frozenset[tuple[str, Fraction]], symbols: tuple[tuple[st
 
 @lru_cache(maxsize=1)
 def _named_powers() -> tuple[tuple[Unit, dict[str, int]], ...]:
-    """Return the powers of names, and 1, by which a unit may be divided, each with its powers of bases."""
+    """Return 1 and powers of names, by which a unit may be divided, each with its powers of bases."""
     powers = (Unit(), *(name**power for name in map(Unit.parse, _NAMED) for power in (1, -1, 2, -2)))
     return tuple((unit, {base: int(power) for base, power in unit.exponents}) for unit in powers)
 
 
 def _length_beside(powers: Mapping[str, Fraction], name: Unit, bases: Mapping[str, int]) -> Fraction:
-    """Return the length of a unit, by its powers of bases, that is written as a name times bases."""
+    """Return the length of a unit, given by powers of bases, when it is written as a name times bases."""
     rest = (abs(powers.get(base, Fraction(0)) - bases.get(base, 0)) for base in {*powers, *bases})
     return _length(name) + sum(rest, Fraction(0))
 
@@ -183,7 +183,7 @@ def _in_bases(unit: Unit) -> Unit:
 
 
 def _in_order(unit: Unit) -> Unit:
-    """Return the unit with its factors in the usual order: m*s, not s*m; names of products come first."""
+    """Return the unit with its factors in the usual order: m*s, not s*m; names for products come first."""
     places = {symbol: place for place, symbol in enumerate(_ORDER)}
     return Unit(unit.exponents, tuple(sorted(unit.symbols, key=lambda item: places.get(item[0], -1))))
 
@@ -199,10 +199,10 @@ def _power(symbol: str, exponent: Fraction) -> str:
 
 
 def unify(pattern: Unit, actual: Unit, bindings: dict[str, Unit]) -> bool:
-    """Say whether the units agree, and bind the variable of the pattern that this settles.
+    """Return whether the units agree, and bind the variable of the pattern that the agreement determines.
 
-    "a/s" against "m/s" binds a = m. With two unknown variables nothing is settled: the answer is True, the
-    bindings stay, and the caller asks again when others are known. On False the bindings are as before.
+    "a/s" against "m/s" binds a = m. Two unknown variables are not determined: the answer is True, the
+    bindings stay, and the caller asks again when more is known. On False the bindings are unchanged.
     """
     try:
         wanted = pattern.substitute(bindings)
@@ -234,7 +234,7 @@ def _table() -> dict[str, Unit]:
 
 
 def _plain(text: str) -> str:
-    """Return the text in the one spelling that the reader knows, without blanks around operators."""
+    """Return the text in the spelling of the parser, without blanks around operators."""
     powers = _RAISED.sub(lambda match: f"^-{'¹²³'.index(match[1]) + 1}", text)
     return _AROUND_OPERATOR.sub(r"\1", powers.translate(SPELLINGS)).strip()
 
@@ -323,8 +323,10 @@ class _Reader:
         return result
 
     def _signed(self) -> Fraction:
-        sign = -1 if self._next() == "-" else 1
-        self.at += sign < 0
+        sign = 1
+        if self._next() == "-":
+            self.at += 1
+            sign = -1
         token = self._take()
         if not token[:1].isdigit() or len(token) > 5:
             raise UnitError(f"{quoted(self.text)} has no exponent after '^'", "write such as 's^2' or 's^-1'")
@@ -341,14 +343,15 @@ class _Reader:
 
 
 def advised(error: UnitError, text: str, wanted: Sequence[Unit] = ()) -> UnitError:
-    """Return the error with what may have been meant; only a unit of a dimension that is wanted, if known."""
+    """Return the error with a suggestion, which has the dimension of a wanted unit if any is known."""
     plain = _plain(text)
     name, why, remedy = elsewhere(plain) or ("", "", "")
     if name:
         return UnitError(f"{quoted(name)} is not a unit here{why}", remedy)
     table = _table()
     likely = [name for name, unit in table.items() if any(map(unit.dimension_equals, wanted))]
-    for near in spellings(plain, table, likely) if len(plain) <= LONGEST else ():
+    tried = spellings(plain, table, likely) if len(plain) <= LONGEST else iter(())
+    for near in tried:
         try:
             meant = _parse(near)
         except UnitError:
@@ -365,7 +368,7 @@ def advised(error: UnitError, text: str, wanted: Sequence[Unit] = ()) -> UnitErr
 
 
 def parse_units(text: str) -> tuple[Unit, ...]:
-    """Return the units of a port's elements: one for all of them ("m/s"), or one each ("m m m rad")."""
+    """Return the units of a port's elements: one for all elements ("m/s"), or one each ("m m m rad")."""
     plain = _plain(text).split()
     if not plain:
         raise UnitError("the unit is empty", "write '1' for a number without unit")
