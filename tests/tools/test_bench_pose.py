@@ -114,7 +114,7 @@ def test_the_levelled_pose_takes_a_third_of_the_time_of_ippe_square(bench):
 @pytest.mark.skipif(not PHOTOGRAPHS.is_dir(), reason="no photographs in ../shared/data/chessboard")
 @pytest.mark.parametrize(("side", "mm", "degrees"), [("left", 1.6, 0.3), ("right", 2.6, 0.47)])
 def test_on_photographs_four_corners_refined_are_better_than_ippe(bench, side, mm, degrees):
-    found = bench.chessboard(PHOTOGRAPHS, side)
+    found = bench.from_chessboard(PHOTOGRAPHS, side)
     refined, ippe = found["plane + gauss_newton"], found["cv2 IPPE"]
     assert refined[0] < mm and refined[1] < degrees
     assert refined[0] < 0.8 * ippe[0] and refined[1] < 0.8 * ippe[1]
