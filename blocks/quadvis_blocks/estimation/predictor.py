@@ -46,12 +46,14 @@ class Predictor(Block):
     pitch_disturbance = In(unit="rad/s^2", default=0.0, doc="pitch torque beside that of the rotors")
     yaw_disturbance = In(unit="rad/s^2", default=0.0, doc="yaw torque beside that of the rotors")
     thrust = In("float64[4]", unit="N", doc="thrust commanded of each rotor: front, right, rear, left")
-    later_position = Out("float64[3]", unit="m", doc="x, y, h, then")
-    later_velocity = Out("float64[3]", unit="m/s", doc="rate of change of the position, then")
-    later_roll = Out(unit="rad", doc="roll, then")
-    later_pitch = Out(unit="rad", doc="pitch, then")
-    later_yaw = Out(unit="rad", doc="yaw, then, in (-pi, pi]")
-    later_rates = Out("float64[3]", unit="rad/s", doc="rates of change of roll, pitch and yaw, then")
+    later_position = Out("float64[3]", unit="m", doc="x, y, h when the command acts")
+    later_velocity = Out("float64[3]", unit="m/s", doc="velocity when the command acts")
+    later_roll = Out(unit="rad", doc="roll when the command acts")
+    later_pitch = Out(unit="rad", doc="pitch when the command acts")
+    later_yaw = Out(unit="rad", doc="yaw when the command acts, in (-pi, pi]")
+    later_rates = Out(
+        "float64[3]", unit="rad/s", doc="rates of change of roll, pitch and yaw when the command acts"
+    )
 
     delay = Param(RADIO_DELAY, unit="s", min=0.0, max=1.0, doc="time that a command takes to the rotors")
     lag = Param(MOTOR_LAG, unit="s", above=0.0, doc="time constant of a motor")

@@ -12,10 +12,10 @@ CAPACITY = 256
 class History(Block):
     """The value that a signal had at an earlier instant: ``y = u(instant)``, straight between samples.
 
-    So what arrives late meets what was measured beside it at the time: a frame of a camera, and the angles of
-    an inertial unit when the frame was taken. The last 256 samples are kept. An instant before them gives the
-    oldest, one in the future or NaN the newest; ``ok`` is then false. An instant is a question, which may go
-    back and be asked again: whether a stamp is news, `supervision.frame_news` finds out.
+    Use it to pair a late measurement with a signal at the measurement's stamp: a frame of a camera with the
+    angles of the inertial unit when the frame was taken. The last 256 samples are kept. An instant before
+    them gives the oldest sample, an instant in the future or NaN the newest; then ``ok`` is false. Instants
+    may repeat and go back: `supervision.frame_news` decides whether a stamp is news.
 
     Error: at most ``M T^2 / 8`` for a signal with ``|u''| <= M``.
     """

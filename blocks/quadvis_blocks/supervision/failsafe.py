@@ -58,7 +58,7 @@ class Failsafe(Block):
     limited = In("bool[4]", default=(False,) * 4, doc="controls that gave way in the mixer")
     land = In(default=0.0, doc="above 0.5 asks for a landing")
     allowed = Out("bool[4]", doc="channels that the law has")
-    neutral = Out("bool[4]", doc="channels that nobody has")
+    neutral = Out("bool[4]", doc="channels held at neutral")
     engaged = Out("bool[4]", doc="channels that the law gets at this tick")
     freeze = Out("bool[4]", doc="channels whose integrators and disturbance estimates must stand still")
     position_weight = Out(doc="how much horizontal position and heading count, 0 to 1")

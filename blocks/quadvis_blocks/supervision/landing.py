@@ -14,16 +14,25 @@ TOUCH = 1e-9  # m; a height no further from another one is the same
 class Landing(Block):
     """A reference that descends, and the moment at which the craft stands on the ground.
 
-    While ``descend`` is true x and y of the reference stay where they were when it became true (or where
-    ``recapture`` puts them) and the height falls at ``speed``, from ``flare`` above ``ground`` on at
-    ``touch_speed``. The craft has landed when it is more than
-    ``gap`` above the reference and for ``settle`` its height has kept within ``band``: it does not follow.
-    This needs neither the right height of the ground nor a rate. While the height is reckoned and not seen
-    (``blind``), it has landed when the reference is ``margin`` below ``ground``; there the reference stops.
-    When it is seen again the reference goes on from the craft. A craft that is more than
-    ``gap`` too high is not pushed sideways: x and y are its own. So are they and their rate of change,
-    ``current_velocity``, once the reference is below the ground: what stands there must not be driven by
-    estimates that do not know that it stands. ``landed`` stays until ``descend`` is false.
+    ======== ============================================ ============================ ======================
+    phase    begins when                                  x and y of the reference     height of the reference
+    ======== ============================================ ============================ ======================
+    off      ``descend`` is false                         those of the input           that of the input
+    descent  ``descend`` becomes true                     kept since then              falls at ``speed``
+    flare    the reference is ``flare`` above ``ground``  kept                         falls at ``touch_speed``
+    ground   the reference is below ``ground``            those of the craft           falls on
+    lowest   the reference is ``margin`` below it         those of the craft           stops
+    ======== ============================================ ============================ ======================
+
+    ``recapture`` takes x and y from the input anew. While the craft is more than ``gap`` above the reference,
+    x and y are those of the craft, so that it is not pushed sideways. Below the ground the reference moves as
+    the craft does (``current_velocity``): estimates that do not know that the craft stands must not drive it.
+
+    The craft has landed when it no longer follows the reference: it is more than ``gap`` above it, and its
+    height has stayed within ``band`` for ``settle``. This needs neither the right height of the ground nor a
+    rate. While the height is reckoned and not seen (``blind``), the craft has landed in the phase "lowest".
+    When the height is seen again, the reference continues from the height of the craft. ``landed`` stays true
+    until ``descend`` is false.
     """
 
     speed = Param(0.3, unit="m/s", above=0.0, tune=True, doc="speed of the descent")

@@ -22,8 +22,8 @@ class ModeSwitch(Block):
     with ``to_manual`` when the pilot does, or when ``neutral`` comes. What the new source does from that tick
     on passes through at once, so the pilot has full authority from the first moment; only the difference in
     trim is taken away smoothly. With ``to_manual`` 0 the stick counts at once as it stands: the output jumps
-    by the difference. ``idle``, for a craft on the ground, counts at once. It goes before ``neutral``, and
-    that before ``automatic``.
+    by the difference. ``idle``, for a craft on the ground, counts at once. Precedence: ``idle``,
+    ``neutral``, ``automatic``.
 
     Source: section 4 ("the four control inputs can independently operate in either manual or automatic
     modes"); the transfer is an addition.

@@ -1,4 +1,4 @@
-"""How what a simulated camera sees comes to those who look at it: frame rate, latency, jitter and losses."""
+"""The transport of a simulated camera's frames: frame rate, latency, jitter and losses."""
 
 from __future__ import annotations
 
