@@ -1,4 +1,4 @@
-"""What the READMEs say is there is there, and the other way round: commands, options, keys, tools."""
+"""The READMEs name all existing commands, options, keys and tools, and no others."""
 
 from __future__ import annotations
 

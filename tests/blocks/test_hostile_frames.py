@@ -1,4 +1,4 @@
-"""No frame ends a run, whatever it holds: every block that takes frames passes over what is not a picture.
+"""No frame ends a run: every block that takes frames ignores a frame that is not a picture.
 
 A new block with a frame input is covered without being named here.
 """

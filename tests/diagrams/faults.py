@@ -1,4 +1,4 @@
-"""Flights under the failsafe with a camera that fails for three seconds, and what became of them.
+"""Flights under the failsafe with a camera that fails for three seconds, and their outcomes.
 
 ``python -m tests.diagrams.faults --seeds 1:5`` flies all kinds at all places with both designs, prints a line
 for each flight and a table in the end; the tests fly one seed.
@@ -62,7 +62,7 @@ PLACES = {
 
 @dataclass
 class Flight:
-    """What became of a flight."""
+    """The outcome of a flight."""
 
     farthest: float  # m, from the target, from the begin of the fault on
     lowest: float  # m

@@ -73,7 +73,7 @@ def test_every_diagram_repeats_from_a_snapshot_in_the_same_engine_and_in_a_fresh
 
 
 def repeated(engine: Engine, snapshot: Snapshot, ticks: int) -> Snapshot:
-    """Return what a run from a snapshot on comes to."""
+    """Return the signals of a run continued from a snapshot."""
     engine.restore(snapshot)
     engine.run(ticks - snapshot.tick)
     return engine.snapshot()

@@ -1,4 +1,4 @@
-"""Diagrams with seeded defects: each file in `cases/` holds many, with what is to be told about them.
+"""Diagrams with seeded defects: each file in `cases/` holds many, with the reports that they must cause.
 
 A file is a stream of YAML documents. `--- # prelude` opens the lines that every case begins with, unless it
 begins with a key `quadvis` itself. `--- # case: title` opens a case; ` $ --set a.b=1` behind the title are

@@ -1,4 +1,4 @@
-"""What is typed after `quadvis`: every slip is one sentence of the house, and what is right is taken."""
+"""The arguments of `quadvis`: every mistake is reported in one sentence, and right arguments are accepted."""
 
 from __future__ import annotations
 

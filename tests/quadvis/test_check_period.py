@@ -1,4 +1,4 @@
-"""What a run would refuse because of a block's period is found when the diagram is checked, at its place."""
+"""A check of the diagram finds every parameter that contradicts a block's period, at its place."""
 
 from __future__ import annotations
 

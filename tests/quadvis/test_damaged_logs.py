@@ -1,4 +1,4 @@
-"""Logs that were cut, damaged or made to harm: what is left is read, and a sentence says what is not."""
+"""Logs that were cut, damaged or made to harm: the intact part is read, and a sentence reports the rest."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from quadvis.cli import main
 from quadvis.errors import QuadvisError
 from quadvis.output.log import LogWriter
 from quadvis.output.log_reader import Log, log_facts, read_log
-from quadvis.output.recording import Channel, Field
+from quadvis.output.recording import RecordedBlock, RecordedPort
 
 DIAGRAM = "quadvis: 1\nname: x\nfigures:\n- {title: one, signals: [c.y]}\n"
 FACTS = {"diagram": DIAGRAM, "name": "x", "hash": hashlib.sha256(DIAGRAM.encode()).hexdigest()}
 ROWS, ROW = 60, struct.Struct("<dq")
-CLOCK = Channel("/c", (Field("y", unit="m"), Field("row", "int64")), "fast")
+CLOCK = RecordedBlock("/c", (RecordedPort("y", unit="m"), RecordedPort("row", "int64")), "fast")
 
 
 def write(path: Path, rows: int = ROWS, every: int = 10) -> bytes:

@@ -1,4 +1,4 @@
-"""Loading as a whole: what comes of right diagrams, and that no text whatever gives anything but faults."""
+"""Loading as a whole: right diagrams are loaded, and every other text gives faults and nothing else."""
 
 from __future__ import annotations
 

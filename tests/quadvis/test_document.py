@@ -1,4 +1,4 @@
-"""Reading files: what is typed how, where faults are, and that no file can crash or stall the reader."""
+"""Reading files: types of values, places of faults, and no file can crash or stall the reader."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Warnings: what can be run, and is surely not what was meant, is told beside the faults."""
+"""Warnings: a diagram that runs, but is surely a mistake, is reported beside the faults."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ class Clock(Block):
 
 
 class Pass(Block):
-    """What it is given, at once."""
+    """The input, in the same tick."""
 
     u = In("float64[*]")
     y = Out("float64[*]")
@@ -39,7 +39,7 @@ class Pass(Block):
 
 
 class Delay(Block):
-    """What it was given a sample ago."""
+    """The input of one sample ago."""
 
     u = In()
     y = Out()

@@ -1,4 +1,4 @@
-"""Every defect is told once, at its place, with what would be right. How cases are written: `corpus.py`."""
+"""Every defect is reported once, at its place, with its remedy. How cases are written: `corpus.py`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .corpus import Case, all_cases
 
 
 def faults(case: Case, folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[Fault]:
-    """Return what is told about a case: with all variants, or as the command line asks for."""
+    """Return the report on a case: with all variants, or with the options of the case."""
     case.write(folder)
     monkeypatch.chdir(folder)
     parser = argparse.ArgumentParser()

@@ -21,7 +21,7 @@ def here(tmp_path, monkeypatch):
 
 
 def link(kind, source, target):
-    """Give a file another name, in each of the ways there are."""
+    """Give a file another name, in every possible way."""
     match kind:
         case "same":
             return source

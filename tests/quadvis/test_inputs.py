@@ -1,4 +1,4 @@
-"""What was checked is what flies: an edit after loading changes nothing, or is refused."""
+"""A run uses the files that were checked: an edit after loading changes nothing, or is refused."""
 
 import os
 import shutil

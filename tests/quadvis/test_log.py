@@ -1,4 +1,4 @@
-"""The log: what goes in comes out, here and in readers that know nothing of quadvis, also after `kill -9`."""
+"""The log: written rows are read back, here and by readers that do not know quadvis, even after `kill -9`."""
 
 from __future__ import annotations
 
@@ -24,14 +24,20 @@ from numpy.typing import NDArray
 from quadvis.errors import QuadvisError, RunError
 from quadvis.output.log import LogWriter, message_definition
 from quadvis.output.log_reader import read_log
-from quadvis.output.recording import Channel, Field, Recording
+from quadvis.output.recording import RecordedBlock, RecordedPort, Recording
 
-PLANT = Channel(
-    "/plant", (Field("position", "float64", (3,), "m"), Field("speed", "float64", (), "m/s")), "physics"
+PLANT = RecordedBlock(
+    "/plant",
+    (RecordedPort("position", "float64", (3,), "m"), RecordedPort("speed", "float64", (), "m/s")),
+    "physics",
 )
-DETECTOR = Channel(
+DETECTOR = RecordedBlock(
     "/vision/detector",
-    (Field("centres", "float64", (4, 2), "px"), Field("found", "bool"), Field("status", "int64")),
+    (
+        RecordedPort("centres", "float64", (4, 2), "px"),
+        RecordedPort("found", "bool"),
+        RecordedPort("status", "int64"),
+    ),
     "10 Hz",
 )
 METADATA = {"diagram": "quadvis: 1\nname: hover\n", "sha256": "0" * 64, "seed": "7", "name": "hover"}
@@ -88,7 +94,7 @@ def test_the_facts_of_the_run_come_back(flight: Path) -> None:
     }
     assert log.summary == {"verdict": "passed"}
     assert log.complete
-    assert log.channels == [PLANT, DETECTOR]
+    assert log.blocks == [PLANT, DETECTOR]
 
 
 def test_a_batch_of_rows_is_the_same_as_its_rows_one_by_one(tmp_path: Path) -> None:
@@ -145,8 +151,8 @@ def test_a_definition_states_units_and_the_order_of_elements() -> None:
 
 
 def test_names_that_ros_would_refuse_are_changed_in_the_message_only(tmp_path: Path) -> None:
-    fields = tuple(Field(name) for name in ("K", "k", "2nd__Gain_", "x-y", "ä"))
-    channels = [Channel("/2nd-vision/a_b", fields), Channel("/2nd/vision-a-b", fields)]
+    fields = tuple(RecordedPort(name) for name in ("K", "k", "2nd__Gain_", "x-y", "ä"))
+    channels = [RecordedBlock("/2nd-vision/a_b", fields), RecordedBlock("/2nd/vision-a-b", fields)]
     path = tmp_path / "names.mcap"
     with LogWriter(path, channels, METADATA) as writer:
         writer.write(0, 0, slots(1.0, 2.0, 3.0, 4.0, 5.0))
@@ -165,11 +171,15 @@ scalars = {
 }
 names = st.text("abcXYZ019_- é", min_size=1, max_size=6)
 fields = st.builds(
-    Field, names, st.sampled_from(sorted(scalars)), st.lists(st.integers(1, 3), max_size=3).map(tuple), names
+    RecordedPort,
+    names,
+    st.sampled_from(sorted(scalars)),
+    st.lists(st.integers(1, 3), max_size=3).map(tuple),
+    names,
 )
 paths = st.lists(names, min_size=1, max_size=3).map(lambda parts: "/" + "/".join(parts))
 channels = st.builds(
-    Channel,
+    RecordedBlock,
     paths,
     st.lists(fields, min_size=1, max_size=4, unique_by=lambda field: field.name).map(tuple),
     names,
@@ -177,7 +187,7 @@ channels = st.builds(
 
 
 @st.composite
-def runs(draw: st.DrawFn) -> tuple[list[Channel], list[tuple[int, int, list[Any]]]]:
+def runs(draw: st.DrawFn) -> tuple[list[RecordedBlock], list[tuple[int, int, list[Any]]]]:
     """Draw blocks and rows of them: channel, time (ns), one value for every slot."""
     blocks = draw(
         st.lists(channels, min_size=1, max_size=3, unique_by=lambda channel: channel.path.strip("/"))
@@ -185,7 +195,7 @@ def runs(draw: st.DrawFn) -> tuple[list[Channel], list[tuple[int, int, list[Any]
     rows = []
     for stamp in draw(st.lists(st.integers(0, 10**12), max_size=8)):
         index = draw(st.integers(0, len(blocks) - 1))
-        values = [draw(scalars[f.type]) for f in blocks[index].fields for _ in range(f.size)]
+        values = [draw(scalars[f.type]) for f in blocks[index].ports for _ in range(f.size)]
         rows.append((index, stamp, values))
     return blocks, rows
 
@@ -193,7 +203,8 @@ def runs(draw: st.DrawFn) -> tuple[list[Channel], list[tuple[int, int, list[Any]
 @given(runs())
 @settings(max_examples=60, deadline=None)
 def test_any_run_comes_back_bit_for_bit(
-    tmp_path_factory: pytest.TempPathFactory, run: tuple[list[Channel], list[tuple[int, int, list[Any]]]]
+    tmp_path_factory: pytest.TempPathFactory,
+    run: tuple[list[RecordedBlock], list[tuple[int, int, list[Any]]]],
 ) -> None:
     blocks, rows = run
     path = tmp_path_factory.mktemp("runs") / "run.mcap"
@@ -206,7 +217,7 @@ def test_any_run_comes_back_bit_for_bit(
         mine = [(stamp, values) for number, stamp, values in rows if number == index]
         assert counts.get(block.path, 0) == len(mine)
         start = 0
-        for field in block.fields:
+        for field in block.ports:
             name, end = block.signal(field), start + field.size
             kind: Any = {"float64": np.float64, "int64": np.int64, "bool": bool}[field.type]
             expected: NDArray[Any] = np.array([values[start:end] for _, values in mine], kind)
@@ -254,8 +265,8 @@ def test_a_damaged_file_gives_a_log_or_a_sentence(
 KILLED = """
 import struct, sys, time
 from quadvis.output.log import LogWriter
-from quadvis.output.recording import Channel, Field
-clock = Channel("/clock", (Field("elapsed"), Field("row", "int64")))
+from quadvis.output.recording import RecordedBlock, RecordedPort
+clock = RecordedBlock("/clock", (RecordedPort("elapsed"), RecordedPort("row", "int64")))
 log = LogWriter(sys.argv[1], [clock], {"diagram": "name: killed"})
 start = time.monotonic()
 for row in range(1_000_000):
@@ -548,19 +559,19 @@ def test_a_recording_grows_while_it_is_read() -> None:
     assert recording.units == read_units(PLANT, DETECTOR)
 
 
-def read_units(*blocks: Channel) -> dict[str, str]:
+def read_units(*blocks: RecordedBlock) -> dict[str, str]:
     """Return the units as the channels declare them."""
-    return {f"{block.path[1:]}.{field.name}": field.unit for block in blocks for field in block.fields}
+    return {f"{block.path[1:]}.{field.name}": field.unit for block in blocks for field in block.ports}
 
 
 def test_rows_of_a_wrong_size_are_refused(tmp_path: Path) -> None:
     with LogWriter(tmp_path / "log.mcap", [PLANT], METADATA) as log:
         with pytest.raises(ValueError, match="has 32 bytes"):
             log.write(0, 0, b"\0" * 24)
-        with pytest.raises(ValueError, match="2 rows of channel 0 have 64 bytes"):
+        with pytest.raises(ValueError, match="2 rows of block 0 have 64 bytes"):
             log.write_rows(0, [0, 1], b"\0" * 32)
     with pytest.raises(ValueError, match="'/scope' has no outputs to log"):
-        LogWriter(tmp_path / "log.mcap", [Channel("/scope", ())], METADATA)
+        LogWriter(tmp_path / "log.mcap", [RecordedBlock("/scope", ())], METADATA)
 
 
 def test_importing_the_log_does_not_import_mcap() -> None:

@@ -1,4 +1,4 @@
-"""A run outlives what it writes to: a log that the disk refuses, a terminal that nobody reads."""
+"""A run survives its outputs: a log that the disk refuses, a terminal that nobody reads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Outputs of commands and blocks: none replaces an input, another kind of file, or what others write."""
+"""No output of a command or block replaces an input, another kind of file, or another program's output."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def contents(folder: Path) -> dict[str, str]:
 
 
 def named(source: str, how: str, target: str) -> str:
-    """Give a file another name, in each of the ways there are."""
+    """Give a file another name, in every possible way."""
     Path(target).parent.mkdir(exist_ok=True, parents=True)
     match how:
         case "spelling":

@@ -67,7 +67,7 @@ Captured = pytest.CaptureFixture[str]
 
 @pytest.fixture(autouse=True)
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder of someone else's: what its block does when it is loaded leaves a file behind."""
+    """A folder from somebody else, with a block that writes a file when it is loaded."""
     block = tmp_path / "mine" / "blocks" / "wind" / "fan.py"
     block.parent.mkdir(parents=True)
     block.write_text(FAN + MARK)

@@ -1,4 +1,4 @@
-"""Figures: what the diagram declares is on the axes, in its unit, and what it cannot mean is a sentence."""
+"""Figures: the declared signals are on the axes, in their units; impossible figures are refused."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from quadvis.output.figures import Figure, Panel, Trace, block_figures
 from quadvis.output.log import LogWriter
 from quadvis.output.log_reader import read_log
 from quadvis.output.plot import plot_figures, plot_log
-from quadvis.output.recording import Channel, Field
+from quadvis.output.recording import RecordedBlock, RecordedPort
 from quadvis.units import Unit
 
 Sheets = list[Any]
@@ -119,8 +119,8 @@ class Run:
         for name in names:
             block, _, port = name.rpartition(".")
             kind = kinds[self[name].dtype.kind]
-            fields = (Field(port, kind, self[name].shape[1:], self.units[name]),)
-            channels.append(Channel(f"/{block}", fields, self.rate(name)))
+            fields = (RecordedPort(port, kind, self[name].shape[1:], self.units[name]),)
+            channels.append(RecordedBlock(f"/{block}", fields, self.rate(name)))
         with LogWriter(path, channels, {"diagram": diagram}) as log:
             for index, name in enumerate(names):
                 stamps = np.round(self.times(name) * 1e9).astype(np.int64)
@@ -444,7 +444,7 @@ def test_stairs_reach_from_one_end_of_the_stretch_to_the_other(stairs: Sheets) -
 
 
 def look(line: Any) -> tuple[Any, ...]:
-    """What of a curve tells it from others."""
+    """The style of a curve, which differs from that of other curves."""
     return line.get_color(), str(line._dash_pattern), line.get_linewidth()
 
 

@@ -1,4 +1,4 @@
-"""Remedies are right: what was meant is suggested, and nothing that is right already is blamed."""
+"""Remedies are right: they suggest what was meant, and never blame a correct part."""
 
 from __future__ import annotations
 

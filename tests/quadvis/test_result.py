@@ -1,4 +1,4 @@
-"""What a run leaves in Python: signals by every name that a diagram uses, from memory or from the log."""
+"""The result of a run in Python: signals by every name of a diagram, from memory or from the log."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A run as a whole: what it records, what it logs, how it is told, what is left of it when it stops."""
+"""A run as a whole: its recording, its log, its report, and its remains when it stops early."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What surrounds a command is never a traceback: one sentence, an exit code, and what was made is whole."""
+"""Failures around a command never give a traceback: one sentence, an exit code, and whole outputs."""
 
 from __future__ import annotations
 

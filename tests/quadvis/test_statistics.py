@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
-from quadvis.output.statistics import STATISTICS, Sum
+from quadvis.output.statistics import STATISTICS, RunningSum
 
 WHOLE: dict[str, Callable[[NDArray[np.float64]], Any]] = {
     "rms": lambda values: float(np.sqrt(np.mean(values**2))),
@@ -59,14 +59,14 @@ def test_sums_of_many_samples_are_those_of_numpy_to_the_bit(size: int, pieces: i
 
 
 def test_a_sum_keeps_only_what_numpy_still_has_to_add() -> None:
-    size = 40 * Sum.LEAF
-    total = Sum(size)
+    size = 40 * RunningSum.LEAF
+    total = RunningSum(size)
     kept = 0
     for piece in np.array_split(np.ones(size), 997):
         total.add(piece)
         kept = max(kept, sum(map(len, total._waiting)) + len(total._sums))
     assert total.value == size
-    assert kept < Sum.LEAF + 100
+    assert kept < RunningSum.LEAF + 100
 
 
 @pytest.mark.parametrize("taken", [1, 100, 8192, 20_000, 99_999])

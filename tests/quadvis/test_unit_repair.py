@@ -1,4 +1,4 @@
-"""Units that do not fit are told at the value that makes them so, once, and without what follows from it."""
+"""Units that do not fit are reported once, at the value that causes them, without their consequences."""
 
 from __future__ import annotations
 

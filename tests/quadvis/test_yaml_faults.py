@@ -1,4 +1,4 @@
-"""Texts that are no YAML: our own sentence for each, whatever parser reads them, and what comes behind."""
+"""Texts that are no YAML: our own sentence for each, with every parser, and the faults after it."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ NONE = {
 
 
 def greatest_at_the_end(folder: Path, part: str, bandwidth: float, lag: str = "80 ms") -> float:
-    """How far from its place a craft is in the last two seconds, whose state is known to the control."""
+    """The largest distance of a craft from its place in the last two seconds, with a known state."""
     seen = SEEN if part == "fused" else {**SEEN, "rates": "rates"}
     wires = {name: f'{{from: "craft.{port}", across: sample}}' for name, port in seen.items()}
     if part == "fused":

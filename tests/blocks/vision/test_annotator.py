@@ -45,7 +45,7 @@ def marks(shown, zoom=1):
 
 
 def farthest(points, others):
-    """Return how far from the others those points are that are farthest."""
+    """Return the largest distance between two of the points."""
     return np.sqrt(((points[:, None] - others) ** 2).sum(axis=2).min(axis=1).max())
 
 

@@ -1,4 +1,4 @@
-"""Files that are no calibrations: refused in one sentence that shows nothing of what is in them."""
+"""Files that are no calibrations are refused in one sentence that quotes nothing from them."""
 
 import os
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What both simulated cameras promise about the arrival of their frames."""
+"""The arrival of frames, in both simulated cameras."""
 
 import math
 from itertools import groupby

@@ -1,4 +1,4 @@
-"""The one reader of pictures: what counts as a picture, what of a file is ignored, and what is refused."""
+"""The only reader of pictures: what it reads, what it ignores in a file, and what it refuses."""
 
 import os
 import struct
