@@ -1,4 +1,4 @@
-"""From what one file says to a checked diagram: all checks in their order."""
+"""From the contents of files to a checked diagram: all checks in their order."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from quadvis.library.catalogue import Catalogue, OwnBlocks
 
 
 class Assembly:
-    """Puts diagrams together out of what one file says."""
+    """Assembles diagrams from the contents of one file."""
 
     def __init__(
         self,
@@ -110,7 +110,7 @@ class Assembly:
         warn_rates(self.spec, self.parts, self.faults)
 
     def _promised(self, filled: FileSpec) -> Outputs:
-        """Return the outputs of what stands in the slots that a variant fills."""
+        """Return the outputs of the blocks in the slots that a variant fills."""
         spec = self.spec
         changed = [name for name, block in spec[BLOCKS].items() if filled[BLOCKS][name] is not block]
         if changed and self._base is None:

@@ -37,7 +37,7 @@ _ANY_STEP = Fraction(1, 100)  # the continuous task needs one; no check looks at
 
 
 class Builder:
-    """Makes the blocks and reports what is wrong with them. ``step`` is the solver's, if one is needed."""
+    """Makes the blocks and reports their faults. ``step`` is the solver's step, if a solver is needed."""
 
     def __init__(
         self, spec: FileSpec, expansion: Expansion, wiring: Wiring, made: Made, faults: Faults

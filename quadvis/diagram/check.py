@@ -1,6 +1,6 @@
 """Checks across wires: ports, kinds, shapes, units, rates and algebraic loops. All faults are collected.
 
-Each check leaves out what is `UNKNOWN`, and adds what it finds wrong to that: one mistake is reported once.
+Each check skips values that are `UNKNOWN`, and makes wrong values `UNKNOWN`: one mistake is reported once.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ class WireCheck:
 
 
 def crossing_fault(source: Task, target: Task, crossing: str | None) -> tuple[str, str]:
-    """Return what is wrong with a wire between two rates and what would be right; empty if nothing is."""
+    """Return the problem and the remedy of a wire between two rates; ("", "") if it is right."""
     slower = source.period > target.period or target.continuous
     fitting = "hold" if slower and not source.continuous else "sample"
     ratio = source.period / target.period if slower else target.period / source.period

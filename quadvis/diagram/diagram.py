@@ -1,4 +1,4 @@
-"""A diagram without a fault, as data: what the engine runs, and what is recorded and made of a run."""
+"""A diagram without a fault, as data: the graph for the engine, and the sections for the results of a run."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from quadvis.machine.files import reading
 
 @dataclass(frozen=True)
 class Diagram:
-    """A diagram without a fault: ``graph`` is what the engine runs, ``values`` what its sections say."""
+    """A diagram without a fault: ``graph`` is for the engine, ``values`` are the values of its sections."""
 
     name: str
     path: Path
@@ -39,7 +39,7 @@ class Diagram:
     variants: tuple[str, ...]
     parameter_files: tuple[ParameterFile, ...] = ()
     settings: tuple[str, ...] = ()  # the parameters that were replaced, block.parameter=value
-    warnings: tuple[Doubt, ...] = ()  # what can be run, and is surely not what was meant
+    warnings: tuple[Doubt, ...] = ()  # faults that do not prevent a run
     ports: Mapping[str, str] = field(default_factory=dict)  # of parts: the signals of blocks that they are
     sources: tuple[Path, ...] = ()  # the YAML files of the diagram, its parts and its parameter files
     files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of every file that was read, by path
@@ -58,7 +58,7 @@ class Diagram:
 
     @contextmanager
     def guarded(self, log: str | Path | None = None) -> Iterator[None]:
-        """Keep the inputs from what is written meanwhile; QuadvisError if a block writes the log's file."""
+        """Protect the inputs from outputs inside; QuadvisError if a block writes the log's file."""
         from quadvis.diagram.outputs import check_log
 
         if log is not None:
@@ -98,17 +98,17 @@ class Diagram:
 
     @property
     def expectations(self) -> Sequence[Expectation]:
-        """What a run must meet."""
+        """The requirements on a run."""
         return self.values[EXPECT].items
 
     @property
     def summary(self) -> Sequence[Entry]:
-        """What the summary of a run shows."""
+        """The lines of the summary of a run."""
         return self.values[SUMMARY].items
 
     @property
     def questions(self) -> Questions:
-        """What an analysis of the loop answers."""
+        """The questions for an analysis of the loop."""
         return self.values[ANALYSE]
 
     def logs(self, path: str) -> bool:

@@ -1,4 +1,4 @@
-"""Warnings: what can be run, and is surely not what was meant."""
+"""Warnings: diagrams that run, but are surely not what was meant."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def warn_parameters(spec: FileSpec, parts: Parts, faults: Faults) -> None:
 
 
 def _blocks(spec: FileSpec) -> Iterator[BlockSpec]:
-    """Yield what stands under the blocks of a file and of its variants."""
+    """Yield the entries of all blocks of a file and of its variants."""
     for blocks in (spec[BLOCKS], *(variant.slots for variant in spec[VARIANTS].values())):
         yield from (block for block in blocks.values() if known(block))
 
@@ -44,7 +44,7 @@ def _warn_parameters(spec: FileSpec, faults: Faults) -> None:
 def warn_rates(spec: FileSpec, parts: Parts, faults: Faults) -> None:
     """Warn of rates at which no block of a diagram runs; `parts` has read those of all its variants."""
     if not parts.is_whole:
-        return  # what could not be read may use any of them
+        return  # an unreadable value may use any of them
     rates = (block.rate for file in (spec, *parts.specs()) for block in _blocks(file))
     used = {rate[0] for rate in rates if rate is not None and known(rate)}
     for name, rate in spec[RATES].items():

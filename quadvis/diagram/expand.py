@@ -107,11 +107,11 @@ class Parts:
         return UNKNOWN not in self._specs.values()
 
     def specs(self) -> list[FileSpec]:
-        """Return what has been read."""
+        """Return the files that have been read."""
         return [spec for spec in self._specs.values() if known(spec)]
 
     def read(self, file: Path) -> FileSpec | Unknown:
-        """Return what a file says."""
+        """Return the contents of a file."""
         real = os.path.realpath(file)
         if real not in self._specs:
             with self.faults.about(""):

@@ -1,4 +1,4 @@
-"""What flows along wires before anything runs: shapes, then units, from what is declared and given."""
+"""The flow of shapes and units along wires before a run, from declarations and given values."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Draft:
 
     @property
     def interface(self) -> Interface:
-        """What the block declares, which is known also where its parameters are not."""
+        """The declarations of the block, which are known even if its parameters are not."""
         return self.type.interface
 
 
@@ -66,11 +66,11 @@ class Link(NamedTuple):
 
 
 class Flow:
-    """Lets what is known flow along the wires until all is known, each block after the blocks that feed it.
+    """Lets known facts flow along the wires until all is known, each block after the blocks that feed it.
 
-    ``unknown`` are inputs of which nothing is known: what depends on them is left out. A cycle has no first
-    block: there one block goes ahead with what it has. What is found does not depend on the order of the
-    blocks in the file: where a choice is left the names decide.
+    ``unknown`` are inputs without any known fact: blocks that depend on them are left out. A cycle has no
+    first block: there one block goes ahead with what it has. What is found does not depend on the order of
+    the blocks in the file: where a choice is left the names decide.
     """
 
     def __init__(self, drafts: Mapping[str, Draft], nodes: Mapping[str, Node], links: Sequence[Link],
@@ -89,7 +89,7 @@ class Flow:
 
     @staticmethod
     def _order(link: Link) -> tuple[str, int]:
-        """Return what sorts wires by the block and the port that they feed."""
+        """Return a key that sorts wires by the block and the port that they feed."""
         return link.draft.path, list(link.draft.interface.inputs).index(link.port)
 
     def run(self) -> None:
@@ -147,7 +147,7 @@ class Flow:
         self._spread(path)
 
     def _spread(self, path: str) -> None:
-        """Give what is known of a block to those that read it, and so on."""
+        """Pass the known facts of a block to its readers, and from them to their readers."""
         changed = [path]
         while changed:
             path = changed.pop()
@@ -177,7 +177,7 @@ class Flow:
             self.faults.add(place, problem, remedy, subject=f"block '{path}'")
 
     def knows(self, link: Link) -> bool:
-        """Say whether what comes along a wire is known."""
+        """Return whether the fact that a wire carries is known."""
         raise NotImplementedError
 
     def take(self, link: Link) -> bool:
@@ -185,11 +185,11 @@ class Flow:
         raise NotImplementedError
 
     def settle(self, path: str) -> None:
-        """Decide what is still open in a block, since no more will be known."""
+        """Decide the open facts of a block, because no more will become known."""
         raise NotImplementedError
 
     def prepare(self, path: str) -> bool:
-        """Let a block in a ring use what is certain, before anything is decided; False if it has no such."""
+        """Let a block in a cycle use its certain facts, before anything is decided; False if it has none."""
         return False
 
     def knowledge(self, path: str) -> int:
@@ -246,7 +246,7 @@ class ShapeFlow(Flow):
         return False
 
     def settle(self, path: str) -> None:
-        """Let constants fix what wires do not; sizes that nothing fixes become a scalar or 1."""
+        """Let constants fix sizes that wires leave open; sizes that stay open become a scalar or 1."""
         draft, node = self.drafts[path], self.nodes[path]
         for port, connection in draft.connections.items():
             if isinstance(connection.source, Constant) and (path, port) not in self.unknown:

@@ -89,7 +89,7 @@ def _quotable(path: str | Path, params: Files, settings: Sequence[str]) -> Itera
 
 @contextmanager
 def _reported_once(faults: Faults) -> Iterator[Mapping[str, str]]:
-    """Raise what was found, and give the SHA-256 of every file that is read meanwhile, by path.
+    """Raise the faults found inside, and yield the SHA-256 of every file that is read inside, by path.
 
     One cause may be met from several blocks: its place and problem are the same.
     """

@@ -1,4 +1,4 @@
-"""From YAML to what a file says: keys known, texts read, places kept; nothing is looked up elsewhere."""
+"""From YAML to the contents of one file: keys are known, texts read, places kept; no other file is read."""
 
 from __future__ import annotations
 

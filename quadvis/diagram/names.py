@@ -1,4 +1,4 @@
-"""Names that were given and names that were wanted: what a misspelt one was meant to be."""
+"""Match given names to wanted names: find the name that a misspelt one means."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ def absent(wanted: Collection[str], given: Collection[str], known: Collection[st
 
 
 def remedy_for(name: str, given: Collection[str], known: Collection[str], *, replaces: bool = False) -> str:
-    """Return what was meant by an unknown name: one that is free, or the one that was written twice.
+    """Return the name that an unknown one means: a free name, or one that was written twice.
 
-    A setting from outside ``replaces`` what is given: for it every name is free.
+    A setting from outside ``replaces`` a given value: for it every name is free.
     """
     if not known:
         return "it has none"

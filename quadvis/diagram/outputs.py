@@ -1,4 +1,4 @@
-"""What a diagram reads and what its blocks write: no writer takes what is read, or what another writes."""
+"""The inputs of a diagram and the outputs of its blocks: no block writes an input or another's output."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def files_written(blocks: Iterable[Block]) -> list[str]:
 
 
 def check_writers(drafts: Sequence[Draft], sources: Iterable[Path], faults: Faults) -> None:
-    """Report blocks that would write over what is read, into a folder that is played, or over another."""
+    """Report blocks that would write over an input, into a folder that is played, or over another output."""
     blocks = {draft.path: draft.block for draft in drafts if isinstance(draft.block, Block)}
     writers = [
         Writer(draft.path, name, path, draft.places.get(name, draft.place))
@@ -75,7 +75,7 @@ def check_log(path: str | os.PathLike[str], blocks: Iterable[Block]) -> None:
 
 
 def file_key(path: str | os.PathLike[str]) -> object:
-    """Return what is equal for two names of one file or folder, also if it is not there yet."""
+    """Return an identity that is equal for two names of one file or folder, even if it does not exist yet."""
     try:
         found = os.stat(path)
     except (OSError, ValueError):

@@ -58,7 +58,7 @@ Given = Mapping[str, Any] | Sequence[str]
 
 
 def read_settings(given: Given, params: Files, faults: Faults) -> tuple[Settings, tuple[ParameterFile, ...]]:
-    """Return what is replaced, by block ("" for the diagram's own parameters) and name, and the files read.
+    """Return the replaced values by block ("" for the diagram's own parameters) and name, and the files read.
 
     The files apply in their order, then ``given``: the last value of a parameter counts.
     """
@@ -140,7 +140,7 @@ def _is_parameters(root: YamlMap, faults: Faults) -> bool:
 
 
 def _wrong_base(path: Path, text: str, users: tuple[str, ...]) -> tuple[str, str]:
-    """Return what is wrong with the file that another builds on, and what would be right."""
+    """Return the problem and the remedy for the base of a parameter file."""
     if os.path.realpath(path) in users:
         return f"'{text}' builds on itself", "name another file, or leave 'base' out"
     if len(users) > MAX_DEPTH:
@@ -149,7 +149,7 @@ def _wrong_base(path: Path, text: str, users: tuple[str, ...]) -> tuple[str, str
 
 
 def _from_texts(texts: Iterable[str], origin: str, faults: Faults) -> Iterator[tuple[str, Setting]]:
-    """Yield the names and values of ``block.parameter=value``; what is wrong with them is reported."""
+    """Yield the names and values of ``block.parameter=value``; report their faults."""
     for number, setting in enumerate(texts, 1):
         name, _, text = (part.strip(" \r\n") for part in setting.partition("="))
         place = Place(origin, 0, number, _odd(name))

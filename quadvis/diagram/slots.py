@@ -12,7 +12,7 @@ from quadvis.diagram.spec import FileSpec
 from quadvis.errors import UNKNOWN, Faults, known, suggestion
 
 Outputs = Mapping[str, Mapping[str, Out]]  # by slot and port
-Pair = tuple[BlockSpec, BlockSpec]  # what stands in a slot, and what a variant puts there
+Pair = tuple[BlockSpec, BlockSpec]  # the block in a slot, and the variant's block for it
 
 
 def fill_slots(spec: FileSpec, variant: str | None, faults: Faults) -> FileSpec:
@@ -53,7 +53,7 @@ def _lineage(variants: Variants, variant: str, faults: Faults) -> list[str]:
 def _fitting(
     spec: FileSpec, variant: str, faults: Faults
 ) -> Iterator[tuple[str, tuple[BlockSpec, BlockSpec]]]:
-    """Yield by slot the diagram's block and the variant's; what fits no slot is reported."""
+    """Yield for each slot the diagram's block and the variant's; report blocks without a slot."""
     blocks = spec[BLOCKS]
     for slot, block in spec[VARIANTS][variant].slots.items():
         base = blocks.get(slot)
@@ -71,7 +71,7 @@ def _fitting(
 
 
 def _in_slot(base: BlockSpec, block: BlockSpec) -> BlockSpec:
-    """Return what is put into a slot: it takes the slot's wires and rate unless it brings its own."""
+    """Return the block for a slot: it has the slot's wires and rate unless it has its own."""
     inputs = base.inputs if block.inputs is None else block.inputs
     return replace(block, slot=base.slot, inputs=inputs, rate=block.rate or base.rate)
 

@@ -1,4 +1,4 @@
-"""What one file says, section by section; nothing is looked up elsewhere."""
+"""The contents of one file, section by section; no other file is read."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from quadvis.errors import Place
 
 @dataclass(frozen=True)
 class FileSpec:
-    """A diagram or a part as its file has it: ``spec[RATES]`` is what stands under ``rates``."""
+    """A diagram or a part as written in its file: ``spec[RATES]`` is the value of ``rates``."""
 
     path: Path
     place: Place  # of the file as a whole

@@ -1,4 +1,4 @@
-"""How units flow along wires: unit variables of blocks are bound by what comes in."""
+"""The flow of units along wires: the units of its inputs bind the unit variables of a block."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from quadvis.units import Unit, unify
 
 
 class Bindings:
-    """What the unit variables of one block stand for, element by element of its vectors."""
+    """The bindings of the unit variables of one block, element by element of its vectors."""
 
     def __init__(self) -> None:
         self.elements: list[dict[str, Unit]] = [{}]
 
     def match(self, pattern: tuple[Unit, ...], units: OpenUnits) -> int | None:
-        """Bind what the units of the elements say; return the first that does not fit, None if all do."""
+        """Bind variables by the units of the elements; return the first unit that does not fit, or None."""
         for index, wanted, unit, places in self._pairs(pattern, units):
             if (
                 isinstance(unit, Unit)
@@ -33,7 +33,7 @@ class Bindings:
         return None
 
     def match_bare(self, pattern: tuple[Unit, ...], units: OpenUnits, outputs: Collection[Unit]) -> None:
-        """Let numbers without unit bind what is still open.
+        """Let numbers without unit bind open variables.
 
         One that stands for an output makes the output a plain number, any other the variable: 3 in "a/s" is
         3 1/s.
@@ -45,7 +45,7 @@ class Bindings:
                     unify(wanted, plain, bound)
 
     def refuses(self, pattern: tuple[Unit, ...], units: OpenUnits) -> int | None:
-        """Return the first number without unit that needs one, None if there is none."""
+        """Return the first number that lacks a unit, or None."""
         for index, wanted, unit, places in self._pairs(pattern, units):
             if isinstance(unit, Bare):
                 found = {wanted.substitute(bound) for bound in places}
@@ -56,7 +56,7 @@ class Bindings:
     def _pairs(
         self, pattern: tuple[Unit, ...], units: OpenUnits
     ) -> Iterator[tuple[int, Unit, Unit | Bare | None, list[dict[str, Unit]]]]:
-        """Yield the elements: index, declared unit, given unit, and what the variables stand for there."""
+        """Yield the elements: index, declared unit, given unit, and the bindings of the variables there."""
         if len(pattern) == len(self.elements) == 1 and units.count(units[0]) == len(units):
             units = units[:1]  # what all say alike holds for every element, as the unit of a scalar does
         missing = len(units) - len(self.elements)
@@ -195,7 +195,7 @@ class UnitFlow(Flow):
         return tuple(unit * factor if isinstance(unit, Unit) else unit for unit in units)
 
     def prepare(self, path: str) -> bool:
-        """Let given values with a unit bind what they can."""
+        """Let given values with a unit bind variables."""
         fresh = path not in self._prepared and any(
             isinstance(unit, Unit) for _, _, units in self._given(path) for unit in units
         )
@@ -205,7 +205,7 @@ class UnitFlow(Flow):
         return fresh
 
     def settle(self, path: str) -> None:
-        """Let given values bind what wires do not; what is still open then counts as plain numbers."""
+        """Let given values bind variables that wires leave open; others then count as plain numbers."""
         bindings, interface = self.bindings[path], self.drafts[path].interface
         self._match_given(path)
         undecided = [port for name, port in interface.inputs.items() if (path, name) in self.unknown]
@@ -235,7 +235,7 @@ class UnitFlow(Flow):
                 self._report_given(path, name, declared, wrong, unit if isinstance(unit, Unit) else None)
 
     def _match_bare(self, path: str) -> None:
-        """Let numbers without unit bind what is open, first those that stand for a variable itself."""
+        """Let numbers without unit bind open variables, first numbers whose unit is a variable itself."""
         outputs = {unit for port in self.drafts[path].interface.outputs.values() for unit in port.units}
         given = sorted(self._given(path), key=lambda item: (not _variable(item[1].units[0]), item[0]))
         for _, declared, units in given:

@@ -43,7 +43,7 @@ def follow_units(
     unknown: Collection[Key],
     faults: Faults,
 ) -> UnitFlow:
-    """Let the units flow along the wires, note them in the nodes, and report what does not fit."""
+    """Let the units flow along the wires, note them in the nodes, and report units that do not fit."""
 
     def flow(changed: Mapping[Key, Unit]) -> UnitFlow:
         found = UnitFlow(drafts, nodes, links, unknown, _Trial())
@@ -100,7 +100,7 @@ def _places(flow: UnitFlow) -> set[Place]:
 
 
 def _values(flow: UnitFlow) -> Iterator[_Value]:
-    """Yield what could be to blame: each value with a unit, and each factor that is missing somewhere."""
+    """Yield the possible causes: each value with a unit, and each factor that is missing somewhere."""
     ratios = list(dict.fromkeys((*flow.ratios.values(), *flow.given_ratios.values())))[:3]
     factors = list(dict.fromkeys(factor for ratio in ratios for factor in (ratio**-1, ratio)))
     found: dict[Place | Key, tuple[Place, list[Key], Unit]] = {}
@@ -108,7 +108,7 @@ def _values(flow: UnitFlow) -> Iterator[_Value]:
         for name, units in (*draft.units.items(), *_constants(draft)):
             fixed = [unit for unit in units if isinstance(unit, Unit)]
             origin = draft.connections[name].place if name in draft.connections else draft.origins[name]
-            # What the command line gives has no place of its own.
+            # A value of the command line has no place of its own.
             key = origin if origin.line else (path, name)
             if fixed and (path, name) not in flow.changed:
                 found.setdefault(key, (origin, [], fixed[0]))[1].append((path, name))

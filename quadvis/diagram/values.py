@@ -51,7 +51,7 @@ def substitute(
         return YamlList(whole, node.file, node.line, node.column, node.key)
     assert isinstance(node, YamlMap)
     if not any(key in node for key in QUANTITY_KEYS):
-        return node  # no value at all: whoever reads it will say so
+        return node  # no value at all: its reader will report this
     node = node.fields(QUANTITY_KEYS[:1], QUANTITY_KEYS[1:], faults)
     value = substitute(node["value"], params, faults) if "value" in node else UNKNOWN
     return faults.read(_spread, value, node.get("unit"), node.key) if known(value) else UNKNOWN
@@ -171,7 +171,7 @@ def _read_whole(declared: Unit, node: Numbers) -> tuple[Any, OpenUnits]:
     """Read a long list of plain numbers as if element by element."""
     if not declared.variables:
         return _floats(node.numbers), ()
-    # All numbers but 0 are alike: what holds for one of them holds for the others.
+    # All numbers but 0 are alike: a rule for one of them holds for the others.
     unit = _element("float64", declared, YamlScalar("1", True, node.file, node.line, node.column, node.key))[
         1
     ]

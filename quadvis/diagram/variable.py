@@ -30,7 +30,7 @@ class Variable:
     others: tuple[str, ...] = ()
 
     def setting(self, value: float) -> str:
-        """Return what gives it a value (SI): ``eyes/camera.latency=0.25 s``."""
+        """Return the setting for a value (SI): ``eyes/camera.latency=0.25 s``."""
         text = f"{value!r} {self.unit}" if self.unit.symbols else repr(value)
         if self.element is not None:
             texts = [text if index == self.element else other for index, other in enumerate(self.others)]
@@ -39,7 +39,7 @@ class Variable:
 
 
 def find_variable(wiring: Wiring, graph: Graph, node: YamlNode) -> Variable:
-    """Return the parameter that a text names; DiagramError if there is none, or if it is no real number."""
+    """Return the parameter that a text names; DiagramError if it does not exist, or is no real number."""
     text = node.text()
     match = NAME.fullmatch(text)
     if match is None:

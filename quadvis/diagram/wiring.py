@@ -1,4 +1,4 @@
-"""What every name of a signal means: a wire from a block, through the ports of parts, or a constant."""
+"""The meaning of every name of a signal: a wire from a block, through the ports of parts, or a constant."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MAX_PORTS = 50  # of parts, that a signal passes without meeting a block
 
 @dataclass(frozen=True)
 class Source:
-    """What an input is given, and where it is written how the wire crosses between rates."""
+    """The source of an input, and the place of the word for its crossing between rates."""
 
     place: Place
     source: Wire | YamlNode | Unknown
@@ -28,17 +28,17 @@ class Source:
 
 
 class Wiring:
-    """Finds what is behind a name. ``unknown`` are blocks and outputs of slots that do not fit."""
+    """Finds the source of a name. ``unknown`` are blocks and outputs of slots that do not fit."""
 
     def __init__(self, expansion: Expansion, faults: Faults) -> None:
         self.expansion, self.faults = expansion, faults
         self.unknown: set[tuple[str, str]] = set()
-        # What goes in and out of parts is sought once, so that a fault in it is reported once.
+        # The ports of parts are resolved once, so that a fault in them is reported once.
         self._found: dict[tuple[str, str], Source] = {}
         self._sought: set[tuple[str, str]] = set()
 
     def check_ports(self, scope: Scope) -> None:
-        """Look at what goes in and out of every part, used or not."""
+        """Resolve the ports of every part, used or not."""
         for child in scope.parts:
             for port in child.spec[PORTS].inputs:
                 self._entry(child, port)
@@ -47,7 +47,7 @@ class Wiring:
             self.check_ports(child)
 
     def ports(self, scope: Scope | None = None) -> Iterator[tuple[str, Wire]]:
-        """Yield what goes out of every part, by its full name such as "control/heading.right"."""
+        """Yield the outputs of every part, by full names such as "control/heading.right"."""
         scope = scope or self.expansion.root
         for child in scope.parts:
             for port in child.spec[PORTS].outputs:
@@ -57,7 +57,7 @@ class Wiring:
             yield from self.ports(child)
 
     def inputs(self, block: FlatBlock) -> Iterator[tuple[str, Source]]:
-        """Yield what each input of a block is given."""
+        """Yield the source of each input of a block."""
         inputs = block.spec.inputs or {}
         for port, given in inputs.items() if known(inputs) else ():
             yield port, self._source(block.scope, given)
@@ -77,7 +77,7 @@ class Wiring:
         return found
 
     def find(self, scope: Scope, reference: Reference) -> Source:
-        """Return what a name means in a scope."""
+        """Return the source that a name means in a scope."""
         if reference.block == INSIDE:
             return self._indexed(self._inside(scope, reference), reference)
         owner, name = _owner(scope, reference.block)
@@ -137,7 +137,7 @@ class Wiring:
         return Source(reference.place, UNKNOWN)
 
     def _entry(self, scope: Scope, port: str) -> Source:
-        """Return what comes into a part by a port."""
+        """Return the source of an input of a part."""
         assert scope.instance is not None and scope.parent is not None
         inputs = scope.instance.inputs or {}
         if inputs is UNKNOWN or port not in inputs:
@@ -150,7 +150,7 @@ class Wiring:
         return self._found[key]
 
     def _export(self, scope: Scope, port: str) -> Source:
-        """Return what goes out of a part by a port."""
+        """Return the source of an output of a part."""
         reference = scope.spec[PORTS].outputs[port]
         if reference is UNKNOWN:
             return Source(scope.spec.place, UNKNOWN)

@@ -1,4 +1,4 @@
-"""Clocks: what the loop waits for before a tick."""
+"""Clocks: the loop waits for one before each tick."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ def names_in(code: types.CodeType) -> Iterator[str]:
 
 
 def _pointed(slot: Slot) -> Any:
-    """Return numba's type of what a slot's pointer points to; it cannot store to pointers to bool."""
+    """Return numba's type for the target of a slot's pointer; numba cannot store through pointers to bool."""
     import numba
 
     return (

@@ -157,7 +157,7 @@ class Engine:
         self._executor.tick = snapshot.tick
 
     def slot(self, path: str, name: str) -> Slot:
-        """Return the slot of a block's output, parameter, state or input; KeyError if there is none."""
+        """Return the slot of a block's output, parameter, state or input; KeyError if it does not exist."""
         block = self.program[path]
         for slots in (block.outputs, block.inputs):
             if name in slots:
@@ -165,7 +165,7 @@ class Engine:
         return block.field(name)
 
     def read(self, path: str, name: str) -> Any:
-        """Return what a block's output, parameter, state or input holds now."""
+        """Return the present value of a block's output, parameter, state or input."""
         return self.memory.read(self.slot(path, name))
 
     def write(self, path: str, name: str, value: Any) -> None:
@@ -173,7 +173,7 @@ class Engine:
         self.memory.write(self.slot(path, name), value)
 
     def call(self, path: str, method: str) -> Call | None:
-        """Return what calls a block's method from slots to slots; None if the block has no such method."""
+        """Return a call of a block's method from slots to slots; None if the block has no such method."""
         op = self.program.op(path, method)
         return None if op is None else self._interpreter.call(op)
 

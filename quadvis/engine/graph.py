@@ -20,7 +20,7 @@ CROSSINGS = {
     "delay": "the producer's value of one of its periods ago, which breaks loops",
     "newest": "whatever the producer gave last, for rates that do not fit into each other",
 }
-CONTINUOUS = "continuous"  # the rate of what the solver integrates; all others are sampled
+CONTINUOUS = "continuous"  # the rate of blocks that the solver integrates; all other rates are sampled
 SOLVERS = ("ode1", "ode2", "ode3", "ode4")
 SINGLE, MULTI = TASKINGS = ("single", "multi")
 DELAY = "delay"
@@ -40,7 +40,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Wire:
-    """Where an input comes from: a port of a block, perhaps a part of it; how it crosses between rates.
+    """The source of an input: a port of a block, or elements of it; and its crossing between rates.
 
     ``late`` and ``latched`` are what `with_transitions` adds where each task runs by itself: the value of one
     of the producer's periods ago; a value that stands still until the reader is due again.
@@ -60,7 +60,7 @@ class Wire:
 
     @property
     def delayed(self) -> bool:
-        """True if the wire gives what the producer gave one of its periods ago."""
+        """True if the wire gives the producer's value of one of its periods ago."""
         return self.late or self.crossing == DELAY
 
 

@@ -51,7 +51,7 @@ class Executor(Protocol):
 
 @dataclass
 class _Moment:
-    """What one combination of due tasks does at a tick, as flat lists."""
+    """The calls of one combination of due tasks at a tick, as flat lists."""
 
     before: list[Call]  # copies, reads, outputs
     writes: list[Call]
@@ -91,7 +91,7 @@ class Interpreter:
         self._moments: dict[tuple[bool, ...], _Moment] = {}
 
     def call(self, op: Op) -> Call:
-        """Return what runs an operation: one call over the memory."""
+        """Return the function that runs an operation: one call over the memory."""
         if op not in self._calls:
             if op.method == COPY:
                 made = self.memory.copy(op.sources[0], op.targets[0])

@@ -63,7 +63,7 @@ class Placed:
     nan: tuple[str, ...] = ()
 
     def field(self, name: str) -> Slot:
-        """Return the slot of a parameter, a state or Work; KeyError if there is none of that name."""
+        """Return the slot of a parameter, a state or Work; KeyError if none has this name."""
         if name in self.frames:
             return self.frames[name]
         item = self.record[name]

@@ -125,7 +125,7 @@ class Memory:
         return np.ndarray(slot.shape, slot.scalar, self.raw, slot.position * SLOT, slot.strides)
 
     def read(self, slot: Slot) -> Any:
-        """Return what a slot holds now: a Python scalar, a copy of an array, or a frame."""
+        """Return the present value of a slot: a Python scalar, a copy of an array, or a frame."""
         if slot.scalar == "frame":
             return self.frames[slot.position]
         value = self.view(slot)
@@ -148,7 +148,7 @@ class Memory:
     def call(
         self, method: Callable[..., Any], arguments: Sequence[Slot], targets: Sequence[Slot]
     ) -> Callable[[], None]:
-        """Return a call of ``method`` from slots to slots, specialised to what they hold.
+        """Return a call of ``method`` from slots to slots, specialised to their types.
 
         A general loop over arguments would cost more than most blocks do. Array arguments are read-only.
         """
@@ -160,7 +160,7 @@ class Memory:
         return make(method, places, self.frames, *self._scalars.values())
 
     def _place(self, slot: Slot) -> Any:
-        """Return what indexes the slot in its view: arrays have one of their own, bools count bytes."""
+        """Return the index of the slot in its view: arrays have one of their own, bools count bytes."""
         if slot.shape:
             return self.view(slot)
         return slot.position * SLOT if slot.scalar == "bool" else slot.position

@@ -16,7 +16,7 @@ _BOUNDS = re.compile(r"\s*(?P<first>\d{1,6})?\s*(?P<slice>:\s*(?P<last>\d{1,6})?
 
 
 def read_name(text: str) -> Wire | None:
-    """Return what a name names, as the source of a wire; None if it is no name of a signal."""
+    """Return the source of a wire that a name means; None if it is no name of a signal."""
     match = _NAME.fullmatch(text)
     if match is None:
         return None

@@ -39,7 +39,7 @@ class Op:
 
 @dataclass(frozen=True)
 class TaskProgram:
-    """What the blocks of one rate do at each of their ticks, phase by phase.
+    """The calls of the blocks of one rate at each of their ticks, phase by phase.
 
     The task is due at tick ``offset`` and then at every ``every`` ticks. ``delays``: copies of outputs of one
     period ago, made before any block runs. ``latches``: copies of what faster tasks gave, made once those are
@@ -110,7 +110,7 @@ class Program:
         return {block.path: number for number, block in enumerate(self.blocks)}
 
     def number(self, path: str) -> int:
-        """Return the number of a block; KeyError if there is none of that path."""
+        """Return the number of a block; KeyError if no block has this path."""
         return self._numbers[path]
 
     def __getitem__(self, path: str) -> Placed:

@@ -1,4 +1,4 @@
-"""Why a run stopped, in a sentence: which block, port and time, what happened, and what may help."""
+"""The sentence on why a run stopped: the block, the port, the time, the problem, and the remedy."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ class Tap(Protocol):
         """The number of the block's ticks from one row to the next."""
 
     def take(self, tick: int, row: memoryview) -> None:
-        """Take the bytes of the outputs, side by side as in memory; whoever keeps them makes a copy."""
+        """Take the bytes of the outputs, side by side as in memory; a tap that keeps them makes a copy."""
 
 
 @dataclass(frozen=True)

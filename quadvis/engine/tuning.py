@@ -73,7 +73,7 @@ class Tuning:
         return f"'{wanted}' is no parameter that can be tuned", suggestion(wanted, self.names)
 
     def apply(self, tick: int) -> None:
-        """Write what waits into memory, before a tick."""
+        """Write the waiting values into memory, before a tick."""
         if self._waiting:
             for (path, name), value in self._waiting.items():
                 self._memory.write(self._tunables[path, name].slot, value)

@@ -1,4 +1,4 @@
-"""A run that is held by hand: advanced step by step, looked into, tuned, and taken back."""
+"""A run by hand: advance it step by step, read and tune its values, and restore snapshots."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from quadvis.errors import Faults, Place, QuadvisError, known, quoted, sentence,
 class LiveRun:
     """A run of a diagram between its beginning and its end: use it as a context manager.
 
-    ``run["craft.position"]`` is what a signal, a parameter or a state holds now, in SI units; an index is
+    ``run["craft.position"]`` is the present value of a signal, parameter or state, in SI units; an index is
     allowed, and so are the ports of parts. ``run["control/roll.bandwidth"] = "3 rad/s"`` lets a tunable
     parameter have a new value from the next tick on; numbers are in SI units. Blocks are closed, and outputs
     left at their safe values, when the context ends.
@@ -103,7 +103,7 @@ class LiveRun:
         return wire.block, wire.port, wire.index
 
     def snapshot(self) -> Snapshot:
-        """Return the whole state between two ticks."""
+        """Return the whole state of the run, between two ticks."""
         return self._engine.snapshot()
 
     def restore(self, snapshot: Snapshot) -> None:

@@ -1,4 +1,4 @@
-"""`analyse`: what `quadvis analyse` asks of a loop: where it is opened, and how far parameters can go."""
+"""`analyse`: the questions of `quadvis analyse`: where to open the loop, and how far parameters can go."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Questions:
     def more(
         self, cuts: Mapping[str, Any], limits: Mapping[str, tuple[str, str, str]]
     ) -> tuple[tuple[Cut, ...], tuple[Limit, ...]]:
-        """Return the cuts and limits with others added; DiagramError says what is wrong with these."""
+        """Return the cuts and limits with others added; DiagramError reports their faults."""
         faults = Faults()
         wiring = Wiring(self.context.wiring.expansion, faults)
         context = replace(self.context, wiring=wiring, faults=faults)

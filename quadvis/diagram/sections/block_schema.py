@@ -76,7 +76,7 @@ def _one_block(block: type[Block]) -> Schema:
     return {
         "description": inspect.getdoc(block) or "",
         "properties": {"with": parameters, "in": inputs},
-        # What stands in a slot may take its wires from there, but brings its own parameters.
+        # A block in a slot may have the slot's wires, but has its own parameters.
         "required": ["with"] if required else [],
     }
 

@@ -1,4 +1,4 @@
-"""`blocks`: what a diagram or part is made of, by name. The slots of a variant are read likewise."""
+"""`blocks`: the blocks of a diagram or part, by name. The slots of a variant are read in the same way."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from quadvis.document import YamlMap, YamlNode, YamlScalar
 from quadvis.engine.graph import CROSSINGS
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown, closest, known
 
-INSIDE = "in"  # the name under which a part's blocks see what comes in
+INSIDE = "in"  # the name of a part's inputs for its blocks
 
 
 @dataclass(frozen=True)
 class InputSpec:
-    """What an input is given: a signal or a constant, and how the wire crosses between rates."""
+    """The source of an input: a signal or a constant, and how the wire crosses between rates."""
 
     place: Place
     source: Reference | YamlNode | Unknown

@@ -1,4 +1,4 @@
-"""What the sections that name blocks and signals are read against, and what such a section is."""
+"""The context of sections that name blocks and signals, and the class of such sections."""
 
 from __future__ import annotations
 
@@ -82,8 +82,8 @@ class Context:
 
 
 class RunSection(Section[Said]):
-    """A section that names blocks and signals: what is recorded of a run, and what is made of it."""
+    """A section that names blocks and signals: it is about the recording and the results of a run."""
 
     @abstractmethod
     def read(self, node: YamlNode | None, context: Context) -> Said:
-        """Return what the section says; ``node`` is None where the key is not written."""
+        """Return the value of the section; ``node`` is None if the key is not written."""

@@ -1,4 +1,4 @@
-"""`expect`: what is required of a run."""
+"""`expect`: the requirements on a run."""
 
 from __future__ import annotations
 

@@ -103,7 +103,7 @@ class FigureReader:
         self.faults, self.context = faults, context
 
     def figures(self, node: YamlNode) -> list[Figure]:
-        """Return what stands under `figures:`."""
+        """Return the figures under `figures:`."""
         entries = self.faults.collect(node.items) or []
         figures = (self.faults.collect(self._figure, entry) for entry in entries)
         return [figure for figure in figures if figure]

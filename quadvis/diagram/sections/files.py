@@ -1,4 +1,4 @@
-"""`files`: what blocks read, held by the SHA-256 of the contents; a resolved diagram has it."""
+"""`files`: the SHA-256 of the files that blocks read; a resolved diagram has this section."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def _named(graph: Graph) -> list[str]:
 
 
 def check_files(files: Files, folder: Path, faults: Faults) -> None:
-    """Report the files that are not what they were when the diagram was written out."""
+    """Report the files that have changed since the diagram was written out."""
     for name, node in files.items():
         wanted = faults.collect(node.text)
         path = folder / name

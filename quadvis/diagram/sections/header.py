@@ -1,4 +1,4 @@
-"""`quadvis`, `name` and `doc`: which format a file has, and what it is called."""
+"""`quadvis`, `name` and `doc`: the format, the name and the purpose of a file."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Name(FileSection[str]):
 
 
 class Doc(FileSection[str]):
-    """What a file is for, in words for people."""
+    """The purpose of a file, in words for people."""
 
     key = "doc"
     words = "what it is for"

@@ -24,7 +24,7 @@ class Logged:
 
 
 class LogSection(RunSection[Logged]):
-    """What is recorded of a run."""
+    """The signals that a run records."""
 
     key = "log"
     words = (

@@ -1,4 +1,4 @@
-"""`ports`: what goes into a part and out of it."""
+"""`ports`: the inputs and outputs of a part."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PORT_KEYS = ("in", "out")
 
 @dataclass
 class Ports:
-    """Names of what comes in, and what goes out."""
+    """The names of inputs, and the sources of outputs."""
 
     inputs: dict[str, Place] = field(default_factory=dict)
     outputs: dict[str, Reference | Unknown] = field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""What a section is: one key at the top of a file, with all that the project says about it.
+"""The class of sections: one key at the top of a file, with everything that the project says about it.
 
 A new key is one module with a subclass of `FileSection`, if the file alone says what it means, or of
 `RunSection` (`context.py`), if it names blocks and signals; and one line in `quadvis.diagram.keys`.
@@ -32,7 +32,7 @@ class Checked(Protocol):
 
     @property
     def values(self) -> Values:
-        """What its sections say."""
+        """The values of its sections."""
 
     @property
     def stop_time(self) -> Fraction:
@@ -61,14 +61,14 @@ class Section(ABC, Generic[Said]):
 
     @abstractmethod
     def schema(self) -> Schema:
-        """Return the JSON schema of what stands under the key."""
+        """Return the JSON schema of the key's value."""
 
     def definitions(self, blocks: Mapping[str, type[Block]]) -> Mapping[str, Schema]:
-        """Return what the schema refers to by name; ``blocks`` are all that exist."""
+        """Return the definitions to which the schema refers; ``blocks`` are all existing blocks."""
         return {}
 
     def resolved(self, diagram: Checked) -> Any:
-        """Return what stands under the key in the resolved diagram, as plain data; None leaves it out.
+        """Return the key's value in the resolved diagram as plain data; None leaves the key out.
 
         The hash of a diagram is made of this: whatever changes here changes it.
         """
@@ -80,11 +80,11 @@ class FileSection(Section[Said]):
 
     @abstractmethod
     def read(self, node: YamlNode | None, faults: Faults) -> Said:
-        """Return what the section says; ``node`` is None where the key is not written."""
+        """Return the value of the section; ``node`` is None if the key is not written."""
 
 
 class Values:
-    """What the sections of a file say, each under its section: ``values[SEED]`` is a number."""
+    """The values of the sections of a file, each under its section: ``values[SEED]`` is a number."""
 
     def __init__(self, found: Mapping[str, Any] | None = None) -> None:
         self._found = dict(found or {})

@@ -1,4 +1,4 @@
-"""`seed`: what all noise begins with."""
+"""`seed`: the seed of all noise."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True)
 class Asked(Generic[Item]):
-    """What a section asks of a run, and the section as plain data, with the full name of every signal."""
+    """The items of a section, and the section as plain data with the full name of every signal."""
 
     items: tuple[Item, ...] = ()
     written: Any = None

@@ -29,7 +29,7 @@ class Tasking(FileSection[str]):
         return {"enum": list(TASKINGS), "description": "how tasks share the processor, as in Simulink"}
 
     def resolved(self, diagram: Checked) -> Any:
-        """Return the word if it is not the default, so that hashes of others stay what they were."""
+        """Return the word if it is not the default, so that the hashes of other diagrams stay the same."""
         tasking = diagram.graph.tasking
         return None if tasking == SINGLE else tasking
 

@@ -16,7 +16,7 @@ VARIANT_KEYS = ("doc", "base", "slots")
 
 @dataclass
 class Variant:
-    """What a variant puts into slots, and the variant on which it builds, with the place of its name."""
+    """The blocks that a variant puts into slots, and the variant on which it builds, with its place."""
 
     slots: Blocks = field(default_factory=dict)
     base: tuple[str, Place] | None = None
