@@ -14,15 +14,15 @@ TOUCH = 1e-9  # m; a height no further from another one is the same
 class Landing(Block):
     """A reference that descends, and the moment at which the craft stands on the ground.
 
-    ======== ============================================ ============================ ======================
-    phase    begins when                                  x and y of the reference     height of the reference
-    ======== ============================================ ============================ ======================
-    off      ``descend`` is false                         those of the input           that of the input
-    descent  ``descend`` becomes true                     kept since then              falls at ``speed``
-    flare    the reference is ``flare`` above ``ground``  kept                         falls at ``touch_speed``
-    ground   the reference is below ``ground``            those of the craft           falls on
-    lowest   the reference is ``margin`` below it         those of the craft           stops
-    ======== ============================================ ============================ ======================
+    ======= =========================================== ======================== ========================
+    phase   begins when                                 x and y of the reference height of the reference
+    ======= =========================================== ======================== ========================
+    off     ``descend`` is false                        those of the input       that of the input
+    descent ``descend`` becomes true                    kept since then          falls at ``speed``
+    flare   the reference is ``flare`` above ``ground`` kept                     falls at ``touch_speed``
+    ground  the reference is below ``ground``           those of the craft       falls on
+    lowest  the reference is ``margin`` below it        those of the craft       stops
+    ======= =========================================== ======================== ========================
 
     ``recapture`` takes x and y from the input anew. While the craft is more than ``gap`` above the reference,
     x and y are those of the craft, so that it is not pushed sideways. Below the ground the reference moves as
