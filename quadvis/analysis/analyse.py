@@ -18,8 +18,8 @@ from quadvis.analysis.probe import AnalysisError
 from quadvis.analysis.systems import closed_loop
 from quadvis.analysis.vary import STABLE, Limits
 from quadvis.diagram.sections.analyse import Cut
-from quadvis.engine.graph import Graph
 from quadvis.errors import DiagramError
+from quadvis.graph.graph import Graph
 from quadvis.output.statistics import finite
 
 if TYPE_CHECKING:

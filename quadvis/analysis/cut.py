@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, In, Out
-from quadvis.engine.graph import Constant, Graph, Node, Wire
+from quadvis.graph.graph import Constant, Graph, Node, Wire
 
 
 class Break(Block):

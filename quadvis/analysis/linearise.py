@@ -31,7 +31,7 @@ from quadvis.analysis.probe import (
 from quadvis.analysis.progress import announce
 from quadvis.diagram.sections.analyse import Cut
 from quadvis.engine.engine import Engine
-from quadvis.engine.graph import Graph
+from quadvis.graph.graph import Graph
 
 Matrix = NDArray[np.float64]
 Columns = dict[int, tuple[Vector, Vector]]  # by slot: the derivatives of the later memory and of the channels

@@ -15,10 +15,10 @@ from quadvis.analysis.cut import break_path
 from quadvis.block import Random
 from quadvis.diagram.sections.analyse import Cut
 from quadvis.engine.engine import Engine
-from quadvis.engine.graph import Graph, Node, Task, Wire
 from quadvis.engine.layout import TIME, Placed
 from quadvis.engine.memory import Slot
 from quadvis.errors import QuadvisError
+from quadvis.graph.graph import Graph, Node, Task, Wire
 
 Vector = NDArray[np.float64]
 Positions = NDArray[np.intp]  # of slots

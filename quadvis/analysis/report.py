@@ -12,9 +12,9 @@ import numpy as np
 from quadvis.analysis.analyse import Analysis
 from quadvis.analysis.margins import Loop
 from quadvis.errors import QuadvisError
+from quadvis.machine.columns import table
 from quadvis.machine.files import PNG, file_name, write_output
 from quadvis.output.canvas import blank_sheet
-from quadvis.output.columns import table
 from quadvis.output.style import COLOURS, STYLE
 from quadvis.units import Unit, format_quantity
 

@@ -29,9 +29,9 @@ from quadvis.diagram.ticks import check_ticks
 from quadvis.diagram.times import read_duration
 from quadvis.diagram.wiring import Wiring
 from quadvis.document import YamlScalar
-from quadvis.engine.graph import Graph
-from quadvis.engine.names import wire_text
 from quadvis.errors import UNKNOWN, DiagramError, Faults, Place, Unknown, known, quoted
+from quadvis.graph.graph import Graph
+from quadvis.graph.names import wire_text
 from quadvis.library.catalogue import Catalogue, OwnBlocks
 
 

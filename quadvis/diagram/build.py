@@ -18,7 +18,6 @@ from quadvis.diagram.times import time_text
 from quadvis.diagram.values import OpenUnits, read_parameter, read_value
 from quadvis.diagram.wiring import Wiring
 from quadvis.document import YamlNode
-from quadvis.engine.graph import CONTINUOUS, Constant, Task, Wire, common_divisor
 from quadvis.errors import (
     UNKNOWN,
     DiagramError,
@@ -30,6 +29,7 @@ from quadvis.errors import (
     known,
     suggestion,
 )
+from quadvis.graph.graph import CONTINUOUS, Constant, Task, Wire, common_divisor
 
 # By path, class, parameters and period: variants share most.
 Made = dict[tuple[str, type[Block], str, Fraction | None], Block]

@@ -14,8 +14,10 @@ from quadvis.diagram.flow import Draft, Key, Link, ShapeFlow
 from quadvis.diagram.names import absent, remedy_for
 from quadvis.diagram.unit_repair import follow_units
 from quadvis.diagram.values import shape_text
-from quadvis.engine.graph import MULTI, SINGLE, Constant, Node, Task, Wire, execution_order, with_transitions
 from quadvis.errors import UNKNOWN, Faults, Place, known
+from quadvis.graph.graph import MULTI, SINGLE, Constant, Node, Task, Wire
+from quadvis.graph.order import execution_order
+from quadvis.graph.tasking import with_transitions
 
 _ANY_TASK = Task("unknown", Fraction(1))  # a node needs one; no check looks at it
 

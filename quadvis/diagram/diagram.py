@@ -19,8 +19,8 @@ from quadvis.diagram.sections.section import Values
 from quadvis.diagram.sections.summary import SUMMARY
 from quadvis.diagram.settings import ParameterFile
 from quadvis.document import dump_yaml
-from quadvis.engine.graph import Graph
 from quadvis.errors import Doubt
+from quadvis.graph.graph import Graph
 from quadvis.machine.files import reading
 
 

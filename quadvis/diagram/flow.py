@@ -10,9 +10,9 @@ import numpy as np
 
 from quadvis.block import Block, In, Interface
 from quadvis.diagram.values import OpenUnits, shape_text
-from quadvis.engine.graph import Constant, Node, Task, Wire, selected
-from quadvis.engine.names import index_text
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown
+from quadvis.graph.graph import Constant, Node, Task, Wire, selected
+from quadvis.graph.names import index_text
 from quadvis.units import Unit
 
 ONE = Unit()

@@ -5,8 +5,8 @@ from __future__ import annotations
 from quadvis.diagram.check import rate_text
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.sections.block_text import constant_text
-from quadvis.engine.graph import Constant, Node, Wire
-from quadvis.engine.names import wire_text
+from quadvis.graph.graph import Constant, Node, Wire
+from quadvis.graph.names import wire_text
 from quadvis.output.draw import DrawnBlock, DrawnWire, draw
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from quadvis.document import YamlNode
-from quadvis.engine.graph import Index
-from quadvis.engine.names import read_name
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown
+from quadvis.graph.graph import Index
+from quadvis.graph.names import read_name
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from quadvis.block import Shape
-from quadvis.engine.graph import Index
-from quadvis.engine.names import index_text
+from quadvis.graph.graph import Index
+from quadvis.graph.names import index_text
 from quadvis.output.statistics import COUNT, Value
 from quadvis.output.stretch import Sampling, Stretch
 from quadvis.units import Unit

@@ -10,8 +10,8 @@ from quadvis.diagram.sections.rates import RATES
 from quadvis.diagram.sections.solver import SOLVER
 from quadvis.diagram.spec import FileSpec
 from quadvis.diagram.times import time_text
-from quadvis.engine.graph import Task, common_divisor, rate_monotonic
 from quadvis.errors import UNKNOWN, Faults, Place, known
+from quadvis.graph.graph import Task, common_divisor, rate_monotonic
 
 MOST = 10**9  # hours of computing, even without a block
 

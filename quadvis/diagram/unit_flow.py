@@ -10,8 +10,8 @@ import numpy as np
 from quadvis.block import Declared, Param
 from quadvis.diagram.flow import ONE, Flow, Key, Link
 from quadvis.diagram.values import Bare, OpenUnits
-from quadvis.engine.graph import Constant, selected
 from quadvis.errors import UNKNOWN, Place, known
+from quadvis.graph.graph import Constant, selected
 from quadvis.units import Unit, unify
 
 

@@ -13,8 +13,8 @@ from typing import NamedTuple
 from quadvis.diagram.flow import Draft, Key, Link
 from quadvis.diagram.unit_flow import UnitFlow, words
 from quadvis.diagram.values import OpenUnits
-from quadvis.engine.graph import Constant, Node
 from quadvis.errors import Fault, Faults, Place
+from quadvis.graph.graph import Constant, Node
 from quadvis.units import Unit
 
 ANGLES = "an angle has a dimension of its own here, rad"

@@ -11,9 +11,9 @@ from quadvis.diagram.expand import Scope
 from quadvis.diagram.values import si
 from quadvis.diagram.wiring import Wiring
 from quadvis.document import YamlList, YamlNode, YamlScalar
-from quadvis.engine.graph import Graph, Node
-from quadvis.engine.names import PATH, PORT
 from quadvis.errors import UNKNOWN, DiagramError, Unknown, known, suggestion
+from quadvis.graph.graph import Graph, Node
+from quadvis.graph.names import PATH, PORT
 from quadvis.units import Unit, UnitError, parse_quantity
 
 NAME = re.compile(rf"(?:(?P<block>{PATH})\.)?(?P<parameter>{PORT})(?:\[(?P<element>\d{{1,6}})\])?", re.ASCII)

@@ -12,8 +12,8 @@ from quadvis.diagram.sections.blocks import BLOCKS, INSIDE, InputSpec
 from quadvis.diagram.sections.ports import PORTS
 from quadvis.diagram.values import substitute
 from quadvis.document import YamlList, YamlNode
-from quadvis.engine.graph import Index, Wire
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known, suggestion
+from quadvis.graph.graph import Index, Wire
 
 MAX_PORTS = 50  # of parts, that a signal passes without meeting a block
 

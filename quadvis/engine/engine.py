@@ -17,13 +17,13 @@ from typing import Any, Self
 import numpy as np
 
 from quadvis.engine.clock import Clock, Unpaced
-from quadvis.engine.graph import Constant, Graph
 from quadvis.engine.interpreter import Call, Executor, Interpreter
 from quadvis.engine.memory import Memory, Slot
 from quadvis.engine.program import Program, make_program
 from quadvis.engine.stops import cannot, explained
 from quadvis.engine.taps import Observer, Tap
 from quadvis.engine.tuning import Tuning
+from quadvis.graph.graph import Constant, Graph
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.block import NO_FRAME, Block
-from quadvis.engine.graph import SINGLE
 from quadvis.engine.layout import TIME
 from quadvis.engine.memory import SLOT, Memory
 from quadvis.engine.program import COPY, Op, Program, TaskProgram
 from quadvis.engine.solver import Solver, Vector
 from quadvis.engine.taps import Observer, Tap
+from quadvis.graph.graph import SINGLE
 
 Call = Callable[[], None]
 NOT_FINITE_OUTPUT = "output"

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from quadvis.block import Block, Shape
-from quadvis.engine.graph import Constant, Graph, Node, Wire, selected
 from quadvis.engine.memory import SLOT, Record, Slot
+from quadvis.graph.graph import Constant, Graph, Node, Wire, selected
 
 TIME = Slot("float64", (), 0)
 

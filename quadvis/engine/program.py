@@ -15,9 +15,9 @@ from functools import cached_property
 
 from quadvis.block import Random
 from quadvis.block.random import stream_start
-from quadvis.engine.graph import Constant, Graph, Node
 from quadvis.engine.layout import TIME, Layout, Placed
 from quadvis.engine.memory import Memory, Slot
+from quadvis.graph.graph import Constant, Graph, Node
 
 COPY = "copy"
 NO_BLOCK = -1

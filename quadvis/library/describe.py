@@ -12,7 +12,7 @@ import numpy as np
 
 from quadvis.block import TAGS, Block, Declared, In, Out, Param, Safe, State
 from quadvis.library.catalogue import Catalogue
-from quadvis.output.columns import table
+from quadvis.machine.columns import table
 
 WIDEST = 30  # characters of a default value
 MANY = 60  # characters of choices on one line

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.engine.graph import CONTINUOUS
-from quadvis.engine.names import index_text, wire_text
 from quadvis.errors import QuadvisError, quoted, suggestion
+from quadvis.graph.graph import CONTINUOUS
+from quadvis.graph.names import index_text, wire_text
 from quadvis.output.figures import Figure, Panel, Trace
 from quadvis.output.recording import Recorded
 from quadvis.units import Unit, parse_units

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from quadvis.engine.graph import CONTINUOUS
 from quadvis.errors import QuadvisError
+from quadvis.graph.graph import CONTINUOUS
 from quadvis.output import svg
 
 # Sizes in CSS pixels: fonts, then distances.

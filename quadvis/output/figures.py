@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quadvis.engine.graph import Wire
-from quadvis.engine.names import wire_text
+from quadvis.graph.graph import Wire
+from quadvis.graph.names import wire_text
 from quadvis.output.recording import Recorded
 from quadvis.units import Unit, parse_units
 

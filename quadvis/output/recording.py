@@ -12,9 +12,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.engine.graph import Index, selected
-from quadvis.engine.names import read_name
 from quadvis.errors import QuadvisError, quoted, suggestion
+from quadvis.graph.graph import Index, selected
+from quadvis.graph.names import read_name
 
 SLOT = 8
 SLOT_TYPES = {"float64": "<f8", "int64": "<i8", "bool": "<i8"}

@@ -10,7 +10,7 @@ import numpy as np
 from quadvis.engine.layout import TIME
 from quadvis.engine.memory import Slot
 from quadvis.engine.program import NO_BLOCK, Op, Program
-from quadvis.output.columns import table
+from quadvis.machine.columns import table
 from quadvis.units import Unit, format_quantity
 
 SECOND = Unit.parse("s")

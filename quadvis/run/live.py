@@ -16,10 +16,10 @@ from quadvis.diagram.values import read_constant, read_value
 from quadvis.document import YamlScalar
 from quadvis.engine.clock import Clock
 from quadvis.engine.engine import Engine, Snapshot
-from quadvis.engine.graph import Node
-from quadvis.engine.names import read_name
 from quadvis.engine.tuning import Change
 from quadvis.errors import Faults, Place, QuadvisError, known, quoted, sentence, suggestion
+from quadvis.graph.graph import Node
+from quadvis.graph.names import read_name
 
 
 class LiveRun:

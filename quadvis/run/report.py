@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from quadvis.diagram.requirements import Entry
-from quadvis.output.columns import table
+from quadvis.machine.columns import table
 from quadvis.run.session import Result
 from quadvis.run.verdict import Outcome, Verdict
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.engine.engine import Engine
-from quadvis.engine.graph import Node
+from quadvis.graph.graph import Node
 from quadvis.output.kept import ALL, RowJudge, RunSignals
 from quadvis.output.log import PORTS, LogWriter
 from quadvis.output.recording import RecordedBlock, RecordedPort, Recording

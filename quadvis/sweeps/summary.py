@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.errors import counted
+from quadvis.machine.columns import table as aligned
 from quadvis.machine.status_line import StatusLine
-from quadvis.output.columns import table as aligned
 from quadvis.sweeps.axes import SEED
 from quadvis.sweeps.table import FAILURE, PASSED, Table
 from quadvis.sweeps.worker import Quantity

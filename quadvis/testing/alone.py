@@ -10,7 +10,7 @@ import numpy as np
 
 from quadvis.block import Block, Sizes
 from quadvis.engine.engine import Engine
-from quadvis.engine.graph import Constant, Graph, Node, Task
+from quadvis.graph.graph import Constant, Graph, Node, Task
 
 ALONE = "block"  # the path of the block
 

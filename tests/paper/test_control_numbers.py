@@ -9,7 +9,7 @@ import pytest
 
 from quadvis.block import Block
 from quadvis.engine.engine import Engine
-from quadvis.engine.graph import Constant, Graph, Node, Task, Wire
+from quadvis.graph.graph import Constant, Graph, Node, Task, Wire
 from quadvis.testing import drive
 from quadvis_blocks.control.altitude import Altitude
 from quadvis_blocks.control.mixer import Mixer

@@ -12,7 +12,7 @@ from quadvis.testing.alone import alone, parameter_sizes
 
 numba = pytest.importorskip("numba")
 
-from quadvis.engine.compiled import Compiler  # noqa: E402 - it needs numba only when it compiles
+from quadvis.native.compiler import Compiler  # noqa: E402 - it needs numba only when it compiles
 
 CALLS: list[str] = []
 LIMIT = 3.0

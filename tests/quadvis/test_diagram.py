@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 
 import quadvis
 from quadvis.api import check, load, load_text
-from quadvis.engine.graph import Constant, Wire
 from quadvis.errors import DiagramError, Faults
+from quadvis.graph.graph import Constant, Wire
 
 DIAGRAMS = Path(__file__).parents[2] / "diagrams"
 HOVER = (DIAGRAMS / "hover.yaml").read_text(encoding="utf-8")

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from quadvis.block import Block, Frame, In, Out, Param, ParameterError, Random, State, uniform
 from quadvis.engine.engine import Engine
-from quadvis.engine.graph import Constant, Graph, Node, Task, Wire, execution_order
 from quadvis.errors import QuadvisError, RunError
+from quadvis.graph.graph import Constant, Graph, Node, Task, Wire
+from quadvis.graph.order import execution_order
 
 STEP = Fraction(1, 100)
 CONTINUOUS = Task("continuous", STEP, continuous=True)

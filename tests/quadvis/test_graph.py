@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadvis.block import Block, In, Out, State
-from quadvis.engine.graph import Constant, Graph, Node, Task, Wire, common_divisor, execution_order, selected
+from quadvis.graph.graph import Constant, Graph, Node, Task, Wire, common_divisor, selected
+from quadvis.graph.order import execution_order
 
 TASK = Task("main", Fraction(1, 10))
 TIMES = st.fractions(min_value=Fraction(1, 10**6), max_value=100, max_denominator=10**6)

@@ -11,8 +11,8 @@ import pytest
 
 from quadvis.block import Block, In, Out, Param, ParameterError, Safe, State, Work
 from quadvis.engine.engine import Engine
-from quadvis.engine.graph import Constant, Graph, Node, Task, Wire
 from quadvis.errors import RunError
+from quadvis.graph.graph import Constant, Graph, Node, Task, Wire
 
 FAST, SLOW = Task("fast", Fraction(1, 10)), Task("slow", Fraction(1, 5))
 EVENTS: list[Any] = []

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from quadvis import load
 from quadvis.diagram.sections.figures import FigureReader, read_figures
-from quadvis.engine.graph import Wire
-from quadvis.engine.names import read_name
 from quadvis.errors import DiagramError, Faults, QuadvisError
+from quadvis.graph.graph import Wire
+from quadvis.graph.names import read_name
 from quadvis.output.figures import Figure, Panel, Trace, block_figures
 from quadvis.output.log import LogWriter
 from quadvis.output.log_reader import read_log

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from quadvis.block import Block, In, Out, Param, Random, State
 from quadvis.block.random import M1, M2
 from quadvis.engine.engine import Engine
-from quadvis.engine.graph import Constant, Graph, Node, Task, Wire
 from quadvis.engine.layout import TIME
 from quadvis.engine.memory import SLOT
 from quadvis.engine.program import Program, make_program
+from quadvis.graph.graph import Constant, Graph, Node, Task, Wire
 from quadvis.run.listing import program_lines
 
 STEP = Fraction(1, 100)

@@ -4,8 +4,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from quadvis.engine.graph import SOLVERS
 from quadvis.engine.solver import TABLEAUS, Solver
+from quadvis.graph.graph import SOLVERS
 
 ORDERS = {name: int(name[-1]) for name in SOLVERS}
 

@@ -15,10 +15,12 @@ import quadvis
 from quadvis.api import load_text
 from quadvis.block import Block, In, Out, State
 from quadvis.engine.engine import Engine
-from quadvis.engine.graph import MULTI, Constant, Graph, Node, Task, Wire, execution_order, with_transitions
 from quadvis.engine.interpreter import Interpreter
 from quadvis.engine.program import Program, TaskProgram, make_program
 from quadvis.errors import DiagramError
+from quadvis.graph.graph import MULTI, Constant, Graph, Node, Task, Wire
+from quadvis.graph.order import execution_order
+from quadvis.graph.tasking import with_transitions
 
 FAST, SLOW = Task("fast", Fraction(1, 10)), Task("slow", Fraction(1, 5))
 

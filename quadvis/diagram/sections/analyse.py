@@ -16,8 +16,8 @@ from quadvis.diagram.times import read_duration
 from quadvis.diagram.variable import Variable, find_variable
 from quadvis.diagram.wiring import Wiring
 from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar
-from quadvis.engine.names import wire_text
 from quadvis.errors import UNKNOWN, Faults, Unknown, known
+from quadvis.graph.names import wire_text
 from quadvis.units import Unit, split_quantity
 
 ANALYSE_KEYS = ("at", "cuts", "limits")

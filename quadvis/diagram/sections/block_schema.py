@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from quadvis.block import Block, Declared, Param
 from quadvis.diagram.sections.forms import CONSTANT, SIGNAL, TEXT, VALUES, Schema, closed, map_of, ref
-from quadvis.engine.graph import CONTINUOUS, CROSSINGS
+from quadvis.graph.graph import CONTINUOUS, CROSSINGS
 from quadvis.library.describe import default_text, first_line
 
 BLOCK_KEYS = ("block", "part", "rate", "slot", "with", "in")

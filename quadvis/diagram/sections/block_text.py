@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Param
-from quadvis.engine.graph import CONTINUOUS, Node, Wire
-from quadvis.engine.names import wire_text
+from quadvis.graph.graph import CONTINUOUS, Node, Wire
+from quadvis.graph.names import wire_text
 
 
 def relative(path: str, folder: Path) -> str:

@@ -15,8 +15,8 @@ from quadvis.diagram.sections.forms import Schema, map_of, ref
 from quadvis.diagram.sections.section import DIAGRAM, PART, Checked, FileSection
 from quadvis.diagram.values import QUANTITY_KEYS
 from quadvis.document import YamlMap, YamlNode, YamlScalar
-from quadvis.engine.graph import CROSSINGS
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown, closest, known
+from quadvis.graph.graph import CROSSINGS
 
 INSIDE = "in"  # the name of a part's inputs for its blocks
 

@@ -14,9 +14,9 @@ from quadvis.diagram.sections.section import Said, Section, Values
 from quadvis.diagram.times import time_text
 from quadvis.diagram.wiring import Wiring
 from quadvis.document import YamlList, YamlMap, YamlNode
-from quadvis.engine.graph import Graph, Node, Wire
-from quadvis.engine.names import wire_text
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known
+from quadvis.graph.graph import Graph, Node, Wire
+from quadvis.graph.names import wire_text
 
 
 @dataclass

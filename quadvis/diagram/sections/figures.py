@@ -33,8 +33,8 @@ from quadvis.diagram.sections.signals import Asked, check_signal
 from quadvis.diagram.times import SECOND
 from quadvis.diagram.unit_flow import words
 from quadvis.document import YamlList, YamlMap, YamlNode, parse_yaml
-from quadvis.engine.graph import Wire
 from quadvis.errors import UNKNOWN, Faults, Unknown, known
+from quadvis.graph.graph import Wire
 from quadvis.output.figures import Figure, Panel, Trace
 from quadvis.output.stretch import NANOSECONDS, stamp
 from quadvis.units import Unit, UnitError

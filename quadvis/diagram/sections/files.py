@@ -10,8 +10,8 @@ from quadvis.diagram.sections.block_text import relative
 from quadvis.diagram.sections.forms import Schema
 from quadvis.diagram.sections.section import Checked, FileSection
 from quadvis.document import YamlNode
-from quadvis.engine.graph import Graph
 from quadvis.errors import Faults
+from quadvis.graph.graph import Graph
 from quadvis.machine.inputs import file_digest
 
 Files = dict[str, YamlNode]  # SHA-256 by path

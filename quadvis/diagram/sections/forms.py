@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from quadvis.diagram.values import QUANTITY_KEYS
-from quadvis.engine.names import PATTERN
+from quadvis.graph.names import PATTERN
 
 Schema = dict[str, Any]
 

@@ -11,8 +11,8 @@ from quadvis.diagram.sections.forms import QUANTITY, Schema, closed, map_of, ref
 from quadvis.diagram.sections.section import Checked, FileSection
 from quadvis.diagram.times import read_duration, read_period
 from quadvis.document import YamlMap, YamlNode
-from quadvis.engine.graph import CONTINUOUS
 from quadvis.errors import Faults, Place, Unknown
+from quadvis.graph.graph import CONTINUOUS
 
 RATE_KEYS = ("rate", "offset")
 

@@ -15,8 +15,8 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar
 from quadvis.block import Block
 from quadvis.diagram.sections.forms import Schema
 from quadvis.document import YamlNode
-from quadvis.engine.graph import Graph
 from quadvis.errors import Faults
+from quadvis.graph.graph import Graph
 
 Value = TypeVar("Value")
 Said = TypeVar("Said", covariant=True)

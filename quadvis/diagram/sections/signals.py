@@ -13,9 +13,9 @@ from quadvis.diagram.sections.context import Context
 from quadvis.diagram.sections.log import LOG
 from quadvis.diagram.times import read_duration
 from quadvis.document import YamlMap, YamlNode
-from quadvis.engine.graph import Node, Wire, selected
-from quadvis.engine.names import wire_text
 from quadvis.errors import UNKNOWN, Unknown, known
+from quadvis.graph.graph import Node, Wire, selected
+from quadvis.graph.names import wire_text
 from quadvis.output.stretch import Sampling, Stretch
 from quadvis.units import Unit
 

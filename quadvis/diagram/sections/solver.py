@@ -10,8 +10,8 @@ from quadvis.diagram.sections.forms import QUANTITY, Schema, closed
 from quadvis.diagram.sections.section import Checked, FileSection
 from quadvis.diagram.times import read_step
 from quadvis.document import YamlNode
-from quadvis.engine.graph import SOLVERS
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown
+from quadvis.graph.graph import SOLVERS
 
 SOLVER_KEYS = ("method", "step")
 

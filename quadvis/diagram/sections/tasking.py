@@ -7,8 +7,8 @@ from typing import Any
 from quadvis.diagram.sections.forms import Schema
 from quadvis.diagram.sections.section import Checked, FileSection
 from quadvis.document import YamlNode
-from quadvis.engine.graph import SINGLE, TASKINGS
 from quadvis.errors import Faults
+from quadvis.graph.graph import SINGLE, TASKINGS
 
 
 class Tasking(FileSection[str]):

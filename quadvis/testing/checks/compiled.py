@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import METHODS, Block
-from quadvis.engine.compiled import Compiled, Compiler
 from quadvis.engine.layout import TIME, Placed
+from quadvis.native.compiler import Compiled, Compiler
 from quadvis.testing.rig import PERIOD, STEPS, Rig, Subject, Whole, rigs, sources, targets
 
 # Compiled and interpreted agree to the last bit where both use the C library's functions and one order of

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from quadvis.block import Block
-from quadvis.engine.compiled import names_in
+from quadvis.native.compiler import names_in
 from quadvis.testing.rig import Subject
 
 

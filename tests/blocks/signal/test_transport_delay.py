@@ -7,7 +7,7 @@ import pytest
 
 from quadvis.block import ParameterError
 from quadvis.engine.engine import Engine
-from quadvis.engine.graph import Constant, Graph, Node, Task, Wire
+from quadvis.graph.graph import Constant, Graph, Node, Task, Wire
 from quadvis.testing import drive
 from quadvis_blocks.signal.integrator import Integrator
 from quadvis_blocks.signal.transport_delay import TransportDelay

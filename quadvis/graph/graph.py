@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -142,6 +142,11 @@ class Graph:
         return count.numerator
 
 
+def rank(task: Task) -> tuple[bool, Fraction, Fraction, str]:
+    """Return the place of a task among others: the continuous one first, then fastest first."""
+    return not task.continuous, task.period, task.offset, task.name
+
+
 def rate_monotonic(tasks: Iterable[Task]) -> list[Task]:
     """Return tasks fastest first, the continuous one before all."""
     return sorted(tasks, key=rank)
@@ -165,78 +170,3 @@ def selected(shape: Shape, index: Index) -> tuple[int, Shape] | None:
     if int(part.flat[-1]) - int(part.flat[0]) + 1 != part.size:
         return None
     return int(part.flat[0]), part.shape
-
-
-def execution_order(nodes: Sequence[Node]) -> tuple[list[Node], list[list[tuple[str, str]]]]:
-    """Return the nodes in an order that respects direct feedthrough, and the algebraic loops that forbid one.
-
-    A loop is a list of (block, input) pairs, each input driven by the next block in the list. Blocks keep the
-    diagram's order wherever the wires allow it.
-    """
-    by_path = {node.path: node for node in nodes}
-    done: set[str] = set()
-    order: list[Node] = []
-    loops: list[list[tuple[str, str]]] = []
-    # Each entry: a block, the input through which the search reached it, what it still needs.
-    trail: list[tuple[str, str, Iterator[tuple[str, str]]]] = []
-    active: dict[str, int] = {}
-
-    def enter(path: str, port: str) -> None:
-        active[path] = len(trail)
-        trail.append((path, port, _needs(by_path[path])))
-
-    for root in nodes:
-        if root.path not in done:
-            enter(root.path, "")
-        while trail:
-            path, _, needs = trail[-1]
-            port, source = next(needs, ("", ""))
-            if not port:
-                trail.pop()
-                del active[path]
-                done.add(path)
-                order.append(by_path[path])
-            elif source in active:
-                loop = trail[active[source] :]
-                inputs = [entered for _, entered, _ in loop[1:]] + [port]
-                loops.append([(entry[0], name) for entry, name in zip(loop, inputs, strict=True)])
-            elif source in by_path and source not in done:
-                enter(source, port)
-    return order, loops
-
-
-def _needs(node: Node) -> Iterator[tuple[str, str]]:
-    """Yield what must be computed before this block: its feedthrough inputs and where they come from."""
-    for port, wire in node.wires(node.block.interface.feedthrough):
-        if not wire.delayed:
-            yield port, wire.block
-
-
-def rank(task: Task) -> tuple[bool, Fraction, Fraction, str]:
-    """Return the place of a task among others: the continuous one first, then fastest first."""
-    return not task.continuous, task.period, task.offset, task.name
-
-
-def with_transitions(nodes: Iterable[Node]) -> None:
-    """Make wires between tasks deterministic where each task runs by itself and faster ones interrupt it.
-
-    As Simulink's rate transitions do: from a slower task a faster one reads what the slower gave one of the
-    slower's periods ago, swapped when the slower is due again, since its present value may not be ready.
-    From a faster task a slower one reads what the faster gave when the slower became due; the value is
-    latched, since the faster runs on meanwhile. So is a late value, unless the reader is always through
-    before it changes.
-    """
-    nodes = list(nodes)
-    tasks = {node.path: node.task for node in nodes}
-    for node in nodes:
-        for port, wire in list(node.wires()):
-            producer, reader = tasks.get(wire.block, node.task), node.task
-            if producer != reader:
-                late = not wire.delayed and rank(producer) > rank(reader)
-                through = (late or wire.delayed) and _falls_on(producer, reader)
-                node.inputs[port] = replace(wire, late=late, latched=not through)
-
-
-def _falls_on(task: Task, other: Task) -> bool:
-    """Return whether every tick of a task is one of another, from the later offset on."""
-    return task.period % other.period == 0 and (task.offset - other.offset) % other.period == 0

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-from quadvis.engine.graph import Index, Wire
+from quadvis.graph.graph import Index, Wire
 
 PATH, PORT = r"[A-Za-z_][\w/]*", r"[A-Za-z_]\w*"
 PATTERN = rf"({PATH})\.({PORT})(\[([\d:,\s]*)\])?"  # block, port, index in brackets, index

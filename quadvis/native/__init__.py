@@ -1,0 +1,1 @@
+"""Methods of blocks compiled to machine code."""
