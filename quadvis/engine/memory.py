@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.block import Block, Shape, Sizes
+from quadvis.block.returned import CALL
 
 SLOT = 8
 C_TYPES = {"float64": ctypes.c_double, "int64": ctypes.c_int64, "bool": ctypes.c_bool}
-CALL = "<call of a block>"  # in place of a file, in tracebacks
 VIEWS = {"float64": "d", "int64": "q", "bool": "?"}
 
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import OWN_MODULES, Block, ParameterError
+from quadvis.block.returned import returned_wrongly
 from quadvis.engine.interpreter import NOT_FINITE_OUTPUT, Stop
 from quadvis.engine.layout import TIME, Placed
 from quadvis.engine.memory import Memory
 from quadvis.engine.program import Program
-from quadvis.engine.returned import returned_wrongly
 from quadvis.errors import QuadvisError, RunError, sentence
 from quadvis.graph.graph import Graph, Node
 from quadvis.machine.failures import MEMORY, arithmetic, is_short_of_memory, surroundings

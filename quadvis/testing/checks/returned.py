@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from quadvis.engine.returned import returned_fault
+from quadvis.block.returned import returned_fault
 from quadvis.testing.rig import STEPS, Subject, rigs, sources, targets
 
 

@@ -6,18 +6,30 @@ import inspect
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from types import FrameType
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from quadvis.block import Frame
-from quadvis.engine.memory import CALL, Slot
+from quadvis.block.signals import Frame, Shape
 from quadvis.machine.source_line import shown
 
+CALL = "<call of a block>"  # the file of the code that calls blocks, in tracebacks
 KINDS = {"float64": "fiub", "int64": "iu", "bool": "b"}  # of numpy, that a slot takes without loss
 
 
-def returned_fault(method: str, returned: Any, slots: Mapping[str, Slot]) -> str:
+class Holder(Protocol):
+    """Where a value goes: its kind and its shape."""
+
+    @property
+    def scalar(self) -> str:
+        """The kind: float64, int64, bool or frame."""
+
+    @property
+    def shape(self) -> Shape:
+        """The length of each axis."""
+
+
+def returned_fault(method: str, returned: Any, slots: Mapping[str, Holder]) -> str:
     """Return what is wrong with what a method has returned for these slots; "" if nothing."""
     values = (returned,) if len(slots) == 1 else returned
     names = ", ".join(slots)
@@ -43,7 +55,9 @@ def _array(value: Any) -> Any:
         return None
 
 
-def returned_wrongly(error: Exception, name: str, arguments: Sequence[Any], slots: Mapping[str, Slot]) -> str:
+def returned_wrongly(
+    error: Exception, name: str, arguments: Sequence[Any], slots: Mapping[str, Holder]
+) -> str:
     """Return what is wrong with what a method of that name has returned, and where; "" if that was right.
 
     What it returned is lost, so it is called again, with its line watched: ``output`` and ``deriv`` change
