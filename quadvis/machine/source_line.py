@@ -1,4 +1,4 @@
-"""Where in somebody's source file an error arose."""
+"""The line of a user's source file in which an error arose."""
 
 from __future__ import annotations
 

@@ -184,7 +184,7 @@ def test_a_description_fits_a_terminal(name: str) -> None:
 
 def test_many_choices_stand_where_the_text_wraps() -> None:
     text = description("vision.frame_fault", Catalogue().find("vision.frame_fault"), 100)
-    assert "38 choices" in text
+    assert "39 choices" in text
     for kind in ("none", "freeze", "half_before", "no_pixels"):
         assert f"{kind}," in text or f"{kind}\n" in text
 
