@@ -17,16 +17,19 @@ from typing import Any, ClassVar, TypeVar
 from quadvis.block.declare import Declared, In, Out, Param, ParameterError, Safe, State, Work
 from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.machine.inputs import file_digest
+from quadvis.machine.source_line import file_of, source_line
 from quadvis.units import Unit
 
 OWN_MODULES = "quadvis_own_blocks."  # before the names of modules that come with a diagram
 METHODS = ("start", "read", "output", "write", "update", "deriv")
 OUTSIDE = ("read", "write")
+PORTS = "ports"
 CHECKS = ("check", "doubts")
 FILES = ("reads", "read_file", "verify_files")
 TAGS = ("not_replayable", "not_restorable", "harmless")
 RESERVED = {
     "self", "time", "period", "interface", "numeric", "open", "close", "write_safe",
+    PORTS, "ports_from", "with_ports", "made_for",
     *CHECKS, *FILES, *METHODS, *TAGS,
 }  # fmt: skip
 
@@ -68,6 +71,7 @@ class Block:
     not_replayable: ClassVar[str] = ""  # why a second run may differ from the first: "it reads a camera"
     not_restorable: ClassVar[str] = ""  # why it cannot go back to a snapshot: "the model has no way back"
     harmless: ClassVar[str] = ""  # why what it writes needs no safe value: "a file moves nothing"
+    made_for: ClassVar[Mapping[str, Any] | None] = None  # the parameters from which a class has its ports
     period: float = math.nan
 
     def __init_subclass__(cls, *, numeric: bool | None = None, bound: bool = False) -> None:
@@ -77,7 +81,40 @@ class Block:
             cls.numeric = numeric
         cls.interface = _interface(cls)
 
+    @classmethod
+    def ports_from(cls) -> tuple[str, ...]:
+        """Return the parameters on which the ports depend: those that the class method ``ports`` asks for."""
+        ports = getattr(cls, "ports", None)
+        return () if ports is None else tuple(inspect.signature(ports).parameters)
+
+    @classmethod
+    def with_ports(cls, parameters: Mapping[str, Any]) -> type[Block]:
+        """Return the class with the ports that it has for these parameters, ParameterError if one is wrong.
+
+        A class whose ports depend on parameters, as those of a model in a file do, has a class method
+        ``ports``: it asks for parameters by name, and returns the ports by name. A method's ``*inputs`` are
+        then all inputs, in that order.
+        """
+        names = cls.ports_from()
+        if not names or cls.made_for is not None:
+            return cls
+        declared = cls.interface.params
+        given = {name: declared[name].given(parameters.get(name)) for name in names}
+        try:
+            ports = getattr(cls, PORTS)(**given)
+        except QuadvisError:
+            raise
+        except Exception as error:
+            place = source_line(error, file_of(cls))
+            reason = f"{type(error).__name__}: {error}{f' in {place}' if place else ''}"
+            raise ParameterError(names[0], f"the ports cannot be made from {names[0]}: {reason}") from error
+        members = {**ports, "__doc__": cls.__doc__, "__module__": cls.__module__, "made_for": given}
+        return type(cls.__name__, (cls,), members)
+
     def __init__(self, *, period: float = math.nan, **parameters: Any) -> None:
+        kind = type(self).with_ports(parameters)
+        if kind is not type(self):
+            self.__class__ = kind
         self.period = period
         declared = self.interface.params
         for name in parameters:
@@ -85,10 +122,7 @@ class Block:
                 problem = f"{type(self).__name__} has no parameter '{name}'"
                 raise ParameterError(name, sentence(problem, suggestion(name, declared)))
         for name, param in declared.items():
-            value = parameters.get(name, param.default)
-            if value is None:
-                raise ParameterError(name, f"parameter '{name}' is missing; give {param.wanted()}")
-            self.__dict__[name] = param.accept(value)
+            self.__dict__[name] = param.given(parameters.get(name))
         self._kept: dict[str, Any] = {}  # what was made of files, by parameter
         self.check()
         self._digests = {
@@ -172,13 +206,17 @@ def _interface(cls: type[Block]) -> Interface:
         function = getattr(cls, method, None)
         if function is None:
             continue
-        names = tuple(inspect.signature(function).parameters)[1:]
+        names = _asked(function, tuple(inputs) if cls.ports_from() else None)
         allowed = {"start": (), "read": ("time",)}.get(method, (*inputs, "time"))
         for name in names:
             if name not in allowed:
                 problem = f"{cls.__name__}.{method} asks for '{name}', which is not one of its inputs"
                 raise TypeError(sentence(problem, suggestion(name, allowed)))
         arguments[method] = names
+    for name in cls.ports_from():
+        if name not in of(Param):
+            problem = f"{cls.__name__}.{PORTS} asks for '{name}', which is not one of its parameters"
+            raise TypeError(sentence(problem, suggestion(name, of(Param))))
     if cls.numeric and not arguments.keys().isdisjoint(OUTSIDE):
         problem = f"{cls.__name__} reads or writes outside, which no compiled method can"
         raise TypeError(sentence(problem, "say numeric=False"))
@@ -196,6 +234,15 @@ def _interface(cls: type[Block]) -> Interface:
         raise TypeError(f"{cls.__name__} declares outputs but has no output method")
     safe = _safe(cls, of(Safe).values(), inputs, arguments.get("write", ()))
     return Interface(inputs, outputs, of(Param), states, of(Work), safe, arguments)
+
+
+def _asked(function: Callable[..., Any], inputs: tuple[str, ...] | None) -> tuple[str, ...]:
+    """Return the names that a method asks for; ``*inputs`` asks for all inputs, None where they are fixed."""
+    names: list[str] = []
+    for name, parameter in tuple(inspect.signature(function).parameters.items())[1:]:
+        every = parameter.kind == parameter.VAR_POSITIONAL and name == "inputs"
+        names += inputs if every and inputs is not None else [name]
+    return tuple(names)
 
 
 def _safe(

@@ -131,6 +131,13 @@ class Param(Declared):
         """True if a diagram must give a value."""
         return self.default is None
 
+    def given(self, value: Any) -> Any:
+        """Return what `accept` makes of a value, or of the default if it is None."""
+        value = self.default if value is None else value
+        if value is None:
+            raise ParameterError(self.name, f"parameter '{self.name}' is missing; give {self.wanted()}")
+        return self.accept(value)
+
     def accept(self, value: Any) -> Any:
         """Return ``value`` as the methods will see it; ParameterError if type, shape or range is wrong."""
         if self.choices:

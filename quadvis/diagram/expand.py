@@ -6,17 +6,28 @@ import os
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from quadvis.block import Block
+from quadvis.block import Block, ParameterError
 from quadvis.diagram.names import absent, remedy_for
 from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec, InputSpec
 from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.ports import PORTS
 from quadvis.diagram.settings import Settings
 from quadvis.diagram.spec import FileSpec
-from quadvis.diagram.values import substitute
+from quadvis.diagram.values import read_parameter, substitute
 from quadvis.document import YamlNode, YamlScalar
-from quadvis.errors import UNKNOWN, DiagramError, Faults, Place, Unknown, known, quoted, suggestion
+from quadvis.errors import (
+    UNKNOWN,
+    DiagramError,
+    Faults,
+    Place,
+    QuadvisError,
+    Unknown,
+    known,
+    quoted,
+    suggestion,
+)
 from quadvis.library.catalogue import Catalogue, CatalogueError
 from quadvis.machine.missing_file import file_trouble
 from quadvis.units import Unit, UnitError, split_quantity
@@ -200,7 +211,7 @@ class Expansion:
                 elif path in self.blocks:
                     self.faults.add(block.place, f"there is a block '{path}' already", "choose another name")
                 else:
-                    kind = self._find_kind(block, path)
+                    kind = self._find_kind(block, path, values)
                     places = self._places(block, path)
                     self.blocks[path] = FlatBlock(path, block, scope, kind, values, places)
 
@@ -217,13 +228,42 @@ class Expansion:
         settings = self.settings.get(path, {})
         return block.parameter_places | {name: setting.place for name, setting in settings.items()}
 
-    def _find_kind(self, block: BlockSpec, path: str) -> type[Block] | Unknown:
+    def _find_kind(
+        self, block: BlockSpec, path: str, values: Mapping[str, YamlNode | Unknown]
+    ) -> type[Block] | Unknown:
         try:
-            return self.catalogue.find(block.kind)
+            kind: type[Block] | Unknown = self._with_ports(self.catalogue.find(block.kind), block, values)
         except CatalogueError as error:
             self.faults.add(block.kind_place, error.problem, error.remedy)
+            kind = UNKNOWN
+        if kind is UNKNOWN:
             self._unknown.add(path)
-            return UNKNOWN
+        return kind
+
+    def _with_ports(
+        self, kind: type[Block], block: BlockSpec, values: Mapping[str, YamlNode | Unknown]
+    ) -> type[Block] | Unknown:
+        """Return the class with the ports that it has for its parameters, where they depend on some."""
+        given: dict[str, Any] = {}
+        for name in kind.ports_from():
+            node = values.get(name)
+            if node is None:
+                continue
+            read = (
+                self.faults.read(read_parameter, kind.interface.params[name], node)
+                if known(node)
+                else UNKNOWN
+            )
+            if not known(read):
+                return UNKNOWN
+            given[name] = read[0]
+        try:
+            return kind.with_ports(given)
+        except QuadvisError as error:
+            node = values.get(error.parameter) if isinstance(error, ParameterError) else None
+            place = node.place if node is not None and known(node) else block.place
+            self.faults.add(place, "; ".join(str(error).splitlines()))
+        return UNKNOWN
 
     def _expand_part(
         self, scope: Scope, block: BlockSpec, values: dict[str, YamlNode | Unknown], files: tuple[str, ...]

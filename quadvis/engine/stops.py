@@ -16,7 +16,7 @@ from quadvis.engine.program import Program
 from quadvis.errors import QuadvisError, RunError, sentence
 from quadvis.graph.graph import Graph, Node
 from quadvis.machine.failures import MEMORY, arithmetic, is_short_of_memory, surroundings
-from quadvis.machine.source_line import source_line
+from quadvis.machine.source_line import file_of, source_line
 
 SHOWN = 4  # numbers in a message
 SMALLER_STEP = "a smaller solver step may help"
@@ -61,7 +61,7 @@ def _failed(error: Exception, block: Placed, graph: Graph, memory: Memory, time:
         return RunError(reason, block=block.path, time=time)
     outputs = list(block.outputs)
     own_code = node.block.__module__.startswith(OWN_MODULES)
-    place = source_line(error, _file(type(node.block))) if own_code else ""
+    place = source_line(error, file_of(type(node.block))) if own_code else ""
     problem = f"{arithmetic(error)}{f' in {place}' if place else ''}{_inputs(block, memory)}"
     reason = sentence(problem, _remedy(graph, block.path))
     return RunError(reason, block=block.path, port=outputs[0] if len(outputs) == 1 else "", time=time)
@@ -87,13 +87,8 @@ def _reason(error: Exception, block: Block) -> str:
         return MEMORY
     if isinstance(error, RecursionError):
         return surroundings(error)
-    place = source_line(error, _file(type(block)))
+    place = source_line(error, file_of(type(block)))
     return f"{type(error).__name__}: {error}{f' in {place}' if place else ''}"
-
-
-def _file(kind: type[Block]) -> str:
-    """Return the file in which a block's class was written."""
-    return str(getattr(sys.modules.get(kind.__module__), "__file__", ""))
 
 
 def _inputs(block: Placed, memory: Memory) -> str:

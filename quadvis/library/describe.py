@@ -51,7 +51,9 @@ def description(name: str, block: type[Block], width: int | None = None) -> str:
 
 def _tags(block: type[Block]) -> dict[str, str]:
     """Return what makes the block unlike others, in words, and why."""
-    return {tag.replace("_", " "): reason for tag in TAGS if (reason := getattr(block, tag))}
+    tags = {tag.replace("_", " "): reason for tag in TAGS if (reason := getattr(block, tag))}
+    names = block.ports_from()
+    return tags | ({"ports": f"they depend on {', '.join(names)}"} if names else {})
 
 
 def _input_row(port: In, direct: bool) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import traceback
 
 
@@ -14,6 +15,11 @@ def source_line(error: BaseException, file: str) -> str:
     if isinstance(error, SyntaxError) and os.path.abspath(error.filename or "") == whole:
         lines.append(error.lineno)
     return f"{shown(file)}:{lines[-1]}" if lines else ""
+
+
+def file_of(kind: type) -> str:
+    """Return the file in which a class was written; "" if it was in none."""
+    return str(getattr(sys.modules.get(kind.__module__), "__file__", None) or "")
 
 
 def shown(file: str) -> str:

@@ -39,6 +39,9 @@ class Subject:
     inputs: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     test: Any = None
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "block", self.block.with_ports(self.given))
+
     def make(self, **parameters: Any) -> Block:
         """Return the block with some parameters, the others as given or at their defaults.
 

@@ -67,7 +67,7 @@ def _one_block(block: type[Block]) -> Schema:
         "required": required,
     }
     inputs: Schema = {
-        "additionalProperties": False,
+        "additionalProperties": ref("input") if block.ports_from() else False,
         "properties": {
             name: {**ref("input"), "description": _words(port)} for name, port in interface.inputs.items()
         },
