@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, State, reached
+from quadvis.block import Block, In, Out, Param, State, Work, reached
 from quadvis_blocks._craft import RADIO_DELAY
 from quadvis_blocks._delay import check_delay
 
@@ -32,6 +32,7 @@ class TransportDelay(Block):
     since = State(f"float64[{CAPACITY}]", unit="s")
     values = State(f"float64[{CAPACITY},n]")  # the one that arrived last, then those on their way
     waiting = State("int64")
+    arrived = Work("int64")  # the place of the value of now
 
     def check(self) -> None:
         """Refuse a delay in which more values come in than there is room for."""
@@ -45,11 +46,12 @@ class TransportDelay(Block):
 
     def output(self, time: float) -> Any:
         """Return the newest value that has had time to arrive."""
-        return self.values[_arrived(self.since, self.waiting, time - self.delay)]
+        self.arrived = _arrived(self.since, self.waiting, time - self.delay)
+        return self.values[self.arrived]
 
     def update(self, u: Any, time: float) -> None:
         """Send the input on its way, every one of them: what waits must not depend on the values."""
-        first = _arrived(self.since, self.waiting, time - self.delay)
+        first = self.arrived
         if first > 0:
             kept = self.waiting + 1 - first
             self.since[:kept] = self.since[first : first + kept].copy()
