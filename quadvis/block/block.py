@@ -24,7 +24,7 @@ OWN_MODULES = "quadvis_own_blocks."  # before the names of modules that come wit
 METHODS = ("start", "read", "output", "write", "update", "deriv")
 OUTSIDE = ("read", "write")
 PORTS = "ports"
-CHECKS = ("check", "doubts")
+CHECKS = ("check", "check_written", "doubts")
 FILES = ("reads", "read_file", "verify_files")
 TAGS = ("not_replayable", "not_restorable", "harmless")
 RESERVED = {
@@ -138,6 +138,12 @@ class Block:
         That is: parameters that contradict each other or do not go with ``self.period`` (s), and files that
         are not usable. It is called as the block is made, with a period of NaN where that is not known (so
         compare with it such that NaN refuses nothing), and before a run with a period that is another.
+        """
+
+    def check_written(self) -> None:
+        """Refuse files that are there and must not be written over, with ParameterError.
+
+        It is called once all inputs of the diagram are known and found safe; ``open`` looks again.
         """
 
     def reads(self) -> list[str]:

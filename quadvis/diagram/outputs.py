@@ -63,7 +63,17 @@ def check_writers(drafts: Sequence[Draft], sources: Iterable[Path], faults: Faul
                 )
             elif key in taken:
                 faults.add(writer.place, f"{what} is what block '{taken[key]}' writes", "name another one")
+            else:
+                _check_found(blocks[writer.block], writer, faults)
         taken.setdefault(key, writer.block)
+
+
+def _check_found(block: Block, writer: Writer, faults: Faults) -> None:
+    """Report what a block would write over, though it is neither an input nor another output."""
+    try:
+        block.check_written()
+    except QuadvisError as error:
+        faults.add(writer.place, str(error))
 
 
 def check_log(path: str | os.PathLike[str], blocks: Iterable[Block]) -> None:

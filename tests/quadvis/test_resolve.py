@@ -109,7 +109,7 @@ def test_a_folder_that_a_run_writes_is_no_part_of_the_hash(tmp_path: Path) -> No
     before = load(path).hash
     written = path.parent.parent / "runs" / "hand_held"
     written.mkdir(parents=True)
-    (written / "000001.jpg").write_bytes(b"picture")
+    (written / "000001.jpg").write_bytes(b"\xff\xd8\xff, an earlier picture")
     assert load(path).hash == before
 
 

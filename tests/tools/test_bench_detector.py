@@ -125,6 +125,6 @@ def test_the_order_of_corners_does_not_matter_for_their_errors(bench):
 
 def test_the_usual_colour_recipes_find_the_circles_of_a_clean_scene(bench):
     rng, size = np.random.default_rng(2), (320, 240)
-    shot = bench._scenes.shoot(rng, size, pose=draw_pose(rng, size, CONDITIONS["clean"]))
+    shot = bench.stage.shoot(rng, size, pose=draw_pose(rng, size, CONDITIONS["clean"]))
     for find in (bench.hsv, bench.simple_blobs()):
         assert shot.errors(find(shot.pixels)).max() < 0.5

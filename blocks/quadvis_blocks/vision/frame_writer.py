@@ -37,11 +37,9 @@ class FrameWriter(Block, numeric=False):
     seen = State("int64", 0)  # how many new frames there were
 
     def check(self) -> None:
-        """Refuse a folder that is a file, or has files that could be replaced and must not be."""
+        """Refuse a folder that is a file."""
         if Path(self.folder).is_file():
             raise ParameterError("folder", f"folder must be a folder, '{self.folder}' is a file")
-        if Path(self.folder).is_dir():
-            self._check_old()
 
     def open(self) -> None:
         """Make the folder; ParameterError if a file that could be replaced must not be."""
@@ -49,9 +47,12 @@ class FrameWriter(Block, numeric=False):
             Path(self.folder).mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise RunError(f"cannot make the folder '{self.folder}': {error.strerror}") from error
-        self._check_old()
+        self.check_written()
 
-    def _check_old(self) -> None:
+    def check_written(self) -> None:
+        """Refuse files in the folder that would be replaced and must not be."""
+        if not Path(self.folder).is_dir():
+            return
         try:
             old = [path for path in Path(self.folder).iterdir() if re.fullmatch(NAMES, path.name)]
         except OSError as error:

@@ -47,14 +47,12 @@ class VideoWriter(Block, numeric=False):
     due = State("int64", 0)  # pictures up to now; black ones if no frame has told their size
 
     def check(self) -> None:
-        """Refuse what is there and is no video, and formats that are not known."""
+        """Refuse a file that is a folder, and formats that are not known."""
         if self._suffix not in CODECS:
             names = ", ".join(CODECS)
             raise ParameterError("file", f"file must end in one of {names}, got '{Path(self.file).name}'")
         if Path(self.file).is_dir():
             raise ParameterError("file", f"file must be a file, '{self.file}' is a folder")
-        if Path(self.file).exists():
-            self._check_old()
 
     def open(self) -> None:
         """Make the folder; the file is begun with the first frame, which has its size."""
@@ -65,9 +63,12 @@ class VideoWriter(Block, numeric=False):
             Path(self.file).parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise RunError(f"cannot make the folder of '{self.file}': {error.strerror}") from error
-        self._check_old()
+        self.check_written()
 
-    def _check_old(self) -> None:
+    def check_written(self) -> None:
+        """Refuse a file that is there and is no video."""
+        if not Path(self.file).parent.is_dir():
+            return
         try:
             check_output(self.file, self._kind)
         except QuadvisError as error:

@@ -24,11 +24,11 @@ class Clock(DeliveringCamera, numeric=False):
     stamp = Out(unit="s", doc="of the frame on the wire")
 
     def output(self, time):
-        shown = self._arrived(self._frame(time), time)[0]
+        shown = self._deliver(self._frame(time), time)
         return int(shown[SEQUENCE]), shown[STAMP]
 
-    def update(self, time):
-        self._advance(self._frame(time), time)
+    def update(self):
+        self._advance()
 
     def _frame(self, time):
         return self._row(time, []) if self._is_captured() and not self._is_lost(time) else None
