@@ -255,8 +255,14 @@ def _shade(u: Array, v: Array, scene: Scene) -> Singles:
     return shade
 
 
+@lru_cache(maxsize=2)
 def _noise_bank(sigma: float, size: int) -> tuple[Picture, Picture]:
-    """Return whole grey levels to add and to subtract; at each position one of the two is zero."""
+    """Return whole grey levels to add and to subtract; at each position one of the two is zero.
+
+    All cameras of one size and noise share the two arrays, so nobody can write to them.
+    """
     # numpy promises never to change the numbers of RandomState, so a run repeats on other versions too.
     noise = np.rint(sigma * np.random.RandomState(0).standard_normal(size + NOISE_STARTS))
-    return np.clip(noise, 0, 255).astype(np.uint8), np.clip(-noise, 0, 255).astype(np.uint8)
+    more, less = np.clip(noise, 0, 255).astype(np.uint8), np.clip(-noise, 0, 255).astype(np.uint8)
+    more.flags.writeable = less.flags.writeable = False
+    return more, less
