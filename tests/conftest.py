@@ -1,5 +1,6 @@
 """Settings of all tests."""
 
+import gc
 import signal
 
 from hypothesis import settings
@@ -8,5 +9,13 @@ from hypothesis import settings
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # The same examples in every run, and no time limit for one: the machines that run the tests are shared.
-settings.register_profile("quadvis", derandomize=True, deadline=None)
-settings.load_profile("quadvis")
+# The second stage tries more of them: `-m "slow or hypothesis" --hypothesis-profile thorough`.
+settings.register_profile("thorough", derandomize=True, deadline=None)
+settings.register_profile("quick", settings.get_profile("thorough"), max_examples=20)
+settings.load_profile("quick")
+
+
+def pytest_collection_finish() -> None:
+    """Keep the garbage collector from looking through thousands of tests again and again."""
+    gc.collect()
+    gc.freeze()

@@ -82,7 +82,7 @@ def test_what_was_lost_stands_in_the_json(
     assert facts["passed"]
     assert facts["lost"].startswith("cannot write the log 'run.mcap': no space left on device; it lacks ")
     monkeypatch.undo()
-    os.chdir(folder)
+    monkeypatch.chdir(folder)
     assert main(["run", "flight.yaml", "--log", "run.mcap", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["lost"] is None
 
