@@ -22,6 +22,7 @@ import numpy as np
 import yaml
 
 import quadvis
+from quadvis.diagram.diagram import Diagram
 
 DIAGRAMS = Path(__file__).parents[2] / "diagrams"
 FILE = Path(__file__).with_name("golden.json")
@@ -38,10 +39,10 @@ def cases() -> list[tuple[str, str | None]]:
     ]
 
 
-def flown(folder: Path, name: str, variant: str | None) -> Any:
-    """Return the run of a diagram in a copy of their folder; it stops early."""
-    loaded = quadvis.load(folder / name, variant=variant)
-    return quadvis.load(folder / name, variant=variant, stop_time=min(DURATION, loaded.duration)).run()
+def loaded(folder: Path, name: str, variant: str | None) -> Diagram:
+    """Return a diagram in a copy of their folder; it stops early, or when it wants to if that is earlier."""
+    whole = quadvis.load(folder / name, variant=variant)
+    return quadvis.load(folder / name, variant=variant, stop_time=min(DURATION, whole.duration))
 
 
 def mean(values: np.ndarray[Any, Any]) -> float:
@@ -50,23 +51,25 @@ def mean(values: np.ndarray[Any, Any]) -> float:
     return float(np.mean(flat * (1.0 + np.arange(flat.size) % 997 / 997.0))) if flat.size else 0.0
 
 
+def digest(result: Any) -> dict[str, float]:
+    """Return what the golden file holds of each signal of a run."""
+    return {signal: float(f"{mean(result[signal]):.10g}") for signal in result}
+
+
 def facts(folder: Path, name: str, variant: str | None) -> dict[str, Any]:
     """Return what the golden file holds of one diagram."""
-    result = flown(folder, name, variant)
-    return {
-        "hash": quadvis.load(DIAGRAMS / name, variant=variant).hash,
-        "signals": {signal: float(f"{mean(result[signal]):.10g}") for signal in result},
-    }
+    hashed = quadvis.load(DIAGRAMS / name, variant=variant).hash
+    return {"hash": hashed, "signals": digest(loaded(folder, name, variant).run())}
 
 
 def bits(folder: Path, name: str, variant: str | None) -> str:
     """Return the SHA-256 of all signals of a run and of their names."""
-    result, digest = flown(folder, name, variant), hashlib.sha256()
+    result, found = loaded(folder, name, variant).run(), hashlib.sha256()
     for signal in result:
-        digest.update(signal.encode())
-        digest.update(result.times(signal).tobytes())
-        digest.update(result[signal].tobytes())
-    return digest.hexdigest()
+        found.update(signal.encode())
+        found.update(result.times(signal).tobytes())
+        found.update(result[signal].tobytes())
+    return found.hexdigest()
 
 
 def title(name: str, variant: str | None) -> str:

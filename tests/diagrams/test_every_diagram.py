@@ -1,22 +1,25 @@
-"""Every diagram of the repository is checked and flown for two seconds, each variant too."""
+"""Every diagram of the repository, by itself and with each of its variants, is flown for a second and a half.
 
+See golden.py for how to renew the golden file.
+"""
+
+from __future__ import annotations
+
+import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 
 import quadvis
 from quadvis.api import Diagram
 from quadvis.engine.engine import Engine, Snapshot
+from tests.diagrams.golden import DIAGRAMS, FILE, cases, digest, loaded, title
 
-DIAGRAMS = Path(__file__).parents[2] / "diagrams"
-CASES = [
-    (path.name, variant)
-    for path in sorted(DIAGRAMS.glob("*.yaml"))
-    for variant in (None, *yaml.safe_load(path.read_text()).get("variants", {}))
-]
+GOLDEN = json.loads(FILE.read_text())
+CASES = cases()
 
 
 @pytest.fixture(scope="module")
@@ -25,37 +28,55 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return Path(shutil.copytree(DIAGRAMS, tmp_path_factory.mktemp("repository") / "diagrams"))
 
 
-def load(folder: Path, name: str, variant: str | None) -> Diagram:
-    """Return a diagram that stops after two seconds, or when it wants to if that is earlier."""
-    loaded = quadvis.load(folder / name, variant=variant)
-    return quadvis.load(folder / name, variant=variant, stop_time=min(2.0, loaded.duration))
+# Of the module, so that the tests of one diagram follow each other and share its flight.
+@pytest.fixture(scope="module", params=CASES, ids=lambda case: title(*case))
+def case(request: pytest.FixtureRequest) -> tuple[str, str | None]:
+    name, variant = request.param
+    return name, variant
 
 
-@pytest.mark.parametrize(("name", "variant"), CASES)
-def test_every_diagram_gives_all_its_signals_and_repeats_to_the_bit_with_the_same_seed(
-    folder: Path, name: str, variant: str | None
-) -> None:
-    diagram = load(folder, name, variant)
-    first = diagram.run()
-    assert first.duration == diagram.duration
-    for signal in first:
-        times = first.times(signal)
-        assert len(times) == len(first[signal]) > 0 and times[0] >= 0.0 and times[-1] <= diagram.duration
-        assert (np.diff(times) > 0.0).all()
-    again = load(folder, name, variant).run()
-    assert list(again) == list(first)
-    assert all(first[signal].tobytes() == again[signal].tobytes() for signal in first)
+@pytest.fixture(scope="module")
+def diagram(folder: Path, case: tuple[str, str | None]) -> Diagram:
+    return loaded(folder, *case)
+
+
+@pytest.fixture(scope="module")
+def flight(diagram: Diagram) -> Any:
+    return diagram.run()
+
+
+def test_the_golden_file_knows_every_diagram_and_variant() -> None:
+    assert list(GOLDEN) == [title(*case) for case in CASES]
 
 
 def test_the_hover_is_among_them_with_a_variant_for_the_second_method() -> None:
     assert {("hover.yaml", None), ("hover.yaml", "plane")} <= set(CASES)
 
 
-@pytest.mark.parametrize(("name", "variant"), CASES)
-def test_every_diagram_repeats_from_a_snapshot_in_the_same_engine_and_in_a_fresh_one(
-    folder: Path, name: str, variant: str | None
+def test_hash_and_signals_are_those_of_the_golden_file(case: tuple[str, str | None], flight: Any) -> None:
+    name, variant = case
+    golden = GOLDEN[title(name, variant)]
+    assert quadvis.load(DIAGRAMS / name, variant=variant).hash == golden["hash"]
+    assert digest(flight) == pytest.approx(golden["signals"], rel=1e-6, abs=1e-9)
+
+
+def test_every_diagram_gives_all_its_signals_and_repeats_to_the_bit_with_the_same_seed(
+    folder: Path, case: tuple[str, str | None], diagram: Diagram, flight: Any
 ) -> None:
-    diagram = load(folder, name, variant)
+    name, variant = case
+    assert flight.duration == diagram.duration
+    for signal in flight:
+        times = flight.times(signal)
+        assert len(times) == len(flight[signal]) > 0 and times[0] >= 0.0 and times[-1] <= diagram.duration
+        assert (np.diff(times) > 0.0).all()
+    again = quadvis.load(folder / name, variant=variant, stop_time=diagram.duration).run()
+    assert list(again) == list(flight)
+    assert all(flight[signal].tobytes() == again[signal].tobytes() for signal in flight)
+
+
+def test_every_diagram_repeats_from_a_snapshot_in_the_same_engine_and_in_a_fresh_one(
+    diagram: Diagram,
+) -> None:
     engine, fresh = Engine(diagram.graph, diagram.seed), Engine(diagram.graph, diagram.seed)
     half = diagram.ticks // 2
     with engine:
