@@ -272,7 +272,7 @@ start = time.monotonic()
 for row in range(1_000_000):
     elapsed = time.monotonic() - start
     log.write(0, row * 1_000_000, struct.pack("<dq", elapsed, row))
-    print(elapsed, flush=True)
+    print(elapsed, time.monotonic() - start, flush=True)  # before the row was written, and after
     time.sleep(0.001)
 """
 
@@ -290,15 +290,16 @@ def test_a_killed_run_keeps_all_but_the_last_tenth_of_a_second(tmp_path: Path) -
     assert child.stdout is not None
     lines = [child.stdout.readline() for _ in range(400)]  # one in a millisecond at most
     child.send_signal(signal.SIGKILL)
-    written = [float(line) for line in [*lines, *child.stdout.read().split("\n")[:-1]]]
+    lines += child.stdout.read().split("\n")[:-1]
+    begun, done = np.array([line.split() for line in lines], float).T
     child.wait()
     child.stdout.close()
     log = read_log(path)
     assert not log.complete
     assert log.diagram == "name: killed"
     assert log["clock.row"].tolist() == list(range(len(log["clock.row"])))
-    assert log["clock.elapsed"][-1] >= written[-1] - 0.1
-    assert len(log["clock.row"]) >= sum(elapsed < written[-1] - 0.1 for elapsed in written)
+    # However long the process was kept waiting between two rows.
+    assert len(log["clock.row"]) >= (done < begun[-1] - 0.1).sum() > 0
 
 
 def test_the_diagram_of_a_run_that_is_killed_at_once_is_kept(tmp_path: Path) -> None:
