@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 DIAGRAMS = Path(__file__).parents[2] / "diagrams"
 HOVER = DIAGRAMS / "hover.yaml"
 DEGREE = np.pi / 180
-SEEDS = range(1, 6)
+SEEDS = range(1, 4)
 NOMINAL, BIASED = "s0", "s1"  # files in diagrams/sets
 # The paper's law loses the target from the picture, and would then have no figure to compare with.
 WITHOUT_EDGES = {"eyes/camera.field_of_view": "unbounded"}
@@ -72,13 +72,11 @@ def test_pictures_give_the_same_as_projected_circles():
 
 
 def test_half_the_frames_are_enough():
-    found = [figures(fly(seed, noise=BIASED, **{"eyes/camera.drop_rate": "0.5"}))[0] for seed in (1, 2)]
-    assert max(found) <= 0.04
+    assert figures(fly(1, noise=BIASED, stop_time="90 s", **{"eyes/camera.drop_rate": "0.5"}))[0] <= 0.04
 
 
 def test_a_latency_of_two_fifths_of_a_second_costs_little():
-    found = [figures(fly(seed, noise=BIASED, **{"eyes.latency": "400 ms"}))[0] for seed in (1, 2)]
-    assert max(found) <= 0.045
+    assert figures(fly(1, noise=BIASED, stop_time="90 s", **{"eyes.latency": "400 ms"}))[0] <= 0.045
 
 
 @pytest.mark.parametrize(
@@ -94,11 +92,11 @@ def test_a_latency_of_two_fifths_of_a_second_costs_little():
     ids=lambda wrong: next(iter(wrong)),
 )
 def test_the_same_gains_hold_a_craft_and_a_wind_that_are_not_as_the_filters_think(wrong):
-    xy, greatest, height, _, lost = figures(fly(1, noise=BIASED, **wrong))
+    xy, greatest, height, _, lost = figures(fly(1, noise=BIASED, stop_time="90 s", **wrong))
     assert xy <= 0.022 and greatest <= 0.07 and height <= 0.02 and lost == 0
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_three_seconds_without_frames_move_it_by_some_decimetres(seed):
     blackout = {"eyes/camera.blackout": "{value: [60, 3], unit: s}"}
     result = fly(seed, noise=BIASED, stop_time="75 s", **blackout)

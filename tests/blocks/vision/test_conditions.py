@@ -20,10 +20,10 @@ from quadvis_vision.trials.scenes import (
     homography,
     shoot,
 )
+from tests.stages import mostly_slow
 
 COLOURS = Path(__file__).parents[3] / "diagrams" / "calib" / "colours.yaml"
 TARGET = Target(ColourCalibration.load(COLOURS), 0.12, 2.0, 80.0)
-SIZES = [(320, 240), (640, 480)]
 CLEAN, COMBINED = 0.07, 0.10  # px rms, what is asked of centres
 
 
@@ -40,32 +40,34 @@ def judge(size, condition, count, seed=1):
 
 @pytest.mark.parametrize("name", CONDITIONS)
 def test_every_condition_is_mastered(name):
-    right, rms = judge((320, 240), CONDITIONS[name], 6)
+    right, rms = judge((320, 240), CONDITIONS[name], 2)
     assert right == 1
     assert rms <= COMBINED
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize(("size", "count"), [((320, 240), 40), ((640, 480), 12)])
 @pytest.mark.parametrize("name", CONDITIONS)
-def test_in_every_condition_99_of_100_pictures_are_seen_rightly(name, size):
-    right, rms = judge(size, CONDITIONS[name], 100, seed=2)
+def test_in_every_condition_99_of_100_pictures_are_seen_rightly(name, size, count):
+    right, rms = judge(size, CONDITIONS[name], count, seed=2)
     assert right >= 0.99
     assert rms <= (CLEAN if name == "clean" else COMBINED)
 
 
+@pytest.mark.parametrize("count", mostly_slow([2, 8]))
 @pytest.mark.parametrize("covering", [None, (250, 250, 250), (60, 60, 60), (110, 140, 190), (20, 20, 20)])
 @pytest.mark.parametrize("share", [0.15, 0.3, 0.5])
-def test_a_circle_behind_something_of_any_colour_is_missing_and_the_others_are_there(covering, share):
-    right, rms = judge((320, 240), Condition(cover=share, covering=covering), 8)
+def test_a_circle_behind_something_of_any_colour_is_missing_and_the_others_are_there(covering, share, count):
+    right, rms = judge((320, 240), Condition(cover=share, covering=covering), count)
     assert right == 1
     assert rms <= CLEAN
 
 
+@pytest.mark.parametrize("flights", mostly_slow([1, 3]))
 @pytest.mark.parametrize("name", ["clean", "noise 20", "light x0.15", "light x1.7", "combined", "12 decoys"])
-def test_a_target_is_followed_in_bad_conditions(name):
+def test_a_target_is_followed_in_bad_conditions(name, flights):
     rng, squares = np.random.default_rng(3), []
-    for _ in range(2):
+    for _ in range(flights):
         places = None
         for pose in draw_flight(rng, (320, 240), CONDITIONS[name], 8):
             shot = shoot(rng, (320, 240), CONDITIONS[name], pose)
