@@ -14,6 +14,7 @@ import pytest
 from quadvis.block import Block, Frame
 from quadvis.library.catalogue import Catalogue
 from quadvis.testing import drive
+from tests.stages import mostly_slow
 
 ROOT = Path(__file__).parents[2]
 CALIB = ROOT / "diagrams" / "calib"
@@ -128,7 +129,7 @@ def test_a_frame_of_any_kind_does_not_end_a_run(name: str, kind: str, tmp_path: 
     feed(make(name, tmp_path), between((NOT_PICTURES | PICTURES)[kind]))
 
 
-@pytest.mark.parametrize("suffix", ["avi", "mp4", "mkv"])
+@pytest.mark.parametrize("suffix", mostly_slow(["avi", "mp4", "mkv"]))
 @pytest.mark.parametrize("kind", NOT_PICTURES | PICTURES)
 def test_a_frame_of_any_kind_does_not_end_any_video(kind: str, suffix: str, tmp_path: Path) -> None:
     file = tmp_path / f"video.{suffix}"
@@ -147,7 +148,7 @@ def test_stamps_and_numbers_of_any_kind_do_not_end_a_run(name: str, tmp_path: Pa
     feed(make(name, tmp_path), frames)
 
 
-@pytest.mark.parametrize("format", ["png", "jpg"])
+@pytest.mark.parametrize("format", mostly_slow(["png", "jpg"]))
 @pytest.mark.parametrize("kind", NOT_PICTURES)
 def test_what_is_not_a_picture_is_not_written(kind: str, format: str, tmp_path: Path) -> None:
     feed(make("vision.frame_writer", tmp_path, format=format), between(NOT_PICTURES[kind]))

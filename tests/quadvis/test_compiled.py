@@ -1,5 +1,6 @@
 import math
 from fractions import Fraction
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from quadvis.block import Block, In, Out, Param, Random, State
 from quadvis.engine.layout import TIME, Placed
 from quadvis.engine.memory import Memory, Record, Slot
 from quadvis.testing.alone import alone, parameter_sizes
+from tests.stages import mostly_slow
 
 numba = pytest.importorskip("numba")
 
@@ -69,9 +71,15 @@ def slots(block: Block, placed: Placed, method: str) -> tuple[list[Slot], list[S
     return arguments, list(placed.outputs.values()) if method == "output" else []
 
 
-@pytest.mark.parametrize("shape", [(), (3,), (2, 2)])
-@pytest.mark.parametrize("mode", ["up", "down"])
-@pytest.mark.parametrize("method", ["start", "output", "update"])
+@pytest.mark.parametrize(
+    ("method", "mode", "shape"),
+    mostly_slow(
+        [
+            ("output", "up", (3,)), ("output", "down", ()), ("output", "down", (2, 2)),
+            *product(["start", "update"], ["down"], [(3,), (), (2, 2)]),
+        ]
+    ),
+)  # fmt: skip
 def test_a_compiled_method_does_to_memory_what_the_interpreted_one_does(
     method: str, mode: str, shape: tuple
 ) -> None:

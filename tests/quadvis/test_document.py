@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar, dump_yaml, parse_yaml, read_yaml, reader
@@ -391,7 +391,6 @@ pieces = st.sampled_from(
 )  # fmt: skip
 
 
-@settings(max_examples=400)
 @given(st.one_of(st.text(), st.lists(pieces, max_size=25).map("".join)))
 def test_any_text_is_read_or_refused(text):
     faults = Faults()

@@ -11,6 +11,7 @@ import time
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -87,12 +88,17 @@ class Picture:
     texts: list[Rectangle] = field(default_factory=list)
 
 
+@cache  # the same few words stand in most pictures
+def length(text: str, size: float, weight: str) -> float:
+    font = FontProperties(family="DejaVu Sans", weight=weight)
+    path = TextPath((0, 0), text.replace("$", "S"), size=size, prop=font)
+    return float(path.get_extents().width) if len(path.vertices) else 0.0
+
+
 def extent(text: ElementTree.Element) -> Rectangle:
     """Where a text stands if it is set in DejaVu Sans, the widest of the usual sans-serif faces."""
     size = float(text.get("font-size", "0"))
-    font = FontProperties(family="DejaVu Sans", weight=text.get("font-weight", "normal"))
-    path = TextPath((0, 0), (text.text or " ").replace("$", "S"), size=size, prop=font)
-    width = float(path.get_extents().width) if len(path.vertices) else 0.0
+    width = length(text.text or " ", size, text.get("font-weight", "normal"))
     x, y = float(text.get("x", "0")), float(text.get("y", "0"))
     left = {"start": x, "middle": x - width / 2, "end": x - width}[text.get("text-anchor", "start")]
     return Rectangle(left, y - 0.76 * size, left + width, y + 0.1 * size)
@@ -505,7 +511,7 @@ def test_hover_is_well_drawn_by_the_layout_for_large_diagrams() -> None:
 
 
 @pytest.mark.usefixtures("simple")
-@settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(suppress_health_check=list(HealthCheck))
 @given(diagrams())
 def test_any_diagram_is_well_drawn_by_the_layout_for_large_ones(
     diagram: tuple[list[DrawnBlock], list[DrawnWire]],

@@ -28,6 +28,7 @@ from quadvis.output.log_reader import read_log
 from quadvis.output.plot import plot_figures, plot_log
 from quadvis.output.recording import RecordedBlock, RecordedPort
 from quadvis.units import Unit
+from tests.stages import mostly_slow
 
 Sheets = list[Any]
 
@@ -143,7 +144,7 @@ def sheets(monkeypatch: pytest.MonkeyPatch) -> Sheets:
 
     def keep(sheet: Any, *arguments: Any, **options: Any) -> None:
         found.append(sheet)
-        save(sheet, *arguments, **options)
+        save(sheet, *arguments, **options | {"dpi": 20})  # nobody looks at the pixels
 
     monkeypatch.setattr(figure, "savefig", keep)
     return found
@@ -485,22 +486,22 @@ def mixed(count: int, title: str = "") -> Panel:
 
 
 CROWDED = {
-    "12 short": (of(SHORT, 12),),
     "12 long": (of(LONG, 12, "all of them"),),
+    "three of 12": (of(LONG, 12, "a", 0.0), of(SHORT, 12, "b"), of(ANOTHER, 12, "c", 0.0)),
+    "nothing shared, two": (mixed(10, "left"), mixed(6, "right")),
+    "one word": (Panel((trace("a.y[0]", "x" * 300), trace("a.y[1]", "_y" * 100))), of(SHORT, 1)),
+    "12 short": (of(SHORT, 12),),
     "40 short": (of(SHORT, 40, "forty"),),
     "40 long": (of(LONG, 40, reference=0.0),),
     "two of 12": (of(LONG, 12, "left", 0.0), of(SHORT, 12, "right", 0.0)),
     "two of 40": (of(LONG, 40, "left"), of(ANOTHER, 40, "right")),
-    "three of 12": (of(LONG, 12, "a", 0.0), of(SHORT, 12, "b"), of(ANOTHER, 12, "c", 0.0)),
     "three with long titles": tuple(of(name, 3, "a title that is long " * 5) for name in (SHORT, LONG) * 2),
     "nothing shared": (mixed(6),),
-    "nothing shared, two": (mixed(10, "left"), mixed(6, "right")),
     "nothing shared, three": (mixed(3), mixed(6), mixed(20)),
-    "one word": (Panel((trace("a.y[0]", "x" * 300), trace("a.y[1]", "_y" * 100))), of(SHORT, 1)),
 }
 
 
-@pytest.mark.parametrize("panels", CROWDED.values(), ids=CROWDED)
+@pytest.mark.parametrize("panels", mostly_slow([(panels,) for panels in CROWDED.values()], 4), ids=CROWDED)
 def test_legends_fit_and_no_two_curves_look_alike(
     panels: tuple[Panel, ...], sheets: Sheets, tmp_path: Path
 ) -> None:

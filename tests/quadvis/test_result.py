@@ -14,6 +14,7 @@ import pytest
 from quadvis.api import Diagram, load, load_text
 from quadvis.errors import QuadvisError
 from quadvis.output.log_reader import read_log
+from tests.stages import mostly_slow
 
 INNER = """\
 quadvis: 1
@@ -213,8 +214,9 @@ def growth(text: str, log: str, seconds: int) -> float:
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="this system has no /proc")
-@pytest.mark.parametrize("judged", [True, False])
-@pytest.mark.parametrize("logged", [True, False])
+@pytest.mark.parametrize(
+    ("logged", "judged"), mostly_slow([(True, True), (False, True), (True, False), (False, False)])
+)
 def test_memory_does_not_grow_with_a_run(judged: bool, logged: bool, tmp_path: Path) -> None:
     log = str(tmp_path / "run.mcap") if logged else ""
     # 40,000 ticks; as lists of rows they took 18 MB.
@@ -223,9 +225,8 @@ def test_memory_does_not_grow_with_a_run(judged: bool, logged: bool, tmp_path: P
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="this system has no /proc")
-@pytest.mark.parametrize("logged", [True, False])
-def test_a_million_ticks_take_less_than_sixty_megabytes(logged: bool, tmp_path: Path) -> None:
-    assert growth(LONG + JUDGED, str(tmp_path / "run.mcap") if logged else "", 1000) < 60
+def test_a_million_ticks_take_less_than_sixty_megabytes(tmp_path: Path) -> None:
+    assert growth(LONG + JUDGED, str(tmp_path / "run.mcap"), 1000) < 60
 
 
 def test_rows_in_memory_are_packed(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from quadvis.errors import QuadvisError, RunError
 from quadvis.machine import exits as shell
 from quadvis.machine.failures import MEMORY
 from quadvis.output.log_reader import read_log
+from tests.stages import mostly_slow
 
 TOOLS = Path(__file__).parents[2] / "tools"
 LONG, DEEP = "a" * 300, "b/" * 3000
@@ -49,15 +50,6 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     signal.signal(signal.SIGTERM, before[0])
     signal.signal(signal.SIGINT, before[1])
     sys.unraisablehook = before[2]
-
-
-def mostly_slow(cases: Sequence[Any], quick: int = 3) -> list[Any]:
-    """Have the first cases tried always, all others in the second stage: each starts processes."""
-    entries = [case if isinstance(case, tuple) else (case,) for case in cases]
-    return [
-        pytest.param(*entry, marks=pytest.mark.slow if number >= quick else ())
-        for number, entry in enumerate(entries)
-    ]
 
 
 def command(
@@ -182,8 +174,11 @@ def test_names_longer_than_the_system_takes_are_a_sentence(
 
 @pytest.mark.parametrize(
     ("closed", "code"),
-    [(">&-", 0), ("2>&-", 0), (">&- 2>&-", 0), ("<&-", 0), ("<&- >&- 2>&-", 0), (">/dev/full", 1),
-     (">/dev/full 2>/dev/full", 1), ("2>/dev/full", 0), (">&- 2>/dev/full", 0), (">/dev/full 2>&-", 1)],
+    mostly_slow(
+        [("<&- >&- 2>&-", 0), (">/dev/full", 1), (">&-", 0), ("2>&-", 0), (">&- 2>&-", 0), ("<&-", 0),
+         (">/dev/full 2>/dev/full", 1), ("2>/dev/full", 0), (">&- 2>/dev/full", 0), (">/dev/full 2>&-", 1)],
+        2,
+    ),
 )  # fmt: skip
 def test_a_run_without_its_streams_leaves_a_whole_log(closed: str, code: int) -> None:
     done = command(f"quadvis run step.yaml --log step.mcap {closed}")
@@ -197,7 +192,7 @@ def test_a_run_without_its_streams_leaves_a_whole_log(closed: str, code: int) ->
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 @pytest.mark.parametrize(
-    "words", ["list", "schema", "--help", "draw step.yaml -o -", "check step.yaml --json"]
+    "words", mostly_slow(["check step.yaml --json", "list", "schema", "--help", "draw step.yaml -o -"])
 )
 def test_a_full_standard_output_is_one_sentence(words: str, unbuffered: str) -> None:
     done = command(f"quadvis {words} >/dev/full", PYTHONUNBUFFERED=unbuffered)
@@ -459,13 +454,13 @@ def test_figures_are_the_same_whatever_surrounds_matplotlib(name: str, plain: st
 
 @pytest.mark.parametrize(
     "settings",
-    [
+    mostly_slow([
         {"text.usetex": True}, {"figure.dpi": 1e5}, {"savefig.dpi": 1e5}, {"savefig.bbox": "tight"},
         {"font.family": "serif"}, {"font.size": 40.0}, {"axes.facecolor": "red"}, {"lines.linewidth": 20.0},
         {"path.sketch": (10, 100, 2)}, {"savefig.transparent": True}, {"figure.autolayout": True},
         {"axes.prop_cycle": "cycler('color', ['r'])"}, {"xtick.labelsize": 1.0}, {"legend.loc": "center"},
         {"text.hinting": "none", "text.hinting_factor": 1}, {"figure.facecolor": "black"},
-    ],
+    ], 5),
     ids=str,
 )  # fmt: skip
 def test_what_a_caller_has_set_in_matplotlib_changes_no_figure_and_is_kept(

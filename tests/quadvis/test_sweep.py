@@ -32,6 +32,7 @@ from quadvis.sweeps.picture import draw
 from quadvis.sweeps.summary import SweepLine, duration_text, sweep_lines
 from quadvis.sweeps.table import read_rows
 from quadvis.sweeps.worker import Job, Row, perform
+from tests.stages import mostly_slow
 
 ROOT = Path(__file__).parents[2]
 HUGE = "1e308"  # a factor that makes infinity of the wave
@@ -437,7 +438,7 @@ PICTURES: list[dict[str, Any]] = [
 ]
 
 
-@pytest.mark.parametrize("over", PICTURES, ids=lambda over: "-".join(over))
+@pytest.mark.parametrize("over", mostly_slow(PICTURES, 2), ids=lambda over: "-".join(over))
 def test_the_picture_is_a_png_whatever_is_swept_over(over: dict[str, Any], here: list[int]) -> None:
     table = quadvis.sweep("loop.yaml", over)
     draw(table, Path("x.png"))
@@ -513,21 +514,22 @@ def gone(pid: int) -> bool:
 linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes in /proc")
 
 
-@pytest.mark.parametrize("kind", ["csv", "parquet"])
-def test_the_table_is_the_same_to_the_bit_for_any_number_of_workers(kind: str, here: list[int]) -> None:
+@pytest.mark.parametrize(
+    ("kind", "workers"), mostly_slow([("csv", "3"), ("csv", "1"), ("parquet", "1"), ("parquet", "3")])
+)
+def test_the_table_is_the_same_to_the_bit_for_any_number_of_workers(
+    kind: str, workers: str, here: list[int]
+) -> None:
     if kind == "parquet":
         pytest.importorskip("pyarrow")
     over = ["law.factor=1,1e308", "size=1 m,9e9 m", "seed=0..3"]
     quadvis.sweep("loop.yaml", over, output=f"here.{kind}")
-    contents = {Path(f"here.{kind}").read_bytes()}
-    for workers in ("1", "3"):
-        process = quadvis_sweep(
-            "loop.yaml", *(f"--over={text}" for text in over), "--workers", workers, "-o", f"{workers}.{kind}"
-        )
-        _, told = process.communicate(timeout=120)
-        assert (process.returncode, told) == (1, "")
-        contents.add(Path(f"{workers}.{kind}").read_bytes())
-    assert len(contents) == 1
+    process = quadvis_sweep(
+        "loop.yaml", *(f"--over={text}" for text in over), "--workers", workers, "-o", f"there.{kind}"
+    )
+    _, told = process.communicate(timeout=120)
+    assert (process.returncode, told) == (1, "")
+    assert Path(f"here.{kind}").read_bytes() == Path(f"there.{kind}").read_bytes()
 
 
 def test_a_script_needs_no_guard_and_its_environment_is_left_alone() -> None:
@@ -556,6 +558,9 @@ def test_a_worker_has_one_thread_for_each_library() -> None:
         assert threads.result() == 1
 
 
+INTERRUPTED = "interrupted\n{} of 10 runs are finished and in x.csv; --resume does the rest\n"
+
+
 def long_runs(seconds: int) -> None:
     Path("long.yaml").write_text(LOOP.replace("0.95 s", f"{seconds} s"))
 
@@ -563,8 +568,7 @@ def long_runs(seconds: int) -> None:
 @linux
 @pytest.mark.parametrize(
     ("number", "code", "words"),
-    [(signal.SIGINT, 130, "interrupted\n{} of 10 runs are finished and in x.csv; --resume does the rest\n"),
-     (signal.SIGHUP, 129, ""), (signal.SIGTERM, 143, "")],
+    mostly_slow([(signal.SIGINT, 130, INTERRUPTED), (signal.SIGHUP, 129, ""), (signal.SIGTERM, 143, "")]),
 )  # fmt: skip
 def test_what_is_finished_when_a_sweep_is_ended_stays_and_resuming_gives_the_bytes_of_one_go(
     number: signal.Signals, code: int, words: str, here: list[int]

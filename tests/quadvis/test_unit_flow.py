@@ -9,6 +9,7 @@ import pytest
 
 from quadvis.api import Diagram, load_text
 from quadvis.errors import DiagramError
+from tests.stages import mostly_slow
 
 HEAD = "quadvis: 1\nname: case\nrates: {c: 10 Hz}\nsolver: {step: 100 ms}\nstop_time: 1 s\nblocks:\n"
 RATE = "  per_second: {block: sources.step, rate: c, with: {after: 1 1/s}}\n"
@@ -144,7 +145,7 @@ def random_blocks(rng: random.Random) -> list[str]:
     return lines
 
 
-@pytest.mark.parametrize("seed", range(150))
+@pytest.mark.parametrize("seed", mostly_slow(range(150), 30))
 def test_the_order_of_the_blocks_does_not_matter(seed: int) -> None:
     rng = random.Random(seed)
     lines = random_blocks(rng)

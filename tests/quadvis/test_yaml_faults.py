@@ -12,6 +12,7 @@ import yaml
 from quadvis.document import parse_yaml, reader
 from quadvis.document.composer import MAX_DEPTH
 from quadvis.errors import DiagramError, Faults
+from tests.stages import mostly_slow
 
 LOADERS = [yaml.SafeLoader, *([yaml.CSafeLoader] if yaml.__with_libyaml__ else [])]
 
@@ -199,7 +200,7 @@ HARD = [
 ]
 
 
-@pytest.mark.parametrize("piece", HARD)
+@pytest.mark.parametrize("piece", mostly_slow(HARD, 2))
 def test_looking_for_the_cause_takes_time_in_proportion_to_the_text(piece: str) -> None:
     def cpu(count: int) -> float:
         text = "z: @\n" + piece * count

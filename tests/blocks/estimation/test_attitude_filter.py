@@ -8,6 +8,7 @@ from scipy.stats import chi2
 
 from quadvis.testing import Driven, drive
 from quadvis_blocks.estimation.attitude_filter import AttitudeFilter
+from tests.stages import mostly_slow
 
 STEP = 0.01
 RATE = "100 Hz"
@@ -64,9 +65,10 @@ def test_in_the_long_run_its_covariance_is_that_of_the_algebraic_riccati_equatio
     assert result.covariance[-1] == pytest.approx(prior - gain @ SIGHT @ prior, rel=1e-3)
 
 
-def test_its_errors_are_as_large_as_its_covariance_says() -> None:
+@pytest.mark.parametrize("count", mostly_slow([16, 60]))
+def test_its_errors_are_as_large_as_its_covariance_says(count: int) -> None:
     runs = []
-    for seed in range(60):
+    for seed in range(count):
         states, torque, angle, gyro = turn(10 + seed, 150)
         runs.append((states, estimate(angle, gyro, torque)))
     low, high = chi2.ppf([0.0005, 0.9995], 4 * len(runs))

@@ -8,6 +8,7 @@ from scipy.stats import chi2
 
 from quadvis.testing import Driven, drive
 from quadvis_blocks.estimation.position_filter import PositionFilter
+from tests.stages import mostly_slow
 
 STEP = 0.05
 RATE = "20 Hz"
@@ -136,14 +137,11 @@ def test_a_stamp_between_ticks_counts_for_its_instant() -> None:
     assert result.velocity[-1] == pytest.approx([2.0, 0.0, 0.0], abs=1e-4)
 
 
-RUNS = 60
-
-
-@pytest.fixture(scope="module")
-def runs() -> list[tuple[np.ndarray, Driven]]:
+@pytest.fixture(scope="module", params=mostly_slow([20, 60]))
+def runs(request: pytest.FixtureRequest) -> list[tuple[np.ndarray, Driven]]:
     """Flights drawn from the filter's own model, with frames at 10 Hz and 0.15 s late."""
     found = []
-    for seed in range(RUNS):
+    for seed in range(request.param):
         states, known = flight(100 + seed, 80)
         position, stamp = frames(states, latency=3, every=2, seed=100 + seed)
         found.append((states, estimate(known, position, stamp)))
@@ -158,13 +156,13 @@ def test_its_errors_are_as_large_as_its_covariance_says(runs: list[tuple[np.ndar
             found = np.stack([result.estimate[tick], result.velocity[tick], result.disturbance[tick]], axis=1)
             for off, covariance in zip(found - states[tick], result.covariance[tick], strict=True):
                 total += off @ np.linalg.solve(covariance, off)
-        low, high = chi2.ppf([0.0005, 0.9995], 9 * RUNS)
+        low, high = chi2.ppf([0.0005, 0.9995], 9 * len(runs))
         assert low < total < high
 
 
 def test_its_innovations_are_as_large_as_it_expects(runs: list[tuple[np.ndarray, Driven]]) -> None:
     nis = np.concatenate([result.nis[np.isfinite(result.nis)] for _, result in runs])
-    assert len(nis) == 38 * RUNS + RUNS  # 39 frames reach the 80 ticks
+    assert len(nis) == 39 * len(runs)  # 39 frames reach the 80 ticks
     low, high = chi2.ppf([0.0005, 0.9995], 3 * len(nis))
     assert low < nis.sum() < high
     assert np.mean(nis > chi2.ppf(0.95, 3)) == pytest.approx(0.05, abs=4 * math.sqrt(0.05 / len(nis)))

@@ -13,6 +13,7 @@ from quadvis.block import ParameterError
 from quadvis.testing import drive
 from quadvis_blocks.plant import dryden
 from quadvis_blocks.plant.dryden import Dryden
+from tests.stages import mostly_slow
 
 FOOT, KNOT = 0.3048, 1852 / 3600
 # In closed form: correlations of the spectra with f, a lag over the scale time L / V, and g of the sides.
@@ -57,10 +58,9 @@ def test_its_standard_deviations_are_the_published_ones(altitude: float, wind_sp
     assert np.abs(np.corrcoef(wind.T) - np.eye(3)).max() < 4 / math.sqrt(4000)
 
 
-@pytest.mark.parametrize("rate", [1.0, 20.0])
-def test_its_correlations_are_those_of_the_spectra_at_any_rate(rate: float) -> None:
+@pytest.mark.parametrize(("rate", "seconds"), mostly_slow([(1.0, 3000), (20.0, 400), (20.0, 3000)], 2))
+def test_its_correlations_are_those_of_the_spectra_at_any_rate(rate: float, seconds: int) -> None:
     sigma, scale = published(6.0, 5.0) / np.array([[1.0], [10.0]])  # scale times for an airspeed of 10 m/s
-    seconds = 3000
     wind = blow(round(seconds * rate), rate=rate, airspeed=10.0) / sigma
     for axis, forget in enumerate(scale):
         correlation = CORRELATION[min(axis, 1)]
@@ -70,10 +70,11 @@ def test_its_correlations_are_those_of_the_spectra_at_any_rate(rate: float) -> N
             assert found == pytest.approx(correlation(lag / forget), abs=4 * math.sqrt(2 * forget / seconds))
 
 
-def test_its_power_densities_are_the_published_ones() -> None:
+@pytest.mark.parametrize("pieces", mostly_slow([16, 60]))
+def test_its_power_densities_are_the_published_ones(pieces: int) -> None:
     sigma, scale = published(15.0, 8.0)
     scale = scale / 20.0
-    rate, pieces = 20.0, 60
+    rate = 20.0
     wind = blow(pieces * 1024, rate=rate, altitude=15.0, wind_speed=8.0, airspeed=20.0)
     frequency, power = scipy.signal.welch(wind, fs=rate, nperseg=2048, axis=0)
     bands = np.geomspace(0.05, 2.0, 9)  # well below the 10 Hz above which sampling folds the tail back

@@ -6,12 +6,13 @@ import pytest
 from quadvis.block import ParameterError
 from quadvis.testing import drive
 from quadvis_blocks.plant.gust import Gust
+from tests.stages import mostly_slow
 
 
-@pytest.mark.parametrize("rate", [2, 20])
-def test_it_has_its_deviation_mean_and_correlation_at_any_rate(rate: int) -> None:
-    wind = drive(Gust(rms=(0.2, 0.5, 0.0), mean=(1.0, 0.0, -1.0)), rate=rate, steps=2000 * rate).wind
-    samples = 2000 / (2 * 2.0)  # independent ones in the run: length over twice the correlation time
+@pytest.mark.parametrize(("rate", "seconds"), mostly_slow([(2, 2000), (20, 400), (20, 2000)], 2))
+def test_it_has_its_deviation_mean_and_correlation_at_any_rate(rate: int, seconds: int) -> None:
+    wind = drive(Gust(rms=(0.2, 0.5, 0.0), mean=(1.0, 0.0, -1.0)), rate=rate, steps=seconds * rate).wind
+    samples = seconds / (2 * 2.0)  # independent ones in the run: length over twice the correlation time
     assert wind.mean(axis=0) == pytest.approx([1.0, 0.0, -1.0], abs=4 * 0.5 / math.sqrt(samples))
     assert wind.std(axis=0) == pytest.approx([0.2, 0.5, 0.0], rel=4 / math.sqrt(2 * samples))
     gust = wind[:, 1]

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from quadvis.errors import QuadvisError
 from quadvis_vision.trials import comparison
 from quadvis_vision.trials.comparison import Poses
+from tests.stages import mostly_slow
 
 
 def poses(values, name="a"):
@@ -82,7 +83,7 @@ def test_a_missing_pose_is_a_dash_and_nothing_is_minus_zero():
     assert lines[4].split() == ["2", *["0.0"] * 6]
 
 
-@pytest.mark.parametrize("count", [1, 30, 200])
+@pytest.mark.parametrize("count", mostly_slow([30, 1, 200]))
 def test_the_figure_shows_every_method(tmp_path, count):
     methods = [random_poses(count, name, seed) for seed, name in enumerate("abc")]
     methods[1].values[::2] = math.nan

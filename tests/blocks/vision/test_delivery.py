@@ -12,6 +12,7 @@ from quadvis.testing import drive
 from quadvis_blocks.vision._delayed_camera import SEQUENCE, STAMP, DeliveringCamera
 from quadvis_blocks.vision.geometric_camera import GeometricCamera
 from quadvis_blocks.vision.rendered_camera import RenderedCamera
+from tests.stages import mostly_slow
 
 CALIBRATION = str(Path(__file__).parents[3] / "diagrams" / "calib" / "camera.yaml")
 HOVER = {"position": [0.1, -0.2, 1.4], "attitude": [0.0, 0.0, 0.0]}
@@ -91,9 +92,9 @@ def test_of_frames_that_arrive_between_two_ticks_the_last_to_arrive_is_shown():
     assert len(set(coarse.sequence.tolist())) < 700  # the others were overtaken unseen
 
 
+@pytest.mark.parametrize("count", mostly_slow([6000, 30000]))
 @pytest.mark.parametrize(("rate", "burst"), [(0.2, 1.0), (0.2, 5.0), (0.6, 3.0)])
-def test_losses_have_their_share_and_their_runs_the_mean_length(rate, burst):
-    count = 30000
+def test_losses_have_their_share_and_their_runs_the_mean_length(rate, burst, count):
     arrived = np.diff(clock(count, drop_rate=rate, drop_burst=burst).sequence, prepend=0) != 0
     memory = 1 - 1 / burst  # correlation of neighbouring frames of the chain
     spread = math.sqrt(rate * (1 - rate) / count * (1 + memory) / (1 - memory))

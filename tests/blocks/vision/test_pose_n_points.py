@@ -272,7 +272,6 @@ def test_unless_told_otherwise_a_block_is_the_method_of_the_paper_alone(method):
 
 @pytest.mark.parametrize("method", [PoseNPoints, PosePlane])
 @pytest.mark.parametrize("refine", ["none", "gauss_newton"])
-@settings(max_examples=40)
 @given(pose=poses)
 def test_exact_ellipses_give_the_pose_back_if_their_radius_is_known(method, refine, pose):
     assume(camera_points(pose)[:, 2].min() > 0.5)
