@@ -393,7 +393,7 @@ def test_a_long_chain_written_backwards_is_checked_in_linear_time(tmp_path: Path
         return pstats.Stats(profile).total_calls  # type: ignore[attr-defined]
 
     calls(10)
-    assert calls(1600) < 1.2 * 8 * calls(200)
+    assert calls(800) < 1.2 * 8 * calls(100)
 
 
 # Everything else.

@@ -24,6 +24,7 @@ import quadvis.output.elkjs
 from quadvis.errors import QuadvisError
 from quadvis.output.draw import DrawnBlock, DrawnWire, draw
 from quadvis.output.elkjs import LayoutError
+from tests.stages import mostly_slow
 
 SVG = "{http://www.w3.org/2000/svg}"
 TASKS = {
@@ -617,10 +618,10 @@ def covered(area: Rectangle, size: float = 250.0) -> list[tuple[int, int]]:
 
 @pytest.mark.parametrize(
     ("make", "count"),
-    [
-        (chain, 1000), (chain, 252), (ring, 400), (apart, 4000), (apart, 251), (fan, 500), (funnel, 300),
-        (tree, 600), (pairs, 700), (parts, 300), (nest, 300), (delays, 300), (tangle, 300),
-    ],
+    mostly_slow([
+        (chain, 252), (ring, 400), (apart, 251), (nest, 300), (delays, 300), (tangle, 300), (chain, 1000),
+        (apart, 4000), (fan, 500), (funnel, 300), (tree, 600), (pairs, 700), (parts, 300),
+    ], 6),
     ids=lambda value: getattr(value, "__name__", str(value)),
 )  # fmt: skip
 def test_a_large_diagram_is_well_drawn_without_the_engine(
@@ -634,6 +635,7 @@ def test_a_large_diagram_is_well_drawn_without_the_engine(
         assert 0.4 < size.right / size.bottom < 6.0
 
 
+@pytest.mark.slow
 def test_the_time_of_a_large_drawing_grows_with_it_and_no_faster() -> None:
     def cpu(count: int) -> float:
         blocks, wires = chain(count)

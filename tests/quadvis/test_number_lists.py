@@ -108,6 +108,7 @@ def test_a_diagram_is_the_same_either_way(
     assert loaded() == whole
 
 
+@pytest.mark.slow
 def test_many_numbers_cost_less_than_half_of_as_many_nodes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -201,7 +201,7 @@ def test_a_ceiling_full_of_dots_does_not_hide_the_target():
 def test_pictures_without_the_target_are_never_taken_for_it():
     rng = np.random.default_rng(16)
     wrong = 0
-    for _ in range(40):
+    for _ in range(12):
         picture, _ = scene((0, 0, 3.0, 0, 0, 0), missing=range(4))
         for k in range(10):
             place, size = rng.uniform((20, 20), (WIDTH - 20, HEIGHT - 20)), rng.uniform(6, 22)
