@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 
 import cv2
@@ -22,6 +23,7 @@ from quadvis.errors import DiagramError, QuadvisError
 from quadvis.machine.files import LOG, Claim, Kind, file_name, open_output, reading, write_output
 from quadvis.machine.interrupts import ENDS
 from quadvis.output.log_reader import read_log
+from tests.stages import mostly_slow
 
 LOOP = """\
 quadvis: 1
@@ -95,9 +97,12 @@ def named(source: str, how: str, target: str) -> str:
 # commands
 
 
-@pytest.mark.parametrize("how", ["same", "spelling", "symbolic", "hard"])
+# A drawing takes half a second, also one that is refused.
+@pytest.mark.parametrize(
+    ("command", "how"),
+    mostly_slow(list(product(["run --log", "draw -o"], ["same", "spelling", "symbolic", "hard"])), 5),
+)
 @pytest.mark.parametrize("source", INPUTS)
-@pytest.mark.parametrize("command", ["run --log", "draw -o"])
 def test_no_command_writes_over_what_it_reads(
     command: str, source: str, how: str, project: Path, capsys: Captured
 ) -> None:
@@ -111,8 +116,13 @@ def test_no_command_writes_over_what_it_reads(
     assert contents(project) == before
 
 
-@pytest.mark.parametrize("content", [b"notes\n", b"quadvis: 1\n", b"\x89HDF\r\n", b"%PDF-1.4", b"[1]"])
-@pytest.mark.parametrize("command", ["run loop.yaml --log", "draw loop.yaml -o", "schema -o"])
+CONTENTS = [b"notes\n", b"quadvis: 1\n", b"\x89HDF\r\n", b"%PDF-1.4", b"[1]"]
+
+
+@pytest.mark.parametrize(
+    ("command", "content"),
+    mostly_slow(list(product(["run loop.yaml --log", "schema -o", "draw loop.yaml -o"], CONTENTS)), 11),
+)
 def test_a_file_of_another_kind_stays(command: str, content: bytes, project: Path, capsys: Captured) -> None:
     Path("out").write_bytes(content)
     before = contents(project)

@@ -144,7 +144,7 @@ def sheets(monkeypatch: pytest.MonkeyPatch) -> Sheets:
 
     def keep(sheet: Any, *arguments: Any, **options: Any) -> None:
         found.append(sheet)
-        save(sheet, *arguments, **options | {"dpi": 20})  # nobody looks at the pixels
+        save(sheet, *arguments, **options)
 
     monkeypatch.setattr(figure, "savefig", keep)
     return found
