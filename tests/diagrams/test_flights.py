@@ -38,7 +38,7 @@ def jumps(result: Any) -> np.ndarray:
     return np.abs(np.diff(controls, axis=0)) * changed
 
 
-@pytest.mark.parametrize("variant", [None, "fused"])
+@pytest.mark.parametrize("variant", mostly_slow([None, "fused"]))
 def test_a_take_over_meets_what_its_diagram_expects(variant: str | None) -> None:
     assert fly("takeover", variant).passed  # tests/test_readmes.py flies all the others in the second stage
 
@@ -66,7 +66,7 @@ def test_a_blackout_of_eight_seconds_ends_softly_on_the_ground() -> None:
     assert result["supervision/landing.landed"][-1]
 
 
-@pytest.mark.parametrize("variant", [None, "fused"])
+@pytest.mark.parametrize("variant", mostly_slow([None, "fused"]))
 def test_no_control_jumps_in_a_take_over_by_stick_or_by_switch(variant: str | None) -> None:
     found = jumps(fly("takeover", variant))
     assert found.max() == 0.0

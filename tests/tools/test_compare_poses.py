@@ -93,6 +93,7 @@ def test_both_methods_of_the_paper_find_the_same_attitude(tmp_path):
     assert np.array(pair["z_ratios"]) == pytest.approx(1, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_folder_of_any_length_is_played_to_its_end(tmp_path):
     folder = tmp_path / "pictures: 7 #1"
     folder.mkdir()
@@ -105,6 +106,7 @@ def test_a_folder_of_any_length_is_played_to_its_end(tmp_path):
         assert values[7:14] == pytest.approx(values[35:], abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_video_is_played_to_its_end(tmp_path):
     said, methods = found("--video", VIDEO, folder=tmp_path)
     _, pictures = found(folder=tmp_path)
@@ -122,6 +124,7 @@ def test_a_camera_with_twice_the_focal_length_sees_everything_twice_as_far(tmp_p
         assert tele[name][0, 2] / values[0, 2] == pytest.approx(2, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_parameter_of_one_method_can_be_replaced(tmp_path):
     text = (ROOT / "diagrams" / "calib" / "camera.yaml").read_text()
     (tmp_path / "tele.yaml").write_text(text.replace("430, 2", "473, 2.2").replace("438", "481.8"))
@@ -131,6 +134,7 @@ def test_a_parameter_of_one_method_can_be_replaced(tmp_path):
     assert np.mean(pair["z_ratios"]) == pytest.approx(1.1, abs=0.01)
 
 
+@pytest.mark.slow
 def test_the_comparison_of_the_paper_with_a_calibration_of_its_own_for_each_method(tmp_path):
     # Points on two planes before the camera of (38), looked at from above, and pixels that are 0.05 px off.
     matrix = np.array([[430.0, 2, 226], [0, 438, 161], [0, 0, 1]])
@@ -181,6 +185,7 @@ def test_pictures_of_another_size_than_the_calibration_are_refused_by_their_head
     assert "1.png is 640x480 but" in said and "camera.yaml is for 452x322 px" in said
 
 
+@pytest.mark.slow
 def test_the_calibration_of_the_pictures_is_the_detectors_too(tmp_path):
     (tmp_path / "pictures").mkdir()
     for number in (1, 2, 3):
