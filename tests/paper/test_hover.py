@@ -42,7 +42,9 @@ def flights(name, seeds, variant="geometric", **settings):
     ],
 )
 def test_each_set_of_errors_gives_the_hover_of_the_reference(name, bandwidth, expected):
-    position, yaw = flights(name, range(1, 4), bandwidth=bandwidth, **WITHOUT_EDGES)
+    # The constant errors of s1 have a random sign in each flight, which matters more than the noise.
+    seeds = range(1, 11 if name == "s1" else 5)
+    position, yaw = flights(name, seeds, bandwidth=bandwidth, **WITHOUT_EDGES)
     assert position == pytest.approx(expected, rel=0.25)
     if name == "s1":  # 0.025 rad/s^2 of trim error against a stiffness of 1 per s^2
         assert np.degrees(yaw) == pytest.approx(1.43, rel=0.25)
