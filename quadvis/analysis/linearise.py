@@ -31,6 +31,7 @@ from quadvis.analysis.probe import (
 from quadvis.analysis.progress import announce
 from quadvis.diagram.sections.analyse import Cut
 from quadvis.engine.engine import Engine
+from quadvis.errors import RunError
 from quadvis.graph.graph import Graph
 
 Matrix = NDArray[np.float64]
@@ -219,10 +220,21 @@ def _unread(probe: Probe, places: Positions, rounds: int, still: tuple[Vector, V
         ends = np.concatenate([chunk for chunk, _ in left])
         inside = [(chunk, changed) for chunk, changed in left if np.isin(changed, ends).all()]
         if len(inside) == len(left):
-            later = probe.after(places[:0], 0.0, count=rounds)[0]
-            return ends if not _changed(probe, _nudged(probe, ends, rounds)[0], later).size else places[:0]
+            return ends if _passes(probe, ends, rounds) else places[:0]
         left = inside
     return places[:0]
+
+
+def _passes(probe: Probe, places: Positions, rounds: int) -> bool:
+    """Return whether a change of all these slots together is gone after so many hyperperiods.
+
+    A change that makes a block fail, such as that of a covariance, is not gone.
+    """
+    try:
+        changed = _nudged(probe, places, rounds)[0]
+    except RunError:
+        return False
+    return not _changed(probe, changed, probe.after(places[:0], 0.0, count=rounds)[0]).size
 
 
 @np.errstate(invalid="ignore")  # a parameter may be infinite, and a signal NaN

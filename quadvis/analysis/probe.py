@@ -18,7 +18,7 @@ from quadvis.engine.engine import Engine
 from quadvis.engine.layout import TIME, Placed
 from quadvis.engine.memory import Slot
 from quadvis.errors import QuadvisError
-from quadvis.graph.graph import Graph, Node, Task, Wire
+from quadvis.graph.graph import Graph, Task, Wire
 
 Vector = NDArray[np.float64]
 Positions = NDArray[np.intp]  # of slots
@@ -220,19 +220,24 @@ class Probe:
         )
 
     def _shake(self) -> None:
-        """Prepare the random disturbance of every signal and all Work of the loop; `shaken` turns it on."""
-        by_task: dict[str, list[int]] = {}
-        for node, block in zip(self.graph.nodes, self.program.blocks, strict=True):
-            found = by_task.setdefault(block.task, [])
-            found += [*self._signals(block), *self._work(node, block)]
-        for task, mine in by_task.items():
-            places = np.array(mine, np.intp)
+        """Prepare the random disturbance of every signal of the loop; `shaken` turns it on.
+
+        An update may take what its output computed as Work, so those outputs run again on what is disturbed.
+        """
+        for task in dict.fromkeys(block.task for block in self.program.blocks):
+            blocks = [block for block in self.program.blocks if block.task == task]
+            places = np.array([place for block in blocks for place in self._signals(block)], np.intp)
+            again = [self.engine.call(block.path, "output") for block in blocks if self._works(block)]
             random = np.random.default_rng(1)
 
-            def disturb(_: int, places: Positions = places, random: Any = random) -> None:
+            def disturb(_: int, places: Positions = places, again: Any = again, random: Any = random) -> None:
                 if self._shaken:
                     size = STEP * np.maximum(1.0, np.abs(np.nan_to_num(self.floats[places])))
                     self.floats[places] += size * random.uniform(0.5, 1.0, places.size)
+                    disturbed = self.floats[places]
+                    for output in again:
+                        output()
+                    self.floats[places] = disturbed
 
             self.engine.observe(task, disturb)
 
@@ -245,16 +250,10 @@ class Probe:
             if position in self.names
         ]
 
-    def _work(self, node: Node, block: Placed) -> list[int]:
-        """Return the slots in which outputs of the loop hand real numbers to updates."""
-        if block.path not in self.loop:
-            return []
-        return [
-            position
-            for name, work in node.block.interface.work.items()
-            if work.signal.scalar == "float64" and not _is_time(work.units)
-            for position, _ in _elements(block.field(name), "")
-        ]
+    def _works(self, block: Placed) -> bool:
+        """Return whether a block of the loop hands real numbers from its output to its update."""
+        work = self.graph[block.path].block.interface.work
+        return block.path in self.loop and any(each.signal.scalar == "float64" for each in work.values())
 
 
 def _is_time(units: Sequence[Any]) -> bool:
