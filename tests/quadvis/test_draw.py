@@ -432,7 +432,7 @@ def test_any_diagram_is_well_drawn(diagram: Drawn) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=40, suppress_health_check=list(HealthCheck))
+@settings(max_examples=15, suppress_health_check=list(HealthCheck))
 @given(diagrams())
 def test_many_more_diagrams_are_well_drawn(diagram: Drawn) -> None:
     assert_drawn_well(diagram)
