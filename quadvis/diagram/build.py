@@ -7,16 +7,17 @@ from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from typing import Any
 
-from quadvis.block import Block, Param, ParameterError
+from quadvis.block import Block, In, Param, ParameterError
 from quadvis.diagram.expand import Expansion, FlatBlock
-from quadvis.diagram.flow import Connection, Draft
+from quadvis.diagram.flow import Connection, Draft, unconnected
 from quadvis.diagram.names import absent, remedy_for
+from quadvis.diagram.sections.ports import PORTS
 from quadvis.diagram.sections.rates import RATES
 from quadvis.diagram.sections.solver import SOLVER
 from quadvis.diagram.spec import FileSpec
 from quadvis.diagram.times import time_text
 from quadvis.diagram.values import OpenUnits, read_parameter, read_value
-from quadvis.diagram.wiring import Wiring
+from quadvis.diagram.wiring import OpenInput, Wiring
 from quadvis.document import YamlNode
 from quadvis.errors import (
     UNKNOWN,
@@ -204,15 +205,28 @@ class Builder:
             yield from ((port, Connection(flat.spec.place, UNKNOWN)) for port in kind.interface.inputs)
         for port, source in self.wiring.inputs(flat):
             declared = kind.interface.inputs.get(port)
-            if isinstance(source.source, Wire) or source.source is UNKNOWN or declared is None:
+            if isinstance(source.source, YamlNode) and declared is not None:
+                read = self.faults.read(read_value, declared.signal, declared.units, source.source)
+                if known(read):
+                    yield port, Connection(source.place, Constant(read[0]), read[1])
+                else:
+                    yield port, Connection(source.place, UNKNOWN)
+            elif isinstance(source.source, OpenInput) and declared is not None:
+                if declared.default is None:
+                    self._report_open(source.source, declared)
+                    yield port, Connection(source.place, UNKNOWN)
+            else:
                 wire = source.source if isinstance(source.source, Wire) else UNKNOWN
                 yield port, Connection(source.place, wire, across=source.across)
-                continue
-            read = self.faults.read(read_value, declared.signal, declared.units, source.source)
-            if known(read):
-                yield port, Connection(source.place, Constant(read[0]), read[1])
-            else:
-                yield port, Connection(source.place, UNKNOWN)
+
+    def _report_open(self, found: OpenInput, reader: In) -> None:
+        """Report an input of a part, unless a misspelt one was meant to be it."""
+        part = found.part
+        assert part.instance is not None
+        inputs, ports = part.instance.inputs or {}, part.spec[PORTS]
+        wanted = [port for port in ports.inputs if port not in ports.defaults]
+        if known(inputs) and found.port in absent(wanted, inputs, ports.inputs):
+            self.faults.add(part.instance.place, *unconnected(found.port, reader), subject=part.subject)
 
 
 def _is_continuous(flat: FlatBlock) -> bool:

@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import cast
 
 from quadvis.block import Block
-from quadvis.diagram.flow import Draft, Key, Link, ShapeFlow
+from quadvis.diagram.flow import Draft, Key, Link, ShapeFlow, unconnected
 from quadvis.diagram.names import absent, remedy_for
 from quadvis.diagram.unit_repair import follow_units
 from quadvis.diagram.values import shape_text
@@ -102,9 +102,7 @@ class WireCheck:
             wanted = [port for port, declared in inputs.items() if declared.default is None]
             self.unknown |= {(draft.path, port) for port in wanted if port not in draft.connections}
             for port in absent(wanted, draft.connections, inputs):
-                constant = ", or a constant" if inputs[port].signal.scalar != "frame" else ""
-                remedy = f"add '{port}: block.port' under 'in'{constant}"
-                self._fault(draft, draft.place, f"input '{port}' is not connected", remedy)
+                self._fault(draft, draft.place, *unconnected(port, inputs[port]))
 
     def _is_right_kind(self, link: Link) -> bool:
         wire, wanted = link.wire, link.declared.signal.scalar

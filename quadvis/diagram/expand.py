@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from quadvis.block import Block, ParameterError
-from quadvis.diagram.names import absent, remedy_for
+from quadvis.diagram.names import remedy_for
 from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec, InputSpec
 from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.ports import PORTS
@@ -293,9 +293,6 @@ class Expansion:
             if name not in declared:
                 problem = f"part '{block.kind}' has no input '{name}'"
                 self.faults.add(given.place, problem, remedy_for(name, inputs, declared))
-        for name in absent(declared, inputs, declared):
-            remedy = f"add '{name}: block.port' under 'in', or a constant"
-            self.faults.add(block.place, f"input '{name}' is not connected", remedy)
 
     def _part(self, block: BlockSpec, file: Path, files: tuple[str, ...]) -> FileSpec | Unknown:
         problem, remedy = "", ""

@@ -202,6 +202,12 @@ def misfit(wire: Wire, shape: Sequence[int]) -> str:
     return f"index {index_text(wire.index)} does not fit '{wire.source}', which has {shape_text(shape)}"
 
 
+def unconnected(port: str, declared: In) -> tuple[str, str]:
+    """Return the problem and the remedy of an input that nothing feeds."""
+    constant = ", or a constant" if declared.signal.scalar != "frame" else ""
+    return f"input '{port}' is not connected", f"add '{port}: block.port' under 'in'{constant}"
+
+
 class ShapeFlow(Flow):
     """Shapes: fixes the symbolic sizes of every node."""
 

@@ -19,11 +19,19 @@ MAX_PORTS = 50  # of parts, that a signal passes without meeting a block
 
 
 @dataclass(frozen=True)
+class OpenInput:
+    """An input of a part that nothing feeds, so that its readers take their own defaults."""
+
+    part: Scope
+    port: str
+
+
+@dataclass(frozen=True)
 class Source:
     """The source of an input, and the place of the word for its crossing between rates."""
 
     place: Place
-    source: Wire | YamlNode | Unknown
+    source: Wire | YamlNode | OpenInput | Unknown
     across: Place | Unknown | None = None
 
 
@@ -140,12 +148,15 @@ class Wiring:
         """Return the source of an input of a part."""
         assert scope.instance is not None and scope.parent is not None
         inputs = scope.instance.inputs or {}
-        if inputs is UNKNOWN or port not in inputs:
+        if inputs is UNKNOWN:
             return Source(scope.instance.place, UNKNOWN)
+        given = inputs.get(port) or scope.spec[PORTS].defaults.get(port)
+        if given is None:
+            return Source(scope.instance.place, OpenInput(scope, port))
         key = (f"{scope.prefix}{INSIDE}", port)
         if self._begin(key, scope, scope.spec[PORTS].inputs[port]):
             with self.faults.about(scope.subject):
-                self._found[key] = self._source(scope.parent, inputs[port])
+                self._found[key] = self._source(scope.parent, given)
             self._sought.discard(key)
         return self._found[key]
 
@@ -178,7 +189,7 @@ class Wiring:
         return True
 
     def _indexed(self, found: Source, reference: Reference) -> Source:
-        if not reference.index or found.source is UNKNOWN:
+        if not reference.index or found.source is UNKNOWN or isinstance(found.source, OpenInput):
             return found
         place = reference.place
         if isinstance(found.source, YamlNode):

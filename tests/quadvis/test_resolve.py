@@ -149,3 +149,51 @@ def test_units_that_wires_decide_are_written_out(tmp_path: Path) -> None:
     first, second = diagram.run(), load_text(diagram.resolved, tmp_path).run()
     for name in first:
         np.testing.assert_array_equal(first[name], second[name])
+
+
+PARTS = """\
+quadvis: 1
+name: case
+rates: {fast: 100 Hz}
+stop_time: 0.1 s
+blocks:
+  wave: {block: sources.sine, rate: fast, with: {amplitude: 1 m}}
+  bare: {part: outer.yaml, rate: fast, in: {u: wave.y}}
+  full: {part: outer.yaml, rate: fast, in: {u: wave.y, stamp: {value: 0, unit: s}, valid: false, size: 3 m}}
+summary: {rate: bare.rate, far: bare/far.y}
+expect: [{signal: full/inner/slope.ok, count: 0}]
+"""
+OUTER = """\
+quadvis: 1
+name: outer
+ports: {in: [u, stamp, valid, {size: 2 m}], out: {rate: inner.rate}}
+blocks:
+  inner: {part: inner.yaml, in: {u: in.u, stamp: in.stamp, valid: in.valid}}
+  far: {block: signal.gain, in: {u: in.size}}
+"""
+INNER = """\
+quadvis: 1
+name: inner
+ports: {in: [u, stamp, valid], out: {rate: slope.rate}}
+blocks:
+  slope: {block: signal.derivative, in: {u: in.u, stamp: in.stamp, valid: in.valid}}
+"""
+FLAT = PARTS.replace("bare.rate", "bare/inner/slope.rate").replace(
+    "  bare: {part: outer.yaml, rate: fast, in: {u: wave.y}}\n",
+    "  bare/inner/slope: {block: signal.derivative, rate: fast, in: {u: wave.y}}\n"
+    "  bare/far: {block: signal.gain, rate: fast, in: {u: 2 m}}\n",
+)
+
+
+def test_an_open_input_of_a_part_leaves_its_readers_open(tmp_path: Path) -> None:
+    for name, text in {"case": PARTS, "outer": OUTER, "inner": INNER, "flat": FLAT}.items():
+        (tmp_path / f"{name}.yaml").write_text(text)
+    diagram, flat = load(tmp_path / "case.yaml"), load(tmp_path / "flat.yaml")
+    same(diagram, flat)
+    assert diagram.draw() == flat.draw()
+    result = diagram.run()
+    assert result.passed
+    np.testing.assert_array_equal(result["bare/far.y"], np.full(11, 2.0))
+    np.testing.assert_array_equal(result["full/far.y"], np.full(11, 3.0))
+    assert np.abs(result["bare.rate"][1:]).min() > 0.1
+    np.testing.assert_array_equal(result["full.rate"], np.zeros(11))

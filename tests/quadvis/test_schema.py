@@ -124,6 +124,13 @@ def test_every_form_of_a_value_is_taken(block: str) -> None:
     assert faults(read(f"{BASE}  more: {block}\n")) == []
 
 
+@pytest.mark.parametrize("default", ["2 m", "true", "[1, 2]", "{value: [1, 2], unit: m}", "-1"])
+def test_an_input_of_a_part_may_have_a_constant_as_its_default(default: str) -> None:
+    part = "quadvis: 1\nname: part\nports: {in: [u, {size: %s}]}\nblocks: {}\n"
+    assert faults(read(part % default)) == []
+    assert faults(read(part % "wave.y")) != [] != faults(read(part % "{from: wave.y}"))
+
+
 def test_editors_can_show_what_blocks_ports_and_parameters_are() -> None:
     derivative = SCHEMA["$defs"]["block:signal.derivative"]
     assert "backward difference" in derivative["description"]

@@ -114,12 +114,12 @@ def _read_input(node: YamlNode, faults: Faults) -> InputSpec:
         else:
             crossing = UNKNOWN if len(node) > 1 else None  # under a key that is wrong
         return InputSpec(node.place, source, crossing, across.place if across is not None else None)
-    if isinstance(node, YamlScalar) and _is_reference(node.value):
+    if isinstance(node, YamlScalar) and is_reference(node.value):
         return InputSpec(node.place, read_reference(node, faults))
     return InputSpec(node.place, node)
 
 
-def _is_reference(text: str) -> bool:
+def is_reference(text: str) -> bool:
     """Say whether an input's text is meant as a signal: no number, truth value or ``$name``."""
     return (text[:1].isalpha() or text[:1] == "_") and text not in ("true", "false")
 

@@ -12,7 +12,7 @@ from typing import Any
 from quadvis.diagram.reference import Reference, read_reference
 from quadvis.diagram.sections.section import Said, Section, Values
 from quadvis.diagram.times import time_text
-from quadvis.diagram.wiring import Wiring
+from quadvis.diagram.wiring import OpenInput, Wiring
 from quadvis.document import YamlList, YamlMap, YamlNode
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known
 from quadvis.graph.graph import Graph, Node, Wire
@@ -55,6 +55,9 @@ class Context:
         source = self.wiring.find(self.wiring.expansion.root, reference).source
         if isinstance(source, YamlNode):
             self.faults.add(reference.place, "this is a constant, not a signal", "name an output of a block")
+        if isinstance(source, OpenInput):
+            problem = f"input '{source.port}' of {source.part.subject} is not connected: there is no signal"
+            self.faults.add(reference.place, problem, "name an output of a block")
         if not isinstance(source, Wire) or source.block not in self.nodes:
             return UNKNOWN
         self.names[reference.place] = wire_text(source)
