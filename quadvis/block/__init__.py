@@ -1,4 +1,4 @@
-"""The contract that blocks are written against: the names that an author imports."""
+"""The contract of blocks: all names that the author of a block imports."""
 
 from quadvis.block.block import METHODS, OUTSIDE, OWN_MODULES, TAGS, Block, Interface, units_of
 from quadvis.block.declare import Declared, In, Out, Param, ParameterError, Random, Safe, State, Work

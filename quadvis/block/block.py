@@ -1,8 +1,8 @@
 """The contract of a block: ports, parameters and state declared once, behaviour in plain methods.
 
-A block's direct feedthrough is what its ``output`` asks for by name. Its parameters and states live in memory
-that the engine owns (see ``quadvis.engine.memory``): snapshot, replay, tuning and scopes ask nothing of
-the author.
+The inputs that ``output`` asks for by name are the block's direct feedthrough. Parameters and states live in
+memory that the engine owns (see ``quadvis.engine.memory``), so snapshot, replay, tuning and scopes need no
+code of the author.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from quadvis.machine.inputs import file_digest
 from quadvis.machine.source_line import file_of, source_line
 from quadvis.units import Unit
 
-OWN_MODULES = "quadvis_own_blocks."  # before the names of modules that come with a diagram
+OWN_MODULES = "quadvis_own_blocks."  # prefix of the names of modules that come with a diagram
 METHODS = ("start", "read", "output", "write", "update", "deriv")
 OUTSIDE = ("read", "write")
 PORTS = "ports"
@@ -38,15 +38,15 @@ _Read = TypeVar("_Read")
 
 @dataclass(frozen=True)
 class Interface:
-    """All that a block class declares, collected when the class is defined."""
+    """All declarations of a block class, collected when the class is defined."""
 
     inputs: Mapping[str, In]
     outputs: Mapping[str, Out]
     params: Mapping[str, Param]
     states: Mapping[str, State]
     work: Mapping[str, Work]
-    safe: Mapping[str, Safe]  # by the input that each stands for
-    arguments: Mapping[str, tuple[str, ...]]  # method -> the names it asks for
+    safe: Mapping[str, Safe]  # by the input that each value replaces
+    arguments: Mapping[str, tuple[str, ...]]  # method -> the names that it asks for
 
     @property
     def feedthrough(self) -> frozenset[str]:
@@ -62,16 +62,17 @@ class Interface:
 class Block:
     """One reusable unit of computation or input/output; see the module's docstring for the contract.
 
-    ``Gain(factor=2.0)`` is a block with its parameters chosen, and with ``period`` (s) if it is known;
-    ParameterError if one is unknown, missing or out of range. It runs once the engine has bound it to memory.
+    ``Gain(factor=2.0)`` makes a block from its parameters, and from ``period`` (s) where that is known;
+    ParameterError if a parameter is unknown, missing or out of range. The block can run after the engine has
+    bound it to memory.
     """
 
     interface: ClassVar[Interface]
     numeric: ClassVar[bool] = True
     not_replayable: ClassVar[str] = ""  # why a second run may differ from the first: "it reads a camera"
-    not_restorable: ClassVar[str] = ""  # why it cannot go back to a snapshot: "the model has no way back"
-    harmless: ClassVar[str] = ""  # why what it writes needs no safe value: "a file moves nothing"
-    made_for: ClassVar[Mapping[str, Any] | None] = None  # the parameters from which a class has its ports
+    not_restorable: ClassVar[str] = ""  # why it cannot return to a snapshot: "the model has no way back"
+    harmless: ClassVar[str] = ""  # why its writes need no safe values: "a file moves nothing"
+    made_for: ClassVar[Mapping[str, Any] | None] = None  # the parameters from which the ports were made
     period: float = math.nan
 
     def __init_subclass__(cls, *, numeric: bool | None = None, bound: bool = False) -> None:
@@ -83,17 +84,17 @@ class Block:
 
     @classmethod
     def ports_from(cls) -> tuple[str, ...]:
-        """Return the parameters on which the ports depend: those that the class method ``ports`` asks for."""
+        """Return the names of the parameters on which the ports depend: the arguments of ``ports``."""
         ports = getattr(cls, "ports", None)
         return () if ports is None else tuple(inspect.signature(ports).parameters)
 
     @classmethod
     def with_ports(cls, parameters: Mapping[str, Any]) -> type[Block]:
-        """Return the class with the ports that it has for these parameters, ParameterError if one is wrong.
+        """Return the class with its ports for these parameters; ParameterError if a parameter is wrong.
 
-        A class whose ports depend on parameters, as those of a model in a file do, has a class method
-        ``ports``: it asks for parameters by name, and returns the ports by name. A method's ``*inputs`` are
-        then all inputs, in that order.
+        The ports of a class may depend on parameters, for example on the file of a model. Such a class has
+        a class method ``ports``, which asks for parameters by name and returns the ports by name. ``*inputs``
+        of a method then stands for all inputs, in the order of ``ports``.
         """
         names = cls.ports_from()
         if not names or cls.made_for is not None:
@@ -123,7 +124,7 @@ class Block:
                 raise ParameterError(name, sentence(problem, suggestion(name, declared)))
         for name, param in declared.items():
             self.__dict__[name] = param.given(parameters.get(name))
-        self._kept: dict[str, Any] = {}  # what was made of files, by parameter
+        self._kept: dict[str, Any] = {}  # results of `read_file`, by parameter
         self.check()
         self._digests = {
             param.name: file_digest(getattr(self, param.name))
@@ -133,33 +134,34 @@ class Block:
         }
 
     def check(self) -> None:
-        """Refuse with ParameterError what no run can do with, so that `quadvis check` finds it.
+        """Raise ParameterError for values that make a run impossible, so that `quadvis check` finds them.
 
-        That is: parameters that contradict each other or do not go with ``self.period`` (s), and files that
-        are not usable. It is called as the block is made, with a period of NaN where that is not known (so
-        compare with it such that NaN refuses nothing), and before a run with a period that is another.
+        Such values are parameters that contradict each other or ``self.period`` (s), and unusable files.
+        This method is called when the block is made, and before a run if the period has changed since then.
+        The period is NaN where it is not known: write comparisons such that NaN refuses nothing.
         """
 
     def check_written(self) -> None:
-        """Refuse files that are there and must not be written over, with ParameterError.
+        """Raise ParameterError for an existing file that must not be overwritten.
 
-        It is called once all inputs of the diagram are known and found safe; ``open`` looks again.
+        This method is called when all inputs of the diagram are known and no block writes over one of them;
+        ``open`` checks the file again.
         """
 
     def reads(self) -> list[str]:
-        """Return the files that a run reads: those that parameters name, and all files of a folder."""
+        """Return the files that a run reads: the files that parameters name, and all files of a folder."""
         files = (param for param in self.interface.params.values() if param.is_file and not param.writes)
         return [path for path in (getattr(self, param.name) for param in files) if path]
 
     def doubts(self) -> list[ParameterError]:
-        """Return what can be run, but is surely not what was meant at ``self.period`` (s): the warnings."""
+        """Return the warnings: values that can run, but are surely a mistake at ``self.period`` (s)."""
         return []
 
     def read_file(self, name: str, read: Callable[[str], _Read]) -> _Read:
-        """Return ``read(path)`` of the file that a parameter names; ParameterError tells what is wrong in it.
+        """Return ``read(path)`` of the file that a parameter names; ParameterError reports a fault in it.
 
-        It is read at the first call and kept, so that what ``check`` has seen is what ``open`` gets, whatever
-        happens to the file meanwhile. Do not change what this returns.
+        The file is read at the first call, and the result is kept. So ``open`` gets the same result as
+        ``check``, even if the file has changed in between. Do not modify the result.
         """
         if name not in self._kept:
             try:
@@ -173,7 +175,10 @@ class Block:
         return found
 
     def verify_files(self) -> None:
-        """Refuse a file that was not kept and is not what it was when the block was made; before ``open``."""
+        """Refuse, before ``open``, a file that has changed since the block was made.
+
+        Results that `read_file` keeps stay valid, so their files may change.
+        """
         for name, digest in self._digests.items():
             path = getattr(self, name)
             if not os.path.isfile(path) or file_digest(path) != digest:
@@ -184,7 +189,7 @@ class Block:
         """Acquire what the block needs outside the engine: a file, a port, a device."""
 
     def write_safe(self, time: float) -> None:
-        """Write the safe values outside: at every end of a run, before ``close``, if ``open`` succeeded."""
+        """Write the safe values: at every end of a run, before ``close``, if ``open`` succeeded."""
         write: Callable[..., None] | None = getattr(self, "write", None)
         if write is None or self.harmless:
             return
@@ -192,7 +197,7 @@ class Block:
         write(*(time if name == "time" else getattr(self, safe[name].name) for name in names))
 
     def close(self) -> None:
-        """Release it; called even if ``open`` failed halfway."""
+        """Release what ``open`` has acquired. This method is called even if ``open`` failed halfway."""
 
 
 def _interface(cls: type[Block]) -> Interface:
@@ -233,7 +238,7 @@ def _interface(cls: type[Block]) -> Interface:
         problem = f"{cls.__name__} declares a frame as Work, which holds numbers"
         raise TypeError(sentence(problem, "keep it in an attribute that output sets and update reads"))
     if of(Work) and not {"output", "update"} <= arguments.keys():
-        raise TypeError(f"{cls.__name__} declares Work, which goes from output to update, and has not both")
+        raise TypeError(f"{cls.__name__} declares Work, which goes from output to update, but has not both")
     if any(state.continuous for state in states.values()) != ("deriv" in arguments):
         raise TypeError(f"{cls.__name__}: continuous states and a deriv method go together")
     if outputs and "output" not in arguments:
@@ -243,7 +248,7 @@ def _interface(cls: type[Block]) -> Interface:
 
 
 def _asked(function: Callable[..., Any], inputs: tuple[str, ...] | None) -> tuple[str, ...]:
-    """Return the names that a method asks for; ``*inputs`` asks for all inputs, None where they are fixed."""
+    """Return the names that a method asks for; ``*inputs`` means all ``inputs``, if these are not None."""
     names: list[str] = []
     for name, parameter in tuple(inspect.signature(function).parameters.items())[1:]:
         every = parameter.kind == parameter.VAR_POSITIONAL and name == "inputs"
@@ -254,7 +259,7 @@ def _asked(function: Callable[..., Any], inputs: tuple[str, ...] | None) -> tupl
 def _safe(
     cls: type[Block], declared: Iterable[Safe], inputs: Mapping[str, In], written: Sequence[str]
 ) -> dict[str, Safe]:
-    """Return the safe values by input; TypeError if one is missing or stands for no input of ``write``."""
+    """Return the safe values by input; TypeError if one is missing or replaces no input of ``write``."""
     safe = {item.input: item for item in declared}
     for name, item in safe.items():
         if name not in written or name not in inputs:
@@ -270,5 +275,5 @@ def _safe(
 
 
 def units_of(declared: Declared, count: int) -> tuple[Unit, ...]:
-    """Return one unit per element of a port with ``count`` elements; a single unit holds for all of them."""
+    """Return one unit per element of a port with ``count`` elements; a single unit holds for all elements."""
     return declared.units * count if len(declared.units) == 1 else declared.units

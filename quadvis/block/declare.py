@@ -1,4 +1,4 @@
-"""What a block class declares: ports, states and parameters, with their types, units and bounds."""
+"""The declarations of a block class: ports, states and parameters, with types, units and bounds."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from quadvis.units import parse_units
 
 
 class ParameterError(QuadvisError):
-    """A value that a parameter cannot take: ``parameter`` names it, the text says what would be right."""
+    """A refused value: ``parameter`` is the name of the parameter, the text says what would be right."""
 
     def __init__(self, parameter: str, message: str) -> None:
         super().__init__(message)
@@ -23,7 +23,7 @@ class ParameterError(QuadvisError):
 
 @dataclass(eq=False)
 class Declared:
-    """Base of everything that a block class declares; the class attribute's name becomes its name."""
+    """Base class of all declarations; a declaration takes the name of its class attribute."""
 
     type: str
     unit: str = "1"
@@ -52,7 +52,7 @@ class Declared:
 
 @dataclass(eq=False)
 class In(Declared):
-    """An input port. With a ``default`` it may stay unconnected."""
+    """An input port. A port with a ``default`` may stay unconnected."""
 
     type: str = "float64"
     default: Any = field(default=None, kw_only=True)
@@ -60,7 +60,7 @@ class In(Declared):
 
 @dataclass(eq=False)
 class Out(Declared):
-    """An output port. ``nan=True`` where NaN says "missing"; elsewhere NaN or infinity stops the run."""
+    """An output port. With ``nan=True``, NaN means "missing"; otherwise NaN or infinity stops the run."""
 
     type: str = "float64"
     nan: bool = field(default=False, kw_only=True)
@@ -68,7 +68,7 @@ class Out(Declared):
 
 @dataclass(eq=False)
 class State(Declared):
-    """A state; only ``start`` and ``update`` change it, or the solver through ``deriv`` if ``continuous``."""
+    """A state. Only ``start`` and ``update`` change it, and the solver by ``deriv`` if ``continuous``."""
 
     type: str = "float64"
     init: float = 0.0
@@ -78,10 +78,10 @@ class State(Declared):
 
 @dataclass(eq=False)
 class Work(Declared):
-    """Scratch of one tick: ``output`` or ``read`` writes what it has found, ``update`` of that tick uses it.
+    """Scratch memory of one tick: ``output`` or ``read`` writes a result, ``update`` of that tick uses it.
 
-    So nothing is computed twice. It is no state: nothing reads what an earlier tick left in it, ``deriv``
-    never reads it, and a snapshot holds zeros in its place.
+    So nothing is computed twice. Work is not a state: no method reads values that an earlier tick has left,
+    ``deriv`` never reads Work, and a snapshot holds zeros in its place.
     """
 
     type: str = "float64"
@@ -96,11 +96,12 @@ class Random(State):
 
 
 class Param(Declared):
-    """A parameter: typed, with unit and bounds (``min``/``max`` inclusive, ``above``/``below`` exclusive).
+    """A parameter with type, unit and bounds (``min``/``max`` inclusive, ``above``/``below`` exclusive).
 
-    Without a default it must be given. ``choices`` makes it a name out of a few; the methods see its index.
-    ``tune=True`` lets it change between ticks of a run. Type ``file`` is a path relative to the diagram, of a
-    file or folder that the block reads, or with ``writes=True`` of one that it writes.
+    A diagram must give a parameter that has no default. With ``choices`` the value is one of these names;
+    the methods see the index of the name. With ``tune=True`` the value may change between ticks of a run.
+    A value of type ``file`` is a path relative to the diagram. It names a file or folder that the block
+    reads, or writes if ``writes=True``.
     """
 
     def __init__(
@@ -132,7 +133,7 @@ class Param(Declared):
         return self.default is None
 
     def given(self, value: Any) -> Any:
-        """Return what `accept` makes of a value, or of the default if it is None."""
+        """Return `accept` of a value, or of the default if the value is None."""
         value = self.default if value is None else value
         if value is None:
             raise ParameterError(self.name, f"parameter '{self.name}' is missing; give {self.wanted()}")
@@ -177,7 +178,7 @@ class Param(Declared):
                 raise ParameterError(self.name, problem)
 
     def wanted(self) -> str:
-        """Say in words what a right value is."""
+        """Describe a right value in words."""
         if self.choices:
             return "one of " + ", ".join(self.choices)
         one, many = _WORDS[self.signal.scalar]
@@ -188,9 +189,10 @@ class Param(Declared):
 
 
 class Safe(Param):
-    """What a block that writes outside leaves there at every end of a run, in place of one of its inputs.
+    """A safe value: the value that ``write`` gets at every end of a run in place of one of the inputs.
 
-    It has type and unit of that input, and no default: whoever wires a device says what is safe for it.
+    A safe value has the type and unit of that input, and no default: only the author of a diagram knows
+    what is safe for a device.
     """
 
     def __init__(self, input: str, *, doc: str = "") -> None:
@@ -198,7 +200,7 @@ class Safe(Param):
         self.input = input
 
     def stand_for(self, port: In) -> None:
-        """Take type and unit of the input."""
+        """Take the type and unit of the input."""
         self.type, self.unit, self.signal, self.units = port.type, port.unit, port.signal, port.units
 
 
@@ -211,7 +213,7 @@ _WORDS = {
 
 
 def _numbers(value: Any) -> NDArray[np.float64] | None:
-    """Return a value as an array of numbers, None if it is something else; NaN is no number."""
+    """Return a value as an array of numbers; None if it is anything else, or if a number is NaN."""
     try:
         if np.asarray(value).dtype.kind in "SU":
             return None
@@ -222,7 +224,7 @@ def _numbers(value: Any) -> NDArray[np.float64] | None:
 
 
 def _fits(array: NDArray[np.float64], scalar: str) -> bool:
-    """Return whether a slot can hold the numbers."""
+    """Return whether slots of this kind can hold the numbers."""
     if scalar == "bool":
         return bool(((array == 0) | (array == 1)).all())
     return scalar == "float64" or bool(((array == np.round(array)) & (np.abs(array) < 2.0**63)).all())

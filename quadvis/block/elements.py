@@ -9,12 +9,12 @@ import numpy as np
 
 
 def copied(value: Any) -> Any:
-    """Return a float or an array of floats once more, so that it lives apart from the first."""
+    """Return a copy of a float or of an array of floats; the copy shares no memory with the original."""
     return 1.0 * value
 
 
 def zeros_like(value: Any) -> Any:
-    """Return as many zeros as there are elements, all of them finite; each zero has its element's sign."""
+    """Return a zero for each element, with the sign of that element; all elements must be finite."""
     return 0.0 * value
 
 
@@ -41,7 +41,7 @@ def all_finite(value: Any) -> bool:
 
 
 def inward(slope: Any, value: Any, lower: float, upper: float) -> Any:
-    """Return ``slope``, with zero for every element of ``value`` at a limit that it would lead beyond."""
+    """Return ``slope``, but zero for every element of ``value`` that is at a limit and would go beyond."""
     if isinstance(value, float):
         return 0.0 if (value >= upper and slope > 0.0) or (value <= lower and slope < 0.0) else slope
     outward = ((value >= upper) & (slope > 0.0)) | ((value <= lower) & (slope < 0.0))

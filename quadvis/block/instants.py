@@ -1,8 +1,8 @@
-"""When an instant has come: the one rule for comparing times, interpreted and compiled.
+"""The one rule for comparing times, the same interpreted and compiled.
 
-The time of a tick is exact, but instants of decimal numbers are sums and differences of rounded ones: 0.1 +
-0.2 is later than 0.3. Compared as they stand they would miss their tick, so two instants (s) no further apart
-than `INSTANT` are one. The same holds for lengths of time.
+The time of a tick is exact, but an instant that was computed from decimal numbers is rounded: 0.1 + 0.2 is
+later than 0.3. An exact comparison would miss the tick of such an instant. So two instants (s) that are no
+further apart than `INSTANT` count as equal. The same rule holds for durations.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ INSTANT = 1e-9  # s; far below any period, far above the rounding of a run of ye
 
 
 def reached(time: Any, instant: Any) -> Any:
-    """Return whether an instant has come by a time, or that a time has lasted that long."""
+    """Return whether a time is at an instant or after it, or whether a duration is at least as long."""
     return time >= instant - INSTANT
 
 
 def passed(time: Any, instant: Any) -> Any:
-    """Return whether a time is later than an instant, or longer than that."""
+    """Return whether a time is after an instant, or whether a duration is longer."""
     return time > instant + INSTANT

@@ -25,9 +25,9 @@ SCALE = 1.0 / (M1 + 1)
 
 
 def stream_start(seed: int, name: str) -> list[int]:
-    """Return the start of a stream: a hash of seed and name, so no stream depends on others."""
+    """Return the initial state of a stream: a hash of seed and name, so no stream depends on another."""
     digest = hashlib.sha256(f"{seed}/{name}".encode()).digest()
-    count = min(M1, M2) - 1  # of numbers that are valid in both halves of a stream, from 1 on
+    count = min(M1, M2) - 1  # the numbers from 1 to `count` are valid in both halves of a stream
     return [1 + int.from_bytes(digest[4 * i : 4 * i + 4], "little") % count for i in range(6)]
 
 

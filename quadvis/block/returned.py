@@ -1,4 +1,4 @@
-"""What a block's method has returned, against what its class declares."""
+"""Compare the values that a method of a block has returned with the declarations of its class."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ import numpy as np
 from quadvis.block.signals import Frame, Shape
 from quadvis.machine.source_line import shown
 
-CALL = "<call of a block>"  # the file of the code that calls blocks, in tracebacks
-KINDS = {"float64": "fiub", "int64": "iu", "bool": "b"}  # of numpy, that a slot takes without loss
+CALL = "<call of a block>"  # file name, in tracebacks, of the code that calls blocks
+KINDS = {"float64": "fiub", "int64": "iu", "bool": "b"}  # numpy's kinds that a slot takes without loss
 
 
 class Holder(Protocol):
-    """Where a value goes: its kind and its shape."""
+    """The destination of a value: its kind and its shape."""
 
     @property
     def scalar(self) -> str:
@@ -30,7 +30,7 @@ class Holder(Protocol):
 
 
 def returned_fault(method: str, returned: Any, slots: Mapping[str, Holder]) -> str:
-    """Return what is wrong with what a method has returned for these slots; "" if nothing."""
+    """Return the fault in the result of a method for these slots; "" if there is none."""
     values = (returned,) if len(slots) == 1 else returned
     names = ", ".join(slots)
     if not isinstance(values, tuple) or len(values) != len(slots):
@@ -58,10 +58,10 @@ def _array(value: Any) -> Any:
 def returned_wrongly(
     error: Exception, name: str, arguments: Sequence[Any], slots: Mapping[str, Holder]
 ) -> str:
-    """Return what is wrong with what a method of that name has returned, and where; "" if that was right.
+    """Return the fault in the result of the method ``name``, with its place; "" if the result was right.
 
-    What it returned is lost, so it is called again, with its line watched: ``output`` and ``deriv`` change
-    nothing.
+    The result is lost, so the method is called again, and the line that returns is recorded. A second call
+    does no harm: ``output`` and ``deriv`` change nothing.
     """
     step = error.__traceback__
     while step is not None and step.tb_next is not None:
@@ -77,7 +77,7 @@ def returned_wrongly(
 
 
 def _watched(method: Callable[..., Any], arguments: Sequence[Any]) -> tuple[Any, str]:
-    """Return what a method returns, and the place of the line that returned it."""
+    """Return the result of a method, and the place of the line that returned it."""
     code = inspect.unwrap(method).__code__
     lines = [code.co_firstlineno]
 

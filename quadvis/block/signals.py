@@ -1,4 +1,4 @@
-"""What travels on wires: kinds and shapes of signals, and frames."""
+"""Signals on wires: their kinds and shapes, and frames."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _SIZE = r"(?:[1-9]\d*|[a-z]\w*)"
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """A picture on its way through a diagram. It travels by reference: never write into ``pixels``.
+    """A picture on its way through a diagram. Blocks share it by reference: never write into ``pixels``.
 
     ``pixels`` is uint8 (height, width, 3), blue-green-red; ``stamp`` is the middle of the exposure (s, run
-    time); ``sequence`` counts frames from 1, and 0 means that there is none yet.
+    time); ``sequence`` counts frames from 1, and 0 means "no picture yet".
     """
 
     pixels: NDArray[np.uint8]
@@ -42,7 +42,7 @@ NO_FRAME = Frame(np.zeros((0, 0, 3), np.uint8), math.nan, 0)
 
 @dataclass(frozen=True)
 class SignalType:
-    """What a port or state holds, a scalar kind and a shape: ``float64[4,2]``, ``float64[n]``, ``frame``."""
+    """The type of a signal, a scalar kind and a shape: ``float64[4,2]``, ``float64[n]``, ``frame``."""
 
     scalar: str
     shape: tuple[int | str, ...]
@@ -60,13 +60,13 @@ class SignalType:
         return SignalType(match[1], tuple(int(size) if size.isdigit() else size for size in sizes))
 
     def resolve(self, sizes: Sizes) -> Shape:
-        """Return the shape with every symbol replaced; a symbol that nothing fixed becomes a scalar or 1."""
+        """Return the shape with every symbol replaced; if ``sizes`` lacks it, ``*`` is a scalar, others 1."""
         if self.shape == ("*",):
             return tuple(sizes.get("*", ()))
         return tuple(sizes.get(size, 1) if isinstance(size, str) else size for size in self.shape)
 
     def unify(self, shape: Shape, sizes: Sizes) -> bool:
-        """Match a concrete shape, adding what it fixes to ``sizes``; False if it does not fit."""
+        """Match a concrete shape, and add the symbols that it fixes to ``sizes``; False if it cannot fit."""
         if self.shape == ("*",):
             return bool(sizes.setdefault("*", shape) == shape)
         if len(shape) != len(self.shape):

@@ -1,4 +1,4 @@
-"""A block by itself: driven in unit tests, and held against the contract."""
+"""Tests of a block by itself: unit tests drive the block, the conformance suite checks the contract."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["Driven", "Subject", "check_block", "drive"]
 
 
 def __getattr__(name: str) -> Any:
-    """Import the conformance suite when it is asked for; whoever only drives a block does without."""
+    """Import the conformance suite when it is first used; a test that only drives a block needs no suite."""
     if name not in ("Subject", "check_block"):
         raise AttributeError(f"module 'quadvis.testing' has no attribute '{name}'")
     from quadvis.testing import conformance

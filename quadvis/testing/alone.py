@@ -1,4 +1,4 @@
-"""A block alone in an engine: what is driven in unit tests and what the conformance suite tortures."""
+"""One block alone in an engine, for unit tests and for the conformance suite."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def alone(
     solver: str = "ode4",
     seed: int = 0,
 ) -> Engine:
-    """Return an engine that runs one block; its inputs hold what ``inputs`` has until they are written to."""
+    """Return an engine that runs one block; the block's inputs hold ``inputs`` until they are written."""
     task = Task("alone", period, continuous=bool(block.interface.continuous))
     constants = {name: Constant(value) for name, value in inputs.items()}
     node = Node(ALONE, type(block).__name__, block, task, dict(constants), sizes)

@@ -1,6 +1,6 @@
-"""What every block must do, the standard library's and anybody else's: a suite of checks to run over a class.
+"""The suite of checks that every block class must pass, in the standard library and in every other library.
 
-check_block(Fan, given={"curve": "fan.csv"})  # all of it; AssertionError tells everything that is wrong
+check_block(Fan, given={"curve": "fan.csv"})  # all checks; AssertionError reports every fault
 
 @pytest.mark.parametrize("name", CHECKS)      # or one by one
 def test_fan(name):
@@ -41,9 +41,9 @@ def check_block(
     inputs: Mapping[str, Sequence[Any]] | None = None,
     test: Path | None = None,
 ) -> None:
-    """Run all checks over a block class; AssertionError tells everything that is wrong. See ``Subject``.
+    """Run all checks over a block class; AssertionError reports every fault. See ``Subject``.
 
-    Whether the block compiles is checked where numba is installed.
+    The check ``compiles`` runs only if numba is installed.
     """
     subject = Subject(block, given or {}, inputs or {}, test)
     problems = []
@@ -60,7 +60,7 @@ def check_block(
         raise AssertionError("\n".join(problems))
 
 
-# Checks that a tag of the block's class switches off: it says why they cannot hold.
+# The checks that each tag of a block class switches off. The text of the tag says why they cannot hold.
 CANNOT_HOLD = {
     "not_replayable": {
         "starts_the_same", "inputs_not_asked_for_do_not_matter", "work_is_of_one_tick",
@@ -71,7 +71,7 @@ CANNOT_HOLD = {
 
 
 def excuse(check: str, block: type[Block]) -> str:
-    """Return why a check cannot hold for a block, by the tags of its class; "" if it must hold."""
+    """Return the text of the tag that says why a check cannot hold for a block; "" if the check must hold."""
     reasons = (str(getattr(block, tag)) for tag, checks in CANNOT_HOLD.items() if check in checks)
     return next(filter(None, reasons), "")
 

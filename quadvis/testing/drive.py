@@ -1,4 +1,4 @@
-"""Run a single block without a diagram, for unit tests and for trying things out."""
+"""Run a single block without a diagram, for unit tests and for experiments."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from quadvis.units import parse_period
 
 
 class Driven:
-    """What a driven block gave: one attribute per output, with a leading time axis, and ``time`` (s)."""
+    """The results of a driven block: one attribute per output, with a leading time axis, and ``time`` (s)."""
 
     def __init__(self, time: np.ndarray[Any, Any], signals: dict[str, Any], engine: Engine) -> None:
         self.time = time
@@ -29,7 +29,7 @@ class Driven:
             raise AttributeError(f"the block has no output '{name}'") from None
 
     def state(self, name: str) -> Any:
-        """Return a state, or a parameter, as it is after the last step."""
+        """Return the value of a state or of a parameter after the last step."""
         return self.engine.read(ALONE, name)
 
 
@@ -45,8 +45,8 @@ def drive(
     """Feed a block step by step and return its outputs.
 
     Each input is one constant value or an array (a list for frames) with a leading time axis. ``rate`` is a
-    rate such as "10 Hz" or a period such as "5 ms", a number means Hz. ``steps`` is needed when no input has
-    a time axis. TypeError if an input is unknown, missing or does not fit.
+    rate such as "10 Hz", a period such as "5 ms", or a number in Hz. ``steps`` is needed if no input has a
+    time axis. TypeError if an input is unknown or missing, or if its shape does not fit.
     """
     interface = block.interface
     for name in inputs:
@@ -72,7 +72,7 @@ def drive(
 
 
 def _series(name: str, signal: Any, value: Any, sizes: dict[str, Any], steps: int | None) -> tuple[Any, bool]:
-    """Return the input's values and whether it is one constant value."""
+    """Return the values of an input, and whether they are one constant value."""
     if signal.scalar == "frame":
         return (value, False) if isinstance(value, list | tuple) else ([value], True)
     array = np.asarray(value)

@@ -1,4 +1,4 @@
-"""Many ways to make and feed one block, for the conformance suite."""
+"""One block with many parameters and many inputs, for the conformance suite."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from quadvis.testing.alone import ALONE, alone, parameter_sizes
 
 STEPS = 16
 PERIOD = Fraction(1, 10)
-VECTOR = 3  # length of what may have any
+VECTOR = 3  # length of an axis that may have any length
 BOOL = In("bool").signal
 GARBAGE = {"float64": np.nan, "int64": -(2**40)}
 Whole = tuple[bytes, tuple[Any, ...]]
@@ -27,11 +27,11 @@ Whole = tuple[bytes, tuple[Any, ...]]
 
 @dataclass(frozen=True)
 class Subject:
-    """A block class to be checked, and what cannot be made up for it.
+    """A block class to be checked, with the values that the suite cannot invent.
 
-    ``given`` has values for parameters, at least for those without a default; ``inputs`` has lists of values
-    for inputs which random numbers do not suit, taken in turn; ``test`` is where the block's own test should
-    lie.
+    ``given`` has values of parameters, at least of all parameters without a default. ``inputs`` has a list of
+    values for each input that random numbers do not suit; the steps take them in turn. ``test`` is the path
+    where the test of the block should be.
     """
 
     block: type[Block]
@@ -45,14 +45,14 @@ class Subject:
     def make(self, **parameters: Any) -> Block:
         """Return the block with some parameters, the others as given or at their defaults.
 
-        ParameterError if they do not go with each other or with ``PERIOD``.
+        ParameterError if the parameters contradict each other or ``PERIOD``.
         """
         return self.block(period=float(PERIOD), **{**self.given, **parameters})
 
 
 @dataclass
 class Rig:
-    """A block alone in an engine, and the inputs that it will be fed with, one for each of ``STEPS``."""
+    """A block alone in an engine, and its inputs, a value of each for each of ``STEPS``."""
 
     engine: Engine
     series: list[dict[str, Any]]
@@ -73,11 +73,11 @@ class Rig:
         return self.engine.bound(ALONE)
 
     def call(self, method: str) -> Call | None:
-        """Return what calls a method from slots to slots; None if the block has no such method."""
+        """Return a function that calls a method from slots to slots; None if the block has no such method."""
         return self.engine.call(ALONE, method)
 
     def feed(self, step: int) -> None:
-        """Write the inputs of a step, and let the block read outside, as at the begin of a tick."""
+        """Write the inputs of a step, and call ``read`` of the block, as at the beginning of a tick."""
         for name, value in self.series[step].items():
             self.memory.write(self.placed.inputs[name], value)
         read = self.call("read")
@@ -90,22 +90,22 @@ class Rig:
         return bytes(self.memory.raw[start : start + self.placed.record.kept * SLOT])
 
     def whole(self) -> Whole:
-        """Return all of memory, Work included, and all pictures; to be put back in the middle of a tick."""
+        """Return all of memory, Work included, and all frames, for `put_back` in the middle of a tick."""
         return bytes(self.memory.raw), tuple(self.memory.frames)
 
     def put_back(self, whole: Whole) -> None:
-        """Make memory and pictures what they were."""
+        """Restore the memory and frames that `whole` returned."""
         self.memory.raw[:], self.memory.frames[:] = whole
 
     def spoil_work(self) -> None:
-        """Write into the block's Work what no method can want: no numbers, and the other truth values."""
+        """Write useless values into the block's Work: NaN, a number far below 0, the other truth value."""
         memory = self.memory
         for name, work in self.engine.graph[ALONE].block.interface.work.items():
             slot, scalar = self.placed.field(name), work.signal.scalar
             memory.write(slot, ~memory.view(slot) if scalar == "bool" else GARBAGE[scalar])
 
     def contents(self) -> tuple[Any, ...]:
-        """Return all of memory but Work, and all pictures, fit to be compared."""
+        """Return all of memory except Work, and all frames, in a form that can be compared."""
         memory = self.memory
         frames = [(frame.pixels.shape, frame.pixels.tobytes()) for frame in memory.frames]
         return memory.content(), frames, [(repr(frame.stamp), frame.sequence) for frame in memory.frames]
@@ -126,14 +126,14 @@ def sources(placed: Placed, names: Sequence[str]) -> list[Slot]:
 
 
 def targets(placed: Placed, method: str) -> Mapping[str, Slot]:
-    """Return the slots of what a method returns, by their names."""
+    """Return the slots of the results of a method, by name."""
     return {"output": placed.outputs, "deriv": placed.slopes}.get(method, {})
 
 
 def rigs(subject: Subject, *, missing: bool = False) -> Iterator[Rig]:
-    """Yield a rig for every shape and choice; ``missing`` strews NaN among the inputs.
+    """Yield a rig for every shape and choice; with ``missing``, some numbers in the inputs are NaN.
 
-    The same subject has the same rigs every time.
+    A subject has the same rigs at every call.
     """
     interface = subject.block.interface
     declared = (*interface.inputs.values(), *interface.outputs.values(), *interface.params.values())
@@ -144,7 +144,7 @@ def rigs(subject: Subject, *, missing: bool = False) -> Iterator[Rig]:
 
 
 def extreme_rigs(subject: Subject) -> Iterator[tuple[str, Any, Rig]]:
-    """Yield each parameter with each extreme value that is not refused, and a rig of a block that has it."""
+    """Yield each parameter with each extreme value that the block accepts, and a rig with that value."""
     params = subject.block.interface.params
     arrays = {
         name: param.default
@@ -161,7 +161,7 @@ def extreme_rigs(subject: Subject) -> Iterator[tuple[str, Any, Rig]]:
 
 
 def _extremes(param: Param) -> Iterator[Any]:
-    """Yield values at the bounds of a parameter and far beyond what anybody would choose."""
+    """Yield values at the bounds of a parameter, and values far beyond any that a person would choose."""
     bounds = [bound for bound in (param.min, param.max) if bound is not None]
     bounds += [
         float(np.nextafter(bound, way))
@@ -192,7 +192,7 @@ def _rig(subject: Subject, block: Block, sizes: Sizes, missing: bool) -> Rig:
 def _parameters(subject: Subject, shape: Shape) -> Iterator[dict[str, Any]]:
     """Yield the defaults, each other choice, and for a numeric block random numbers within the bounds.
 
-    Choices that do not go with the rest are left out.
+    Choices that contradict other parameters are left out.
     """
     params = {
         name: param for name, param in subject.block.interface.params.items() if name not in subject.given
@@ -216,13 +216,13 @@ def _parameters(subject: Subject, shape: Shape) -> Iterator[dict[str, Any]]:
 
 
 def _choices(param: Param) -> list[Any]:
-    """Return the values of a parameter with few of them, other than its default."""
+    """Return the values of a parameter other than its default, if it has choices or is true or false."""
     values: tuple[Any, ...] = (False, True) if param.signal == BOOL else param.choices
     return [value for value in values if value != param.default]
 
 
 def _shaken(param: Param, shape: Shape) -> Any:
-    """Return numbers near the default and within the inclusive bounds."""
+    """Return random numbers near the default and within the inclusive bounds."""
     rng = np.random.default_rng(zlib.crc32(param.name.encode()))
     default = np.broadcast_to(np.asarray(param.default, float), param.signal.resolve({"*": shape}))
     factor = rng.uniform(0.6, 1.4, default.shape)

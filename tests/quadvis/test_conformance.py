@@ -104,7 +104,7 @@ def test_a_block_whose_update_uses_what_output_has_computed_passes(tmp_path: Pat
 def test_work_that_outlasts_its_tick_is_reported(before: str, after: str, tmp_path: Path) -> None:
     assert WORKING.count(before) == 1
     with pytest.raises(
-        AssertionError, match="it read Work before output wrote it; keep in states what lasts"
+        AssertionError, match="Work was read before output wrote it; keep in states what lasts"
     ):
         CHECKS["work_is_of_one_tick"](Subject(block(tmp_path, WORKING.replace(before, after))))
 
@@ -229,8 +229,8 @@ FAULTS = [
         "only update may",
     ),
     ("output_changes_nothing", "        if not enable:", CALLS, "output gave two answers at step 0"),
-    ("repeats_after_restore", COUNT, HIDES, "restored in the same engine it gives something else"),
-    ("repeats_after_restore", COUNT, OPENS, "restored in a fresh engine it gives something else"),
+    ("repeats_after_restore", COUNT, HIDES, "restored in the same engine the run differs"),
+    ("repeats_after_restore", COUNT, OPENS, "restored in a fresh engine the run differs"),
     (
         "returns_what_it_declares",
         "[0], self.count",

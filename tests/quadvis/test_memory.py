@@ -304,7 +304,7 @@ def test_work_goes_from_output_to_update_of_a_tick_and_is_no_part_of_a_snapshot(
     ("members", "sentence"),
     [
         ({"held": Work("frame")}, "keep it in an attribute"),
-        ({"held": Work(), "update": lambda self: None}, "goes from output to update, and has not both"),
+        ({"held": Work(), "update": lambda self: None}, "goes from output to update, but has not both"),
     ],
 )  # fmt: skip
 def test_work_that_cannot_be_is_refused(members: dict[str, object], sentence: str) -> None:

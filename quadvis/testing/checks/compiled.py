@@ -1,4 +1,4 @@
-"""That the methods of a numeric block do the same compiled as interpreted."""
+"""The check that compiled methods of a numeric block give the same results as interpreted methods."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from quadvis.engine.layout import TIME, Placed
 from quadvis.native.compiler import Compiled, Compiler
 from quadvis.testing.rig import PERIOD, STEPS, Rig, Subject, Whole, rigs, sources, targets
 
-# Compiled and interpreted agree to the last bit where both use the C library's functions and one order of
-# summation. numba promises neither on every machine, so a few last bits are allowed.
+# Compiled and interpreted results agree to the last bit where both methods use the functions of the C library
+# and the same order of summation. numba promises neither on every machine, so the last few bits may differ.
 TOLERANCE = 1e-12
 
 
 def compiles(subject: Subject) -> None:
-    """Check that every method of a numeric block, compiled, agrees with the interpreted one.
+    """Check that every compiled method of a numeric block agrees with the interpreted method.
 
-    Over random inputs, some of them NaN, and random parameters; both start from the same memory at every
-    call, so that errors do not add up. Whole numbers agree exactly, floats to ``TOLERANCE``, absolute and
-    relative.
+    Inputs and parameters are random, and some inputs are NaN. Both methods start from the same memory at
+    every call, so that errors do not add up. Whole numbers agree exactly, floats to ``TOLERANCE``, absolute
+    and relative.
     """
     if not subject.block.numeric:
         return
@@ -47,7 +47,7 @@ def _compile(block: type[Block], placed: Placed) -> dict[str, Compiled]:
 
 
 def _agree(rig: Rig, compiled: Mapping[str, Compiled], step: int) -> None:
-    """Call every method both ways; then take an Euler step, to reach another state."""
+    """Compare every method in both forms; then take an Euler step, to reach another state."""
     program, memory = rig.engine.program, rig.memory
     memory.write(TIME, float(step * PERIOD))
     for method in METHODS:
@@ -58,7 +58,7 @@ def _agree(rig: Rig, compiled: Mapping[str, Compiled], step: int) -> None:
         try:
             call()
         except (ArithmeticError, ValueError):
-            # What is an error when interpreted stops a run: there is no result to agree with.
+            # An error of the interpreted method stops a run, so there is no result to compare with.
             rig.put_back(before)
             continue
         interpreted = rig.whole()

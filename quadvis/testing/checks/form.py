@@ -1,4 +1,4 @@
-"""How a block is written: its file, its words, and that all it declares has a use."""
+"""Checks of the source of a block: its file, its texts, and a use for every declaration."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from quadvis.testing.rig import Subject
 
 
 def one_block_in_its_module(subject: Subject) -> None:
-    """Check that the module defines no other public block, and that its file is called as the class is."""
+    """Check that the module defines no other public block, and that its file is named after the class."""
     module = sys.modules[subject.block.__module__]
     kinds = [kind for kind in vars(module).values() if isinstance(kind, type) and issubclass(kind, Block)]
     own = {kind.__name__ for kind in kinds if kind.__module__ == module.__name__}
@@ -26,7 +26,7 @@ def one_block_in_its_module(subject: Subject) -> None:
 
 
 def documented(subject: Subject) -> None:
-    """Check that the docstring begins with a sentence, and that every port and parameter says what it is."""
+    """Check that the docstring begins with a sentence, and that every port and parameter has a ``doc``."""
     first, _, rest = inspect.cleandoc(vars(subject.block).get("__doc__") or "").partition("\n")
     assert first.endswith("."), "the docstring's first line must be a sentence that ends in a full stop"
     assert not rest or rest.startswith("\n"), "the docstring's second line must be empty"
@@ -37,12 +37,12 @@ def documented(subject: Subject) -> None:
 
 
 def tested(subject: Subject) -> None:
-    """Check that there is a test file where one should be."""
+    """Check that the test file of the block exists."""
     assert subject.test is None or subject.test.is_file(), f"there is no test at {subject.test}; write one"
 
 
 def all_declarations_used(subject: Subject) -> None:
-    """Check that every input is asked for, and every parameter, state and Work named, by some method."""
+    """Check that some method asks for every input, and some method names every parameter, state and Work."""
     interface = subject.block.interface
     asked = {name for names in interface.arguments.values() for name in names}
     idle = [name for name in interface.inputs if name not in asked]
@@ -50,7 +50,7 @@ def all_declarations_used(subject: Subject) -> None:
     classes = [kind for kind in subject.block.__mro__ if kind not in Block.__mro__]
     functions = [value for kind in classes for value in vars(kind).values() if inspect.isfunction(value)]
     names = {name for function in functions for name in _named(inspect.unwrap(function).__code__)}
-    names |= {item.name for item in interface.safe.values()}  # the contract writes them
+    names |= {item.name for item in interface.safe.values()}  # `Block.write_safe` uses them
     idle = [name for name in (*interface.params, *interface.states, *interface.work) if name not in names]
     assert not idle, f"no method uses {', '.join(idle)}; take it away"
 

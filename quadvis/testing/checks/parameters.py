@@ -1,4 +1,4 @@
-"""What a block refuses, and that it does so before a run."""
+"""Checks that a block refuses bad parameters, and refuses them before a run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from quadvis.testing.rig import Subject, extreme_rigs
 
 
 def refuses_bad_parameters(subject: Subject) -> None:
-    """Check that a value beyond a bound, of another kind or missing is refused with the house's sentence."""
+    """Check that a value beyond a bound, of another kind or missing is refused in the usual words."""
     subject.make()
     for name, param in subject.block.interface.params.items():
         for value in _bad_values(param):

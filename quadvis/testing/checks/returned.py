@@ -1,4 +1,4 @@
-"""What the methods return, against what the block declares."""
+"""The check that the results of the methods fit the declarations of the block."""
 
 from __future__ import annotations
 

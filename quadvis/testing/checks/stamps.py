@@ -1,4 +1,4 @@
-"""What a block makes of stamps that cannot be."""
+"""The check that impossible stamps do not harm a block."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ import numpy as np
 
 from quadvis.testing.rig import PERIOD, STEPS, Rig, Subject, rigs
 
-HOSTILE = (1000.0, 0.7 * float(PERIOD), -1000.0, np.nan, np.inf, -np.inf)  # s, beside the right stamp
-HOSTILE_AT = STEPS // 3  # the step at which it comes
+HOSTILE = (1000.0, 0.7 * float(PERIOD), -1000.0, np.nan, np.inf, -np.inf)  # s, added to the right stamp
+HOSTILE_AT = STEPS // 3  # the step at which the hostile stamp comes
 
 
 def outlives_hostile_stamps(subject: Subject) -> None:
-    """Check that a stamp that cannot be is as good as one that repeats, and that later good ones count.
+    """Check that an impossible stamp acts like a repeated stamp, and that later good stamps count.
 
-    Stamps are the inputs called ``stamp`` or ``..._stamp``. One of them is ahead of the time, from long ago,
-    NaN or infinite. From two samples later on the block must give the floats and flags that it gives when
-    that stamp repeats the one before, since neither is news; counts and codes may tell the two apart.
+    Stamps are the inputs called ``stamp`` or ``..._stamp``. In one run, the stamp of one step is ahead of
+    the time, from long ago, NaN or infinite. In the other run, the stamp of that step repeats the stamp of
+    the step before. Neither is news. So, two samples later and from then on, both runs must give the same
+    floats and flags; whole numbers, such as counts and codes, may differ.
     """
     names = [
         name
@@ -36,24 +37,24 @@ def outlives_hostile_stamps(subject: Subject) -> None:
                 for name, value in wanted.items():
                     same = np.array_equal(found[name], value, equal_nan=True)
                     words = (
-                        f"{step - HOSTILE_AT} samples after a stamp {_told(hostile)} {name} is {found[name]}"
+                        f"{step - HOSTILE_AT} samples after a stamp {_words(hostile)} {name} is {found[name]}"
                     )
                     assert same, f"{words}, not {value} as if that stamp were no news; it must not count"
 
 
 def _good(step: int) -> float:
-    """Return the stamp of what comes at a step, half a period old."""
+    """Return the right stamp for a step: the instant half a period before the step."""
     return float((step - Fraction(1, 2)) * PERIOD)
 
 
-def _told(hostile: float) -> str:
+def _words(hostile: float) -> str:
     if not np.isfinite(hostile):
         return f"of {hostile}"
     return f"{abs(hostile):g} s {'ahead' if hostile > 0.0 else 'back'}"
 
 
 def _stamped(rig: Rig, names: Sequence[str], stamp: float) -> list[dict[str, Any]]:
-    """Run a block on good stamps but one; return its floats and flags at each step."""
+    """Run a block with right stamps, except one; return its floats and flags at each step."""
     found = []
     memory, outputs = rig.memory, rig.placed.outputs
     slots = {name: slot for name, slot in outputs.items() if slot.scalar in ("float64", "bool")}

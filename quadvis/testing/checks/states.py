@@ -1,4 +1,4 @@
-"""Which method changes what, and that states hold all that later outputs depend on."""
+"""Checks that only the right methods change states, and that later outputs depend on nothing but states."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from quadvis.testing.rig import STEPS, Rig, Subject, rigs, sources
 
 
 def starts_the_same(subject: Subject) -> None:
-    """Check that ``start`` gives the same states whatever ran before it."""
+    """Check that ``start`` gives the same states after any run as before the first run."""
     for rig, again in zip(rigs(subject), rigs(subject), strict=True):
         initial = rig.engine.snapshot()
         with rig.engine, again.engine:
@@ -24,7 +24,7 @@ def starts_the_same(subject: Subject) -> None:
 
 
 def output_changes_nothing(subject: Subject) -> None:
-    """Check that ``output`` called twice gives the same, and leaves parameters and states alone."""
+    """Check that two calls of ``output`` give the same results, and change no parameter and no state."""
     for rig in rigs(subject):
         output = rig.call("output")
         if output is None:
@@ -42,7 +42,7 @@ def output_changes_nothing(subject: Subject) -> None:
 
 
 def work_is_of_one_tick(subject: Subject) -> None:
-    """Check that what Work held before ``output`` of a tick does not matter, and to ``deriv`` never."""
+    """Check that Work of an earlier tick has no effect, and that Work has no effect on ``deriv``."""
     if not subject.block.interface.work:
         return
     for rig, other in zip(rigs(subject), rigs(subject), strict=True):
@@ -60,13 +60,13 @@ def work_is_of_one_tick(subject: Subject) -> None:
                 rig.engine.run(1)
                 other.engine.run(1)
                 same = rig.contents() == other.contents()
-                assert same, f"at step {step} it read Work before output wrote it; keep in states what lasts"
+                assert same, f"at step {step} Work was read before output wrote it; keep in states what lasts"
 
 
 def outside_changes_nothing(subject: Subject) -> None:
-    """Check that ``read`` and ``write`` return nothing and leave parameters and states alone.
+    """Check that ``read`` and ``write`` return nothing, and change no parameter and no state.
 
-    ``write`` takes the safe values as well.
+    ``write`` must accept the safe values, too.
     """
     arguments = subject.block.interface.arguments
     for rig in rigs(subject) if not arguments.keys().isdisjoint(OUTSIDE) else ():
@@ -88,7 +88,7 @@ def outside_changes_nothing(subject: Subject) -> None:
 
 
 def inputs_not_asked_for_do_not_matter(subject: Subject) -> None:
-    """Check that what ``output`` gives depends on the inputs that it asks for alone."""
+    """Check that the results of ``output`` depend only on the inputs that it asks for."""
     others = set(subject.block.interface.inputs) - subject.block.interface.feedthrough
     for rig in rigs(subject):
         output, memory = rig.call("output"), rig.memory
@@ -116,11 +116,11 @@ def repeats_after_restore(subject: Subject) -> None:
             snapshot = rig.engine.snapshot()
             first = rig.run(range(half, STEPS))
             _repeats(rig, snapshot, first, "the same engine")
-        with fresh.engine:  # not before the other is closed: a file is written by one of them at a time
+        with fresh.engine:  # after the first engine is closed: only one engine at a time may write a file
             _repeats(fresh, snapshot, first, "a fresh engine")
 
 
 def _repeats(rig: Rig, snapshot: Snapshot, first: list[tuple[Any, ...]], words: str) -> None:
     rig.engine.restore(snapshot)
     same = rig.run(range(STEPS - len(first), STEPS)) == first
-    assert same, f"restored in {words} it gives something else; keep in states what matters"
+    assert same, f"restored in {words} the run differs; keep in states what matters"
