@@ -1,1 +1,1 @@
-"""Blocks that make signals out of time, numbers and chance."""
+"""Blocks that make signals from time, numbers and chance."""

@@ -10,7 +10,7 @@ from quadvis.block import Block, Out, Param
 class Constant(Block):
     """The same value at every tick: ``y = value``, a scalar or an array of any shape.
 
-    A tunable value makes it a knob that can be turned during a run.
+    The value is tunable, so the block is a knob that can be turned during a run.
     """
 
     value = Param(0.0, type="float64[*]", unit="a", tune=True, doc="the value")

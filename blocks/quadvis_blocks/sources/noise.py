@@ -8,11 +8,12 @@ from quadvis.block import Block, Out, Param, Random, State, normal_like
 
 
 class Noise(Block):
-    """Band-limited white noise: a fresh normal number at each tick of the block, held until the next.
+    """Band-limited white noise: a new normal number at each tick of the block, held until the next tick.
 
-    Mean ``mean``, standard deviation ``sigma``; the shape of ``sigma`` is the shape of the output, elements
-    are independent. As a signal in continuous time it has the two-sided power spectral density ``sigma**2 *
-    period`` up to about half the block's rate. The numbers follow from the run's seed and the block's path.
+    The numbers have the mean ``mean`` and the standard deviation ``sigma``. The output has the shape of
+    ``sigma``; its elements are independent. As a signal in continuous time the noise has the two-sided power
+    spectral density ``sigma**2 * period`` up to about half the block's rate. The numbers follow from the
+    run's seed and the block's path.
     """
 
     sigma = Param(

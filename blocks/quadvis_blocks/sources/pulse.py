@@ -11,7 +11,7 @@ from quadvis.block import INSTANT, Block, Out, Param, ParameterError, reached
 class Pulse(Block):
     """Rectangular pulses: ``high`` for ``width`` seconds out of every ``interval``, ``low`` for the rest.
 
-    The first pulse rises at ``begin``. ``width`` half of ``interval`` is a square wave.
+    The first pulse rises at ``begin``. A ``width`` of half the ``interval`` gives a square wave.
     """
 
     low = Param(0.0, unit="a", tune=True, doc="value between pulses")
@@ -28,7 +28,7 @@ class Pulse(Block):
             raise ParameterError("width", problem)
 
     def doubts(self) -> list[ParameterError]:
-        """Doubt pulses that may fall between two samples of the block."""
+        """Warn of pulses that may fall between two samples of the block."""
         if self.width == 0.0 or reached(self.width, self.period):
             return []
         problem = f"width is {self.width:g} s, shorter than the period of the block, {self.period:g} s"

@@ -18,7 +18,7 @@ class Sine(Block):
     y = Out(unit="a", doc="the wave")
 
     def doubts(self) -> list[ParameterError]:
-        """Doubt a wave that the block's samples show as a slower one."""
+        """Warn of a wave that looks like a slower wave in the block's samples."""
         highest = 0.5 / self.period
         if self.frequency <= highest * (1 + 1e-9):
             return []

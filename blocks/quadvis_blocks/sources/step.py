@@ -8,7 +8,7 @@ from quadvis.block import Block, Out, Param, reached
 
 
 class Step(Block):
-    """One value before an instant, another from it on.
+    """One value before an instant, another value from that instant on.
 
     ``y = before`` for t < at, ``y = after`` for t >= at.
     """

@@ -12,9 +12,10 @@ LINEAR, HOLD = range(2)
 
 
 class Table(Block):
-    """A vector that goes from row to row of a table, and stays at the first row before and the last after.
+    """A vector that follows the rows of a table; before the first row and after the last it is that row.
 
-    ``interpolation: linear`` draws straight lines between the rows, ``hold`` steps from one to the next.
+    With ``interpolation: linear`` the vector moves in straight lines between the rows. With ``hold`` it
+    steps from row to row.
     """
 
     times = Param(type="float64[k]", unit="s", doc="instant of each row, increasing")
@@ -23,7 +24,7 @@ class Table(Block):
     y = Out("float64[n]", unit="a", doc="the vector")
 
     def check(self) -> None:
-        """Refuse times that do not increase or that are not one for each row."""
+        """Refuse times that do not increase, or a number of times that is not the number of rows."""
         if len(self.times) != len(self.values):
             problem = f"times must have one entry for each of the {len(self.values)} rows of values"
             raise ParameterError("times", f"{problem}, got {len(self.times)}")
