@@ -1,4 +1,4 @@
-"""How long a block that keeps what is on its way can delay it."""
+"""The longest delay of a block with a queue of limited length."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from quadvis.block import ParameterError, passed
 
 
 def check_delay(delay: float, ticks: int, period: float) -> None:
-    """Refuse a ``delay`` (s) of more than so many ticks of a period (s); ParameterError."""
+    """Raise ParameterError if ``delay`` (s) is longer than ``ticks`` times ``period`` (s)."""
     longest = ticks * period
     if passed(delay, longest):
         bound = f"at most {ticks} ticks of the block, {longest:g} s"

@@ -1,4 +1,4 @@
-"""A number that tells one array of numbers from another, the same interpreted and compiled."""
+"""A hash of an array of numbers, the same interpreted and compiled."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import math
 from typing import Any
 
 M1, M2 = 4294967087, 4294944443  # primes
-NOTHING = 0  # the digest of what has no number in it
-HALF = 2**26  # a mantissa has 53 bits; products with pieces below this one stay exact
+NOTHING = 0  # the digest of a value without any number
+HALF = 2**26  # a mantissa has 53 bits; products with pieces below `HALF` stay exact
 
 
 def digest(value: Any) -> int:
     """Return 63 bits of a polynomial hash over the bits of a scalar or an array; 0 if all of it is NaN.
 
-    Equal numbers give equal digests (-0.0 and 0.0 are equal, NaN counts as one number). Two arrays that
-    differ have the same one by a chance of about 2**-62.
+    Equal numbers give equal digests (-0.0 equals 0.0, and NaN equals NaN). Two different arrays have the
+    same digest with a probability of about 2**-62.
     Source: R. M. Karp and M. O. Rabin, Efficient randomized pattern-matching algorithms, IBM Journal of
     Research and Development 31(2), 1987; here with two prime moduli.
     """
@@ -30,7 +30,7 @@ def digest(value: Any) -> int:
 
 
 def _mixed(number: float, first: int, second: int, numbers: int) -> tuple[int, int, int]:
-    """Return both remainders, and how many numbers there were, after one element more."""
+    """Return both remainders and the count of numbers after one more element; NaN does not count."""
     if math.isnan(number):
         high, low, power = 1, 1, 5000
     elif math.isinf(number):

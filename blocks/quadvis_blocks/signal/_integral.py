@@ -1,4 +1,4 @@
-"""What the integrators share: an initial value between limits."""
+"""The common part of the integrators: an initial value between limits."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from quadvis.block import Block, In, Out, Param, ParameterError, State
 
 if TYPE_CHECKING:
     _Base = Block
-else:  # no block by itself: it has outputs, but not what makes them
+else:  # `Integral` alone is not a block: it declares an output, but has no output method
     _Base = object
 
 

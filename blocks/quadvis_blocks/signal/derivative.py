@@ -12,11 +12,12 @@ from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, judge, keep
 class Derivative(Block):
     """Rate of change of a sampled signal by backward difference: ``rate = (u_t - u_{t-T}) / T``.
 
-    T is the true time between the two samples, from their stamps; without stamps it is the time between
-    ticks. A frame whose stamp is no news (repeated, back, ahead of the time, NaN) and a sample that is not
-    valid keep the last rate, so the block may run faster than the camera. A value with NaN counts as not
-    valid. The rate is 0 and ``ok`` false until there are two samples, and again after a gap: when two stamps,
-    or the arrivals of two samples, are further apart than ``gap_reset``. Successive ticks are never a gap.
+    T is the true time between the two samples, from their stamps; without stamps T is the time between
+    ticks. A sample is skipped if its stamp is no news (repeated, back, ahead of the time, NaN), if ``valid``
+    is false or if its value has NaN. A skipped sample leaves the rate as it was, so the block may run faster
+    than the camera. The rate is 0 and ``ok`` is false before the second sample, and again after a gap. A gap
+    is a time longer than ``gap_reset`` between two stamps or between the arrivals of two samples. Successive
+    ticks are never a gap.
 
     Source: section 6.2. Error: at most ``M T / 2`` for a signal with ``|u''| <= M``; noise of standard
     deviation s in the signal becomes ``s sqrt(2) / T`` in the rate.
@@ -30,21 +31,21 @@ class Derivative(Block):
         unit="s",
         above=0.0,
         tune=True,
-        doc="how long a clock that started again runs until it counts",
+        doc="how long a restarted clock must run before its stamps count",
     )
     u = In("float64[*]", unit="a", doc="the signal; NaN where it is missing")
-    stamp = In(unit="s", default=math.nan, doc="instant at which u was measured; NaN for now")
+    stamp = In(unit="s", default=math.nan, doc="instant at which u was measured; NaN means now")
     valid = In("bool", default=True, doc="whether u is good")
     rate = Out("float64[*]", unit="a/s", doc="rate of change")
-    ok = Out("bool", doc="whether it comes from two samples without a gap")
+    ok = Out("bool", doc="whether the rate comes from two samples without a gap")
     last = State("float64[*]")
     last_rate = State("float64[*]")
     last_ok = State("bool")
     measured = State(unit="s")
     arrived = State(unit="s")
     stamps = State(f"float64[{SIZE}]")
-    verdict = Work("int64")  # on the stamp of now
-    moment = Work(unit="s")  # the instant that it stands for
+    verdict = Work("int64")  # on the stamp of this tick
+    moment = Work(unit="s")  # the instant of that stamp
     good = Work("bool")  # whether this sample counts
     rate_now = Work("float64[*]")
     ok_now = Work("bool")
@@ -56,7 +57,7 @@ class Derivative(Block):
         self.arrived = -math.inf
 
     def output(self, u: Any, stamp: float, valid: bool, time: float) -> tuple[Any, bool]:
-        """Return the rate, and whether it means anything."""
+        """Return the rate, and whether it comes from two samples without a gap."""
         longest = max(self.gap_reset, 1.5 * self.period)
         in_time = not passed(time - self.arrived, longest)
         self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)

@@ -8,10 +8,10 @@ from quadvis.block import Block, In, Out
 
 
 class Difference(Block):
-    """One signal less another, element by element: ``y = plus - minus``."""
+    """One signal minus another, element by element: ``y = plus - minus``."""
 
-    plus = In("float64[*]", unit="a", doc="what is taken from")
-    minus = In("float64[*]", unit="a", doc="what is taken away")
+    plus = In("float64[*]", unit="a", doc="the signal with the positive sign")
+    minus = In("float64[*]", unit="a", doc="the signal with the negative sign")
     y = Out("float64[*]", unit="a", doc="the difference")
 
     def output(self, plus: Any, minus: Any) -> Any:

@@ -12,11 +12,11 @@ class DiscreteIntegrator(Integral, Block):
     """The sum of a sampled signal times the period (forward Euler), held between limits, element by element.
 
     ``y[k+1] = min(max(y[k] + T u[k], lower), upper)``, ``y[0] = initial``; exact for an input that is held
-    between samples. No direct feedthrough. While ``freeze`` is true it stands still, e.g. while a mixer is
-    saturated.
+    between samples. The block has no direct feedthrough. While ``freeze`` is true the sum does not change,
+    for example while a mixer is saturated.
     """
 
-    freeze = In("bool", default=False, doc="true to stand still")
+    freeze = In("bool", default=False, doc="true to keep the sum as it is")
     integral = State("float64[*]")
 
     def output(self) -> Any:

@@ -10,21 +10,22 @@ CAPACITY = 256
 
 
 class History(Block):
-    """The value that a signal had at an earlier instant: ``y = u(instant)``, straight between samples.
+    """The value of a signal at an earlier instant: ``y = u(instant)``, with straight lines between samples.
 
-    Use it to pair a late measurement with a signal at the measurement's stamp: a frame of a camera with the
-    angles of the inertial unit when the frame was taken. The last 256 samples are kept. An instant before
-    them gives the oldest sample, an instant in the future or NaN the newest; then ``ok`` is false. Instants
-    may repeat and go back: `supervision.frame_news` decides whether a stamp is news.
+    The block pairs a late measurement with a signal at the measurement's stamp: for example, a frame of a
+    camera with the angles of the inertial unit at the instant of the frame. The last 256 samples are kept.
+    An instant before them gives the oldest sample; an instant in the future or NaN gives the newest sample;
+    in these cases ``ok`` is false. Instants may repeat and go back: `supervision.frame_news` decides whether
+    a stamp is news.
 
     Error: at most ``M T^2 / 8`` for a signal with ``|u''| <= M``.
     """
 
-    u = In(unit="a", doc="the signal; no angle that wraps")
-    instant = In(unit="s", doc="when its value is wanted, such as the stamp of a frame")
-    y = Out(unit="a", doc="its value then")
+    u = In(unit="a", doc="the signal; not an angle that wraps")
+    instant = In(unit="s", doc="instant of the wanted value, such as the stamp of a frame")
+    y = Out(unit="a", doc="value of the signal at that instant")
     ok = Out("bool", doc="whether the instant lies between the oldest sample and now")
-    values = State(f"float64[{CAPACITY}]")  # of the ticks before this one, the newest first
+    values = State(f"float64[{CAPACITY}]")  # at the ticks before this one, newest first
     kept = State("int64")
 
     def output(self, u: float, instant: float, time: float) -> tuple[float, bool]:

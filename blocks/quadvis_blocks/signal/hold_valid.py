@@ -10,13 +10,13 @@ from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, judge, keep
 
 
 class HoldValid(Block):
-    """The last valid value of a measurement, how old it is, and whether that is young enough.
+    """The last valid value of a measurement, its age, and whether it is young enough.
 
-    A value is valid if ``valid`` is true and all its elements are finite, so NaN never passes, and if its
-    ``stamp`` is newer than that of the value held: a frame that was overtaken on its way comes too late, and
-    one that is there still is no news, nor is one whose stamp is ahead of the time. The age counts from the
-    stamp, or from the tick at which the value came if no stamp is connected. Before the first valid value the
-    output is ``initial``, the age counts from the start and ``ok`` is false.
+    A value is valid if ``valid`` is true, if all its elements are finite (NaN never passes), and if its
+    ``stamp`` is news: newer than the stamp of the held value and not ahead of the time. So a frame that was
+    overtaken on its way does not count, and a repeated frame does not count. The age counts from the stamp;
+    if no stamp is connected, it counts from the tick at which the value came. Before the first valid value
+    the output is ``initial``, the age counts from the start, and ``ok`` is false.
     """
 
     max_age = Param(0.25, unit="s", min=0.0, tune=True, doc="greatest age (inclusive) that is ok")
@@ -25,31 +25,31 @@ class HoldValid(Block):
         unit="s",
         above=0.0,
         tune=True,
-        doc="how long a clock that started again runs until it counts",
+        doc="how long a restarted clock must run before its stamps count",
     )
     value = In("float64[*]", unit="a", doc="the measurement; NaN where it is missing")
     valid = In("bool", default=True, doc="whether the measurement is good")
-    stamp = In(unit="s", default=math.nan, doc="instant of the measurement; NaN for now")
+    stamp = In(unit="s", default=math.nan, doc="instant of the measurement; NaN means now")
     initial = In("float64[*]", unit="a", default=0.0, doc="the output before the first valid value")
     held = Out("float64[*]", unit="a", doc="the last valid value")
-    age = Out(unit="s", doc="time since it was measured")
-    ok = Out("bool", doc="whether there is one, and its age is at most ``max_age``")
+    age = Out(unit="s", doc="time since the held value was measured")
+    ok = Out("bool", doc="whether a value is held whose age is at most ``max_age``")
     last = State("float64[*]")
     measured = State(unit="s")
     seen = State("bool")
     stamps = State(f"float64[{SIZE}]")
-    verdict = Work("int64")  # on the stamp of now
-    moment = Work(unit="s")  # the instant that it stands for
-    good = Work("bool")  # whether the value of now counts
+    verdict = Work("int64")  # on the stamp of this tick
+    moment = Work(unit="s")  # the instant of that stamp
+    good = Work("bool")  # whether the value of this tick counts
 
     def start(self) -> None:
-        """Know no value yet."""
+        """Begin without a value."""
         begin(self.stamps)
 
     def output(
         self, value: Any, valid: bool, stamp: float, initial: Any, time: float
     ) -> tuple[Any, float, bool]:
-        """Return the value if it is valid, else the last one that was."""
+        """Return the value if it is valid, else the last valid value; and its age, and whether that is ok."""
         self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)
         self.good = self.verdict == NEWS and _is_good(value, valid, self.moment, self.seen, self.measured)
         if self.good:
@@ -71,5 +71,5 @@ class HoldValid(Block):
 
 
 def _is_good(value: Any, valid: bool, made: float, seen: bool, measured: float) -> bool:
-    """Return whether a value is good, and made after the one that is held."""
+    """Return whether a value is good, and was measured after the held value."""
     return bool(valid and all_finite(value) and not (seen and made <= measured))

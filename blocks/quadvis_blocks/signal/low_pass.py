@@ -11,8 +11,8 @@ from quadvis.block import Block, In, Out, Param, State
 class LowPass(Block):
     """First-order lag ``1 / (time_constant s + 1)``, exact for an input that is held between samples.
 
-    ``y[k+1] = y[k] + (1 - exp(-T / time_constant)) * (u[k] - y[k])``, ``y[0] = initial``; no direct
-    feedthrough.
+    ``y[k+1] = y[k] + (1 - exp(-T / time_constant)) * (u[k] - y[k])``, ``y[0] = initial``. The block has no
+    direct feedthrough.
     """
 
     time_constant = Param(0.1, unit="s", above=0.0, tune=True, doc="time to 63 % of a step")

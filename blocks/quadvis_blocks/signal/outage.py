@@ -8,18 +8,18 @@ from quadvis.block import Block, In, Out, Param, ParameterError, State, Work, co
 
 
 class Outage(Block):
-    """A signal that stands still, and says that it is not good, during stretches of time.
+    """A signal that stands still, and is marked as not good, during outages.
 
-    A camera that goes blind, an IMU that hangs or a pilot's link that is lost: ``y`` is the signal, and
-    ``ok`` says so as long as ``valid`` does; from each begin to each end ``y`` keeps the last value from
-    before and ``ok`` is false. Stamps that pass through it stand still too.
+    Outages imitate a camera that goes blind, an IMU that hangs or a lost link of the pilot. During an outage
+    ``y`` keeps the last value from before the outage, and ``ok`` is false. At all other times ``y`` is the
+    signal, and ``ok`` is ``valid``. A stamp that passes through this block stands still too.
     """
 
-    during = Param(type="float64[k,2]", unit="s", doc="begin (inclusive) and end of each outage")
+    during = Param(type="float64[k,2]", unit="s", doc="beginning (inclusive) and end of each outage")
     u = In("float64[*]", unit="a", doc="any signal")
-    valid = In("bool", default=True, doc="whether it is good")
+    valid = In("bool", default=True, doc="whether the signal is good")
     y = Out("float64[*]", unit="a", nan=True, doc="the signal, or its last value from before the outage")
-    ok = Out("bool", doc="whether it is good, and there is no outage")
+    ok = Out("bool", doc="whether the signal is good and there is no outage")
     last = State("float64[*]")
     out = Work("bool")  # whether there is an outage now
 
@@ -31,7 +31,7 @@ class Outage(Block):
                 raise ParameterError("during", problem)
 
     def output(self, u: Any, valid: bool, time: float) -> tuple[Any, bool]:
-        """Return the signal or what is left of it."""
+        """Return the signal, or its last value from before the outage; and whether it is good."""
         self.out = _inside(self.during, time)
         if self.out:
             return copied(self.last), False
@@ -44,5 +44,5 @@ class Outage(Block):
 
 
 def _inside(during: Any, time: float) -> bool:
-    """Return whether a time lies in one of the stretches."""
+    """Return whether a time lies in one of the outages."""
     return bool((reached(time, during[:, 0]) & ~reached(time, during[:, 1])).any())

@@ -8,7 +8,7 @@ from quadvis.block import Block, In, Out, Param, State, Work, clip
 
 
 class RateLimiter(Block):
-    """A signal that follows its input no faster than the limits, element by element.
+    """A signal that follows its input no faster than the limits allow, element by element.
 
     ``y[k] = y[k-1] + min(max(u[k] - y[k-1], -falling T), rising T)`` with ``y[-1] = initial``.
     """
@@ -26,10 +26,10 @@ class RateLimiter(Block):
         self.last = self.initial
 
     def output(self, u: Any) -> Any:
-        """Return the input, or as near to it as the limits allow."""
+        """Return the value that is nearest to the input within the limits."""
         self.given = self.last + clip(u - self.last, -self.falling * self.period, self.rising * self.period)
         return self.given
 
     def update(self) -> None:
-        """Keep what was given out."""
+        """Keep the output."""
         self.last = self.given

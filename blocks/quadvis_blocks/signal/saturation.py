@@ -10,7 +10,7 @@ from quadvis.block import Block, In, Out, Param, ParameterError, clip
 class Saturation(Block):
     """A signal held between two limits, element by element: ``y = min(max(u, lower), upper)``.
 
-    With ``lower = -upper`` it is the sigma of the paper's section 4.
+    With ``lower = -upper`` this is the function sigma of the paper's section 4.
     """
 
     lower = Param(-1.0, unit="a", tune=True, doc="smallest value that passes")
@@ -19,7 +19,7 @@ class Saturation(Block):
     y = Out("float64[*]", unit="a", doc="the signal within the limits")
 
     def check(self) -> None:
-        """Refuse limits that leave nothing between them."""
+        """Refuse a lower limit above the upper limit."""
         if self.lower > self.upper:
             problem = f"lower must be at most upper, {self.upper:g}, got {self.lower:g}"
             raise ParameterError("lower", problem)

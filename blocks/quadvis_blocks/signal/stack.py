@@ -15,7 +15,7 @@ class Stack(Block):
     a = In(unit="a", doc="first element")
     b = In(unit="a", default=0.0, doc="second element")
     c = In(unit="a", default=0.0, doc="third element")
-    y = Out("float64[3]", unit="a", doc="the three of them")
+    y = Out("float64[3]", unit="a", doc="the vector (a, b, c)")
 
     def output(self, a: float, b: float, c: float) -> Any:
         """Return the vector."""

@@ -10,7 +10,7 @@ from quadvis.block import Block, In, Out
 class Sum(Block):
     """Two or three signals added, element by element: ``y = a + b + c``.
 
-    For a difference see ``signal.difference``.
+    Block ``signal.difference`` subtracts.
     """
 
     a = In("float64[*]", unit="a", doc="first term")

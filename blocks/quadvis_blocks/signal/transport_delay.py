@@ -15,31 +15,35 @@ CAPACITY = 512
 class TransportDelay(Block):
     """A held signal, ``delay`` seconds later: ``y(t) = u(t - delay)``.
 
-    Before anything came through the output is ``initial``. The input may change at the block's ticks only, as
-    the output of a slower task does. In the continuous task the output may change inside a solver step, which
-    costs the solver an error of up to half that step times the change. At a discrete rate it changes at
-    ticks: with the block at the solver's rate and a delay of a whole number of steps, nothing is lost.
+    The output is ``initial`` until the first input arrives. The input may change only at the block's ticks,
+    as the output of a slower task does. In the continuous task the output may change inside a solver step;
+    this gives the solver an error of up to half a step times the change. At a discrete rate the output
+    changes at ticks: with the block at the solver's rate and a delay of a whole number of steps, there is no
+    such error.
 
     Error: ParameterError if the delay is longer than 511 ticks of the block.
     """
 
     delay = Param(
-        RADIO_DELAY, unit="s", above=0.0, doc="time that a change takes; default the 22 ms of a radio frame"
+        RADIO_DELAY,
+        unit="s",
+        above=0.0,
+        doc="time until a change arrives; default: the 22 ms of a radio frame",
     )
     initial = Param(0.0, unit="a", doc="every element of the output until the first input arrives")
     u = In("float64[n]", unit="a", doc="a held signal")
     y = Out("float64[n]", unit="a", doc="the signal of ``delay`` seconds ago")
     since = State(f"float64[{CAPACITY}]", unit="s")
-    values = State(f"float64[{CAPACITY},n]")  # the one that arrived last, then those on their way
+    values = State(f"float64[{CAPACITY},n]")  # the value that arrived last, then the values on their way
     waiting = State("int64")
-    arrived = Work("int64")  # the place of the value of now
+    arrived = Work("int64")  # index of the value that is the output now
 
     def check(self) -> None:
-        """Refuse a delay in which more values come in than there is room for."""
+        """Refuse a delay that holds more values than there is room for."""
         check_delay(self.delay, CAPACITY - 1, self.period)
 
     def start(self) -> None:
-        """Forget everything on its way."""
+        """Begin with no value on its way."""
         self.since[0] = -math.inf
         self.values[0, :] = self.initial
         self.waiting = 0
@@ -50,7 +54,7 @@ class TransportDelay(Block):
         return self.values[self.arrived]
 
     def update(self, u: Any, time: float) -> None:
-        """Send the input on its way, every one of them: what waits must not depend on the values."""
+        """Send the input on its way, even if it has not changed: the queue must not depend on the values."""
         first = self.arrived
         if first > 0:
             kept = self.waiting + 1 - first
@@ -63,7 +67,7 @@ class TransportDelay(Block):
 
 
 def _arrived(since: Any, waiting: int, instant: float) -> int:
-    """Return the place of the last value sent by ``instant``; the first was there already."""
+    """Return the index of the last value sent by ``instant``; 0 if all waiting values were sent later."""
     place = 0
     while place < waiting and reached(instant, since[place + 1]):
         place += 1
