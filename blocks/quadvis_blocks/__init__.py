@@ -1,1 +1,1 @@
-"""The block library of quadvis: one block per file, in groups that a diagram names as ``<group>.<block>``."""
+"""The block library of quadvis: one block per file. A diagram names a block as ``<group>.<block>``."""

@@ -1,29 +1,36 @@
-"""Which stamp is news, and how old it is: the one rule of all blocks that take a stamp.
+"""Which stamp is news, and how old a stamp is: the one rule of all blocks that take a stamp.
 
-A stamp is the instant (s, run time) at which something was measured or made, as its sender says. Senders err:
+A stamp is the instant (s, run time) at which a value was measured or made, according to its sender. Senders
+err, so each stamp gets a verdict:
 
 ========= ============================================================ =========================
 verdict   a stamp that                                                 counts
 ========= ============================================================ =========================
 NEWS      is later than all that counted, and not ahead of the time    as it stands
-REPEATED  is the one seen last                                         no
+REPEATED  equals the stamp seen last                                   no
 BACK      is not later than one that counted: overtaken on its way     no
-AHEAD     is ahead of the time                                          no
+AHEAD     is ahead of the time                                         no
 MISSING   is NaN or infinite                                           no
 RESTARTED is of a clock that was set back or started again             no; as NEWS after a while
 ========= ============================================================ =========================
 
-A clock that started again shows by stamps that rise as the time does, behind the one that counted last, while
-nothing else counts. A row of them is RESTARTED once it lasts a quarter of ``restart``, even if it catches up
-with what counted before: a clock that was set back by 0.3 s does after 0.3 s. When the row has lasted
-``restart`` its clock is taken: its stamps are then shifted so that what comes is as old as what came before.
-One stamp that fits the time again without that shift, and is newer, ends it. A clock that is ahead is never
-taken, whatever it does.
+A restarted clock is accepted in four steps:
 
-Until the first finite stamp NaN means that there is no clock: what comes is of now, at each tick. A block
-keeps a clock (`SIZE`,) as one of its states; `begin` in ``start``, `judge` in ``output``, `keep` in
-``update``, or `note` there if ``output`` does not judge. Age counts from the instant that `judge` gives,
-which is never after the arrival: of age by stamp and age by arrival that is the larger one.
+1. Its stamps form a row: they are earlier than the last stamp that counted, and they rise as fast as the
+   time. A stamp that counts ends the row.
+2. When the row has lasted a quarter of ``restart``, its stamps are RESTARTED, even if the row has caught up
+   with the last stamp that counted: the row of a clock that was set back by 0.3 s does so after 0.3 s.
+3. When the row has lasted ``restart``, its clock is accepted: its stamps count as NEWS. They are shifted, so
+   that their age at arrival is the age of the stamps that counted before.
+4. The shift ends with the first stamp that is later than all that counted and fits the time without it.
+
+A clock that is ahead of the time is never accepted, however its stamps rise.
+
+Before the first finite stamp, NaN means that there is no clock: each tick brings a value that was measured at
+that tick. A block keeps a clock, an array (`SIZE`,), as one of its states. It calls `begin` in ``start``,
+`judge` in ``output`` and `keep` in ``update``; if ``output`` does not judge, it calls `note` in ``update``.
+The age of a value counts from the instant that `judge` returns. This instant is never after the arrival, so
+the age is the larger one of the age by stamp and the age by arrival.
 """
 
 from __future__ import annotations
@@ -33,21 +40,21 @@ from typing import Any
 
 from quadvis.block import passed, reached
 
-RESTART = 1.0  # s; how long a clock that started again must run before it is taken
+RESTART = 1.0  # s; how long a restarted clock must run before it is accepted
 NEWS, REPEATED, BACK, AHEAD, MISSING, RESTARTED = range(6)
 
 SIZE = 7
 SEEN = 0  # the last finite stamp; NaN before the first
-MADE = 1  # what counted last: the instant that it stood for
-SHIFT = 2  # run time less stamp of a clock that was taken again; else 0
-DELAY = 3  # from that instant to its arrival
-ROW = 4  # arrival of the first stamp of a row that lies behind; NaN if there is none
-ROW_AGE = 5  # least age of a stamp of the row, by its own clock
-ROW_LAST = 6  # its last stamp
+MADE = 1  # the instant of the last stamp that counted
+SHIFT = 2  # run time minus stamp, of an accepted clock that was restarted; else 0
+DELAY = 3  # the time from MADE to the arrival of that stamp
+ROW = 4  # arrival of the first stamp of the row; NaN if there is no row
+ROW_AGE = 5  # least age at arrival in the row, by the row's own clock
+ROW_LAST = 6  # the last stamp of the row
 
 
 def begin(clock: Any) -> None:
-    """Know no stamp yet."""
+    """Begin without a stamp."""
     clock[SEEN] = math.nan
     clock[MADE] = -math.inf
     clock[SHIFT] = 0.0
@@ -58,7 +65,7 @@ def begin(clock: Any) -> None:
 
 
 def judge(clock: Any, stamp: float, time: float, restart: float) -> tuple[int, float]:
-    """Return what a stamp is at a time (s), and the instant that it stands for; -inf if for none."""
+    """Return the verdict on a stamp at a time (s), and the instant of the stamp; -inf if it has none."""
     if not math.isfinite(stamp):
         if math.isnan(stamp) and math.isnan(clock[SEEN]):
             return NEWS, time
@@ -80,14 +87,14 @@ def judge(clock: Any, stamp: float, time: float, restart: float) -> tuple[int, f
 
 
 def note(clock: Any, stamp: float, time: float, restart: float) -> tuple[int, float]:
-    """Keep a stamp that was not judged before, and return what `judge` does."""
+    """Judge and keep a stamp; return the result of `judge`."""
     verdict, made = judge(clock, stamp, time, restart)
     keep(clock, stamp, time, restart, verdict, made)
     return verdict, made
 
 
 def keep(clock: Any, stamp: float, time: float, restart: float, verdict: int, made: float) -> None:
-    """Keep a stamp, and what `judge` has said of it at this time."""
+    """Keep a stamp, with the result of `judge` at this time."""
     if not math.isfinite(stamp):
         return
     if verdict == NEWS:
@@ -106,7 +113,7 @@ def keep(clock: Any, stamp: float, time: float, restart: float, verdict: int, ma
 
 
 def _instant(clock: Any, stamp: float, time: float) -> float:
-    """Return the instant of a stamp: as it stands, or by the shift of its clock, whichever fits."""
+    """Return the instant of a stamp: the stamp itself or the shifted stamp, whichever fits better."""
     shifted = float(stamp + clock[SHIFT])
     plain = clock[MADE] < stamp and reached(time, stamp)
     if not plain:
@@ -117,7 +124,7 @@ def _instant(clock: Any, stamp: float, time: float) -> float:
 
 
 def _in_row(clock: Any, stamp: float, time: float, restart: float) -> bool:
-    """Return whether a stamp goes on with the row: later, and as the time does."""
+    """Return whether a stamp continues the row: it is later, and rises as fast as the time."""
     if math.isnan(clock[ROW]) or stamp <= clock[ROW_LAST]:
         return False
     return bool(abs(time - stamp - clock[ROW_AGE]) <= 0.25 * restart)

@@ -1,1 +1,1 @@
-"""Who flies: manual and automatic mode, stale data, what happens when the camera sees nothing, landing."""
+"""Blocks that decide who flies: manual and automatic mode, stale data, lost vision, landing."""

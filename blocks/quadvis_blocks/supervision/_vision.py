@@ -1,4 +1,4 @@
-"""What the states of vision and the reasons for them are called, by all blocks that hand them on."""
+"""The numbers of the states of vision and of their reasons, for all blocks that pass them on."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ NONE, NO_FRAMES, TARGET_LOST, REARMING, FROZEN, BAD_STAMP, CLOCK_RESTARTED, CONT
 
 
 def trouble_of(verdict: int, before: int) -> int:
-    """Return what is wrong with the newest stamp, by the verdict on that of now and what was wrong before."""
+    """Return the trouble with the newest stamp, by its verdict; a repeated stamp keeps that of ``before``."""
     if verdict == REPEATED:
         return before
     if verdict == NEWS:

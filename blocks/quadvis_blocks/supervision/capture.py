@@ -1,4 +1,4 @@
-"""The reference taken from where the craft is."""
+"""The reference taken from the position of the craft."""
 
 from __future__ import annotations
 
@@ -14,29 +14,39 @@ COLLECTIVE, ROLL, PITCH, YAW = range(4)
 
 
 class Capture(Block):
-    """A reference that is shifted to where the craft is when the control law takes over.
+    """A reference that is shifted to the craft when the control law takes over.
 
-    When collective, roll or pitch, or yaw become automatic, the height, x and y, or the heading of the
-    reference become those of the craft. When vision comes back (``rearmed``) x and y do if the craft is
-    further than ``distance`` from them. The shift stays, so a moving reference moves on from there; with a
-    ``return_speed`` it shrinks at that speed, heading excepted.
+    ============================================================= =================================
+    event                                                         the reference takes the craft's
+    ============================================================= =================================
+    the collective becomes automatic                              height
+    roll or pitch becomes automatic                               x and y
+    yaw becomes automatic                                         heading
+    vision comes back (``rearmed``) with the craft further than   x and y
+    ``distance`` from x and y of the shifted reference
+    ============================================================= =================================
+
+    The shift stays, so a moving reference moves on from the position of the craft. With a ``return_speed``
+    the shift of the position shrinks at that speed; the shift of the heading stays.
     """
 
-    distance = Param(0.5, unit="m", min=0.0, tune=True, doc="how far the craft may be off without a capture")
-    return_speed = Param(0.0, unit="m/s", min=0.0, tune=True, doc="speed at which the shift shrinks; 0 stays")
+    distance = Param(0.5, unit="m", min=0.0, tune=True, doc="error above which ``rearmed`` takes x and y")
+    return_speed = Param(
+        0.0, unit="m/s", min=0.0, tune=True, doc="speed at which the shift shrinks; 0: never"
+    )
     position_reference = In("float64[3]", unit="m", doc="where to be: x, y, h")
     velocity_reference = In(
         "float64[3]", unit="m/s", default=(0.0, 0.0, 0.0), doc="rate of change of the position reference"
     )
     heading_reference = In(unit="rad", doc="heading to hold")
     position = In("float64[3]", unit="m", doc="where the craft is: x, y, h")
-    heading = In(unit="rad", doc="its heading")
-    engaged = In("bool[4]", doc="channels that the law gets at this tick: collective, roll, pitch, yaw")
+    heading = In(unit="rad", doc="heading of the craft")
+    engaged = In("bool[4]", doc="channels that the law takes over at this tick: collective, roll, pitch, yaw")
     rearmed = In("bool", default=False, doc="true at the tick at which vision comes back")
     shifted_position = Out("float64[3]", unit="m", doc="where to be: x, y, h")
     shifted_velocity = Out("float64[3]", unit="m/s", doc="rate of change of the shifted position")
     shifted_heading = Out(unit="rad", doc="heading to hold, in (-pi, pi]")
-    captured = Out("bool", doc="whether x and y are taken at this tick")
+    captured = Out("bool", doc="whether x and y are taken from the craft at this tick")
     shift = State("float64[3]")
     turn = State()
     shift_now = Work("float64[3]")
@@ -58,14 +68,14 @@ class Capture(Block):
         return position_reference + shift, velocity, wrapped(heading_reference + self.turn_now), taken
 
     def update(self) -> None:
-        """Keep the shift, a little smaller if it shrinks."""
+        """Keep the shift, and let it shrink by one period of ``return_speed``."""
         step = min(self.return_speed * self.period, self.away)
         self.shift = self.shift_now * (1.0 - step / self.away if self.away > 0.0 else 1.0)
         self.turn = self.turn_now
 
 
 def _shifted(shift: Any, error: Any, engaged: Any, rearmed: bool, distance: float) -> tuple[Any, bool]:
-    """Return the shift with what is captured now, and whether x and y are."""
+    """Return the shift after the captures of this tick, and whether x and y were captured."""
     taken = engaged[ROLL] or engaged[PITCH]
     if rearmed:
         taken = taken or math.hypot(error[0] - shift[0], error[1] - shift[1]) > distance

@@ -1,4 +1,4 @@
-"""What is done when something that the control laws need is missing."""
+"""The reaction to the loss of a signal that the control laws need."""
 
 from __future__ import annotations
 
@@ -16,42 +16,61 @@ NEUTRAL, PILOT = range(2)
 ZERO, KEEP = range(2)
 MANUAL, MIXED, AUTOMATIC, COASTING, LEVELLED, LANDING = range(6)
 NONE, SWITCH, STICK, IMU_STALE, STICKS_STALE = range(5)
-OF_VISION = 4  # what is added to the first reasons of vision
+OF_VISION = 4  # added to the reasons 1 to 3 of vision
 ASKED, SATURATED = 8, 9
-MORE_OF_VISION = 6  # what is added to the others
+MORE_OF_VISION = 6  # added to the reasons 4 to 7 of vision
 
 
 class Failsafe(Block):
     """Who has each channel, how much vision counts, and whether to land.
 
-    - Vision not FRESH: positions count as long as it coasts, and less and less over ``blend`` once it is
-      LEVEL; velocities not at all while the frames are stale (``coast_velocity: keep`` for an estimator that
-      reckons on by itself). When vision is FRESH again both come back over ``blend``.
-    - Vision given up (LAND): descend, and go on to the ground even if vision comes back; or hand all channels
-      to the pilot (``on_loss: manual``) until he has switched them off and on, but descend while his sticks
-      are stale. ``land`` above 0.5 asks for the same at any time. Taking the collective in hand ends it.
-    - IMU stale: no automatic roll and pitch. They are neutral; with ``imu_lost: pilot``, right for a craft
-      that levels itself, they are the pilot's, if his sticks are not stale.
+    - Vision is not FRESH. In COAST, positions still count; from LEVEL on, their weight falls to 0 over
+      ``blend``. Velocities do not count while frames are stale, nor from LEVEL on. ``coast_velocity: keep``
+      lets them count in COAST, for an estimator that continues by dead reckoning. When vision is FRESH again,
+      both come back over ``blend``.
+    - Vision is given up (LAND). The craft descends, and continues to the ground even if vision comes back.
+      With ``on_loss: manual`` the pilot gets all channels instead, until he has switched them off and on;
+      while his sticks are stale, the craft descends. ``land`` above 0.5 asks for a descent at any time. The
+      descent ends when the pilot takes the collective.
+    - The IMU is stale. Roll and pitch are not automatic but neutral. With ``imu_lost: pilot``, right for a
+      craft that levels itself, the pilot has them, unless his sticks are stale.
 
-    Modes: 0 MANUAL (no channel automatic), 1 MIXED (some), 2 AUTOMATIC (all), and with any channel automatic
-    3 COAST, 4 LEVEL, 5 LAND. Reasons, the first that holds: in LAND what began it; 3 IMU stale; of vision 5
-    no new frames, 6 target not found, 7 not enough good frames yet, 10 frames frozen, 11 stamps ahead, back
-    or NaN, 12 their clock started again, 13 a contradiction to the inertial unit; 2 a stick took a channel
-    back; 4 sticks stale; 1 a switch is off; 9 a control gave way in the mixer; 0 none. 8: landing was asked
-    for.
+    Modes: 0 MANUAL (no channel is automatic), 1 MIXED (some are), 2 AUTOMATIC (all are); while any channel is
+    automatic, vision and landing give 3 COAST, 4 LEVEL, 5 LAND.
 
-    ``freeze`` is for integrators and disturbance estimates: channels that the law does not have, or on which
-    it does not get what it wants.
+    In mode LAND the reason is the one that began the landing; 8 means that ``land`` asked for it. In all
+    other modes the reason is the first line of this table that holds:
+
+    ====== ========================================
+    reason meaning
+    ====== ========================================
+    3      the IMU is stale
+    5      no new frames
+    6      the target is not found
+    7      not enough good frames yet
+    10     frames are frozen
+    11     stamps are ahead of the time, back or NaN
+    12     the camera's clock restarted
+    13     frames contradict the inertial unit
+    2      a stick took a channel back
+    4      the sticks are stale
+    1      a switch is off
+    9      a control gave way in the mixer
+    0      none of these
+    ====== ========================================
+
+    ``freeze`` stops integrators and disturbance estimates on the channels that the law does not have, and on
+    the channels whose control gave way in the mixer.
     """
 
     on_loss = Param("land", choices=("land", "manual"), doc="what to do when vision is given up")
-    imu_lost = Param("neutral", choices=("neutral", "pilot"), doc="whose roll and pitch are without an IMU")
+    imu_lost = Param("neutral", choices=("neutral", "pilot"), doc="who has roll and pitch without an IMU")
     coast_velocity = Param("zero", choices=("zero", "keep"), doc="velocities while frames are stale")
-    blend = Param(1.0, unit="s", above=0.0, tune=True, doc="time over which positions come and go")
+    blend = Param(1.0, unit="s", above=0.0, tune=True, doc="time in which positions fade out and in")
     automatic = In("bool[4]", doc="channels that the pilot leaves to the law: collective, roll, pitch, yaw")
     overridden = In("bool[4]", default=(False,) * 4, doc="channels that a stick took back")
     vision = In("int64", default=FRESH, doc="state of vision: 0 FRESH, 1 COAST, 2 LEVEL, 3 LAND")
-    vision_reason = In("int64", default=0, doc="why, as `supervision.vision_watchdog` says: 0 to 7")
+    vision_reason = In("int64", default=0, doc="reason of `supervision.vision_watchdog` for it: 0 to 7")
     vision_stale = In("bool", default=False, doc="whether the last good frame is too old")
     imu_stale = In("bool", default=False, doc="whether the IMU's last news is too old")
     sticks_stale = In("bool", default=False, doc="whether the sticks' last news is too old")
@@ -59,14 +78,14 @@ class Failsafe(Block):
     land = In(default=0.0, doc="above 0.5 asks for a landing")
     allowed = Out("bool[4]", doc="channels that the law has")
     neutral = Out("bool[4]", doc="channels held at neutral")
-    engaged = Out("bool[4]", doc="channels that the law gets at this tick")
+    engaged = Out("bool[4]", doc="channels that the law takes over at this tick")
     freeze = Out("bool[4]", doc="channels whose integrators and disturbance estimates must stand still")
-    position_weight = Out(doc="how much horizontal position and heading count, 0 to 1")
-    velocity_weight = Out(doc="how much horizontal velocity counts, 0 to 1")
-    blind = Out("bool", doc="whether vision does not count now: stale, or not FRESH again since LEVEL")
+    position_weight = Out(doc="weight of horizontal position and heading, 0 to 1")
+    velocity_weight = Out(doc="weight of horizontal velocity, 0 to 1")
+    blind = Out("bool", doc="whether vision does not count now: stale, or LEVEL or LAND")
     descend = Out("bool", doc="whether to land")
     mode = Out("int64", doc="0 MANUAL, 1 MIXED, 2 AUTOMATIC, 3 COAST, 4 LEVEL, 5 LAND")
-    reason = Out("int64", doc="why: 0 to 13, see above")
+    reason = Out("int64", doc="reason for the mode: 0 to 13, see above")
     had = State("bool[4]")
     begun = State("bool")
     landing = State("bool")
@@ -83,7 +102,7 @@ class Failsafe(Block):
         self, automatic: Any, overridden: Any, vision: int, vision_reason: int, vision_stale: bool,
         imu_stale: bool, sticks_stale: bool, limited: Any, land: float,
     ) -> tuple[Any, Any, Any, Any, float, float, bool, bool, int, int]:  # fmt: skip
-        """Return who has what, what counts, and why."""
+        """Return the owners of the channels, the weights, the decision to land, mode and reason."""
         given_up = _given_up(self.given_up, self.on_loss, vision, sticks_stale, automatic)
         allowed = automatic & (not given_up)
         neutral = np.zeros(allowed.size, np.bool_)
@@ -123,7 +142,7 @@ class Failsafe(Block):
 
 
 def _given_up(given_up: bool, on_loss: int, vision: int, sticks_stale: bool, automatic: Any) -> bool:
-    """Return whether all channels are the pilot's until he has switched them off and on."""
+    """Return whether the pilot has all channels until he has switched them off and on."""
     if sticks_stale or not automatic.any():
         return False
     return given_up or (on_loss == TO_MANUAL and vision == LOST)
@@ -143,7 +162,7 @@ def _landing(
 
 
 def _weight(weight: float, vision: int, step: float) -> float:
-    """Return how much positions count one step later."""
+    """Return the weight of positions one step later."""
     return min(weight + step, 1.0) if vision <= COAST else max(weight - step, 0.0)
 
 
@@ -160,7 +179,7 @@ def _mode(allowed: Any, vision: int, descend: bool) -> int:
 
 
 def _of_vision(reason: int) -> int:
-    """Return the failsafe's number of a reason of vision."""
+    """Return the number that the failsafe gives to a reason of vision."""
     return reason + (OF_VISION if reason <= REARMING else MORE_OF_VISION)
 
 
@@ -168,7 +187,7 @@ def _reason(
     flown: bool, all_on: bool, overridden: bool, vision_reason: int, imu_stale: bool, sticks_stale: bool,
     limited: bool,
 ) -> int:  # fmt: skip
-    """Return the first reason that holds; vision matters to a channel that the law has or had to give up."""
+    """Return the first reason that holds; vision counts if the law has a channel or had to give it up."""
     if imu_stale:
         return IMU_STALE
     if flown and vision_reason > 0:

@@ -1,4 +1,4 @@
-"""Which frames are news, and when they were taken."""
+"""The frames that are news, and the instants at which they were taken."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from quadvis_blocks._digest import NOTHING, digest
 from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, judge, keep
 from quadvis_blocks.supervision._vision import FROZEN, trouble_of
 
-RECENT = 32  # frames that are remembered: a camera that goes round in up to so many old ones has no news
+RECENT = 32  # remembered frames: a camera that repeats a cycle of up to so many old frames brings no news
 STALE = 0  # of the choices of repeats
 
 
 class FrameNews(Block):
-    """The stamp of the newest frame that is news, in the time of the run; it stands still while none is.
+    """The stamp of the newest frame that is news, in run time; it does not change while no frame is news.
 
-    A frame is news if its stamp is (later than all before, not ahead of the time, finite) and if what was
-    measured in it is not the same to the last bit as in one of the last 32 different frames: a camera has
-    noise, so a picture or a measurement that repeats is a camera that froze, or that goes round in old ones,
-    whatever stamps and numbers it gives. Measurements without noise may repeat because nothing moves: for
-    them set ``repeats`` to ``news``, or leave ``value`` out. A clock that started again counts again after
-    ``restart``, with its stamps shifted into the time of the run.
+    A frame is news if its stamp is news (later than all before, not ahead of the time, finite), and if its
+    measurement is not equal, to the last bit, to the measurement of one of the last 32 different frames. A
+    camera has noise. So a picture or a measurement that repeats means that the camera froze, or that it
+    repeats a cycle of old pictures, whatever stamps and numbers these have. Measurements without noise may
+    repeat because nothing moves: for them set ``repeats`` to ``news``, or leave ``value`` out. A restarted
+    clock counts again after ``restart``, with its stamps shifted into run time.
 
-    Put it where frames come in, and hand its stamp to all that ask for one: they agree then on which frames
-    count.
+    Put this block where frames come in, and pass ``instant`` to all blocks that take a stamp. Then these
+    blocks agree on which frames count.
 
-    Reasons: 0 none, 4 frozen, 5 a stamp ahead of the time, from before or NaN, 6 a clock that started again.
+    Reasons: 0 none, 4 frozen, 5 a stamp ahead of the time, back or NaN, 6 a restarted clock.
     """
 
     restart = Param(
@@ -35,33 +35,35 @@ class FrameNews(Block):
         unit="s",
         above=0.0,
         tune=True,
-        doc="how long a clock that started again runs until it counts",
+        doc="how long a restarted clock must run before its stamps count",
     )
     repeats = Param(
-        "stale", choices=("stale", "news"), doc="a measurement that repeats to the bit: no news, or news"
+        "stale",
+        choices=("stale", "news"),
+        doc="whether a measurement that repeats to the bit is news",
     )
-    stamp = In(unit="s", doc="instant of the newest frame as the camera says; NaN for none yet")
-    value = In("float64[*]", unit="a", default=math.nan, doc="what was measured in it, if it has noise")
-    frozen = In("bool", default=False, doc="whether whoever looks at the pictures says that they repeat")
+    stamp = In(unit="s", doc="instant of the newest frame by the camera's clock; NaN before the first")
+    value = In("float64[*]", unit="a", default=math.nan, doc="measurement in that frame, if it has noise")
+    frozen = In("bool", default=False, doc="whether another block reports that the pictures repeat")
     instant = Out(unit="s", nan=True, doc="instant of the newest frame that was news; NaN before the first")
-    fresh = Out("bool", doc="whether there is one at this tick")
-    reason = Out("int64", doc="what was wrong with the newest: 0 nothing, 4 frozen, 5 its stamp, 6 its clock")
+    fresh = Out("bool", doc="whether a frame is news at this tick")
+    reason = Out("int64", doc="trouble with the newest frame: 0 none, 4 frozen, 5 its stamp, 6 its clock")
     taken = State(unit="s", init=math.nan)
     recent = State(f"int64[{RECENT}]", NOTHING)  # digests of measurements, the newest first
     cause = State("int64")
     stamps = State(f"float64[{SIZE}]")
-    verdict = Work("int64")  # on the stamp of now
-    moment = Work(unit="s")  # the instant that it stands for
-    seen = Work("int64")  # digest of the measurement of now
-    known = Work("bool")  # whether it is a recent one
+    verdict = Work("int64")  # on the stamp of this tick
+    moment = Work(unit="s")  # the instant of that stamp
+    seen = Work("int64")  # digest of the measurement of this tick
+    known = Work("bool")  # whether that is one of the recent measurements
     cause_now = Work("int64")
 
     def start(self) -> None:
-        """Know no frame yet."""
+        """Begin without a frame."""
         begin(self.stamps)
 
     def output(self, stamp: float, value: Any, frozen: bool, time: float) -> tuple[float, bool, int]:
-        """Return the instant of the newest frame that was news, whether it is new, and what is wrong."""
+        """Return the instant of the newest frame that was news, whether it came now, and the trouble."""
         self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)
         self.seen = digest(value) if self.verdict == NEWS and self.repeats == STALE else NOTHING
         self.known = frozen or _is_known(self.seen, self.recent)
@@ -84,5 +86,5 @@ class FrameNews(Block):
 
 
 def _is_known(seen: int, recent: Any) -> bool:
-    """Return whether a measurement is one of the recent ones; one without a number never is."""
+    """Return whether a measurement is one of the recent ones; a measurement without a number never is."""
     return bool(seen != NOTHING and (recent == seen).any())

@@ -8,66 +8,67 @@ import numpy as np
 
 from quadvis.block import Block, In, Out, Param, State, Work, copied, reached
 
-TOUCH = 1e-9  # m; a height no further from another one is the same
+TOUCH = 1e-9  # m; heights that differ by no more than this count as equal
 
 
 class Landing(Block):
-    """A reference that descends, and the moment at which the craft stands on the ground.
+    """A reference that descends, and the decision that the craft stands on the ground.
 
-    ======= =========================================== ======================== ========================
-    phase   begins when                                 x and y of the reference height of the reference
-    ======= =========================================== ======================== ========================
-    off     ``descend`` is false                        those of the input       that of the input
-    descent ``descend`` becomes true                    kept since then          falls at ``speed``
-    flare   the reference is ``flare`` above ``ground`` kept                     falls at ``touch_speed``
-    ground  the reference is below ``ground``           those of the craft       falls on
-    lowest  the reference is ``margin`` below it        those of the craft       stops
-    ======= =========================================== ======================== ========================
+    ======= ============================================ ======================== ========================
+    phase   begins when                                  x and y of the reference height of the reference
+    ======= ============================================ ======================== ========================
+    off     ``descend`` is false                         those of the input       that of the input
+    descent ``descend`` becomes true                     kept since then          falls at ``speed``
+    flare   the reference is ``flare`` above ``ground``  kept                     falls at ``touch_speed``
+    ground  the reference is below ``ground``            those of the craft       falls on
+    lowest  the reference is ``margin`` below ``ground`` those of the craft       stops
+    ======= ============================================ ======================== ========================
 
-    ``recapture`` takes x and y from the input anew. While the craft is more than ``gap`` above the reference,
-    x and y are those of the craft, so that it is not pushed sideways. Below the ground the reference moves as
-    the craft does (``current_velocity``): estimates that do not know that the craft stands must not drive it.
+    ``recapture`` takes x and y from the input again. While the craft is more than ``gap`` above the
+    reference, x and y are those of the craft, so that the craft is not pushed sideways. Below the ground the
+    velocity of the reference is that of the craft (``current_velocity``): an estimator that does not know
+    that the craft stands must not drive it sideways.
 
-    The craft has landed when it no longer follows the reference: it is more than ``gap`` above it, and its
-    height has stayed within ``band`` for ``settle``. This needs neither the right height of the ground nor a
-    rate. While the height is reckoned and not seen (``blind``), the craft has landed in the phase "lowest".
-    When the height is seen again, the reference continues from the height of the craft. ``landed`` stays true
-    until ``descend`` is false.
+    The craft has landed when it no longer follows the reference: the craft is more than ``gap`` above the
+    reference, and its height has stayed within ``band`` for ``settle``. This rule needs neither the right
+    height of the ground nor a vertical speed. While the height is reckoned and not seen (``blind``), the
+    craft has landed in the phase "lowest". When the height is seen again, the reference continues from the
+    height of the craft. ``landed`` stays true until ``descend`` is false.
     """
 
     speed = Param(0.3, unit="m/s", above=0.0, tune=True, doc="speed of the descent")
     gap = Param(0.15, unit="m", above=0.0, tune=True, doc="least height above the reference on the ground")
     band = Param(0.06, unit="m", above=0.0, tune=True, doc="greatest change of the height on the ground")
-    settle = Param(1.0, unit="s", min=0.0, tune=True, doc="how long the height must keep within it")
-    ground = Param(0.0, unit="m", tune=True, doc="height of the craft as it stands on the ground")
-    flare = Param(0.5, unit="m", min=0.0, tune=True, doc="height above the ground at which it slows down")
-    touch_speed = Param(0.2, unit="m/s", above=0.0, tune=True, doc="speed of the rest of the descent")
-    margin = Param(
-        1.5, unit="m", above=0.0, tune=True, doc="how far the reference goes below the ground, in the dark"
+    settle = Param(1.0, unit="s", min=0.0, tune=True, doc="how long the height must stay within ``band``")
+    ground = Param(0.0, unit="m", tune=True, doc="height of the craft when it stands on the ground")
+    flare = Param(
+        0.5, unit="m", min=0.0, tune=True, doc="height above the ground where the descent slows down"
     )
+    touch_speed = Param(0.2, unit="m/s", above=0.0, tune=True, doc="speed of the rest of the descent")
+    margin = Param(1.5, unit="m", above=0.0, tune=True, doc="how far below the ground the reference descends")
     position_reference = In("float64[3]", unit="m", doc="where to be: x, y, h")
     velocity_reference = In(
         "float64[3]", unit="m/s", default=(0.0, 0.0, 0.0), doc="rate of change of the reference"
     )
     descend = In("bool", doc="whether to land")
-    recapture = In("bool", default=False, doc="true to take x and y from the reference anew")
+    recapture = In("bool", default=False, doc="true to take x and y from the input again")
     current = In("float64[3]", unit="m", doc="where the craft is: x, y, h")
     current_velocity = In(
-        "float64[3]", unit="m/s", default=(0.0, 0.0, 0.0), doc="its rate of change, as it is known"
+        "float64[3]", unit="m/s", default=(0.0, 0.0, 0.0), doc="velocity of the craft, as far as it is known"
     )
     blind = In("bool", default=False, doc="whether the height is reckoned, not seen")
     position = Out("float64[3]", unit="m", doc="where to be: x, y, h")
-    velocity = Out("float64[3]", unit="m/s", doc="its rate of change")
+    velocity = Out("float64[3]", unit="m/s", doc="rate of change of the position")
     landed = Out("bool", doc="whether the craft stands on the ground: let the rotors idle")
     active = State("bool")
     was_blind = State("bool")
     spot = State("float64[3]", unit="m")
     rest = State(unit="m")  # height from which the craft has not moved
-    since = State(unit="s")  # when it came there
+    since = State(unit="s")  # when the craft came to that height
     down = State("bool")
-    place = Work("float64[3]", unit="m")  # the reference of now
-    slow = Work("bool")  # whether it is near the ground
-    stands = Work("bool")  # whether the craft stands there now
+    place = Work("float64[3]", unit="m")  # the reference at this tick
+    slow = Work("bool")  # whether the reference is near the ground
+    stands = Work("bool")  # whether the craft stands on the ground at this tick
 
     def output(
         self, position_reference: Any, velocity_reference: Any, descend: bool, recapture: bool, current: Any,
@@ -93,7 +94,7 @@ class Landing(Block):
         return where, pace, self.down or self.stands
 
     def update(self, descend: bool, current: Any, blind: bool, time: float) -> None:
-        """Go down by one period."""
+        """Lower the reference by one period."""
         height = float(current[2])
         if blind or not self.active or abs(height - self.rest) > self.band:
             self.rest = height

@@ -17,13 +17,13 @@ MANUAL, AUTOMATIC, NEUTRAL, IDLE = range(4)
 class ModeSwitch(Block):
     """Each control from the pilot or from the control law, without a jump when it changes hands.
 
-    At the tick at which a channel changes hands its output stays what it was, to the bit. The difference from
-    the new source is an offset that then decays exponentially: with ``to_automatic`` when the law takes over,
-    with ``to_manual`` when the pilot does, or when ``neutral`` comes. What the new source does from that tick
-    on passes through at once, so the pilot has full authority from the first moment; only the difference in
-    trim is taken away smoothly. With ``to_manual`` 0 the stick counts at once as it stands: the output jumps
-    by the difference. ``idle``, for a craft on the ground, counts at once. Precedence: ``idle``,
-    ``neutral``, ``automatic``.
+    At the tick at which a channel changes hands, its output keeps its last value, to the bit. The difference
+    from the new source becomes an offset. The offset decays exponentially: with time constant
+    ``to_automatic`` if the law takes over, with ``to_manual`` if the pilot takes over or the channel becomes
+    neutral. Every change of the new source from that tick on passes through at once. So the pilot has full
+    authority from the first moment; only the difference in trim fades out. With ``to_manual: 0`` there is no
+    offset: the output jumps by the difference. ``idle``, for a craft on the ground, takes effect at once.
+    Precedence: ``idle``, ``neutral``, ``automatic``.
 
     Source: section 4 ("the four control inputs can independently operate in either manual or automatic
     modes"); the transfer is an addition.
@@ -50,22 +50,22 @@ class ModeSwitch(Block):
     yaw = In(unit="rad/s^2", doc="yaw torque of the control law")
     automatic = In("bool[4]", doc="channels that the law has, not the pilot: collective, roll, pitch, yaw")
     neutral = In(
-        "bool[4]", default=(False, False, False, False), doc="channels that neither has: neutral controls"
+        "bool[4]", default=(False, False, False, False), doc="channels that neither of them has: neutral"
     )
     idle = In("bool", default=False, doc="true to let all rotors idle")
     controls = Out(
         "float64[4]",
         unit="N rad/s^2 rad/s^2 rad/s^2",
-        doc="what goes to the mixer: collective; roll, pitch and yaw torque over inertia",
+        doc="controls for the mixer: collective; roll, pitch and yaw torque over inertia",
     )
-    source = Out("int64[4]", doc="whose it is: 0 pilot, 1 control law, 2 neutral, 3 idle")
-    stamp = Out(unit="s", doc="instant at which they were made: now")
+    source = Out("int64[4]", doc="source of each control: 0 pilot, 1 control law, 2 neutral, 3 idle")
+    stamp = Out(unit="s", doc="instant at which the controls were made: now")
     last = State("float64[4]")
     offset = State("float64[4]")
     owner = State("int64[4]")
     begun = State("bool")
     given = Work("float64[4]")
-    apart = Work("float64[4]")  # what is given less what its owner wants
+    apart = Work("float64[4]")  # output minus the value that the owner wants
     owner_now = Work("int64[4]")
 
     def output(
@@ -95,7 +95,7 @@ class ModeSwitch(Block):
         return given, owners, time
 
     def update(self) -> None:
-        """Take the difference at a change of hands into the offset, and let it decay."""
+        """Keep the offset, which a change of hands has made, and let it decay."""
         for channel in range(CHANNELS):
             constant = _time_constant(self.owner_now[channel], self.to_automatic, self.to_manual)
             fading = math.exp(-self.period / constant) if constant > 0.0 else 0.0
@@ -106,7 +106,7 @@ class ModeSwitch(Block):
 
 
 def _owner(automatic: bool, neutral: bool, idle: bool) -> int:
-    """Return whose a channel is."""
+    """Return the owner of a channel."""
     if idle:
         return IDLE
     if neutral:
@@ -115,7 +115,7 @@ def _owner(automatic: bool, neutral: bool, idle: bool) -> int:
 
 
 def _value(owner: int, channel: int, manual: Any, law: Any, weight: float, idle_thrust: float) -> float:
-    """Return what the owner wants on a channel."""
+    """Return the value that the owner wants on a channel."""
     if owner == AUTOMATIC:
         return float(law[channel])
     if owner == MANUAL:
@@ -126,14 +126,14 @@ def _value(owner: int, channel: int, manual: Any, law: Any, weight: float, idle_
 
 
 def _time_constant(owner: int, to_automatic: float, to_manual: float) -> float:
-    """Return the time constant of the transfer to an owner; 0 if it counts at once."""
+    """Return the time constant of the transfer to an owner; 0 if the owner counts at once."""
     if owner == IDLE:
         return 0.0
     return to_automatic if owner == AUTOMATIC else to_manual
 
 
 def _handed(value: float, smooth: bool, changed: bool, last: float, offset: float) -> tuple[float, float]:
-    """Return a control, and how far it is from what its owner wants."""
+    """Return a control, and its offset from the value that its owner wants."""
     if not smooth:
         return value, 0.0
     if changed:

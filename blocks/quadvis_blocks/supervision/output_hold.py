@@ -10,12 +10,12 @@ from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, judge, keep
 
 
 class OutputHold(Block):
-    """The last good command for a short while, then a safe one: the gate before an actuator.
+    """The last good command for a short time, then a safe command: the gate before an actuator.
 
-    A command is good if ``valid`` is true, all its elements are finite and its ``stamp`` is newer than all
-    before and not ahead of the time; without stamps every tick brings a new one. It is held until it is older
-    than ``max_age``; then every element is ``safe`` until the next good one. Before the first good one the
-    output is safe.
+    A command is good if ``valid`` is true, if all its elements are finite, and if its ``stamp`` is later than
+    all before and not ahead of the time. Without stamps every tick brings a new command. A good command is
+    held until it is older than ``max_age``. Then every element of the output is ``safe`` until the next good
+    command, as it is before the first.
     """
 
     max_age = Param(0.25, unit="s", min=0.0, tune=True, doc="how long (inclusive) a command is held")
@@ -25,27 +25,27 @@ class OutputHold(Block):
         unit="s",
         above=0.0,
         tune=True,
-        doc="how long a clock that started again runs until it counts",
+        doc="how long a restarted clock must run before its stamps count",
     )
     u = In("float64[*]", unit="a", doc="the command")
     valid = In("bool", default=True, doc="whether the command is good")
-    stamp = In(unit="s", default=math.nan, doc="instant at which it was made; NaN for now")
-    y = Out("float64[*]", unit="a", doc="the command, held, or the safe one")
-    stale = Out("bool", doc="whether it is the safe one")
+    stamp = In(unit="s", default=math.nan, doc="instant at which the command was made; NaN means now")
+    y = Out("float64[*]", unit="a", doc="the held command, or the safe command")
+    stale = Out("bool", doc="whether y is the safe command")
     last = State("float64[*]")
     made = State(unit="s")
     stamps = State(f"float64[{SIZE}]")
-    verdict = Work("int64")  # on the stamp of now
-    moment = Work(unit="s")  # the instant that it stands for
-    good = Work("bool")  # whether the command of now counts
+    verdict = Work("int64")  # on the stamp of this tick
+    moment = Work(unit="s")  # the instant of that stamp
+    good = Work("bool")  # whether the command of this tick counts
 
     def start(self) -> None:
-        """Know no command yet."""
+        """Begin without a command."""
         begin(self.stamps)
         self.made = -math.inf
 
     def output(self, u: Any, valid: bool, stamp: float, time: float) -> tuple[Any, bool]:
-        """Return the command that counts, and whether it is the safe one."""
+        """Return the held or the safe command, and whether it is the safe one."""
         self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)
         self.good = self.verdict == NEWS and valid and all_finite(u) and self.moment > self.made
         if passed(time - (self.moment if self.good else self.made), self.max_age):

@@ -1,4 +1,4 @@
-"""Which poses the inertial unit allows."""
+"""The gate for poses that contradict the inertial unit."""
 
 from __future__ import annotations
 
@@ -16,14 +16,17 @@ DEGREE = math.pi / 180.0
 
 
 class PoseGate(Block):
-    """A validation gate: a pose counts if the craft can have come there since the last one that counted.
+    """A validation gate: a pose counts if the craft can have reached it since the last pose that counted.
 
-    It is refused if its heading is further than ``turn`` from the last one plus what the gyro has shown
-    since, or its position further than ``jump`` from the last one and what ``speed`` and ``acceleration``
-    allow. The error of the gyro counts with ``drift``, so after long enough without a good pose any pose is
-    in reach again. After a refusal ``confirm`` poses in a row must agree with each other as well: of random
-    ones, some are in reach by chance. A picture that is turned or mirrored, or in which something else is
-    taken for the target, looks good to the camera alone.
+    Let t be the time since the last pose that counted. A pose is refused in two cases:
+
+    - Its heading differs from the last heading plus the rotation by the gyro by more than ``turn + drift t``.
+    - Its position is further from the last position than ``jump + speed t + acceleration t^2 / 2``.
+
+    So after a long enough time without a good pose, every pose is in reach again. After a refusal,
+    ``confirm`` poses in a row must be in reach and agree with each other, because some random poses are in
+    reach by chance. The gate catches errors that look good to the camera alone: a picture that is turned or
+    mirrored, or another thing that is taken for the target.
 
     ``plausible`` and ``reason`` hold until the next frame. Reason 7 is a refused pose, else ``trouble``.
 
@@ -32,13 +35,11 @@ class PoseGate(Block):
     """
 
     turn = Param(15.0 * DEGREE, unit="rad", above=0.0, tune=True, doc="greatest unexpected change of heading")
-    drift = Param(10.0 * DEGREE, unit="rad/s", min=0.0, tune=True, doc="how fast the gyro's heading may err")
-    jump = Param(0.25, unit="m", above=0.0, tune=True, doc="greatest change of position in no time")
-    speed = Param(
-        2.0, unit="m/s", min=0.0, tune=True, doc="greatest speed of a craft that flies as it should"
-    )
+    drift = Param(10.0 * DEGREE, unit="rad/s", min=0.0, tune=True, doc="greatest drift of the gyro's heading")
+    jump = Param(0.25, unit="m", above=0.0, tune=True, doc="greatest change of position in zero time")
+    speed = Param(2.0, unit="m/s", min=0.0, tune=True, doc="greatest speed of a craft in normal flight")
     acceleration = Param(
-        5.0, unit="m/s^2", min=0.0, tune=True, doc="how fast one that does not may gain more of it"
+        5.0, unit="m/s^2", min=0.0, tune=True, doc="greatest acceleration of a craft that exceeds it"
     )
     confirm = Param(3, type="int64", min=1, tune=True, doc="poses in a row that end a refusal")
     restart = Param(
@@ -46,34 +47,34 @@ class PoseGate(Block):
         unit="s",
         above=0.0,
         tune=True,
-        doc="how long a clock that started again runs until it counts",
+        doc="how long a restarted clock must run before its stamps count",
     )
     position = In("float64[3]", unit="m", doc="measured position; NaN if there is none")
     yaw = In(unit="rad", doc="measured heading; NaN if there is none")
-    stamp = In(unit="s", doc="instant of the frame; NaN for none yet")
+    stamp = In(unit="s", doc="instant of the frame; NaN before the first")
     valid = In("bool", default=True, doc="whether the frame gave a pose")
     yaw_rate = In(unit="rad/s", doc="rate of change of the heading, by the gyro")
-    trouble = In("int64", default=NONE, doc="why frames do not count, to hand on")
+    trouble = In("int64", default=NONE, doc="why frames do not count, to be passed on")
     plausible = Out("bool", doc="whether the newest frame gave a pose that counts")
     reason = Out("int64", doc="7 if the newest pose was refused, else trouble")
     counted = State("float64[4]", unit="m m m rad")  # the last pose that counted
     counted_at = State(unit="s", init=math.nan)
-    counted_turn = State(unit="rad")  # since then, by the gyro
+    counted_turn = State(unit="rad")  # rotation since then, by the gyro
     newest = State("float64[4]", unit="m m m rad")  # the last pose, whether it counted or not
     newest_at = State(unit="s", init=math.nan)
     newest_turn = State(unit="rad")
     row = State("int64")  # poses that agree, since the last refusal
-    doubted = State("bool")  # whether there was one, and no row has ended it
+    doubted = State("bool")  # whether there was a refusal that no row of poses has ended
     refused = State("bool")
     stamps = State(f"float64[{SIZE}]")
-    verdict = Work("int64")  # on the stamp of now
-    moment = Work(unit="s")  # the instant that it stands for
+    verdict = Work("int64")  # on the stamp of this tick
+    moment = Work(unit="s")  # the instant of that stamp
     compared = Work("bool")  # whether there is a new pose
     row_now = Work("int64")
     refused_now = Work("bool")
 
     def start(self) -> None:
-        """Know no pose yet."""
+        """Begin without a pose."""
         begin(self.stamps)
 
     def output(
@@ -93,7 +94,7 @@ class PoseGate(Block):
         return valid and not self.refused_now, CONTRADICTED if self.refused_now else trouble
 
     def update(self, position: Any, yaw: float, stamp: float, yaw_rate: float, time: float) -> None:
-        """Keep a pose that counts, and turn with the gyro."""
+        """Keep the newest pose, and the pose that counts; add the rotation by the gyro."""
         keep(self.stamps, stamp, time, self.restart, self.verdict, self.moment)
         self.refused = self.refused_now
         if self.compared:
@@ -120,7 +121,7 @@ def _limits(jump: float, speed: float, acceleration: float, turn: float, drift: 
 
 
 def _agrees(position: Any, yaw: float, before: Any, turned: float, elapsed: float, limits: Any) -> bool:
-    """Return whether a pose is in reach of one before (4,); any is if NaN has elapsed."""
+    """Return whether a pose is in reach of an earlier pose (4,); true if ``elapsed`` (s) is NaN."""
     away = 0.0
     for axis in range(3):
         away += (position[axis] - before[axis]) ** 2
@@ -130,7 +131,7 @@ def _agrees(position: Any, yaw: float, before: Any, turned: float, elapsed: floa
 
 
 def _row(row: int, reached: bool, agreed: bool) -> int:
-    """Return how many poses in a row are in reach, and agree with each other."""
+    """Return the number of poses in a row that are in reach and agree with each other."""
     if not reached:
         return 0
     return row + 1 if agreed else 1

@@ -1,4 +1,4 @@
-"""How old the news of a signal is."""
+"""The age of the last news of a signal."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, judge, keep
 
 
 class Staleness(Block):
-    """How long ago a signal last brought news, and whether that is too long.
+    """The time since a signal last brought news, and whether that time is too long.
 
-    News is a stamp newer than all before, a sequence number other than the last, or a value of which an
-    element is other than the last; connect what there is. Inputs that are not connected, NaN, and stamps of
-    the future bring none. The age counts from the stamp of the news if it has one, else from the tick at
-    which it came; before the first news it counts from the start.
+    News is a stamp later than all before, a sequence number that differs from the last, or a value with an
+    element that differs from the last. Connect the inputs that the signal has. Inputs that are not connected,
+    NaN, and stamps ahead of the time bring no news. The age counts from the stamp of the news; without a
+    stamp it counts from the tick at which the news came. Before the first news it counts from the start.
     """
 
     max_age = Param(
@@ -30,23 +30,23 @@ class Staleness(Block):
         unit="s",
         above=0.0,
         tune=True,
-        doc="how long a clock that started again runs until it counts",
+        doc="how long a restarted clock must run before its stamps count",
     )
     stamp = In(unit="s", default=math.nan, doc="instant of the measurement")
     sequence = In("int64", default=0, doc="number of the measurement")
-    value = In("float64[*]", unit="a", default=0.0, doc="the measurement, if it has noise: it never repeats")
+    value = In("float64[*]", unit="a", default=0.0, doc="the measurement, if it has noise and never repeats")
     age = Out(unit="s", doc="time since the last news")
-    stale = Out("bool", doc="whether that is more than ``max_age``")
+    stale = Out("bool", doc="whether the age is more than ``max_age``")
     news = State(unit="s")
     last_sequence = State("int64")
     last_value = State("float64[*]")
     stamps = State(f"float64[{SIZE}]")
-    verdict = Work("int64")  # on the stamp of now
-    moment = Work(unit="s")  # the instant that it stands for
+    verdict = Work("int64")  # on the stamp of this tick
+    moment = Work(unit="s")  # the instant of that stamp
     newest = Work(unit="s")  # when the last news came
 
     def start(self) -> None:
-        """Know nothing yet."""
+        """Begin without news."""
         begin(self.stamps)
 
     def output(self, stamp: float, sequence: int, value: Any, time: float) -> tuple[float, bool]:
@@ -62,7 +62,7 @@ class Staleness(Block):
         return max(0.0, age), passed(age, self.max_age)
 
     def update(self, stamp: float, sequence: int, value: Any, time: float) -> None:
-        """Keep what came."""
+        """Keep stamp, sequence number and value."""
         keep(self.stamps, stamp, time, self.restart, self.verdict, self.moment)
         self.news = self.newest
         self.last_sequence = sequence
@@ -70,7 +70,7 @@ class Staleness(Block):
 
 
 def _differs(value: Any, last: Any) -> bool:
-    """Return whether an element is a number other than the last."""
+    """Return whether an element is a number that differs from its last value."""
     if isinstance(value, float):
         return value == value and value != last
     for place in range(value.size):

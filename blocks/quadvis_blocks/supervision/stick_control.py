@@ -1,4 +1,4 @@
-"""The pilot's controls, from his sticks."""
+"""The pilot's controls, computed from his sticks."""
 
 from __future__ import annotations
 
@@ -16,11 +16,16 @@ ANGLE, DIRECT = range(2)
 class StickControl(Block):
     """Collective thrust and torques that the sticks ask for.
 
-    Collective: the weight plus ``force`` times the stick, whatever the tilt. Roll and pitch with ``mode:
-    angle``: a torque that brings the angle to ``tilt`` times the stick, two poles at -bandwidth; yaw: one
-    that brings the rate to ``turn`` times the stick, one pole there. Sticks in the middle are a level craft.
-    With ``mode: direct`` a torque of ``torque`` times the stick, for a craft that steadies itself. Stick
-    right is right side down, and clockwise from above; stick back is nose up.
+    Collective: a lift of the weight plus ``force`` times the stick, at any tilt. The torques depend on
+    ``mode``:
+
+    - ``angle``: the roll and pitch torques bring the angle to ``tilt`` times the stick, with two poles at
+      -bandwidth. The yaw torque brings the rate to ``turn`` times the stick, with one pole at -bandwidth.
+      Sticks in the middle keep the craft level.
+    - ``direct``: each torque is ``torque`` times the stick, for a craft that stabilises itself.
+
+    A stick to the right means right side down (roll) and clockwise from above (yaw). A stick that is pulled
+    back means nose up.
     """
 
     mode = Param("angle", choices=("angle", "direct"), doc="what roll, pitch and yaw sticks ask for")
@@ -28,8 +33,8 @@ class StickControl(Block):
     tilt = Param(0.26, unit="rad", above=0.0, tune=True, doc="angle at full stick, mode angle")
     turn = Param(1.0, unit="rad/s", above=0.0, tune=True, doc="yaw rate at full stick, mode angle")
     torque = Param(5.0, unit="rad/s^2", above=0.0, tune=True, doc="torque at full stick, mode direct")
-    force = Param(2.0, unit="N", above=0.0, tune=True, doc="force beyond the weight at full stick")
-    mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
+    force = Param(2.0, unit="N", above=0.0, tune=True, doc="force above the weight at full stick")
+    mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass of the craft; default: Draganfly IV")
     gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
     tilt_floor = Param(0.5, above=0.0, max=1.0, tune=True, doc="least cos(roll) cos(pitch) to divide by")
     sticks = In("float64[4]", doc="collective, roll, pitch, yaw, each -1 to 1")

@@ -10,25 +10,32 @@ from quadvis.block import Block, In, Out, Param, ParameterError, State, Work
 
 CHANNELS = 4
 ENGAGEMENT, NEUTRAL = range(2)
-SWITCH_ON, SWITCH_OFF = 0.6, 0.4  # a switch counts as moved beyond the one or below the other
+SWITCH_ON, SWITCH_OFF = 0.6, 0.4  # a switch comes on above the first value, and goes off below the second
 
 
 class StickOverride(Block):
-    """Which channels the pilot leaves to the control law: his switches, unless he moves a stick.
+    """Which channels the pilot leaves to the control law: his switches decide, unless he moves a stick.
 
-    A channel is automatic while its switch is on. A stick that moves by more than ``threshold`` from where it
-    stood when its switch came on takes its channel back at once, and it stays the pilot's until the switch
-    has been off. With ``origin: neutral`` the deflection counts from neutral instead, and a channel is not
-    given away while its stick is further out than ``release``. ``together`` lets one stick take back all.
+    A channel is automatic while its switch is on. A stick takes its channel back at once when it moves by
+    more than ``threshold`` from its position at the tick when the switch came on. The pilot then keeps the
+    channel until the switch has been off. With ``origin: neutral`` the deflection counts from neutral
+    instead, and a switch that comes on while its stick is further out than ``release`` does not make the
+    channel automatic. With ``together`` one stick takes back all channels.
 
-    While the sticks are stale nothing changes: a link that fails does not look like a pilot who moves.
+    While the sticks are stale nothing changes: a link that fails must not look like a pilot who moves.
     """
 
     threshold = Param(0.3, above=0.0, max=2.0, tune=True, doc="deflection that takes a channel back")
     release = Param(
-        0.2, min=0.0, max=1.0, tune=True, doc="greatest deflection at which neutral lets a channel go"
+        0.2,
+        min=0.0,
+        max=1.0,
+        tune=True,
+        doc="greatest deflection at which a switch takes effect, origin neutral",
     )
-    origin = Param("engagement", choices=("engagement", "neutral"), doc="from where a deflection counts")
+    origin = Param(
+        "engagement", choices=("engagement", "neutral"), doc="the point from which a deflection counts"
+    )
     together = Param(False, type="bool", tune=True, doc="whether one stick takes back all channels")
     sticks = In("float64[4]", doc="collective, roll, pitch, yaw, each -1 to 1")
     switches = In("float64[4]", doc="one for each channel: 1 wants automatic, 0 or less manual")
@@ -49,7 +56,7 @@ class StickOverride(Block):
             raise ParameterError("release", problem)
 
     def output(self, sticks: Any, switches: Any, stale: bool) -> tuple[Any, Any]:
-        """Return the channels that are automatic, and those that a stick took back."""
+        """Return the channels that are automatic, and the channels that a stick took back."""
         on, taken, origins = _decided(
             sticks, switches, stale, self.on, self.taken, self.origins,
             self.origin, self.threshold, self.release, self.together,
@@ -70,7 +77,7 @@ def _decided(
     sticks: Any, switches: Any, stale: bool, on: Any, taken: Any, origins: Any,
     origin: int, threshold: float, release: float, together: bool,
 ) -> tuple[Any, Any, Any]:  # fmt: skip
-    """Return which switches are on, which channels are taken back, and where their sticks stood."""
+    """Return which switches are on, which channels are taken back, and from where deflections count."""
     on, taken, origins = on.copy(), taken.copy(), origins.copy()
     if stale:
         return on, taken, origins

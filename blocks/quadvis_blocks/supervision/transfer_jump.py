@@ -1,4 +1,4 @@
-"""How much a control jumps when it changes hands."""
+"""The jump of a control when it changes hands."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from quadvis.block import Block, In, Out, State, Work
 
 
 class TransferJump(Block):
-    """The change of each control at the tick at which its source changes, and 0 at all others.
+    """The change of each control at the tick at which its source changes, and 0 at all other ticks.
 
-    A gauge, to show that a mode switch is bumpless; it knows nothing of how that is done.
+    The block measures whether a mode switch is bumpless. It knows nothing of the method of the switch.
     """
 
     controls = In(
@@ -20,8 +20,10 @@ class TransferJump(Block):
         unit="N rad/s^2 rad/s^2 rad/s^2",
         doc="collective; roll, pitch and yaw torque over inertia",
     )
-    source = In("int64[4]", doc="whose each of them is")
-    jump = Out("float64[4]", unit="N rad/s^2 rad/s^2 rad/s^2", doc="their changes as they change hands")
+    source = In("int64[4]", doc="source of each control")
+    jump = Out(
+        "float64[4]", unit="N rad/s^2 rad/s^2 rad/s^2", doc="change of each control as it changes hands"
+    )
     changes = Out("int64", doc="how often a control has changed hands so far")
     last = State("float64[4]")
     owner = State("int64[4]")
@@ -30,13 +32,13 @@ class TransferJump(Block):
     counted_now = Work("int64")
 
     def output(self, controls: Any, source: Any) -> tuple[Any, int]:
-        """Return the changes, and how many there have been."""
+        """Return the jumps, and the number of changes of hands so far."""
         changed = (source != self.owner) & self.begun
         self.counted_now = self.counted + int(changed.sum())
         return np.where(changed, controls - self.last, 0.0), self.counted_now
 
     def update(self, controls: Any, source: Any) -> None:
-        """Keep what is there now."""
+        """Keep controls and sources."""
         self.counted = self.counted_now
         self.last = controls
         self.owner = source

@@ -1,4 +1,4 @@
-"""References that ask for no more than vision can be trusted with."""
+"""A reference whose errors count as far as vision can be trusted."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ from quadvis_blocks._angles import wrapped
 class TrustedReference(Block):
     """The reference drawn towards the craft, so that errors count by a weight: ``e' = weight e``.
 
-    A horizontal position or heading that is known no more leaves no error with weight 0, and the laws behind
-    it level the craft; a velocity that is known no more counts as the reference's own. Height and climb pass.
+    With weight 0, an unknown horizontal position or heading gives no error, so the control laws level the
+    craft; an unknown velocity counts as the velocity of the reference. Height and vertical speed pass
+    unchanged.
     """
 
     position_reference = In("float64[3]", unit="m", doc="where to be: x, y, h")
-    velocity_reference = In("float64[3]", unit="m/s", default=(0.0, 0.0, 0.0), doc="its rate of change")
+    velocity_reference = In("float64[3]", unit="m/s", default=(0.0, 0.0, 0.0), doc="velocity to fly")
     heading_reference = In(unit="rad", doc="heading to hold")
     position = In("float64[3]", unit="m", doc="where the craft is: x, y, h")
     velocity = In("float64[3]", unit="m/s", doc="rate of change of the position")
-    heading = In(unit="rad", doc="its heading")
-    position_weight = In(doc="how much horizontal position and heading count, 0 to 1")
-    velocity_weight = In(doc="how much horizontal velocity counts, 0 to 1")
+    heading = In(unit="rad", doc="heading of the craft")
+    position_weight = In(doc="weight of horizontal position and heading, 0 to 1")
+    velocity_weight = In(doc="weight of horizontal velocity, 0 to 1")
     trusted_position = Out("float64[3]", unit="m", doc="where to be: x, y, h")
-    trusted_velocity = Out("float64[3]", unit="m/s", doc="its rate of change")
+    trusted_velocity = Out("float64[3]", unit="m/s", doc="velocity to fly")
     trusted_heading = Out(unit="rad", doc="heading to hold, in (-pi, pi]")
 
     def output(
@@ -41,7 +42,7 @@ class TrustedReference(Block):
 
 
 def _drawn(reference: Any, value: Any, weight: float) -> Any:
-    """Return x and y drawn to the value; the third element passes. Exact at weight 1."""
+    """Return the reference with x and y drawn towards the value; weight 1 keeps it to the bit."""
     rest = 1.0 - weight
     x = reference[0] + rest * (value[0] - reference[0])
     y = reference[1] + rest * (value[1] - reference[1])

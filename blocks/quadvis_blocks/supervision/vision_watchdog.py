@@ -1,4 +1,4 @@
-"""The state of vision, by the time stamps of its frames."""
+"""The state of vision, judged by the stamps of its frames."""
 
 from __future__ import annotations
 
@@ -35,20 +35,28 @@ class VisionWatchdog(Block):
     ===== ===== ========================================= ============================================
 
     The age counts from the stamp of the frame, not from its arrival. Vision is gone since the last good frame
-    of the FRESH state, or since the start; single frames in between do not stop that clock, they only put
-    off the next state for as long as they are fresh. With ``clock: frame``, for an estimator that makes the
-    most of single frames, vision is gone since the last good frame of any state.
+    of the FRESH state, or since the start. Single good frames after that do not stop this clock; they only
+    delay the next state for as long as they are fresh. With ``clock: frame``, for an estimator that uses
+    single frames well, vision is gone since the last good frame of any state.
 
-    It goes down at most one state a tick, and back to FRESH only after ``frames`` good frames in a row, never
-    stale in between, over at least ``proof``. It starts in COAST: vision has to prove itself first.
+    The state goes down at most one step per tick. It goes back to FRESH only after ``frames`` good frames in
+    a row, never stale in between, over at least ``proof``. It starts at COAST: vision has to prove itself.
 
-    Reasons: 0 none, 1 no new frames, 2 frames come but the target is not found, 3 too few good frames yet;
-    and frames come, but 4 frozen: the same one again and again, 5 with stamps ahead of the time, from before
-    or NaN, 6 from a clock that started again, 7 in contradiction to the inertial unit. It sees stamps itself;
-    4 and 7 it takes from those who do (``trouble``, ``contradicted``).
+    ====== =================================================== ==========================
+    reason meaning                                             found from
+    ====== =================================================== ==========================
+    0      none
+    1      no new frames                                       the stamps
+    2      frames come, but the target is not found            ``valid``
+    3      too few good frames yet                             the stamps and ``valid``
+    4      frames are frozen: the same frame again and again   ``trouble``
+    5      stamps are ahead of the time, back or NaN           the stamps, or ``trouble``
+    6      the camera's clock restarted                        the stamps, or ``trouble``
+    7      frames contradict the inertial unit                 ``contradicted``, ``trouble``
+    ====== =================================================== ==========================
 
-    With a camera of 10 frames/s and the 20 Hz of the control the default ``coast`` lets one frame be lost,
-    and the state changes at most 0.3 s after the last good frame was taken.
+    With a camera of 10 frames/s and the control at 20 Hz, the default ``coast`` allows one lost frame, and
+    the state changes at most 0.3 s after the last good frame was taken.
     """
 
     coast = Param(0.25, unit="s", above=0.0, tune=True, doc="greatest age (inclusive) of a FRESH frame")
@@ -57,38 +65,38 @@ class VisionWatchdog(Block):
     frames = Param(5, type="int64", min=1, tune=True, doc="good frames in a row to be FRESH again")
     proof = Param(0.5, unit="s", min=0.0, tune=True, doc="least time from the first of them to the last")
     clock = Param(
-        "trust", choices=("trust", "frame"), doc="vision is gone since it was FRESH, or since a frame"
+        "trust",
+        choices=("trust", "frame"),
+        doc="vision is gone since the last good frame in FRESH (trust), or in any state (frame)",
     )
     restart = Param(
         RESTART,
         unit="s",
         above=0.0,
         tune=True,
-        doc="how long a clock that started again runs until it counts",
+        doc="how long a restarted clock must run before its stamps count",
     )
-    stamp = In(unit="s", doc="instant of the newest frame; NaN for none yet")
-    valid = In("bool", doc="whether it gave a pose")
+    stamp = In(unit="s", doc="instant of the newest frame; NaN before the first")
+    valid = In("bool", doc="whether the newest frame gave a pose")
     trouble = In(
-        "int64", default=NONE, doc="why frames do not count, as `supervision.frame_news` says; 0 if they do"
+        "int64", default=NONE, doc="why frames do not count, by `supervision.frame_news`; 0 if they do"
     )
     contradicted = In("bool", default=False, doc="whether the estimator refused the newest frame")
     state = Out("int64", doc="0 FRESH, 1 COAST, 2 LEVEL, 3 LAND")
-    reason = Out(
-        "int64", doc="0 none, 1 no new frames, 2 target not found, 3 not enough yet; 4 to 7 see above"
-    )
+    reason = Out("int64", doc="0 none, 1 no new frames, 2 target not found, 3 too few yet; 4 to 7 see above")
     age = Out(unit="s", doc="time since the last good frame was taken, or since the start")
-    stale = Out("bool", doc="whether that is more than ``coast``")
-    rearmed = Out("bool", doc="true for the one tick at which it becomes FRESH")
+    stale = Out("bool", doc="whether the age is more than ``coast``")
+    rearmed = Out("bool", doc="true for the one tick at which the state becomes FRESH")
     now = State("int64", COAST)
     newest = State(unit="s")  # stamp of any frame
     good = State(unit="s")  # stamp of the last good frame
     since = State(unit="s")  # stamp of the last good frame of the FRESH state
     first = State(unit="s")  # stamp of the first good frame of the row
     row = State("int64")
-    cause = State("int64")  # what is wrong with the stamp that was seen last
+    cause = State("int64")  # trouble with the stamp that was seen last
     stamps = State(f"float64[{SIZE}]")
-    verdict = Work("int64")  # on the stamp of now
-    moment = Work(unit="s")  # the instant that it stands for
+    verdict = Work("int64")  # on the stamp of this tick
+    moment = Work(unit="s")  # the instant of that stamp
     state_now = Work("int64")
     newest_now = Work(unit="s")
     good_now = Work(unit="s")
@@ -97,14 +105,14 @@ class VisionWatchdog(Block):
     cause_now = Work("int64")
 
     def check(self) -> None:
-        """Refuse times that do not follow on each other."""
+        """Refuse times that do not increase from state to state."""
         for name, after, limit in (("level", "coast", self.coast), ("land", "level", self.level)):
             if getattr(self, name) <= limit:
                 found = f"{getattr(self, name):g} s"
                 raise ParameterError(name, f"{name} must be above {after}, {limit:g} s, got {found}")
 
     def start(self) -> None:
-        """Trust nothing yet."""
+        """Begin in COAST, without a frame."""
         self.newest = -math.inf
         self.now = COAST
         begin(self.stamps)
@@ -112,7 +120,7 @@ class VisionWatchdog(Block):
     def output(
         self, stamp: float, valid: bool, trouble: int, contradicted: bool, time: float
     ) -> tuple[int, int, float, bool, bool]:
-        """Return state, reason, age, whether that is too great, and whether vision has just come back."""
+        """Return state, reason, age, whether the age is too great, and whether vision has just come back."""
         self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)
         made = self.moment if self.verdict == NEWS and not math.isnan(stamp) else -math.inf
         newest, good, first, row = _counted(
@@ -149,9 +157,9 @@ class VisionWatchdog(Block):
 def _counted(
     made: float, well: bool, newest: float, good: float, first: float, row: int, longest: float
 ) -> tuple[float, float, float, int]:
-    """Return the instants of newest and last good frame, and the first and number of good ones in a row.
+    """Return the instants of the newest and the last good frame, and the begin and length of the good row.
 
-    `made` is that of a new frame, -inf if there is none.
+    ``made`` is the instant of a new frame; -inf if there is no new frame.
     """
     if made == -math.inf:
         return newest, good, first, row
