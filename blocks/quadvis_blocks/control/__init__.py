@@ -1,1 +1,1 @@
-"""The paper's control laws (17)-(23), and what links them to rotors and setpoints."""
+"""The paper's control laws (17)-(23), and the blocks between these laws, the rotors and the setpoints."""

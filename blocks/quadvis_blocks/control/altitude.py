@@ -10,12 +10,12 @@ from quadvis_blocks.control._gains import check_gains, gain_pair
 
 
 class Altitude(Block):
-    """Collective thrust that brings the height to its reference, whatever the tilt.
+    """Collective thrust that brings the height to its reference at any tilt.
 
     ``thrust = (r1 + m g) / max(cos(roll) cos(pitch), tilt_floor)`` with the proportional-derivative law ``r1
-    = -a1 (climb - climb_reference) - a2 (height - height_reference)``, a force, held to ``force_limit``. The
-    gains follow from the bandwidth, a1 = 2 m lambda and a2 = m lambda^2, two poles at -lambda; ``gains``
-    other than zero override them.
+    = -a1 (climb - climb_reference) - a2 (height - height_reference)``. r1 is a force, held to
+    ``force_limit``. The gains follow from the bandwidth: a1 = 2 m lambda and a2 = m lambda^2 give two poles
+    at -lambda. ``gains`` replace these values unless both are zero.
 
     Source: equations (17) and (18). Error: a force error d leaves a height error of d / a2.
     """
@@ -25,7 +25,7 @@ class Altitude(Block):
         (0.0, 0.0), type="float64[2]", unit="N*s/m N/m", min=0.0, tune=True,
         doc="a1, a2 of equation (18); both zero: from the bandwidth",
     )  # fmt: skip
-    mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
+    mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass of the craft; default: Draganfly IV")
     gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
     force_limit = Param(2.0, unit="N", above=0.0, tune=True, doc="greatest |r1|")
     tilt_floor = Param(0.5, above=0.0, max=1.0, tune=True, doc="least cos(roll) cos(pitch) to divide by")
@@ -39,7 +39,7 @@ class Altitude(Block):
     thrust = Out(unit="N", doc="collective thrust u, the sum over the rotors")
 
     def check(self) -> None:
-        """Refuse one gain without the other."""
+        """Refuse gains of which only one is zero."""
         check_gains(self.gains)
 
     def output(

@@ -1,4 +1,4 @@
-"""Position and velocity errors as the craft sees them."""
+"""Position and velocity errors in the frame of the craft's heading."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from quadvis.block import Block, In, Out, Param
 class HeadingRotation(Block):
     """Horizontal position and velocity relative to a reference, turned into the frame of the craft's heading.
 
-    ``forward = cos(psi) dx + sin(psi) dy``, ``right = -sin(psi) dx + cos(psi) dy``, likewise the velocities.
-    The paper's laws assume psi = 0: without this rotation its loop is unstable from 43.55 deg of yaw on. The
-    outputs are errors; feed them to ``control.nested_saturation`` without a reference of its own.
+    ``forward = cos(psi) dx + sin(psi) dy``, ``right = -sin(psi) dx + cos(psi) dy``; the velocities are turned
+    likewise. The paper's laws assume psi = 0: without this rotation the paper's loop is unstable from 43.55
+    deg of yaw on. The outputs are errors: feed them to ``control.nested_saturation`` with references of zero.
     """
 
     enabled = Param(True, type="bool", tune=True, doc="false to give the errors unturned, as in the paper")
     offset = Param(
-        0.0, unit="rad", tune=True, doc="added to the heading, e.g. for a camera that is mounted askew"
+        0.0, unit="rad", tune=True, doc="added to the heading, for example for a camera mounted askew"
     )
     position = In("float64[3]", unit="m", doc="x, y, h")
     velocity = In("float64[3]", unit="m/s", doc="rate of change of the position")
@@ -28,7 +28,7 @@ class HeadingRotation(Block):
         "float64[3]", unit="m/s", default=(0.0, 0.0, 0.0), doc="rate of change of the reference"
     )
     forward = Out(unit="m", doc="how far the craft is ahead of the reference")
-    right = Out(unit="m", doc="how far it is to the right")
+    right = Out(unit="m", doc="how far the craft is to the right of the reference")
     forward_velocity = Out(unit="m/s", doc="rate of change of forward at a constant heading")
     right_velocity = Out(unit="m/s", doc="rate of change of right at a constant heading")
 

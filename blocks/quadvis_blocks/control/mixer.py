@@ -9,28 +9,32 @@ import numpy as np
 from quadvis.block import Block, In, Out, Param, ParameterError, clip
 from quadvis_blocks._craft import ARM, INERTIA, THRUST_MAX, TORQUE_RATIO
 
-ROUNDING = 1e-12  # N; a demand right at a limit is not called saturated
+ROUNDING = 1e-12  # N; a demand exactly at a limit does not count as saturated
 
 
 class Mixer(Block):
     """Thrust of each rotor that gives the wanted collective thrust and torques, within the rotors' limits.
 
     Rotors: 0 front, 1 right, 2 rear, 3 left; front and rear turn counterclockwise seen from above. Within the
-    limits it is the exact inverse of u = f0 + f1 + f2 + f3, Ix roll = l (f3 - f1), Iy pitch = l (f0 - f2),
-    Iz yaw = c (f0 + f2 - f1 - f3). Beyond them yaw gives way first (to the other side if need be), then the
-    collective, each by as little as possible; roll and pitch last and in proportion to each other.
-    Whatever the inputs, every thrust lies within the limits. ``given`` is what the rotors then do, and
-    ``limited`` tells on which axes that is less than was wanted: integrators and disturbance estimates take
-    the one as their input, or stand still by the other.
+    limits the mixer is the exact inverse of u = f0 + f1 + f2 + f3, Ix roll = l (f3 - f1), Iy pitch =
+    l (f0 - f2), Iz yaw = c (f0 + f2 - f1 - f3).
+
+    Beyond the limits the controls give way in this order, each by as little as possible: yaw first (if
+    necessary it changes sign), then the collective, at last roll and pitch in proportion to each other. Every
+    thrust lies within the limits for all inputs. ``given`` is the collective and the torques that the thrusts
+    produce; ``limited`` marks the controls that gave way. Integrators and disturbance estimates use ``given``
+    as their input, or stand still while ``limited`` is true.
 
     Source: section 3 in words; the numbering and the order of giving way are additions.
     """
 
-    arm = Param(ARM, unit="m", above=0.0, doc="l, from the centre to each rotor; default Draganfly IV")
+    arm = Param(ARM, unit="m", above=0.0, doc="l, from the centre to each rotor; default: Draganfly IV")
     inertia = Param(
         INERTIA, type="float64[3]", unit="kg*m^2", above=0.0, doc="about roll, pitch and yaw axis"
     )
-    torque_ratio = Param(TORQUE_RATIO, unit="m", above=0.0, doc="c, a rotor's drag torque over its thrust")
+    torque_ratio = Param(
+        TORQUE_RATIO, unit="m", above=0.0, doc="c, drag torque of a rotor divided by its thrust"
+    )
     thrust_min = Param(0.0, unit="N", min=0.0, doc="least thrust of a rotor")
     thrust_max = Param(THRUST_MAX, unit="N", above=0.0, doc="greatest thrust of a rotor")
     collective = In(unit="N", doc="collective thrust u")
@@ -38,22 +42,22 @@ class Mixer(Block):
     pitch = In(unit="rad/s^2", doc="pitch torque divided by inertia")
     yaw = In(unit="rad/s^2", doc="yaw torque divided by inertia")
     thrust = Out("float64[4]", unit="N", doc="thrust of each rotor: front, right, rear, left")
-    saturated = Out("bool", doc="whether something had to give way")
+    saturated = Out("bool", doc="whether a control gave way")
     given = Out(
         "float64[4]",
         unit="N rad/s^2 rad/s^2 rad/s^2",
-        doc="what the thrusts amount to: collective; roll, pitch and yaw torque over inertia",
+        doc="controls that the thrusts produce: collective; roll, pitch and yaw torque over inertia",
     )
-    limited = Out("bool[4]", doc="which of them gave way: collective, roll, pitch, yaw")
+    limited = Out("bool[4]", doc="controls that gave way: collective, roll, pitch, yaw")
 
     def check(self) -> None:
-        """Refuse limits that leave nothing between them."""
+        """Refuse a least thrust that is not below the greatest."""
         if self.thrust_min >= self.thrust_max:
             problem = f"thrust_min must be below thrust_max, {self.thrust_max:g} N, got {self.thrust_min:g} N"
             raise ParameterError("thrust_min", problem)
 
     def output(self, collective: float, roll: float, pitch: float, yaw: float) -> tuple[Any, bool, Any, Any]:
-        """Return the thrusts, whether something gave way, what they amount to, and what gave way."""
+        """Return the thrusts, whether a control gave way, the controls produced, and which gave way."""
         least, most = self.thrust_min, self.thrust_max
         # Thrust of one rotor for one unit of torque over inertia.
         per_roll = 0.5 * self.inertia[0] / self.arm
@@ -65,7 +69,7 @@ class Mixer(Block):
         steep = reach > half
         if steep:
             side, front = side * half / reach, front * half / reach
-        # With yaw free to choose, opposite rotors share what roll and pitch leave them.
+        # Yaw is still free, so opposite rotors share the range that roll and pitch leave.
         room = half - 0.5 * (abs(side) + abs(front))
         allowed = clip(mean, least + half - room, least + half + room)
         lowest = max(least + abs(front) - allowed, allowed + abs(side) - most)

@@ -11,21 +11,23 @@ ROLL, PITCH = range(2)
 
 
 class NestedSaturation(Block):
-    """Roll (or pitch) torque that brings a lateral position to its reference, privileging small angles.
+    """Roll (or pitch) torque that brings a lateral position to its reference and keeps the angle small.
 
-    With lambda the bandwidth, M1..M4 the amplitudes, and the chain of four integrators x1 = (y - y_ref) / g,
-    x2 = dx1/dt, x3 = phi, x4 = dphi/dt (for pitch the first two change sign and phi is theta)::
+    Let lambda be the bandwidth, M1..M4 the amplitudes, and x1 to x4 a chain of four integrators:
+    x1 = (y - y_ref) / g, x2 = dx1/dt, x3 = phi, x4 = dphi/dt. For pitch, x1 and x2 change sign, and phi is
+    theta. The law is::
 
         torque = -lambda^2 s1(x4/lambda + s2(x3 + x4/lambda + s3(2 x3 + x4/lambda + lambda x2
                  + s4(x4/lambda + 3 x3 + 3 lambda x2 + lambda^2 x1))))
 
-    where s_i holds its argument to [-M_i, M_i]. Four poles at -lambda near the reference; lambda = 1 is the
-    paper to the bit. Always |torque| <= lambda^2 M1; in the end |angle| <= M3 and |velocity| <= g M4 /
-    lambda. Sufficient for convergence: M1 > 2 M2, M2 > 2 M3, M3 > 2 M4. At 20 Hz with a camera at 10 FPS a
-    bandwidth of 1 to 2.5 rad/s works.
+    where s_i holds its argument to [-M_i, M_i]. Near the reference the loop has four poles at -lambda; lambda
+    = 1 is the paper's law to the bit. Always |torque| <= lambda^2 M1; in the end |angle| <= M3 and |velocity|
+    <= g M4 / lambda. Sufficient for convergence: M1 > 2 M2, M2 > 2 M3, M3 > 2 M4. At 20 Hz with a camera at
+    10 FPS a bandwidth of 1 to 2.5 rad/s works.
+
     Source: equations (22) and (23); bandwidth and references are additions.
-    Error: an angle error b leaves a position error of 6 g b / lambda^2, a torque error d one of g d /
-    lambda^4; ``angle_reference`` and ``feedforward`` take what is known of them away.
+    Error: an angle error b leaves a position error of 6 g b / lambda^2; a torque error d leaves a position
+    error of g d / lambda^4. ``angle_reference`` and ``feedforward`` remove the known part of these errors.
     """
 
     axis = Param("roll", choices=("roll", "pitch"), doc="roll moves the craft along y, pitch along -x")
@@ -47,7 +49,7 @@ class NestedSaturation(Block):
     feedforward = In(
         unit="rad/s^2", default=0.0, doc="torque that balances a known disturbance, added to the law's"
     )
-    torque = Out(unit="rad/s^2", doc="torque divided by inertia: the angular acceleration wanted")
+    torque = Out(unit="rad/s^2", doc="torque divided by inertia: the wanted angular acceleration")
     level = Out("int64", doc="innermost saturated stage: 0 none, 1 the torque, 4 the position")
 
     def output(

@@ -1,4 +1,4 @@
-"""Where the craft should be."""
+"""Position and heading where the craft should be."""
 
 from __future__ import annotations
 

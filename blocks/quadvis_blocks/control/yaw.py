@@ -8,11 +8,12 @@ from quadvis_blocks.control._gains import check_gains, gain_pair
 
 
 class Yaw(Block):
-    """Yaw torque that turns the craft to its heading, the short way round.
+    """Yaw torque that turns the craft to the heading reference, the short way round.
 
-    ``torque = -a1 (angular_rate - angular_rate_reference) - a2 (angle - angle_reference) + feedforward``, the
-    angle error wrapped to (-pi, pi], the sum held to ``torque_limit``. The gains follow from the bandwidth,
-    a1 = 2 lambda and a2 = lambda^2, two poles at -lambda; ``gains`` other than zero override them.
+    ``torque = -a1 (angular_rate - angular_rate_reference) - a2 (angle - angle_reference) + feedforward``. The
+    angle error is wrapped to (-pi, pi], and the sum is held to ``torque_limit``. The gains follow from the
+    bandwidth: a1 = 2 lambda and a2 = lambda^2 give two poles at -lambda. ``gains`` replace these values
+    unless both are zero.
 
     Source: equation (19). Error: a torque error d leaves a heading error of d / a2.
     """
@@ -27,17 +28,17 @@ class Yaw(Block):
         unit="rad/s^2",
         above=0.0,
         tune=True,
-        doc="greatest |torque|; the rotors have the least authority here",
+        doc="greatest |torque|; the rotors have the least authority about the yaw axis",
     )
     angle = In(unit="rad", doc="yaw angle psi, clockwise from above")
     angular_rate = In(unit="rad/s", doc="rate of change of the angle")
     angle_reference = In(unit="rad", default=0.0, doc="heading to hold")
     angular_rate_reference = In(unit="rad/s", default=0.0, doc="rate of change of the reference")
     feedforward = In(unit="rad/s^2", default=0.0, doc="torque that balances a known disturbance")
-    torque = Out(unit="rad/s^2", doc="torque divided by inertia: the angular acceleration wanted")
+    torque = Out(unit="rad/s^2", doc="torque divided by inertia: the wanted angular acceleration")
 
     def check(self) -> None:
-        """Refuse one gain without the other."""
+        """Refuse gains of which only one is zero."""
         check_gains(self.gains)
 
     def output(
