@@ -1,1 +1,1 @@
-"""Models of the craft and of the air that it flies in, for simulation."""
+"""Models of the craft, the air and the ground, for simulation."""

@@ -11,9 +11,9 @@ from quadvis.block import Block, Out, Param, Random, State, fill_normal
 class Gust(Block):
     """Wind that wanders about a mean: a first-order Gauss-Markov process along each axis.
 
-    The axes are independent of each other.
-    Mean ``mean``, standard deviation ``rms``, autocorrelation exp(-|t| / correlation_time), exact at the
-    block's rate whatever it is; stationary from the first sample on.
+    The axes are independent of each other. Each process has the mean ``mean``, the standard deviation ``rms``
+    and the autocorrelation exp(-|t| / correlation_time). Its samples are exact at any rate of the block, and
+    stationary from the first sample on.
     """
 
     rms = Param(
@@ -25,12 +25,12 @@ class Gust(Block):
         doc="standard deviation along x, y, h",
     )
     correlation_time = Param(
-        2.0, unit="s", above=0.0, tune=True, doc="time after which it has forgotten 63 %"
+        2.0, unit="s", above=0.0, tune=True, doc="time after which the correlation has fallen by 63 %"
     )
     mean = Param((0.0, 0.0, 0.0), type="float64[3]", unit="m/s", tune=True, doc="mean wind along x, y, h")
     wind = Out("float64[3]", unit="m/s", doc="velocity of the air along x, y, h")
     state = State("float64[3]")  # in standard deviations
-    fresh = State("float64[3]")  # what it will move by
+    fresh = State("float64[3]")  # the random numbers of this tick
     stream = Random()
 
     def start(self) -> None:
@@ -42,7 +42,7 @@ class Gust(Block):
         return self.mean + self.rms * self.state
 
     def update(self) -> None:
-        """Move on by one period."""
+        """Advance the process by one period."""
         keep = math.exp(-self.period / self.correlation_time)
         fill_normal(self.stream, self.fresh)
         self.state = keep * self.state + math.sqrt(1.0 - keep * keep) * self.fresh

@@ -15,24 +15,24 @@ class Lateral(Block):
     """Lateral motion by roll (or forward motion by pitch) without rotors, drag or yaw, for exact checks.
 
     Roll: y'' = g tilt(phi) + acceleration, phi'' = torque. Pitch: x'' = -g tilt(theta) + acceleration,
-    theta'' = torque. ``tilt`` is the angle itself (``linear``) or its tangent (``tangent``). With a ``lag``
-    the torque follows its input like the thrust of a motor, ``1 / (lag s + 1)``.
+    theta'' = torque. The function ``tilt`` is the angle itself (``linear``) or its tangent (``tangent``).
+    With a ``lag`` the torque follows its input as the thrust of a motor does: ``1 / (lag s + 1)``.
 
     Source: equations (20) and (21), and their counterpart for pitch.
     """
 
     axis = Param("roll", choices=("roll", "pitch"), doc="roll moves the craft along y, pitch along -x")
     tilt = Param(
-        "linear", choices=("linear", "tangent"), doc="acceleration over g as a function of the angle"
+        "linear", choices=("linear", "tangent"), doc="acceleration divided by g, as a function of the angle"
     )
     gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
-    lag = Param(0.0, unit="s", min=0.0, doc="time constant of the motors; 0 for torque at once")
+    lag = Param(0.0, unit="s", min=0.0, doc="time constant of the motors; 0: no lag")
     initial_position = Param(0.0, unit="m", doc="position at the start")
     initial_velocity = Param(0.0, unit="m/s", doc="velocity at the start")
     initial_angle = Param(0.0, unit="rad", doc="angle at the start")
     initial_rate = Param(0.0, unit="rad/s", doc="angular rate at the start")
     torque = In(unit="rad/s^2", doc="torque divided by inertia")
-    acceleration = In(unit="m/s^2", default=0.0, doc="disturbance, e.g. by wind")
+    acceleration = In(unit="m/s^2", default=0.0, doc="disturbance, for example by wind")
     position = Out(unit="m", doc="y for roll, x for pitch")
     velocity = Out(unit="m/s", doc="rate of change of the position")
     angle = Out(unit="rad", doc="roll or pitch angle")

@@ -20,34 +20,36 @@ class Rotorcraft(Block):
 
     World: x forward, y right, h up; roll > 0 right side down, pitch > 0 nose up, yaw > 0 clockwise from
     above. Rotors: 0 front, 1 right, 2 rear, 3 left; front and rear turn counterclockwise seen from above.
-    Each thrust follows its command, held to the limits, with a first-order lag; u is their sum, and the
-    torques over inertia are l (f3 - f1) / Ix, l (f0 - f2) / Iy, c (f0 + f2 - f1 - f3) / Iz, each plus its
-    ``torque_bias``. With a ``bias_sign`` of ``random`` these biases are sizes: each takes a sign of its own
-    at the start of a run. What else pulls and turns the craft, such as the ground or a tether, comes in as
-    ``force`` and ``torque``.
+    Each thrust follows its command, held to the limits, with a first-order lag. u is the sum of the thrusts.
+    The torques over inertia are l (f3 - f1) / Ix, l (f0 - f2) / Iy, c (f0 + f2 - f1 - f3) / Iz, each plus its
+    ``torque_bias``. With ``bias_sign: random`` each bias is a size, and gets a random sign of its own at the
+    start of a run. Other forces and torques on the craft, such as those of the ground or a tether, are the
+    inputs ``force`` and ``torque``.
 
     Model ``paper``, equations (11)-(16): m x'' = -u sin(pitch), m y'' = u cos(pitch) sin(roll), m h'' = u
-    cos(pitch) cos(roll) - m g, and the angles are double integrals of the torques (14 with its missing dots).
-    It does not know yaw: x and y are then axes that turn with the craft. Model ``rigid_body``: Newton-Euler
-    with 3-2-1 angles; rates are those of the body axes. To first order in the tilt, at yaw 0, the two are the
-    same.
+    cos(pitch) cos(roll) - m g, and the angles are double integrals of the torques (equation 14 with its
+    missing dots). Yaw has no effect on x and y in this model, so x and y are axes that turn with the craft.
+    Model ``rigid_body``: Newton-Euler with 3-2-1 angles; rates are those about the body axes. To first order
+    in the tilt, at yaw 0, both models are the same.
 
-    The start is a trimmed hover: every rotor carries a quarter of the weight. Yaw is wrapped to (-pi, pi] at
-    the output only; the states go on turning, so that no solver step jumps. Error: pitch of +-90 deg is
+    A run starts in a trimmed hover: every rotor carries a quarter of the weight. Only the output wraps yaw to
+    (-pi, pi]; the state of yaw is not wrapped, so that no solver step jumps. Error: a pitch of +-90 deg is
     singular in ``rigid_body``.
     """
 
     model = Param("paper", choices=("paper", "rigid_body"), doc="equations of motion")
-    mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass; default Draganfly IV")
-    arm = Param(ARM, unit="m", above=0.0, doc="l, from the centre to each rotor; default Draganfly IV")
+    mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass; default: Draganfly IV")
+    arm = Param(ARM, unit="m", above=0.0, doc="l, from the centre to each rotor; default: Draganfly IV")
     inertia = Param(
         INERTIA, type="float64[3]", unit="kg*m^2", above=0.0, doc="about roll, pitch and yaw axis"
     )
-    torque_ratio = Param(TORQUE_RATIO, unit="m", above=0.0, doc="c, a rotor's drag torque over its thrust")
+    torque_ratio = Param(
+        TORQUE_RATIO, unit="m", above=0.0, doc="c, drag torque of a rotor divided by its thrust"
+    )
     lag = Param(MOTOR_LAG, unit="s", above=0.0, tune=True, doc="time constant of a motor")
     thrust_min = Param(0.0, unit="N", min=0.0, doc="least thrust of a rotor")
     thrust_max = Param(THRUST_MAX, unit="N", above=0.0, doc="greatest thrust of a rotor")
-    drag = Param(0.1, unit="N*s/m", min=0.0, tune=True, doc="force per speed through the air")
+    drag = Param(0.1, unit="N*s/m", min=0.0, tune=True, doc="drag force divided by the speed through the air")
     torque_bias = Param(
         (0.0, 0.0, 0.0),
         type="float64[3]",
@@ -56,7 +58,7 @@ class Rotorcraft(Block):
         doc="trim error about roll, pitch and yaw axis",
     )
     bias_sign = Param(
-        "given", choices=("given", "random"), doc="random: each torque bias with a sign drawn at the start"
+        "given", choices=("given", "random"), doc="random: each torque bias gets a random sign at the start"
     )
     gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
     initial_position = Param((0.0, 0.0, 0.0), type="float64[3]", unit="m", doc="x, y, h at the start")
@@ -67,7 +69,7 @@ class Rotorcraft(Block):
     thrust = In("float64[4]", unit="N", doc="commanded thrust of each rotor: front, right, rear, left")
     wind = In("float64[3]", unit="m/s", default=(0.0, 0.0, 0.0), doc="velocity of the air along x, y, h")
     force = In(
-        "float64[3]", unit="N", default=(0.0, 0.0, 0.0), doc="other force on its centre of mass along x, y, h"
+        "float64[3]", unit="N", default=(0.0, 0.0, 0.0), doc="other force on the centre of mass along x, y, h"
     )
     torque = In(
         "float64[3]", unit="N*m", default=(0.0, 0.0, 0.0), doc="other torque about roll, pitch and yaw axis"
@@ -75,9 +77,9 @@ class Rotorcraft(Block):
     position = Out("float64[3]", unit="m", doc="x, y, h")
     velocity = Out("float64[3]", unit="m/s", doc="rate of change of the position")
     attitude = Out("float64[3]", unit="rad", doc="roll, pitch, yaw; yaw in (-pi, pi]")
-    rates = Out("float64[3]", unit="rad/s", doc="about roll, pitch and yaw axis, as a gyro sees them")
+    rates = Out("float64[3]", unit="rad/s", doc="about roll, pitch and yaw axis, as a gyro measures them")
 
-    # Scalars, because the solver visits them four times a step and a float costs a tenth of a small array.
+    # Scalars, because the solver reads them four times a step, and a float costs a tenth of a small array.
     front = State(unit="N", continuous=True)
     right = State(unit="N", continuous=True)
     rear = State(unit="N", continuous=True)
@@ -98,7 +100,7 @@ class Rotorcraft(Block):
     sign_stream = Random()
 
     def check(self) -> None:
-        """Refuse limits that leave nothing between them."""
+        """Refuse a least thrust that is not below the greatest."""
         if self.thrust_min >= self.thrust_max:
             problem = f"thrust_min must be below thrust_max, {self.thrust_max:g} N, got {self.thrust_min:g} N"
             raise ParameterError("thrust_min", problem)
@@ -169,7 +171,7 @@ def _paper_lift(roll: float, pitch: float) -> tuple[float, float, float]:
 
 
 def _lift(roll: float, pitch: float, yaw: float) -> tuple[float, float, float]:
-    """Return the direction of the thrust: minus the third column of Rz(yaw) Ry(pitch) Rx(roll), h up."""
+    """Return the direction of the thrust, minus the third column of Rz(yaw) Ry(pitch) Rx(roll), h upward."""
     across, along = math.sin(roll), math.cos(roll) * math.sin(pitch)
     cosine, sine = math.cos(yaw), math.sin(yaw)
     return -along * cosine - across * sine, across * cosine - along * sine, math.cos(roll) * math.cos(pitch)

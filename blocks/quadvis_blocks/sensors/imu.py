@@ -1,4 +1,4 @@
-"""The inertial measurement unit on board."""
+"""The inertial measurement unit (IMU) on board."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ GIVEN, RANDOM = range(2)
 class Imu(Block):
     """Roll, pitch and angular rates as an inertial unit gives them: true value, bias, drift, white noise.
 
-    White noise is fresh at each tick of the block. The drift of each angle and rate is a first-order
-    Gauss-Markov process, exact at the block's rate and stationary from the first sample. With a ``bias_sign``
-    of ``random`` the biases are sizes: each takes a sign of its own at the start of a run. Noise, drift of
-    the rates and signs have random streams of their own: turning one on leaves the others as they are. Yaw is
-    not measured: the camera does that.
+    White noise is drawn anew at each tick of the block. The drift of each angle and rate is a first-order
+    Gauss-Markov process, exact at the block's rate and stationary from the first sample. With ``bias_sign:
+    random`` each bias is a size, and gets a random sign of its own at the start of a run. The noise, the
+    drift of the rates and the signs have separate random streams, so turning one on does not change the
+    others. The unit does not measure yaw: the camera does.
 
-    Source: section 6.2 (an IMU gives roll and pitch at a higher rate than the camera); the errors are a
-    typical unit's, meant for 100 Hz.
+    Source: section 6.2 (an IMU gives roll and pitch at a higher rate than the camera). The default errors are
+    those of a typical unit at 100 Hz.
     """
 
     angle_noise = Param(
@@ -40,7 +40,7 @@ class Imu(Block):
         (0.0, 0.0, 0.0), type="float64[3]", unit="rad/s", tune=True, doc="constant error of each rate"
     )
     bias_sign = Param(
-        "given", choices=("given", "random"), doc="random: each bias with a sign drawn at the start"
+        "given", choices=("given", "random"), doc="random: each bias gets a random sign at the start"
     )
     attitude = In("float64[3]", unit="rad", doc="true roll, pitch, yaw")
     rates = In("float64[3]", unit="rad/s", doc="true rates about roll, pitch and yaw axis")
@@ -48,7 +48,7 @@ class Imu(Block):
     pitch = Out(unit="rad", doc="measured pitch angle")
     gyro = Out("float64[3]", unit="rad/s", doc="measured rates about roll, pitch and yaw axis")
     stamp = Out(unit="s", doc="instant of the measurement")
-    drawn = State("float64[7]")  # fresh at each tick: roll, pitch, three rates, drift of roll and pitch
+    drawn = State("float64[7]")  # drawn at each tick: roll, pitch, three rates, drift of roll and pitch
     wander = State("float64[2]")  # the drifts; all in standard deviations
     rate_drawn = State("float64[3]")
     rate_wander = State("float64[3]")
@@ -67,7 +67,7 @@ class Imu(Block):
             random_signs(self.sign_stream, self.signs)
 
     def output(self, attitude: Any, rates: Any, time: float) -> tuple[float, float, Any, float]:
-        """Return the measured angles and rates, and when they were measured."""
+        """Return the measured angles and rates, and the instant of the measurement."""
         drawn, wander, bias, signs = self.drawn, self.wander, self.angle_bias, self.signs
         roll = attitude[0] + signs[0] * bias[0] + self.drift * wander[0] + self.angle_noise * drawn[0]
         pitch = attitude[1] + signs[1] * bias[1] + self.drift * wander[1] + self.angle_noise * drawn[1]
