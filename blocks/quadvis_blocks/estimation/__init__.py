@@ -1,1 +1,1 @@
-"""From measurements to the quantities that the control laws need."""
+"""Blocks that compute the quantities of the control laws from measurements."""

@@ -1,14 +1,14 @@
-"""A Kalman filter for position, velocity and disturbance along three axes, that can go back to its past.
+"""A Kalman filter for position, velocity and disturbance along three axes, which can go back in time.
 
-Along an axis, with a known acceleration a that is straight between ticks and white noises w and n,
+The model of an axis has a known acceleration a, which is linear between ticks, and white noises w and n:
 
     p' = v,    v' = a + d + w,    d' = -d / decay + n.
 
-Estimates stand in an array (3, 9), an axis a row: p, v, d, then the covariances pp, pv, pd, vv, vd, dd. The
-axes do not mix. The past are the last ticks, the oldest first: instant, acceleration, and the estimates with
-all frames before that instant. The tick of now is number TICKS. Frames stand with the newest first. Running
-again from the tick before a frame that comes late, through the frames since, gives to the bit what the filter
-would have given had the frame come in time.
+Estimates are an array (3, 9) with one row for each axis: p, v, d, then the covariances pp, pv, pd, vv, vd,
+dd. The axes are independent. The past holds the last ticks, oldest first: instant, acceleration, and the
+estimates with all frames before that instant. The present tick has the number TICKS. Frames are kept newest
+first. After a late frame the filter runs again from the tick before the frame, through all later frames. The
+result is, to the bit, the result for a frame that came in time.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from typing import Any
 
 from quadvis.block import passed, reached
 
-TICKS = 64  # how many ticks are kept, and how many frames
+TICKS = 64  # kept ticks, and kept frames
 FRAMES = 64
 STAMP, VALUE, VARIANCE, WIDTH = 0, 1, 4, 7  # a frame: stamp, three positions, their variances
 STRAIN = 1.0 / 3.0  # share of a new frame in the strain
-BEGUN, LAST, STRAINED = range(3)  # of a trial
-NOTHING, TAKEN, REFUSED, LATE, RESET = range(5)  # what becomes of a frame
+BEGUN, LAST, STRAINED = range(3)  # of a trial: stamps of its first and its last frame, and its strain
+NOTHING, TAKEN, REFUSED, LATE, RESET = range(5)  # verdicts on a frame; NOTHING: there is no frame
 
 
 def begin(chains: Any, position: Any, sigma: Any, disturbance: Any) -> None:
@@ -45,9 +45,9 @@ def begin_axis(chains: Any, axis: int, position: float, sigma: Any, disturbance:
 def predict(chains: Any, before: Any, after: Any, step: float, model: Any) -> None:
     """Carry estimates over a step (s) on which the known acceleration goes from `before` to `after` (3,).
 
-    `model` (10,) has for each axis the density of w (m/s^2 / sqrt(Hz)), then the deviation of d, then its
-    decay time; and the height up to which the ground may touch the craft. The noise of d reaches p and v as
-    if d did not decay within the step.
+    `model` (10,) has the density of w (m/s^2 / sqrt(Hz)) of each axis, then the deviation of d of each axis,
+    then the decay time of d of each axis, and the height up to which the ground may touch the craft. The
+    effect of the noise of d on p and v is computed as if d did not decay within the step.
     """
     for axis in range(3):
         decay = float(model[6 + axis])
@@ -74,7 +74,7 @@ def predict(chains: Any, before: Any, after: Any, step: float, model: Any) -> No
 
 
 def correct(chains: Any, frame: Any, model: Any) -> None:
-    """Take the positions of a frame into account; of what the ground does no wind is learned."""
+    """Correct estimates by the positions of a frame; near the ground d of x and y is not corrected."""
     low = is_low(chains, frame, model)
     for axis in range(3):
         row = chains[axis]
@@ -94,10 +94,10 @@ def correct(chains: Any, frame: Any, model: Any) -> None:
 
 
 def advance(chains: Any, begin: Any, end: Any, until: float, frames: Any, held: int, model: Any) -> None:
-    """Carry estimates from a tick towards the next one, up to an instant, through the frames on the way.
+    """Carry estimates from a tick towards the next tick, up to an instant, through the frames on the way.
 
-    `begin` and `end` (4,) are the ticks: instant and acceleration. Frames at the first instant count, those
-    at `until` do not.
+    `begin` and `end` (4,) are the ticks: instant and acceleration. Frames at the instant of `begin` count,
+    frames at `until` do not.
     """
     at, length = float(begin[0]), float(end[0] - begin[0])
     slope = (end[1:] - begin[1:]) / length if length > 0.0 else 0.0 * begin[1:]
@@ -115,7 +115,7 @@ def advance(chains: Any, begin: Any, end: Any, until: float, frames: Any, held: 
 
 
 def append(ticks: Any, past: Any, oldest: int, now: Any, chains: Any) -> int:
-    """Keep a tick (4,) and the estimates there in place of the oldest, and return the first of use."""
+    """Replace the oldest tick by a new tick (4,) and its estimates; return the oldest tick in use."""
     ticks[:-1] = ticks[1:].copy()
     past[:-1] = past[1:].copy()
     ticks[TICKS - 1] = now
@@ -124,7 +124,7 @@ def append(ticks: Any, past: Any, oldest: int, now: Any, chains: Any) -> int:
 
 
 def place(ticks: Any, oldest: int, stamp: float) -> int:
-    """Return the number of the last tick that is not after a stamp; -1 if it is not kept any more."""
+    """Return the number of the last tick that is not after a stamp; -1 if that tick is no longer kept."""
     number = TICKS - 1
     while number >= oldest:
         if ticks[number, 0] <= stamp:
@@ -138,15 +138,17 @@ def filtered(
     model: Any, sigma: Any, gate: float, tolerance: float, strain: float, limit: float, trial: Any,
     tried: Any, reset_after: float,
 ) -> tuple[int, int, int, float, float]:  # fmt: skip
-    """Give the estimates at the tick `now`, before its own frames, with a new frame if that is believed.
+    """Compute the estimates at the tick `now`, before the frames of that tick, with a new frame if believed.
 
-    `now` (4,) is the tick after those in `ticks`, and `frame` has NaN for a stamp if there is
-    none. A frame beyond the gate is refused, and one by which the `strain` goes beyond a limit. Refused ones
-    are tried on estimates of their own, `trial` (3, 9) with `tried` (3,); if these have agreed with them for
-    `reset_after`, they are the estimates from then on. Where the ground may touch the craft nothing strains,
-    as long as frames are believed, and a frame that is beyond the gate in height alone resets the height.
-    Past, frames, trial and tried are renewed in place. Returned are what became of the frame, how many are
-    held, the oldest tick of use, the frame's squared innovation over its variance, and the strain.
+    `now` (4,) is the tick after those in `ticks`. The stamp of `frame` is NaN if there is no frame. A frame
+    is refused if it is beyond the gate, or if it raises `strain` above `limit`. Refused frames are tried on
+    separate estimates, `trial` (3, 9) with `tried` (3,). When the trial has agreed with the refused frames
+    for `reset_after`, its estimates replace the others. Where the ground may touch the craft, the strain is
+    zero while frames are believed, and a frame that is beyond the gate in height alone resets the height.
+
+    `chains`, `past`, `frames`, `trial` and `tried` are changed in place. The result is the verdict on the
+    frame, the number of frames held, the oldest tick in use, the squared innovation of the frame over its
+    variance, and the strain.
     """
     first, verdict, nis, grounded = TICKS - 1, NOTHING, math.nan, False
     start = chains.copy()
@@ -162,7 +164,7 @@ def filtered(
             nis, level, beside, above = innovation(chains, frame, tolerance)
             low = is_low(chains, frame, model)
             near = max(beside, above) <= gate * gate
-            if near:  # one frame alone, however far, does not do it
+            if near:  # the bound 2 limit: no single frame exceeds the limit
                 calm = low and math.isnan(tried[BEGUN])
                 strain += -strain if calm else STRAIN * (min(level, 2.0 * limit) - strain)
             verdict = TAKEN if near and strain <= limit else REFUSED
@@ -195,13 +197,13 @@ def agree(
     trial: Any, tried: Any, ticks: Any, oldest: int, now: Any, frame: Any, model: Any, sigma: Any,
     gate: float, tolerance: float, limit: float,
 ) -> None:  # fmt: skip
-    """Try a refused frame on estimates of its own: they go on with it, or begin anew there.
+    """Try a refused frame on the trial: the trial continues with the frame, or begins anew at it.
 
     `tried` (3,) are the stamps of the first and of the last frame that agreed, and their strain.
     """
     stamp, strain = float(frame[STAMP]), 0.0
     if tried[LAST] >= stamp and tried[BEGUN] <= stamp:
-        return  # it was overtaken on its way
+        return  # the frame was overtaken on its way
     goes_on = tried[BEGUN] < stamp and place(ticks, oldest, float(tried[LAST])) >= 0
     if goes_on:
         carry(trial, ticks, oldest, now, float(tried[LAST]), stamp, model)
@@ -216,7 +218,7 @@ def agree(
         goes_on = goes_on and beside <= gate * gate and strain <= limit
     if goes_on:
         correct(trial, frame, model)
-        for axis in range(3):  # what only an unlikely wind explains does not agree either
+        for axis in range(3):  # frames that only an unlikely wind explains do not agree
             goes_on = goes_on and abs(trial[axis, 2]) <= gate * model[3 + axis]
     if not goes_on:
         strain, tried[BEGUN] = 0.0, stamp
@@ -226,12 +228,12 @@ def agree(
 
 
 def is_low(chains: Any, frame: Any, model: Any) -> bool:
-    """Return whether the ground may touch the craft, by the estimates and by a frame."""
+    """Return whether the ground may touch the craft, according to the estimates and to a frame."""
     return bool(frame[VALUE + 2] <= model[9] and chains[2, 0] <= model[9])
 
 
 def carry(chains: Any, ticks: Any, oldest: int, now: Any, since: float, until: float, model: Any) -> None:
-    """Carry estimates from an instant to another by the accelerations of the ticks alone."""
+    """Carry estimates from one instant to another by the accelerations of the ticks alone."""
     for number in range(oldest, TICKS):
         tick, end = ticks[number], now if number + 1 == TICKS else ticks[number + 1]
         after, before = max(since, float(tick[0])), min(until, float(end[0]))
@@ -245,9 +247,9 @@ def again(
     chains: Any, past: Any, ticks: Any, first: int, now: Any, until: float, frames: Any,
     held: int, model: Any, keep: bool,
 ) -> None:  # fmt: skip
-    """Run estimates at tick `first` on to an instant `until`; with `keep`, renew the past on the way.
+    """Run the estimates of tick `first` forward to the instant `until`; with `keep`, renew the past.
 
-    `now` (4,) is the tick after the last one kept.
+    `now` (4,) is the tick after the last kept tick.
     """
     for number in range(first, TICKS):
         start = ticks[number]
@@ -260,9 +262,9 @@ def again(
 
 
 def insert(frames: Any, held: int, frame: Any, horizon: float) -> int:
-    """Put a frame among those held, by their stamps, and return how many there are.
+    """Insert a frame into the held frames, in the order of their stamps, and return their number.
 
-    Those before a horizon are dropped, and the oldest if there is no place.
+    Frames before `horizon` are dropped. The oldest frame is dropped if there is no room.
     """
     while held > 0 and (frames[held - 1, STAMP] < horizon or held >= FRAMES):
         held -= 1
@@ -275,7 +277,11 @@ def insert(frames: Any, held: int, frame: Any, horizon: float) -> int:
 
 
 def innovation(chains: Any, frame: Any, tolerance: float) -> tuple[float, float, float, float]:
-    """Return squared innovations over variances: of all axes; of x, y; beyond tolerance of x, y and of h."""
+    """Return four squared innovations over variances.
+
+    They are the sum over all axes, the sum over x and y, and, with `tolerance` taken off each innovation, the
+    greater one of x and y and that of h.
+    """
     total = level = beside = above = 0.0
     for axis in range(3):
         off = float(frame[VALUE + axis]) - float(chains[axis, 0])
@@ -291,7 +297,7 @@ def innovation(chains: Any, frame: Any, tolerance: float) -> tuple[float, float,
 
 
 def latest(chains: Any, frames: Any, held: int, now: float, model: Any) -> None:
-    """Take the frames of this very instant into account."""
+    """Correct estimates by the frames of the instant `now`."""
     for index in range(held - 1, -1, -1):
         if frames[index, STAMP] >= now:
             correct(chains, frames[index], model)

@@ -1,8 +1,9 @@
-"""What the rotors do with commands that reach them late: the model that estimators share.
+"""The model of the rotors with delayed commands, which the estimators share.
 
 A command is a wrench (4,): collective thrust (N), then the torques about roll, pitch and yaw axis over the
-inertias (rad/s^2). It holds until the next one, arrives after a delay, and the rotors follow it with a
-first-order lag. Both are linear, so they act on a wrench as they do on the thrust of each rotor.
+inertias (rad/s^2). A command arrives after a delay and holds until the next command arrives. The rotors
+follow with a first-order lag. Delay and lag are linear, so they act on a wrench as on the thrust of each
+rotor.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ import numpy as np
 
 from quadvis.block import reached
 
-CAPACITY = 128  # commands: the last that arrived, and those on their way
+CAPACITY = 128  # commands: the last one that arrived, and the commands on their way
 
 
 def wrench(thrust: Any, arm: float, inertia: Any, torque_ratio: float) -> Any:
-    """Return the wrench of four thrusts (N): front, right, rear, left, as equations (14) to (16) have it."""
+    """Return the wrench of four thrusts (N): front, right, rear, left, by equations (14) to (16)."""
     front, right, rear, left = float(thrust[0]), float(thrust[1]), float(thrust[2]), float(thrust[3])
     return np.array(
         (
@@ -31,17 +32,17 @@ def wrench(thrust: Any, arm: float, inertia: Any, torque_ratio: float) -> Any:
 
 
 def start(times: Any, commands: Any, now: Any, collective: float) -> None:
-    """Begin with a collective thrust (N), no torque, and one command, which has arrived."""
+    """Begin with one command that has arrived: a collective thrust (N) and no torque."""
     times[0] = -math.inf
     for index in range(4):
         commands[0, index] = now[index] = collective if index == 0 else 0.0
 
 
 def send(times: Any, commands: Any, count: int, time: float, delay: float, command: Any) -> int:
-    """Put a command on its way at a time (s), forget what is over, and return how many are kept.
+    """Send a command at a time (s), drop the commands that are over, and return the number of kept commands.
 
-    Those before the last that arrived are over. Every command goes in, also one like the last: what is on
-    its way must not depend on the values. `check_delay` has seen to it that there is room.
+    The commands before the last one that arrived are over. Every command is kept, even if it equals the one
+    before: the queue must not depend on the values. `check_delay` has made sure that there is room.
     """
     first = 0
     while first + 1 < count and reached(time, times[first + 1]):
@@ -58,9 +59,9 @@ def send(times: Any, commands: Any, count: int, time: float, delay: float, comma
 def follow(
     times: Any, commands: Any, count: int, now: Any, begin: float, end: float, lag: float, mean: Any
 ) -> None:
-    """Carry the wrench `now` (4,) in place from one instant to a later one, and give its mean on the way.
+    """Carry the wrench `now` (4,) in place from `begin` to `end` (s), and write its mean into `mean` (4,).
 
-    `times` are the instants at which the commands reach the rotors, the first one before `begin`.
+    `times` are the instants at which the commands reach the rotors; the first one is before `begin`.
     """
     for index in range(4):
         mean[index] = 0.0

@@ -1,4 +1,4 @@
-"""Angle and rate about one axis, and what disturbs them."""
+"""Angle and rate about one axis, with their disturbances."""
 
 from __future__ import annotations
 
@@ -16,34 +16,34 @@ DEGREE = math.pi / 180.0
 class AttitudeFilter(Block):
     """Angle, rate, torque disturbance and bias of the gyro about one axis: roll, pitch or yaw.
 
-    A Kalman filter for ``angle' = rate``, ``rate' = torque + disturbance``, with an angle and a rate that
-    are measured; the rate has a bias. The disturbance (a trim error) and the bias wander slowly. The torque
-    is what the rotors give from now to the next tick, as `estimation.rotor_state` tells.
+    A Kalman filter for ``angle' = rate``, ``rate' = torque + disturbance``. Angle and rate are measured, the
+    rate with a bias. The disturbance (a trim error) and the bias wander slowly. The torque is that of the
+    rotors from now to the next tick, from `estimation.rotor_state`.
 
-    An angle may be late, as the heading that a camera sees: with a ``stamp`` it is held against the estimate
-    of that instant, and the difference corrects the estimate of now. An angle is new if its stamp is
-    news; without a stamp it is new at each tick. Innovations count up to ``gate`` standard
-    deviations, so that a wrong measurement does little and a lasting one wins.
+    An angle may be late, for example the heading that a camera sees. With a ``stamp`` the angle is compared
+    with the estimate of that instant, and the difference corrects the present estimate. An angle is new if
+    its stamp is news; without a stamp an angle is new at each tick. Innovations are limited to ``gate``
+    standard deviations, so that a single wrong measurement has little effect, and a lasting difference wins.
 
-    Error: an error of the measured angle that lasts goes into the estimate whole. A late angle corrects as
-    one in time does, which is good while the latency is short against the filter's own time; it is not used
-    if it is older than 127 ticks.
+    Error: a lasting error of the measured angle goes into the estimate in full. A late angle corrects like an
+    angle in time; this is accurate while the latency is short compared with the time constant of the filter.
+    An angle older than 127 ticks is not used.
     """
 
     angle = In(unit="rad", doc="measured angle; NaN if there is none")
     gyro = In(unit="rad/s", doc="measured angular rate; NaN if there is none")
     torque = In(unit="rad/s^2", doc="torque over inertia until the next tick")
-    stamp = In(unit="s", default=math.nan, doc="instant at which the angle was measured; NaN for now")
+    stamp = In(unit="s", default=math.nan, doc="instant at which the angle was measured; NaN means now")
     valid = In("bool", default=True, doc="whether the angle is good")
     estimate = Out(unit="rad", doc="angle in (-pi, pi]")
     angular_rate = Out(unit="rad/s", doc="angular rate, without the gyro's bias")
-    disturbance = Out(unit="rad/s^2", doc="torque over inertia beside the known one")
-    bias = Out(unit="rad/s", doc="what the gyro reads at rest")
+    disturbance = Out(unit="rad/s^2", doc="torque over inertia in addition to the known one")
+    bias = Out(unit="rad/s", doc="reading of the gyro at rest")
     covariance = Out(
         "float64[4,4]",
         unit="rad^2 rad^2/s rad^2/s^2 rad^2/s rad^2/s rad^2/s^2 rad^2/s^3 rad^2/s^2 "
         "rad^2/s^2 rad^2/s^3 rad^2/s^4 rad^2/s^3 rad^2/s rad^2/s^2 rad^2/s^3 rad^2/s^2",
-        doc="of the four",
+        doc="covariance of angle, rate, disturbance and bias",
     )
 
     angle_noise = Param(
@@ -54,14 +54,12 @@ class AttitudeFilter(Block):
     )
     torque_noise = Param(0.1, unit="rad/s^1.5", min=0.0, tune=True, doc="white noise of the torque")
     disturbance_wander = Param(
-        0.01, unit="rad/s^2.5", min=0.0, tune=True, doc="how the disturbance wanders: deviation after 1 s"
+        0.01, unit="rad/s^2.5", min=0.0, tune=True, doc="wander of the disturbance: deviation after 1 s"
     )
     bias_wander = Param(
-        0.01 * DEGREE, unit="rad/s^1.5", min=0.0, tune=True, doc="how the bias wanders: deviation after 1 s"
+        0.01 * DEGREE, unit="rad/s^1.5", min=0.0, tune=True, doc="wander of the bias: deviation after 1 s"
     )
-    gate = Param(
-        5.0, above=0.0, tune=True, doc="standard deviations beyond which an innovation counts no more"
-    )
+    gate = Param(5.0, above=0.0, tune=True, doc="standard deviations to which innovations are limited")
     initial_sigma = Param(
         (5.0 * DEGREE, 5.0 * DEGREE, 0.1, 0.5 * DEGREE),
         type="float64[4]", unit="rad rad/s rad/s^2 rad/s", above=0.0, doc="deviations at the start",
@@ -72,21 +70,21 @@ class AttitudeFilter(Block):
         unit="s",
         above=0.0,
         tune=True,
-        doc="how long a clock that started again runs until it counts",
+        doc="how long a restarted clock must run before its stamps count",
     )
 
     mean = State("float64[4]")  # before the measurements of this tick
     spread = State("float64[4,4]")
-    past = State(f"float64[{CAPACITY}]")  # angles, not wrapped, after the measurements; the newest first
+    past = State(f"float64[{CAPACITY}]")  # angles, not wrapped, after the measurements; newest first
     kept = State("int64")
     stamps = State(f"float64[{SIZE}]")
-    verdict = Work("int64")  # on the stamp of now
-    moment = Work(unit="s")  # the instant that it stands for
+    verdict = Work("int64")  # on the stamp of this tick
+    moment = Work(unit="s")  # the instant of that stamp
     mean_now = Work("float64[4]")  # with the measurements of this tick
     spread_now = Work("float64[4,4]")
 
     def start(self) -> None:
-        """Begin with zeros, as uncertain as the parameter says."""
+        """Begin at zero, with the deviations ``initial_sigma``."""
         begin(self.stamps)
         for index in range(4):
             self.spread[index, index] = self.initial_sigma[index] ** 2
@@ -94,7 +92,7 @@ class AttitudeFilter(Block):
     def output(
         self, angle: float, gyro: float, stamp: float, valid: bool, time: float
     ) -> tuple[float, float, float, float, Any]:
-        """Return the estimate with the measurements of now."""
+        """Return the estimate with the measurements of this tick."""
         self.mean_now = self.mean
         self.spread_now = self.spread
         mean, spread = self.mean_now, self.spread_now
@@ -119,7 +117,7 @@ class AttitudeFilter(Block):
 
 
 def _off(angle: float, late: float, past: Any, kept: int, now: float, period: float) -> float:
-    """Return how far a measured angle is from the estimate of `late` seconds ago; NaN if not known."""
+    """Return the difference of a measured angle from the estimate `late` seconds ago; NaN if unknown."""
     ticks, rounding = late / period, INSTANT / period
     if not math.isfinite(angle) or ticks > min(kept, CAPACITY - 1) + rounding:
         return math.nan
@@ -133,7 +131,7 @@ def _off(angle: float, late: float, past: Any, kept: int, now: float, period: fl
 def _measure(
     mean: Any, spread: Any, off: float, gyro: float, angle_noise: float, rate_noise: float, gate: float
 ) -> None:
-    """Take an angle that is off by so much and a gyro into account, each unless it is NaN."""
+    """Correct by an angle, with the difference `off` from its estimate, and by a gyro; NaN is skipped."""
     if not math.isnan(off):
         _correct(mean, spread, spread[0].copy(), float(spread[0, 0]), off, angle_noise, gate)
     if math.isfinite(gyro):
@@ -145,7 +143,7 @@ def _measure(
 def _correct(
     mean: Any, spread: Any, towards: Any, variance: float, off: float, noise: float, gate: float
 ) -> None:
-    """Correct by one number that is off, whose covariance with the state is `towards` (4,)."""
+    """Correct by a number with the difference `off`; `towards` (4,) is its covariance with the state."""
     total = variance + noise * noise
     limit = gate * math.sqrt(total)
     mean += towards * (min(max(off, -limit), limit) / total)

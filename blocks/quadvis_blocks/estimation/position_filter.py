@@ -1,4 +1,4 @@
-"""Where the craft is and how it moves, from frames that come late and in any order."""
+"""Position and motion of the craft, from frames that come late and in any order."""
 
 from __future__ import annotations
 
@@ -31,60 +31,64 @@ from quadvis_blocks.estimation._chain import (
 class PositionFilter(Block):
     """Position, velocity and disturbance of the craft, from known accelerations and frames that come late.
 
-    A Kalman filter: along each axis the acceleration is the known one, plus a disturbance that wanders with
-    the deviation ``wander`` and the correlation time ``decay``, plus white noise. A frame counts for the
-    instant of its stamp: the filter goes back to it and runs again through what it knows since, so frames
-    that are late and out of order give what they would have given in time. Without frames it goes on by the
-    accelerations alone. The last 64 ticks are kept; a frame from before them is refused.
+    A Kalman filter. The acceleration along each axis is the known one, plus a disturbance, plus white noise.
+    The disturbance wanders with the deviation ``wander`` and the correlation time ``decay``. A frame counts
+    for the instant of its stamp: the filter goes back to that instant, and runs again through all later
+    inputs. So frames that come late and out of order give the same result as frames in time. Without frames
+    the filter continues by the accelerations alone. The last 64 ticks are kept; a frame from before them is
+    refused.
 
-    A frame is refused if along an axis it is further than ``gate`` standard deviations, and ``tolerance``
-    for what the model leaves out, from where it was expected; or if frames are within that, but x and y
-    strain the filter: the mean of their squared innovations over the variances, by a fading memory of
-    some three frames, is above ``strain_limit``. It is 2 when all is well, and rises at once when
-    positions are of other instants than their stamps say, or contradict the known accelerations in
-    another way. Up to the height ``contact`` the ground may carry and hold the craft, which the
-    accelerations do not know: where frames and estimates are both below, nothing strains, no disturbance in
-    x and y is learned, and a frame that is too far in height alone is believed and sets the height anew.
+    A frame counts if its stamp is news, or if its stamp goes back because the frame was overtaken on its way;
+    it needs ``valid`` and finite numbers. A frame is refused in two cases:
 
-    Refused frames are tried on estimates of their own. When these have agreed with them for ``reset_after``,
-    within the gate, without strain and with disturbances within ``gate`` deviations, they take the place of
-    the filter's. Frames that contradict the known accelerations never get there: the filter goes on by the
-    accelerations. A frame counts if its stamp is news, or goes back as that of one overtaken on its way does;
-    it needs ``valid`` and finite numbers. From a refused frame to the next one that is believed the
-    measurements contradict the known accelerations.
+    - Along an axis, it is further from the expected position than ``gate`` standard deviations plus
+      ``tolerance``, which allows for errors of the model.
+    - The frame is nearer, but the strain rises above ``strain_limit``. The strain is the mean of the squared
+      innovations of x and y over their variances, with a fading memory of some three frames. It is 2 when all
+      is well. It rises at once when positions are not of the instants of their stamps, or contradict the
+      known accelerations in another way.
 
-    Of the libraries, filterpy is no longer kept, and neither it nor scipy takes frames out of order or
-    compiles.
+    Up to the height ``contact`` the ground may carry and hold the craft, and the known accelerations do not
+    include its forces. Where frames and estimates are both below ``contact``, the strain is zero, no
+    disturbance of x and y is learned, and a frame that is too far off in height alone is believed and sets
+    the height.
 
-    Error: the covariance is true if the noise is what the parameters say; errors that outlast a frame, as
-    those of a tilt do, it does not see.
+    Refused frames are tried on separate estimates. These replace the estimates of the filter when they have
+    agreed with the refused frames for ``reset_after``: within the gate, without strain, and with disturbances
+    within ``gate`` deviations. Frames that contradict the known accelerations never reach that; the filter
+    then continues by the accelerations. ``contradicted`` is true from a refused frame to the next believed
+    frame.
+
+    The libraries do not serve here: filterpy is no longer maintained, and neither filterpy nor scipy takes
+    frames out of order or can be compiled.
+
+    Error: the covariance is right if the noise is as the parameters say. It does not include errors that last
+    longer than a frame, such as those of a tilt.
     """
 
     acceleration = In("float64[3]", unit="m/s^2", doc="known acceleration along x, y, h, now")
     position = In("float64[3]", unit="m", doc="measured position x, y, h; NaN if there is none")
-    stamp = In(unit="s", doc="instant at which it was measured")
-    valid = In("bool", default=True, doc="whether it is good")
+    stamp = In(unit="s", doc="instant at which the position was measured")
+    valid = In("bool", default=True, doc="whether the position is good")
     measured = In(
         "float64[4,4]",
         unit="m^2 m^2 m^2 m*rad " * 3 + "m*rad m*rad m*rad rad^2",
         default=((0.0,) * 4,) * 4,
-        doc="its covariance beside noise, such as `vision.pose_imu` gives; the first three variances count",
+        doc="its covariance in addition to noise, as from `vision.pose_imu`; the first three variances count",
     )
     estimate = Out("float64[3]", unit="m", doc="position now: x, y, h")
     velocity = Out("float64[3]", unit="m/s", doc="rate of change of the position")
-    disturbance = Out("float64[3]", unit="m/s^2", doc="acceleration beside the known one")
+    disturbance = Out("float64[3]", unit="m/s^2", doc="acceleration in addition to the known one")
     covariance = Out(
         "float64[3,3,3]",
         unit="m^2 m^2/s m^2/s^2 m^2/s m^2/s^2 m^2/s^3 m^2/s^2 m^2/s^3 m^2/s^4 " * 3,
-        doc="by axis, of position, velocity and disturbance",
+        doc="covariance of position, velocity and disturbance, by axis",
     )
-    age = Out(
-        unit="s", doc="time since the newest frame that was believed, by its stamp; from the start if none"
-    )
-    ok = Out("bool", doc="whether there was one, and its age is at most max_age")
-    contradicted = Out("bool", doc="whether the newest frame that could be compared was refused by the gate")
-    nis = Out(nan=True, doc="squared innovation over its variance, summed, of a new frame; else NaN")
-    refused = Out("int64", doc="how many frames were refused")
+    age = Out(unit="s", doc="time since the stamp of the newest believed frame, or since the start")
+    ok = Out("bool", doc="whether a frame was believed, and the age is at most max_age")
+    contradicted = Out("bool", doc="whether the newest frame that could be compared was refused")
+    nis = Out(nan=True, doc="sum of squared innovations over variances of a new frame; else NaN")
+    refused = Out("int64", doc="number of refused frames")
 
     noise = Param(
         (0.005, 0.005, 0.005), type="float64[3]", unit="m", above=0.0, tune=True,
@@ -92,7 +96,7 @@ class PositionFilter(Block):
     )  # fmt: skip
     acceleration_noise = Param(
         (0.02, 0.02, 0.02), type="float64[3]", unit="m/s^1.5", min=0.0, tune=True,
-        doc="white noise of the acceleration: velocity deviates by this times the root of the time",
+        doc="white noise of the acceleration: the velocity deviates by this times the root of the time",
     )  # fmt: skip
     wander = Param(
         (0.1, 0.1, 0.1), type="float64[3]", unit="m/s^2", above=0.0, tune=True,
@@ -100,32 +104,36 @@ class PositionFilter(Block):
     )  # fmt: skip
     decay = Param(
         (10.0, 10.0, 10.0), type="float64[3]", unit="s", above=0.0, tune=True,
-        doc="correlation time of the disturbance; one that lasts is pulled to zero by it a little",
+        doc="correlation time of the disturbance; it pulls a lasting disturbance a little to zero",
     )  # fmt: skip
     gate = Param(5.0, above=0.0, tune=True, doc="greatest innovation in standard deviations")
     strain_limit = Param(
         12.0,
         above=0.0,
         tune=True,
-        doc="greatest squared innovation over its variance, x and y, mean of some frames",
+        doc="greatest strain: squared innovations of x and y over variances, mean of some frames",
     )
     contact = Param(0.2, unit="m", tune=True, doc="height up to which the ground may touch the craft")
-    tolerance = Param(0.0, unit="m", min=0.0, tune=True, doc="innovation that is never too great")
+    tolerance = Param(0.0, unit="m", min=0.0, tune=True, doc="part of an innovation that the gate ignores")
     reset_after = Param(1.0, unit="s", above=0.0, tune=True, doc="how long refused frames must agree")
     restart = Param(
         RESTART,
         unit="s",
         above=0.0,
         tune=True,
-        doc="how long a clock that started again runs until it counts",
+        doc="how long a restarted clock must run before its stamps count",
     )
     max_age = Param(2.0, unit="s", above=0.0, tune=True, doc="how long accelerations alone are good enough")
     initial = Param((0.0, 0.0, 0.0), type="float64[3]", unit="m", doc="position at the start")
     initial_sigma = Param(
-        (1.0, 0.5), type="float64[2]", unit="m m/s", above=0.0, doc="deviation of position and velocity then"
+        (1.0, 0.5),
+        type="float64[2]",
+        unit="m m/s",
+        above=0.0,
+        doc="deviation of position and velocity at the start",
     )
 
-    ticks = State(f"float64[{TICKS},4]")  # instant and acceleration, the last one last
+    ticks = State(f"float64[{TICKS},4]")  # instant and acceleration, newest last
     past = State(f"float64[{TICKS},3,9]")  # estimates just before the frames of that instant
     oldest = State("int64", TICKS)  # the first tick that frames may go back to; none yet
     frames = State(f"float64[{FRAMES},{WIDTH}]")
@@ -135,11 +143,13 @@ class PositionFilter(Block):
     refusing = State("bool")
     refusals = State("int64")
     trial = State("float64[3,9]")  # estimates by refused frames alone
-    tried = State("float64[3]", math.nan)  # stamps of the first and the last of them, and their strain
+    tried = State(
+        "float64[3]", math.nan
+    )  # stamps of the first and the last of these frames, and their strain
     strain = State()  # squared innovations of x and y over their variances, by fading memory
-    verdict = Work("int64")  # on the stamp of now
-    moment = Work(unit="s")  # the instant that it stands for
-    chains = Work("float64[3,9]")  # the estimates just before the frames of now
+    verdict = Work("int64")  # on the stamp of this tick
+    moment = Work(unit="s")  # the instant of that stamp
+    chains = Work("float64[3,9]")  # the estimates just before the frames of this tick
     past_now = Work(f"float64[{TICKS},3,9]")
     oldest_now = Work("int64")
     frames_now = Work(f"float64[{FRAMES},{WIDTH}]")
@@ -159,7 +169,7 @@ class PositionFilter(Block):
     def output(
         self, acceleration: Any, position: Any, stamp: float, valid: bool, measured: Any, time: float
     ) -> tuple[Any, ...]:
-        """Return the estimate with what is known now."""
+        """Return the estimates with the frames so far."""
         now, nis = _tick(time, acceleration), math.nan
         self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)
         self.chains = self.past[TICKS - 1]
@@ -193,7 +203,7 @@ class PositionFilter(Block):
         )  # fmt: skip
 
     def update(self, acceleration: Any, stamp: float, time: float) -> None:
-        """Keep what came in, and the estimates just before the frames of this instant."""
+        """Keep the frame, and the estimates just before the frames of this instant."""
         if self.oldest < TICKS:
             keep(self.stamps, stamp, time, self.restart, self.verdict, self.moment)
             self.past = self.past_now
@@ -215,14 +225,14 @@ def _model(noise: Any, wander: Any, decay: Any, contact: float) -> Any:
 
 
 def _counts(verdict: int, made: float, stamp: float) -> float:
-    """Return the instant of a frame; NaN if it does not count. One that is ahead is there to be refused."""
+    """Return the instant of a frame; NaN if it does not count. A frame ahead of the time will be refused."""
     if verdict == AHEAD:
         return stamp
     return made if verdict in (NEWS, BACK) and not math.isnan(stamp) else math.nan
 
 
 def _frame(position: Any, stamp: float, valid: bool, measured: Any, noise: Any) -> Any:
-    """Return a frame; its stamp is NaN if it is not fit for use."""
+    """Return a frame; its stamp is NaN if the frame cannot be used."""
     frame = np.zeros(WIDTH)
     fit = valid
     for axis in range(3):
@@ -234,7 +244,7 @@ def _frame(position: Any, stamp: float, valid: bool, measured: Any, noise: Any) 
 
 
 def _newer(newest: float, stamp: float, verdict: int) -> float:
-    """Return the stamp of the newest frame that was believed."""
+    """Return the stamp of the newest believed frame."""
     if verdict != TAKEN and verdict != RESET:
         return newest
     return stamp if math.isnan(newest) else max(newest, stamp)

@@ -1,4 +1,4 @@
-"""The state of the craft when a command of now will act."""
+"""The state of the craft at the instant when a command sent now will act."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ STEP = 0.01  # s, at most
 
 
 class Predictor(Block):
-    """State of the craft when a command of now will act, by the commands that are on their way.
+    """State of the craft when a command sent now will act, from the commands that are on their way.
 
-    A command arrives ``delay`` later: until then the motion follows from the commands sent so far. The lag of
-    the motors is then made up for by ``x + lag x'``. For a law torque = K x that is just the command that a
+    A command arrives ``delay`` later. Until then the motion follows from the commands sent so far. Then ``x +
+    lag x'`` compensates the lag of the motors. For a law torque = K x this gives exactly the command that a
     first-order lag turns into K x, since ``command = torque + lag torque'``. So the law may be tuned as if
-    there were neither radio nor motors: at 20 Hz, 22 ms and 80 ms the laws of the paper are stable up to a
-    bandwidth of 10 rad/s in place of 3.3.
+    there were neither radio nor motors: at 20 Hz, with a delay of 22 ms and a lag of 80 ms, the laws of the
+    paper are stable up to a bandwidth of 10 rad/s instead of 3.3.
 
-    Disturbances stay as they are. Run it at the rate of the control, and let ``thrust`` be what that sends.
+    Disturbances are taken as constant. Run the block at the rate of the control, and connect ``thrust`` to
+    the thrusts that the control sends.
 
     Error: ParameterError if the delay is longer than 127 ticks.
 
@@ -34,7 +35,10 @@ class Predictor(Block):
     position = In("float64[3]", unit="m", doc="x, y, h, now")
     velocity = In("float64[3]", unit="m/s", doc="rate of change of the position")
     disturbance = In(
-        "float64[3]", unit="m/s^2", default=(0.0, 0.0, 0.0), doc="acceleration beside thrust and gravity"
+        "float64[3]",
+        unit="m/s^2",
+        default=(0.0, 0.0, 0.0),
+        doc="acceleration in addition to thrust and gravity",
     )
     roll = In(unit="rad", doc="right side down is positive")
     pitch = In(unit="rad", doc="nose up is positive")
@@ -42,10 +46,10 @@ class Predictor(Block):
     roll_rate = In(unit="rad/s", doc="rate of change of roll")
     pitch_rate = In(unit="rad/s", doc="rate of change of pitch")
     yaw_rate = In(unit="rad/s", doc="rate of change of yaw")
-    roll_disturbance = In(unit="rad/s^2", default=0.0, doc="roll torque beside that of the rotors")
-    pitch_disturbance = In(unit="rad/s^2", default=0.0, doc="pitch torque beside that of the rotors")
-    yaw_disturbance = In(unit="rad/s^2", default=0.0, doc="yaw torque beside that of the rotors")
-    thrust = In("float64[4]", unit="N", doc="thrust commanded of each rotor: front, right, rear, left")
+    roll_disturbance = In(unit="rad/s^2", default=0.0, doc="roll torque in addition to that of the rotors")
+    pitch_disturbance = In(unit="rad/s^2", default=0.0, doc="pitch torque in addition to that of the rotors")
+    yaw_disturbance = In(unit="rad/s^2", default=0.0, doc="yaw torque in addition to that of the rotors")
+    thrust = In("float64[4]", unit="N", doc="commanded thrust of each rotor: front, right, rear, left")
     later_position = Out("float64[3]", unit="m", doc="x, y, h when the command acts")
     later_velocity = Out("float64[3]", unit="m/s", doc="velocity when the command acts")
     later_roll = Out(unit="rad", doc="roll when the command acts")
@@ -55,14 +59,14 @@ class Predictor(Block):
         "float64[3]", unit="rad/s", doc="rates of change of roll, pitch and yaw when the command acts"
     )
 
-    delay = Param(RADIO_DELAY, unit="s", min=0.0, max=1.0, doc="time that a command takes to the rotors")
+    delay = Param(RADIO_DELAY, unit="s", min=0.0, max=1.0, doc="time from sending a command to its arrival")
     lag = Param(MOTOR_LAG, unit="s", above=0.0, doc="time constant of a motor")
-    arm = Param(ARM, unit="m", above=0.0, doc="l, from the centre to each rotor; default Draganfly IV")
+    arm = Param(ARM, unit="m", above=0.0, doc="l, from the centre to each rotor; default: Draganfly IV")
     inertia = Param(
         INERTIA, type="float64[3]", unit="kg*m^2", above=0.0, doc="about roll, pitch and yaw axis"
     )
-    torque_ratio = Param(TORQUE_RATIO, unit="m", above=0.0, doc="c, a rotor's drag torque over its thrust")
-    mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
+    torque_ratio = Param(TORQUE_RATIO, unit="m", above=0.0, doc="c, drag torque of a rotor over its thrust")
+    mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass of the craft; default: Draganfly IV")
     gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
 
     times = State(f"float64[{CAPACITY}]", unit="s")  # at which commands arrive
@@ -71,7 +75,7 @@ class Predictor(Block):
     now = State("float64[4]")  # the wrench of the rotors
 
     def check(self) -> None:
-        """Refuse a delay in which more commands come in than there is room for."""
+        """Refuse a delay that holds more commands than there is room for."""
         check_delay(self.delay, CAPACITY - 1, self.period)
 
     def start(self) -> None:
@@ -95,7 +99,7 @@ class Predictor(Block):
         yaw_disturbance: float,
         time: float,
     ) -> tuple[Any, Any, float, float, float, Any]:
-        """Return the state when a command of now will act."""
+        """Return the state when a command sent now will act."""
         place, speed, now, mean = position.copy(), velocity.copy(), self.now.copy(), np.zeros(4)
         angles, rates = np.array((roll, pitch, yaw)), np.array((roll_rate, pitch_rate, yaw_rate))
         trim = np.array((roll_disturbance, pitch_disturbance, yaw_disturbance))
@@ -122,7 +126,7 @@ class Predictor(Block):
         )
 
     def update(self, thrust: Any, time: float) -> None:
-        """Send a command on its way, and follow those that arrive until the next tick."""
+        """Send a command, and follow the commands that arrive until the next tick."""
         command = wrench(thrust, self.arm, self.inertia, self.torque_ratio)
         self.count = send(self.times, self.commands, self.count, time, self.delay, command)
         mean = np.zeros(4)

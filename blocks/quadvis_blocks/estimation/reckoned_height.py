@@ -13,37 +13,40 @@ from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, note
 
 
 class ReckonedHeight(Block):
-    """Position and velocity as measured; while blind, height and climb from the thrust that is given.
+    """Position and velocity as measured; while blind, height and climb from the commanded thrust.
 
-    A model runs along all the time: ``m h'' = u cos(roll) cos(pitch) - m g - drag h' + m trim``, with the
-    motors' lag. Each new frame corrects height and climb by fading memory, and much more slowly the trim,
-    which takes in a thrust that is not what it should be but not the gusts. While ``blind`` the model alone
-    counts, and horizontal position and velocity pass as they come.
+    A model runs all the time: ``m h'' = u cos(roll) cos(pitch) - m g - drag h' + m trim``, with the lag of
+    the motors. Each new frame corrects height and climb by a fading memory. It corrects the trim much more
+    slowly, so that the trim includes a constant error of the thrust, but not gusts. While ``blind``, height
+    and climb come from the model alone; horizontal position and velocity pass unchanged.
 
-    Error while blind: of the climb e at the beginning, e m / drag in the end; of the trim d, d t^2 / 2.
+    Error while blind: an error e of the climb at the beginning gives an error of the height of e m / drag in
+    the end; an error d of the trim gives d t^2 / 2.
     """
 
     bandwidth = Param(4.0, unit="rad/s", above=0.0, tune=True, doc="how fast the model follows the frames")
     trim_bandwidth = Param(
         0.1, unit="rad/s", min=0.0, tune=True, doc="how fast the trim follows; slower than gusts"
     )
-    mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
-    drag = Param(0.1, unit="N*s/m", min=0.0, tune=True, doc="force per speed through the air")
+    mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass of the craft; default: Draganfly IV")
+    drag = Param(0.1, unit="N*s/m", min=0.0, tune=True, doc="drag force over the speed through the air")
     lag = Param(MOTOR_LAG, unit="s", above=0.0, tune=True, doc="time constant of a motor")
     gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
-    lowest = Param(-10.0, unit="m", tune=True, doc="where the model stops to sink, when the rotors idle")
+    lowest = Param(
+        -10.0, unit="m", tune=True, doc="height where the model stops sinking, when the rotors idle"
+    )
     restart = Param(
         RESTART,
         unit="s",
         above=0.0,
         tune=True,
-        doc="how long a clock that started again runs until it counts",
+        doc="how long a restarted clock must run before its stamps count",
     )
     position = In("float64[3]", unit="m", doc="measured position: x, y, h")
     velocity = In("float64[3]", unit="m/s", doc="measured velocity")
-    stamp = In(unit="s", doc="instant of the newest frame; NaN for none yet")
+    stamp = In(unit="s", doc="instant of the newest frame; NaN before the first")
     blind = In("bool", doc="whether the measured height does not count")
-    collective = In(unit="N", doc="collective thrust that the rotors were told to give")
+    collective = In(unit="N", doc="commanded collective thrust of the rotors")
     roll = In(unit="rad", doc="roll angle")
     pitch = In(unit="rad", doc="pitch angle")
     known_position = Out("float64[3]", unit="m", doc="x, y, and the height that counts")
@@ -57,7 +60,7 @@ class ReckonedHeight(Block):
     stamps = State(f"float64[{SIZE}]")
 
     def start(self) -> None:
-        """Know nothing yet, in a trimmed hover."""
+        """Begin in a trimmed hover, without a frame."""
         begin(self.stamps)
         self.last = -math.inf
         self.lift = self.mass * self.gravity

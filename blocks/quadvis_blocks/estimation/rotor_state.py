@@ -1,4 +1,4 @@
-"""What the rotors give now, from the commands that were sent."""
+"""The present thrust and torques of the rotors, from the commands that were sent."""
 
 from __future__ import annotations
 
@@ -13,28 +13,29 @@ from quadvis_blocks.estimation._rotors import CAPACITY, follow, send, start, wre
 
 
 class RotorState(Block):
-    """Thrust and torques that the rotors give now, by a model of radio and motors.
+    """Present thrust and torques of the rotors, from a model of radio and motors.
 
-    A command holds until the next one, arrives ``delay`` later, and the rotors follow with a first-order lag.
-    Exact between ticks, so the block may run faster than the commands come, and a command may arrive between
-    two ticks. Commands that came in at most a tick late are what a simulation's ``across: hold`` gives.
+    A command arrives ``delay`` later and holds until the next command arrives; the rotors follow with a
+    first-order lag. The model is exact between ticks. So the block may run faster than the commands come, and
+    a command may arrive between two ticks. With ``across: hold`` in a simulation, a command enters the block
+    at most one tick late.
 
-    Error: none beyond the model's; ParameterError if the delay is longer than 127 ticks.
+    Error: none beyond that of the model; ParameterError if the delay is longer than 127 ticks.
     """
 
-    thrust = In("float64[4]", unit="N", doc="thrust commanded of each rotor: front, right, rear, left")
-    collective = Out(unit="N", doc="the sum of the thrusts, now")
+    thrust = In("float64[4]", unit="N", doc="commanded thrust of each rotor: front, right, rear, left")
+    collective = Out(unit="N", doc="sum of the thrusts, now")
     torque = Out(
         "float64[3]", unit="rad/s^2", doc="about roll, pitch, yaw over inertia: mean until the next tick"
     )
 
-    delay = Param(RADIO_DELAY, unit="s", min=0.0, doc="time that a command takes to the rotors")
+    delay = Param(RADIO_DELAY, unit="s", min=0.0, doc="time from sending a command to its arrival")
     lag = Param(MOTOR_LAG, unit="s", above=0.0, doc="time constant of a motor")
-    arm = Param(ARM, unit="m", above=0.0, doc="l, from the centre to each rotor; default Draganfly IV")
+    arm = Param(ARM, unit="m", above=0.0, doc="l, from the centre to each rotor; default: Draganfly IV")
     inertia = Param(
         INERTIA, type="float64[3]", unit="kg*m^2", above=0.0, doc="about roll, pitch and yaw axis"
     )
-    torque_ratio = Param(TORQUE_RATIO, unit="m", above=0.0, doc="c, a rotor's drag torque over its thrust")
+    torque_ratio = Param(TORQUE_RATIO, unit="m", above=0.0, doc="c, drag torque of a rotor over its thrust")
     mass = Param(
         0.5, unit="kg", above=0.0, doc="mass of the craft, whose weight the rotors carry at the start"
     )
@@ -45,7 +46,7 @@ class RotorState(Block):
     now = State("float64[4]")
 
     def check(self) -> None:
-        """Refuse a delay in which more commands come in than there is room for."""
+        """Refuse a delay that holds more commands than there is room for."""
         check_delay(self.delay, CAPACITY - 1, self.period)
 
     def start(self) -> None:
@@ -60,7 +61,7 @@ class RotorState(Block):
         return float(self.now[0]), mean[1:]
 
     def update(self, thrust: Any, time: float) -> None:
-        """Send a command on its way, and follow those that arrive until the next tick."""
+        """Send a command, and follow the commands that arrive until the next tick."""
         command = wrench(thrust, self.arm, self.inertia, self.torque_ratio)
         self.count = send(self.times, self.commands, self.count, time, self.delay, command)
         mean = np.zeros(4)

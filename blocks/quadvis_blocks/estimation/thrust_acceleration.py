@@ -14,11 +14,11 @@ from quadvis_blocks.estimation._rotors import acceleration
 class ThrustAcceleration(Block):
     """Acceleration along x, y, h that the collective thrust and gravity give a craft of known attitude.
 
-    ``u / m`` along minus the third column of Rz(yaw) Ry(pitch) Rx(roll), less g along h: what
-    `estimation.position_filter` takes as known. Wind, drag and an error of the mass are left to the
-    disturbance that it estimates.
+    It is ``u / m`` along minus the third column of Rz(yaw) Ry(pitch) Rx(roll), minus g along h.
+    `estimation.position_filter` takes this acceleration as known; the disturbance that it estimates includes
+    wind, drag and an error of the mass.
 
-    Source: equations (11) to (13), with the yaw that they leave out.
+    Source: equations (11) to (13), and yaw, which these equations leave out.
     """
 
     collective = In(unit="N", doc="collective thrust u that the rotors give")
@@ -27,7 +27,7 @@ class ThrustAcceleration(Block):
     yaw = In(unit="rad", default=0.0, doc="clockwise from above is positive")
     acceleration = Out("float64[3]", unit="m/s^2", doc="along x, y, h")
 
-    mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass of the craft; default Draganfly IV")
+    mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass of the craft; default: Draganfly IV")
     gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
 
     def output(self, collective: float, roll: float, pitch: float, yaw: float) -> Any:

@@ -1,4 +1,4 @@
-"""Where the craft is, from where its camera sees the target."""
+"""The position of the craft, from the position of its camera relative to the target."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from quadvis.block import Block, In, Out, Param
 class VehiclePosition(Block):
     """World position of the craft from the camera's position in the frame of a target on the ceiling.
 
-    The target frame has x forward, y right and z down, its origin at the centre of the circles. So x and y
-    add to the target's, and the height is the target's less z. NaN, for a target not seen, stays NaN.
+    The target frame has x forward, y right and z down; its origin is the centre of the circles. So x and y
+    are added to those of the target, and z is subtracted from the height of the target. NaN, for a target
+    that is not seen, stays NaN.
     """
 
     target = Param(
