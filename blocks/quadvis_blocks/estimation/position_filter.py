@@ -143,9 +143,7 @@ class PositionFilter(Block):
     refusing = State("bool")
     refusals = State("int64")
     trial = State("float64[3,9]")  # estimates by refused frames alone
-    tried = State(
-        "float64[3]", math.nan
-    )  # stamps of the first and the last of these frames, and their strain
+    tried = State("float64[3]", math.nan)  # stamps of the first and last of these frames, and their strain
     strain = State()  # squared innovations of x and y over their variances, by fading memory
     verdict = Work("int64")  # on the stamp of this tick
     moment = Work(unit="s")  # the instant of that stamp

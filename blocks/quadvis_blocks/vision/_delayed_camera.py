@@ -10,29 +10,30 @@ from numpy.typing import NDArray
 from quadvis.block import Block, Param, ParameterError, Random, State, passed, reached, uniform
 
 QUEUE = 16  # frames that can be on their way at once
-SEQUENCE, STAMP, ARRIVAL = range(3)  # the first columns of a row, the rest is what was captured
+SEQUENCE, STAMP, ARRIVAL = range(3)  # the first columns of a row; the rest is the content of the frame
 CONTENT = 3
 
 Row = NDArray[np.float64]
 
 
 class DeliveringCamera(Block, numeric=False):
-    """A camera whose frames take their time, do not all arrive, and may overtake each other.
+    """A camera whose frames are late, may get lost, and may overtake each other.
 
-    A frame is captured at every ``every``-th tick, from the first on, and numbered from 1 whether it gets
-    through or not. It is delivered at the first tick at or after stamp + latency + extra, with an extra that
-    is uniform from 0 to ``jitter`` and drawn for each frame. One wire shows one frame, the one that arrived
-    last: with a jitter beyond the time between two frames an older frame can follow a newer one, with a
-    smaller sequence number and stamp. Of frames that arrive between two ticks the last to arrive is shown, of
-    those that arrive together the newest. With a latency of whole ticks any jitter costs a tick; a finer rate
-    and an ``every`` above 1 resolve it.
+    A frame is captured at every ``every``-th tick, from the first tick on. Frames are numbered from 1, lost
+    frames included. A frame is delivered at the first tick at or after stamp + latency + extra; the extra
+    time is drawn for each frame, uniformly from 0 to ``jitter``. The wire shows one frame, the one that
+    arrived last. With a jitter longer than the time between two frames, an older frame can follow a newer
+    one; its sequence number and stamp are then smaller. Of the frames that arrive between two ticks, the last
+    to arrive is shown; of frames that arrive together, the newest. With a latency of whole ticks any jitter
+    costs a whole tick; a faster rate of the block with an ``every`` above 1 resolves the jitter.
 
-    Losses are a two-state Markov chain: a frame is lost with probability ``drop_rate`` / ``drop_burst`` after
-    one that was not, with 1 - (1 - ``drop_rate``) / ``drop_burst`` after one that was. Their share is
-    ``drop_rate``, the mean length of a run of them ``drop_burst`` / (1 - ``drop_rate``) frames; a
-    ``drop_burst`` of 1 makes them independent. Frames captured in ``blackout`` are lost as well.
+    Losses are a two-state Markov chain. A frame is lost with probability ``drop_rate`` / ``drop_burst`` after
+    a frame that was not lost, and with probability 1 - (1 - ``drop_rate``) / ``drop_burst`` after a lost
+    frame. The share of lost frames is ``drop_rate``. The mean length of a run of lost frames is
+    ``drop_burst`` / (1 - ``drop_rate``); with a ``drop_burst`` of 1 the losses are independent. Frames
+    captured in ``blackout`` are lost, too.
 
-    Chances of delivery have a random stream of their own, so that they leave the noise of a frame as it is.
+    The delivery has a random stream of its own, so it does not change the noise of the frames.
 
     Source of the chain: E. N. Gilbert, Capacity of a burst-noise channel, 1960.
     """
@@ -42,23 +43,23 @@ class DeliveringCamera(Block, numeric=False):
     jitter = Param(0.0, unit="s", min=0.0, doc="greatest extra time of a frame; uniform from 0")
     drop_rate = Param(0.0, min=0.0, max=1.0, tune=True, doc="share of the frames that get lost")
     drop_burst = Param(
-        1.0, min=1.0, tune=True, doc="how many times longer runs of lost frames are than independent ones"
+        1.0, min=1.0, tune=True, doc="mean length of a run of lost frames, relative to independent losses"
     )
     blackout = Param(
         (0.0, 0.0),
         type="float64[2]",
         unit="s",
         tune=True,
-        doc="begin and length of an interval whose frames are all lost",
+        doc="beginning and length of an interval whose frames are all lost",
     )
 
     delivery = Random()
-    chances = State("float64[2]")  # of the coming frame: lost or not, and its extra time
+    chances = State("float64[2]")  # random numbers of the coming frame: for its loss, and for its extra time
     ticks = State("int64")
     captured = State("int64")
     dropped = State("bool")  # whether the last frame was lost by chance
     pending = State(f"float64[{QUEUE},{CONTENT}]")  # rows on their way, oldest first; cameras widen it
-    waiting = State("int64")  # how many of them there are
+    waiting = State("int64")  # number of rows on their way
     shown = State(f"float64[{CONTENT}]")  # the row on the wire; sequence 0 before the first
     _arrivals: tuple[Row, list[Row]]  # the rows on the wire and on their way, from output to update
 
@@ -100,13 +101,13 @@ class DeliveringCamera(Block, numeric=False):
         return float(stamp + self.latency + self.jitter * self.chances[1])
 
     def _row(self, stamp: float, content: Any) -> Row:
-        """Return the frame of this tick as it goes into the queue."""
+        """Return the frame of this tick as a row of the queue."""
         return np.concatenate(([self.captured + 1, stamp, self._arrival(stamp)], content))
 
     def _arrived(self, fresh: Row | None, time: float) -> tuple[Row, list[Row]]:
-        """Return the row on the wire at this time and those that are still on their way.
+        """Return the row on the wire at this time, and the rows that are still on their way.
 
-        ``fresh`` is the row of the frame that is captured now, if it is not lost.
+        ``fresh`` is the row of the frame that is captured now; None if there is none or if it is lost.
         """
         queue = [row.copy() for row in self.pending[: self.waiting]] + ([] if fresh is None else [fresh])
         due = [row for row in queue if reached(time, row[ARRIVAL])]
@@ -116,12 +117,12 @@ class DeliveringCamera(Block, numeric=False):
         return last, [row for row in queue if not reached(time, row[ARRIVAL])]
 
     def _deliver(self, fresh: Row | None, time: float) -> Row:
-        """Return the row on the wire at this time; for ``output``, which hands it to `_advance`."""
+        """Return the row on the wire at this time, and keep all rows for `_advance`; for ``output``."""
         self._arrivals = self._arrived(fresh, time)
         return self._arrivals[0]
 
     def _advance(self) -> None:
-        """Keep what is on the wire and on its way, and go on to the next tick; for ``update``."""
+        """Keep the rows on the wire and on their way, and go to the next tick; for ``update``."""
         shown, rest = self._arrivals
         self.shown[:] = shown
         if rest:

@@ -1,4 +1,4 @@
-"""What the pose blocks share: ports, parameters and the way from pixels to rays and back."""
+"""The common part of the pose blocks: ports, parameters, and the way from pixels to rays and back."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from quadvis_vision.pose.refine import View, pose_of, refine, unknowns_of
 
 if TYPE_CHECKING:
     _Base = Block
-else:  # no block by itself: it has outputs, but not what makes them
+else:  # `PoseFromCircles` alone is not a block: it declares outputs, but has no output method
     _Base = object
 
 Array = NDArray[np.float64]
@@ -36,7 +36,7 @@ class PinholeRays:
         self.camera = CameraCalibration.load(path)
 
     def rays(self, pixels: Array) -> Array:
-        """Return vectors (n, 3) in camera axes toward what pixels (n, 2) see."""
+        """Return the vectors (n, 3) in camera axes along which pixels (n, 2) look."""
         xy = self.camera.normalise(pixels)
         return np.column_stack((xy, np.ones(len(xy))))
 
@@ -58,7 +58,7 @@ class TwoPlanesRays:
         self.matrix = self.planes.pinhole[0]
 
     def rays(self, pixels: Array) -> Array:
-        """Return unit vectors (n, 3) in camera axes toward what pixels (n, 2) see, eq. (4)."""
+        """Return the unit vectors (n, 3) in camera axes along which pixels (n, 2) look, eq. (4)."""
         return self.planes.rays(pixels)
 
     def pixels(self, points: Array) -> Array:
@@ -76,24 +76,24 @@ def _alike(matrix: Array, points: Array) -> Array:
 
 
 class PoseFromCircles(_Base):
-    """Ports and parameters of a block that finds the craft from the circles of the target."""
+    """Ports and parameters of a block that computes the pose of the craft from the circles of the target."""
 
     centres = In("float64[4,2]", unit="px", doc="u, v of circles 1 to 4; a row with NaN is missing")
     position = Out(
         "float64[3]", unit="m", nan=True, doc="x forward, y right of the target's middle, z below it"
     )
-    yaw = Out(unit="rad", nan=True, doc="heading against the target, clockwise from above, in (-pi, pi]")
+    yaw = Out(unit="rad", nan=True, doc="heading relative to the target, clockwise from above, in (-pi, pi]")
     rotation = Out("float64[3,3]", nan=True, doc="from target axes to camera axes")
     roll = Out(unit="rad", nan=True, doc="right side down is positive")
     pitch = Out(unit="rad", nan=True, doc="nose up is positive")
-    residual = Out(unit="px", nan=True, doc="rms distance of the circles from where the pose puts them")
+    residual = Out(unit="px", nan=True, doc="rms distance of the circles from their places by the pose")
     valid = Out("bool", doc="whether there is a pose")
 
     calibration = Param(type="file", doc="camera calibration file (YAML)")
-    rays = Param("pinhole", choices=("pinhole", "two_planes"), doc="what kind of calibration the file holds")
+    rays = Param("pinhole", choices=("pinhole", "two_planes"), doc="kind of the calibration in the file")
     side = Param(SIDE, unit="m", above=0.0, doc="distance between the centres of neighbouring circles")
     radius = Param(
-        0.0, unit="m", min=0.0, doc="of the circles, to correct for perspective; 0 takes them as points"
+        0.0, unit="m", min=0.0, doc="of the circles, to correct for perspective; 0: circles are points"
     )
 
     def check(self) -> None:
@@ -111,11 +111,11 @@ class PoseFromCircles(_Base):
         self._corners = target_corners(self.side)
 
     def _seen(self, pose: Pose, radius: float) -> Array:
-        """Return the normalised points (4, 2) where a pose puts circles of a radius (m)."""
+        """Return the normalised points (4, 2) at which circles of a radius (m) are seen from a pose."""
         return seen_centres(pose, camera_points(pose, self._corners), radius)
 
     def _described(self, pose: Pose, seen: Array, centres: Array) -> tuple[Any, ...]:
-        """Return the outputs for a pose that puts circles at normalised points `seen` (n, 2)."""
+        """Return the outputs for a pose; `seen` (n, 2) are the normalised points of its circles."""
         roll, pitch, yaw = attitude_of(pose.rotation.T @ CAMERA_FROM_BODY).tolist()
         errors = self._camera.pixels(seen) - centres
         residual = math.sqrt(np.vdot(errors, errors) / len(errors))
@@ -124,10 +124,12 @@ class PoseFromCircles(_Base):
 
 
 class PoseFromFour(PoseFromCircles, Block, numeric=False):
-    """A method of the paper, which takes all four circles and nothing else; `solve` is that method."""
+    """A block for a method of the paper, which uses all four circles and nothing else: `solve`."""
 
     refine = Param(
-        "none", choices=("none", "gauss_newton"), doc="how the distance in the picture is made least, if so"
+        "none",
+        choices=("none", "gauss_newton"),
+        doc="how the residual in the picture is minimised, if at all",
     )
 
     def solve(self, rays: Array) -> Pose | None:
@@ -136,7 +138,7 @@ class PoseFromFour(PoseFromCircles, Block, numeric=False):
 
     def output(self, centres: Any) -> tuple[Any, ...]:
         """Return the pose; NaN and false if a circle is missing or the four are no square seen from below."""
-        with np.errstate(all="ignore"):  # whatever the pixels are
+        with np.errstate(all="ignore"):  # pixels may have any values
             rays = self._camera.rays(centres)
             pose = self.solve(rays) if np.isfinite(rays).all() else None
             if pose is not None and (self.radius or self.refine == GAUSS_NEWTON):

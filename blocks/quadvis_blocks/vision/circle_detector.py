@@ -25,27 +25,39 @@ from quadvis_vision.detection.detect import (
 )
 
 STALE_PICTURE = 0  # of the choices of repeats
-RECENT = 32  # pictures that are remembered
-FOLLOW_MAX = 0.5  # s between two pictures; after more than that the target is searched for, not followed
+RECENT = 32  # remembered pictures
+FOLLOW_MAX = 0.5  # s; after a longer time between two pictures the target is searched for, not followed
 
 
 class CircleDetector(Block, numeric=False):
-    """Where the four coloured circles of the target are in a picture.
+    """The places of the four coloured circles of the target in a picture.
 
     Corners 1 to 4 are clockwise from the upper left of the picture at zero yaw: red, blue, green and black in
-    the paper. A target that was not there before is taken by four circles that make a square, or by three or
-    two (see `fewest`) if their sizes and ellipses agree to a few percent with their distances and nothing
-    else in the picture could be meant; once found, three or two that moved together keep it. A circle that
-    something hides in part, from about a tenth of its diameter on, has no centre, and its quality says why.
-    Steps without a new picture repeat the last result with `fresh` false, also its stamp and sequence number.
-    So do pictures that are one of the last 32 different ones to the bit, whatever stamp and number they have:
-    a sensor has noise, and a picture that repeats is a camera that froze, or goes round in old ones. Set
-    `repeats` to `news` for pictures without noise, as a renderer or a recording may give, where nothing
-    moves, and for recordings that begin again. A frame that is not a picture is a target that is
-    not found.
+    the paper. A new target is accepted if four circles make a square. Three or two circles are enough (see
+    `fewest`) if their sizes and ellipses agree to a few percent with their distances, and if no other circles
+    in the picture could be meant. A target that was found before is kept by three or two circles that moved
+    together. A circle that is hidden in part, from about a tenth of its diameter on, has no centre, and its
+    quality says why.
 
-    `status`: 0 four circles, 1 three, 2 two, 3 target not found, 4 circles of all colours that are no
-    square, 5 no picture yet, 7 the frame is not a picture, or has not the size that `calibration` is for.
+    At steps without a new picture the block repeats the last result, with its stamp and sequence number, and
+    `fresh` is false. A picture is not new if it equals one of the last 32 different pictures to the bit,
+    whatever its stamp and number: a sensor has noise, so a picture that repeats means that the camera froze,
+    or that it repeats a cycle of old pictures. Set `repeats` to `news` for pictures that may repeat: pictures
+    without noise (from a renderer or a recording) in which nothing moves, and recordings that begin again.
+
+    ====== ===========================================================================
+    status meaning
+    ====== ===========================================================================
+    0      four circles
+    1      three circles
+    2      two circles
+    3      target not found
+    4      circles of all colours that are no square
+    5      no picture yet
+    7      the frame is not a picture, or its size is not the size for `calibration`
+    ====== ===========================================================================
+
+    With status 7, too, the target is not found.
 
     Source: sections 5 (centres of gravity, colour calibration, order of the corners) and 6.
     """
@@ -53,15 +65,15 @@ class CircleDetector(Block, numeric=False):
     frame = In("frame", doc="the newest picture")
     centres = Out("float64[4,2]", unit="px", nan=True, doc="u, v of circles 1 to 4; NaN rows are missing")
     quality = Out(
-        "float64[4]", nan=True, doc="1 for a whole circle, below 0.9 for one hidden in part, NaN for none"
+        "float64[4]", nan=True, doc="1 for a whole circle, below 0.9 for a partly hidden one, NaN for none"
     )
     status = Out("int64", doc="0, 1, 2: four, three, two circles; 3 and above: no target, see above")
-    found = Out("bool", doc="all four circles")
-    lost = Out("bool", doc="a new frame in which there is no target")
+    found = Out("bool", doc="whether all four circles are found")
+    lost = Out("bool", doc="whether a new frame has no target")
     stamp = Out(unit="s", nan=True, doc="instant at which the picture was taken")
     sequence = Out("int64", doc="number of the picture; 0 before the first")
-    fresh = Out("bool", doc="a picture that was not there at the step before")
-    frozen = Out("bool", doc="whether the newest frame has the picture of a recent one, to the bit")
+    fresh = Out("bool", doc="whether the picture is new at this step")
+    frozen = Out("bool", doc="whether the newest frame repeats a recent picture, to the bit")
 
     colours = Param(type="file", doc="colours of the circles (YAML)")
     side = Param(SIDE, unit="m", above=0.0, doc="distance between the centres of neighbouring circles")
@@ -70,11 +82,11 @@ class CircleDetector(Block, numeric=False):
     radius_max = Param(80.0, unit="px", above=0.0, doc="largest radius in the picture")
     calibration = Param("", type="file", doc="camera calibration file (YAML): pictures must have its size")
     fewest = Param(
-        2, type="int64", min=2, max=4, doc="circles that make a target that was not there before; 4 is safest"
+        2, type="int64", min=2, max=4, doc="least number of circles that make a new target; 4 is safest"
     )
 
     repeats = Param(
-        "stale", choices=("stale", "news"), doc="a picture that is a recent one to the bit: no news, or news"
+        "stale", choices=("stale", "news"), doc="whether a picture that repeats to the bit is stale or news"
     )
 
     last_centres = State("float64[4,2]", math.nan)
@@ -82,10 +94,10 @@ class CircleDetector(Block, numeric=False):
     last_status = State("int64", STALE)
     last_stamp = State("float64", math.nan)
     last_sequence = State("int64", 0)
-    recent = State(f"int64[{RECENT}]", 0)  # checksums of the last pictures, the newest first
+    recent = State(f"int64[{RECENT}]", 0)  # checksums of the last pictures, newest first
     newest = State("int64", 0)  # number of the frame that came last, frozen or not
     stuck = State("bool")
-    places = State("float64[4,6]")  # of all four circles, to follow them; see Detection
+    places = State("float64[4,6]")  # places of all four circles, to follow them; see Detection
 
     def check(self) -> None:
         """Read the files, and compare the sizes."""
@@ -113,7 +125,7 @@ class CircleDetector(Block, numeric=False):
         """Read the files."""
         self._picture = self._size()
         self._target = Target(self._load(), self.radius / self.side, self.radius_min, self.radius_max)
-        # What output has found, for update of the same tick.
+        # Results of output, for update of the same tick.
         self._new = self._frozen = False
         self._seen = nothing(STALE)
         self._sum = 0
@@ -162,7 +174,7 @@ class CircleDetector(Block, numeric=False):
 
 
 def checksum(frame: Frame) -> int:
-    """Return a number that tells the pixels of one picture from those of another; 0 for no picture."""
+    """Return a checksum of the pixels of a frame; 0 if the frame is not a picture."""
     if not usable(frame.pixels):
         return 0
     pixels = np.ascontiguousarray(frame.pixels)

@@ -12,38 +12,45 @@ KINDS = (NO_FAULT, *TIMING, *PICTURES)
 
 
 class FrameFault(Block, numeric=False):
-    """Frames as they come, and with a fault of one kind for ``duration`` from ``begin`` on.
+    """Frames that pass unchanged, except during a fault of one kind: for ``duration`` from ``begin`` on.
 
-    Put it between a camera and those who look, to see what they make of it. For ``drop``, ``bursts``,
-    ``late`` and ``swap`` frames do not come, or not when they should; with ``freeze``, ``alternate``,
-    ``stutter`` and ``outdated`` an old picture comes under a new stamp and number; the kinds in ``_stamp``
-    and ``clock_restart`` change the stamps alone; all others change the picture and leave stamp and number
-    as they are. It counts a frame a tick, so it runs at the rate of the camera.
+    Put this block between a camera and the blocks behind it, to see how they react to the fault.
+
+    ===================================================== ===============================================
+    kind                                                  effect
+    ===================================================== ===============================================
+    ``drop``, ``bursts``, ``late``, ``swap``              frames do not come, or come at a wrong time
+    ``freeze``, ``alternate``, ``stutter``, ``outdated``  an old picture comes under a new stamp and number
+    ``..._stamp``, ``clock_restart``                      only the stamps change
+    all others                                            only the pictures change
+    ===================================================== ===============================================
+
+    The block counts one frame per tick, so it must run at the rate of the camera.
     """
 
-    kind = Param(NO_FAULT, choices=KINDS, doc="what goes wrong")
-    begin = Param(0.0, unit="s", doc="begin of the fault (inclusive)")
-    duration = Param(3.0, unit="s", min=0.0, doc="its length")
+    kind = Param(NO_FAULT, choices=KINDS, doc="kind of the fault")
+    begin = Param(0.0, unit="s", doc="beginning of the fault (inclusive)")
+    duration = Param(3.0, unit="s", min=0.0, doc="length of the fault")
     frame = In("frame", doc="the newest frame of a camera")
-    faulty = Out("frame", doc="what comes of it")
-    active = Out("bool", doc="whether the fault is there")
+    faulty = Out("frame", doc="that frame, or what the fault makes of it")
+    active = Out("bool", doc="whether the fault is active")
     chance = Random()
-    drawn = State()  # for the picture of the coming tick
+    drawn = State()  # random number for the picture of the coming tick
     ticks = State("int64")  # of the fault so far
-    shown = State("frame")  # at the tick before
-    shown_before = State("frame")  # and the one before
-    one = State("frame")  # that came a tick ago
+    shown = State("frame")  # the frame on the output one tick ago
+    shown_before = State("frame")  # the frame on the output two ticks ago
+    one = State("frame")  # the frame that came one tick ago
     two = State("frame")
     three = State("frame")
     on = Work("bool")
     _given: Frame  # by output, for update of the same tick
 
     def start(self) -> None:
-        """Draw what the first picture needs."""
+        """Draw the random number of the first picture."""
         self.drawn = uniform(self.chance)
 
     def output(self, frame: Frame, time: float) -> tuple[Frame, bool]:
-        """Return the frame or what is left of it, and whether there is a fault."""
+        """Return the frame, with the fault while that is active, and whether it is active."""
         self.on = is_on(time, self.begin, self.duration)
         kind = KINDS[self.kind]
         whole = kind == NO_FAULT or frame.sequence == 0 or not self.on
@@ -51,7 +58,7 @@ class FrameFault(Block, numeric=False):
         return self._given, self.on
 
     def update(self, frame: Frame) -> None:
-        """Keep what came and what was shown."""
+        """Keep the frame that came and the frame that was shown."""
         self.shown, self.shown_before = self._given, self.shown
         self.one, self.two, self.three = frame, self.one, self.two
         self.ticks = self.ticks + 1 if self.on else 0

@@ -1,4 +1,4 @@
-"""Frames into a folder, to be looked at or played again."""
+"""Writes frames into a folder, to be looked at or played again."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from quadvis.machine.files import JPG, PNG, check_output, write_output
 from quadvis_vision.pictures.drawing import is_picture
 
 KINDS = {".png": PNG, ".jpg": JPG}
-NAMES = r"\d{6,}\.(png|jpg)"  # of the pictures that it writes
+NAMES = r"\d{6,}\.(png|jpg)"  # of the pictures that the block writes
 
 
 class FrameWriter(Block, numeric=False):
     """Writes every new frame as a picture into a folder: ``000001.png``, ``000002.png``, ...
 
-    The number is the frame's sequence number, so `vision.image_folder` plays them in order. Pictures of an
-    earlier run with the same name are replaced, but nothing that this run reads, and no file of another kind;
-    frames that are no pictures (uint8, three channels, with pixels) are passed over. RunError if one cannot
-    be written.
+    The number is the frame's sequence number, so `vision.image_folder` plays the pictures in order. A picture
+    of an earlier run with the same name is replaced. A file that this run reads and a file of another kind
+    are never replaced. Frames that are not pictures (uint8, three channels, with pixels) are skipped.
+    RunError if a picture cannot be written.
     """
 
     harmless = "pictures in a folder move nothing"
 
     frame = In("frame", doc="the frames to write")
 
-    folder = Param(type="file", writes=True, doc="folder, made if it is not there")
+    folder = Param(type="file", writes=True, doc="folder; it is made if it does not exist")
     format = Param("png", choices=("png", "jpg"), doc="png keeps every bit, jpg is some ten times smaller")
-    every = Param(1, type="int64", min=1, doc="write one frame out of so many")
+    every = Param(1, type="int64", min=1, doc="number of frames of which one is written")
 
     written = State("int64", 0)  # sequence number of the last new frame
-    seen = State("int64", 0)  # how many new frames there were
+    seen = State("int64", 0)  # number of new frames so far
 
     def check(self) -> None:
         """Refuse a folder that is a file."""
@@ -42,7 +42,7 @@ class FrameWriter(Block, numeric=False):
             raise ParameterError("folder", f"folder must be a folder, '{self.folder}' is a file")
 
     def open(self) -> None:
-        """Make the folder; ParameterError if a file that could be replaced must not be."""
+        """Make the folder; ParameterError if a file that the run might replace must not be replaced."""
         try:
             Path(self.folder).mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -50,7 +50,7 @@ class FrameWriter(Block, numeric=False):
         self.check_written()
 
     def check_written(self) -> None:
-        """Refuse files in the folder that would be replaced and must not be."""
+        """Refuse files in the folder that the run might replace and that must not be replaced."""
         if not Path(self.folder).is_dir():
             return
         try:

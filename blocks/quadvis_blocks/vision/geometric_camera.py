@@ -25,13 +25,13 @@ PICTURE, UNBOUNDED = range(2)
 
 
 class GeometricCamera(DeliveringCamera, numeric=False):
-    """What `vision.rendered_camera` and `vision.circle_detector` would give, without rendering.
+    """The results of `vision.rendered_camera` with `vision.circle_detector`, without rendering.
 
-    The centres of the four ellipses are projected, white noise is added, and a circle whose outline leaves
-    the picture is missing. It has the outputs of the detector, so either can fill the same slot; it takes a
-    tenth of the time, and its noise is a parameter. Measurements are stamped when they are taken and arrive
-    as the frames of the rendered camera do: after latency and jitter, not all of them, the last to arrive on
-    the wire. Until another one comes the last one stays, with ``fresh`` false.
+    The block projects the centres of the four ellipses and adds white noise; a circle whose outline leaves
+    the picture is missing. The block has the outputs of the detector, so both can fill the same slot. It
+    takes a tenth of the time, and its noise is a parameter. A measurement is stamped when it is taken.
+    Measurements arrive as the frames of the rendered camera do: after latency and jitter, and some are lost.
+    The measurement that arrived last stays on the wire until another one arrives, with ``fresh`` false.
 
     Source: camera of equations (10) and (38); noise and latency of the reference experiment.
     """
@@ -41,12 +41,12 @@ class GeometricCamera(DeliveringCamera, numeric=False):
     centres = Out("float64[4,2]", unit="px", nan=True, doc="u, v of circles 1 to 4; NaN rows are missing")
     quality = Out("float64[4]", nan=True, doc="1 for a circle that is seen")
     status = Out("int64", doc="0, 1, 2: four, three, two circles; 3: target not found; 5: nothing yet")
-    found = Out("bool", doc="all four circles")
-    lost = Out("bool", doc="a new measurement in which there is no target")
+    found = Out("bool", doc="whether all four circles are found")
+    lost = Out("bool", doc="whether a new measurement has no target")
     stamp = Out(unit="s", nan=True, doc="instant of the measurement")
     sequence = Out("int64", doc="number of the measurement; 0 before the first")
-    fresh = Out("bool", doc="a measurement that was not there at the step before")
-    frozen = Out("bool", doc="false: there are no pictures that could repeat")
+    fresh = Out("bool", doc="whether the measurement is new at this step")
+    frozen = Out("bool", doc="always false: no picture exists that could repeat")
 
     calibration = Param(type="file", doc="camera calibration file (YAML)")
     ceiling = Param(4.5, unit="m", doc="height of the target; 3 m above a hover at 1.5 m")
@@ -56,7 +56,7 @@ class GeometricCamera(DeliveringCamera, numeric=False):
     field_of_view = Param(
         "picture",
         choices=("picture", "unbounded"),
-        doc="unbounded: circles are seen beyond the edges of the picture too",
+        doc="unbounded: circles are also seen beyond the edges of the picture",
     )
 
     stream = Random()
@@ -66,7 +66,7 @@ class GeometricCamera(DeliveringCamera, numeric=False):
     last_sequence = State("int64")
 
     def check(self) -> None:
-        """Read the calibration, and refuse a latency that does not go with the period."""
+        """Read the calibration, and refuse a latency that is too long for the period."""
         super().check()
         self._load()
 
@@ -100,14 +100,14 @@ class GeometricCamera(DeliveringCamera, numeric=False):
         return centres, quality, status, status == 0, lost, row[STAMP], sequence, fresh, False
 
     def update(self) -> None:
-        """Keep what was measured at this tick, and what has arrived."""
+        """Keep the measurement of this tick, and the measurements that have arrived."""
         if self._is_captured():
             fill_normal(self.stream, self.drawn)
         self._advance()
         self.last_sequence = int(self.shown[SEQUENCE])
 
     def _taken(self, position: Any, attitude: Any, time: float) -> Row | None:
-        """Return what is measured at this tick, unless there is nothing or it gets lost."""
+        """Return the measurement of this tick; None if there is none, or if it is lost."""
         if not self._is_captured() or self._is_lost(time):
             return None
         return self._row(time, self._measure(position, attitude).ravel())

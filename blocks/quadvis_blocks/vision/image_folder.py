@@ -21,12 +21,13 @@ FileState = tuple[int, int]
 class ImageFolder(Block, numeric=False):
     """Plays the pictures of a folder, one at each tick, in the order of the numbers in their names.
 
-    Each picture is stamped with the time of its tick. After the last one it stays on the wire with its stamp
-    and sequence number, and `finished` is true; with `loop` the first one follows, and the sequence numbers
-    go on. A picture that cannot be read, is cut short, or declares more than 64 million pixels becomes a
-    frame without pixels (0, 0, 3), with stamp and number like any other; so does one that was changed since
-    the run began, and a folder that was changed before it is refused. The orientation that a file may ask
-    for is ignored: a calibration is about pixels as the sensor gave them.
+    Each picture is stamped with the time of its tick. The last picture stays on the wire with its stamp and
+    sequence number, and `finished` is true; with `loop` the first picture follows the last, and the sequence
+    numbers continue. A picture that cannot be read, is cut short, or declares more than 64 million pixels
+    becomes a frame without pixels (0, 0, 3), with a stamp and number like any other. A picture that has
+    changed since the beginning of the run becomes such a frame, too. A folder that has changed before the run
+    is refused. The orientation that a file may ask for is ignored, because a calibration is for the pixels of
+    the sensor.
 
     Source: section 6.1, the comparison of pose estimates on a recorded sequence.
     """
@@ -35,7 +36,7 @@ class ImageFolder(Block, numeric=False):
     finished = Out("bool", doc="true when there is no picture left")
 
     folder = Param(type="file", doc="folder with png, jpg or bmp files")
-    pattern = Param("*", type="str", doc="which files, e.g. left*.jpg")
+    pattern = Param("*", type="str", doc="pattern of the file names, such as left*.jpg")
     loop = Param(
         False,
         type="bool",
@@ -43,7 +44,7 @@ class ImageFolder(Block, numeric=False):
     )
 
     played = State("int64", 0)  # pictures that were on the wire
-    stamp = State("float64")  # of the last one
+    stamp = State("float64")  # of the last picture
     at_end = Work("bool")
 
     def check(self) -> None:
@@ -62,7 +63,7 @@ class ImageFolder(Block, numeric=False):
         return list(self.read_file("folder", self._listed))
 
     def _listed(self, folder: str) -> dict[Path, FileState]:
-        """Return the files in the order in which they are played, and by what a change of them is known."""
+        """Return the files in the order in which they are played, each with the state that shows a change."""
         if not Path(folder).is_dir():
             problem = f"folder '{folder}' does not exist; name a folder with pictures"
             raise ParameterError("folder", problem)
@@ -79,7 +80,7 @@ class ImageFolder(Block, numeric=False):
         return sorted((p for p in found if p.suffix.lower() in SUFFIXES and p.is_file()), key=natural_order)
 
     def open(self) -> None:
-        """Refuse a folder that is not what it was when the diagram was checked."""
+        """Refuse a folder that has changed since the diagram was checked."""
         self._states = self.read_file("folder", self._listed)
         now = {path: state_of(path) for path in self._find()}
         for path in [*self._states, *now]:
@@ -103,7 +104,7 @@ class ImageFolder(Block, numeric=False):
         return self._last, self.at_end
 
     def _read(self, path: Path) -> NDArray[np.uint8]:
-        """Return a picture, or one without pixels if it cannot be used or is not what it was."""
+        """Return a picture, without pixels if the file cannot be used or has changed."""
         return read_frame(path) if state_of(path) == self._states[path] else Frame.none().pixels
 
     def update(self, time: float) -> None:
@@ -114,7 +115,7 @@ class ImageFolder(Block, numeric=False):
 
 
 def state_of(path: Path) -> FileState | None:
-    """Return by what a change of a file is known: length in bytes and time of the last change (ns)."""
+    """Return the state that shows a change of a file: length in bytes and time of the last change (ns)."""
     try:
         found = path.stat()
     except OSError:
@@ -123,13 +124,13 @@ def state_of(path: Path) -> FileState | None:
 
 
 def natural_order(path: Path) -> tuple[list[tuple[int, int | str]], str]:
-    """Return a key that sorts view2 before view10; names that differ only in case or zeros follow it."""
+    """Return a key that sorts view2 before view10; it also orders names that differ only in case or zeros."""
     parts = re.split(r"([0-9]+)", path.name.casefold())
     return [(0, int(part)) if part.isdigit() else (1, part) for part in parts if part], path.name
 
 
 def read_frame(path: Path) -> NDArray[np.uint8]:
-    """Return the picture (height, width, 3) BGR, or one without pixels (0, 0, 3) if it cannot be used."""
+    """Return the picture (height, width, 3) BGR; without pixels (0, 0, 3) if the file cannot be used."""
     try:
         return read_coded(path).decode()
     except QuadvisError:

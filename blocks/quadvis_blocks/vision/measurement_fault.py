@@ -13,46 +13,46 @@ from quadvis_blocks.vision._fault_timing import LATE, NO_FAULT, TIMING, comes, i
 SHAPES = ("no_target", "turned", "mirrored", "shifted", "noise", "other_colours", "half_gone", "two_left")
 KINDS = (NO_FAULT, *TIMING, *SHAPES)
 STAMP, CENTRES, WIDTH = 0, 1, 9  # a measurement: stamp, u, v of four circles
-SHOWN = LATE + 1  # the measurement that was shown last, after those of so many ticks ago; then the one before
+SHOWN = LATE + 1  # row of the measurement shown last, behind those of the last ticks; then the one before
 
 
 class MeasurementFault(Block, numeric=False):
-    """Measured centres as they come, and with a fault of one kind for ``duration`` from ``begin`` on.
+    """Measured centres that pass unchanged, except during a fault: for ``duration`` from ``begin`` on.
 
-    What `vision.frame_fault` does to pictures, for `vision.geometric_camera`, which has none: the kinds that
-    concern time and stamps are the same; of the others there are those that a detector would not notice, or
-    would answer by finding nothing.
+    This block is the `vision.frame_fault` for `vision.geometric_camera`, which has no pictures. The kinds
+    that concern times and stamps are the same. The other kinds are faults that a detector would not notice,
+    or faults with which it would find nothing.
     """
 
-    kind = Param(NO_FAULT, choices=KINDS, doc="what goes wrong")
-    begin = Param(0.0, unit="s", doc="begin of the fault (inclusive)")
-    duration = Param(3.0, unit="s", min=0.0, doc="its length")
+    kind = Param(NO_FAULT, choices=KINDS, doc="kind of the fault")
+    begin = Param(0.0, unit="s", doc="beginning of the fault (inclusive)")
+    duration = Param(3.0, unit="s", min=0.0, doc="length of the fault")
     middle = Param((226.0, 161.0), type="float64[2]", unit="px", doc="middle of the picture")
     centres = In("float64[4,2]", unit="px", doc="u, v of circles 1 to 4; NaN rows are missing")
-    instant = In(unit="s", doc="instant of the measurement, its stamp; NaN for none yet")
-    faulty = Out("float64[4,2]", unit="px", nan=True, doc="what comes of the centres")
-    faulty_stamp = Out(unit="s", nan=True, doc="what comes of the stamp")
-    active = Out("bool", doc="whether the fault is there")
+    instant = In(unit="s", doc="stamp of the measurement; NaN before the first")
+    faulty = Out("float64[4,2]", unit="px", nan=True, doc="the centres, or what the fault makes of them")
+    faulty_stamp = Out(unit="s", nan=True, doc="the stamp, or what the fault makes of it")
+    active = Out("bool", doc="whether the fault is active")
     chance = Random()
-    drawn = State("float64[8]")  # for the measurement of the coming tick
+    drawn = State("float64[8]")  # random numbers for the measurement of the coming tick
     ticks = State("int64")  # of the fault so far
-    kept = State(f"float64[{SHOWN + 2},{WIDTH}]", math.nan)  # of this tick and before, and those shown
-    row = Work(f"float64[{WIDTH}]")  # that is shown now
+    kept = State(f"float64[{SHOWN + 2},{WIDTH}]", math.nan)  # the last that came, then the last shown
+    row = Work(f"float64[{WIDTH}]")  # the measurement that is shown now
     on = Work("bool")
 
     def start(self) -> None:
-        """Draw what the first measurement needs."""
+        """Draw the random numbers of the first measurement."""
         fill_normal(self.chance, self.drawn)
 
     def output(self, centres: Any, instant: float, time: float) -> tuple[Any, float, bool]:
-        """Return the measurement or what is left of it, and whether there is a fault."""
+        """Return the measurement, with the fault while that is active, and whether it is active."""
         self.on = is_on(time, self.begin, self.duration)
         row = self._faulty(centres, instant)
         self.row = row
         return row[CENTRES:].reshape(4, 2), row[STAMP], self.on
 
     def update(self, centres: Any, instant: float) -> None:
-        """Keep what came and what was shown."""
+        """Keep the measurement that came and the measurement that was shown."""
         self.kept[1:SHOWN] = self.kept[: SHOWN - 1].copy()
         self.kept[0] = _row(centres, instant)
         self.kept[SHOWN + 1] = self.kept[SHOWN]
@@ -61,7 +61,7 @@ class MeasurementFault(Block, numeric=False):
         fill_normal(self.chance, self.drawn)
 
     def _faulty(self, centres: Any, stamp: float) -> Any:
-        """Return stamp and centres (9,) as they come of a measurement."""
+        """Return stamp and centres (9,) of a measurement, with the fault while that is active."""
         row, kind = _row(centres, stamp), KINDS[self.kind]
         if kind == NO_FAULT or math.isnan(stamp) or not self.on:
             return row
@@ -77,7 +77,7 @@ class MeasurementFault(Block, numeric=False):
         return row
 
     def _moved(self, kind: str, centres: Any) -> Any:
-        """Return the centres (4, 2) of a picture that has the fault."""
+        """Return the centres (4, 2) of a picture with the fault."""
         off = centres - self.middle
         moved = {
             "no_target": np.full((4, 2), math.nan),

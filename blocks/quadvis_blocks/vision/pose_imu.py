@@ -15,25 +15,29 @@ from quadvis_vision.pose.level import level_covariance, level_pose
 from quadvis_vision.pose.refine import Estimate, Tilt, View, pose_of, refine
 
 LEVEL, MAP = range(2)
-NO_TILT = 8  # a status; those below are the detector's
-MISFIT_MAX = 0.1  # of the side, rms, of the levelled pose; a tilt wrong by 10 deg gives 0.05 at 1.6 sides
+NO_TILT = 8  # a status; smaller numbers are those of the detector
+MISFIT_MAX = 0.1  # sides; greatest rms error of the levelled pose: 10 deg of tilt give 0.05 at 1.6 sides
 UNCERTAIN = np.full((4, 4), math.nan)
 
 
 class PoseImu(PoseFromCircles, Block, numeric=False):
     """Position and heading of the craft from two circles or more, with roll and pitch from the inertial unit.
 
-    `level` takes roll and pitch as they are: what is left is linear, has one solution, and follows from two
-    circles. `map` weighs them against the picture: the pose is the most probable one if circles and angles
-    scatter by `pixel_sigma` and `tilt_sigma`, so it serves near the target, where the picture knows the tilt
-    better, and far from it. With two circles the modes are one. The target frame has x forward, y right and z
-    down from the ceiling; the camera looks up with picture right = forward. Roll and pitch must be those at
-    the instant of the frame: a degree of error moves the craft by 1.7 % of the distance.
+    - Mode `level` takes roll and pitch as they are. The problem for the other unknowns is linear, has one
+      solution, and needs only two circles.
+    - Mode `map` weighs roll and pitch against the picture: the pose is the most probable one if circles and
+      angles scatter by `pixel_sigma` and `tilt_sigma`. So it is good near the target, where the picture shows
+      the tilt better, and also far from it. With two circles both modes give the same pose.
 
-    `covariance` is that of one pose by the same sigmas. An error of the angles outlasts a frame, so poses one
-    after the other share it. If there is no pose, everything is NaN, `valid` false, and `status` says why.
+    The target frame has x forward, y right and z down from the ceiling; the camera looks up with picture
+    right = forward. Roll and pitch must be those at the instant of the frame: an error of one degree moves
+    the craft by 1.7 % of the distance.
 
-    Source: section 6.2 has roll and pitch from the inertial unit, but no use for them in the pose. Two or
+    `covariance` is that of a single pose, from the same sigmas. An error of the angles lasts longer than a
+    frame, so successive poses share it. Without a pose all other outputs are NaN, `valid` is false, and
+    `status` says why.
+
+    Source: section 6.2 has roll and pitch from the inertial unit, but does not use them in the pose. Two or
     more points and the vertical: Kukelova, Bujnak and Pajdla, Closed-form solutions to minimal absolute pose
     problems with known vertical direction (2010); here yaw and distance are linear, as the points are level.
     """
@@ -44,16 +48,16 @@ class PoseImu(PoseFromCircles, Block, numeric=False):
         "float64[4,4]",
         unit="m^2 m^2 m^2 m*rad " * 3 + "m*rad m*rad m*rad rad^2",
         nan=True,
-        doc="of x, y, z and yaw",
+        doc="covariance of x, y, z and yaw",
     )
     status = Out(
         "int64", doc="0, 1, 2: from four, three, two circles; 3: fewer; 4: no square of circles; 8: no tilt"
     )
 
     radius = Param(
-        RADIUS, unit="m", min=0.0, doc="of the circles, to correct for perspective; 0 takes them as points"
+        RADIUS, unit="m", min=0.0, doc="of the circles, to correct for perspective; 0: circles are points"
     )
-    mode = Param("map", choices=("level", "map"), doc="angles taken as they are, or weighed")
+    mode = Param("map", choices=("level", "map"), doc="take the angles as they are, or weigh them")
     pixel_sigma = Param(0.2, unit="px", above=0.0, tune=True, doc="standard deviation of a coordinate")
     tilt_sigma = Param(
         math.radians(0.5), unit="rad", above=0.0, tune=True, doc="standard deviation of roll and of pitch"
@@ -61,7 +65,7 @@ class PoseImu(PoseFromCircles, Block, numeric=False):
 
     def output(self, centres: Any, imu_roll: float, imu_pitch: float) -> tuple[Any, ...]:
         """Return the pose, its covariance and the status."""
-        with np.errstate(all="ignore"):  # whatever the pixels are
+        with np.errstate(all="ignore"):  # pixels may have any values
             rays = self._camera.rays(centres)
             seen = np.isfinite(rays).all(axis=1) & (rays[:, 2] > 0)
             count = int(seen.sum())
@@ -85,7 +89,7 @@ class PoseImu(PoseFromCircles, Block, numeric=False):
             return None
         start = np.array([*level, tilt.roll, tilt.pitch])
         misfit = (self._seen(pose_of(start), self.radius) - points)[seen]
-        allowed = MISFIT_MAX * self.side / level[2]  # as the side looks from straight below
+        allowed = MISFIT_MAX * self.side / level[2]  # the size of the side from straight below
         if not np.vdot(misfit, misfit) < len(misfit) * allowed * allowed:
             return None
         weights = self._camera.slopes(points[seen]) / self.pixel_sigma

@@ -9,14 +9,14 @@ from quadvis_vision.pose.pose import Array, Pose, pose_from_plane
 class PosePlane(PoseFromFour, numeric=False):
     """Position and attitude of the craft from the four circles by the homography of the target's plane.
 
-    The homography from the plane to normalised image points is the first two columns of the rotation and
-    the translation, up to scale; the nearest rotation is taken. The target frame has x forward, y right
-    and z down from the ceiling, so z is how far the camera is below it; it looks up with picture right =
-    forward. Without four circles, or if the four are no square seen from below, everything is NaN and
-    `valid` false.
+    The homography from the plane to normalised image points consists of the first two columns of the rotation
+    and of the translation, up to scale. The rotation is the nearest rotation matrix. The target frame has x
+    forward, y right and z down from the ceiling, so z is the distance of the camera below the ceiling. The
+    camera looks up with picture right = forward. Without four circles, or if the four are no square seen from
+    below, all other outputs are NaN and `valid` is false.
 
-    Source: section 5.2, equations (32)-(35), after Sturm (2000). Its rotation equals that of
-    `vision.pose_n_points`; the two differ in distance alone.
+    Source: section 5.2, equations (32)-(35), after Sturm (2000). The rotation equals that of
+    `vision.pose_n_points`; the two poses differ only in distance.
     """
 
     def solve(self, rays: Array) -> Pose | None:

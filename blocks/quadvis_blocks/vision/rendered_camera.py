@@ -13,7 +13,7 @@ from quadvis_vision.camera.calibration import CameraCalibration
 from quadvis_vision.camera.projection import RADIUS, SIDE
 from quadvis_vision.simulation.renderer import Renderer, Scene
 
-# What a picture depends on, after the columns of every row.
+# The content of a row: the numbers on which its picture depends.
 LIGHT, NOISE = CONTENT, CONTENT + 1
 START = slice(CONTENT + 2, CONTENT + 8)  # pose at the beginning and the end of the exposure
 END = slice(CONTENT + 8, CONTENT + 14)
@@ -21,18 +21,18 @@ WIDTH = CONTENT + 14
 
 
 class RenderedCamera(DeliveringCamera, numeric=False):
-    """What a camera on the craft sees of four coloured discs on a light ceiling.
+    """The pictures of a camera on the craft, of four coloured discs on a light ceiling.
 
     The camera looks straight up from the craft: picture right is the craft's front, picture top its right
-    side. At zero attitude under the middle of the target, discs 1 to 4 stand clockwise from upper left; they
-    leave the picture where the real ones would. Colours are blue-green-red, as in a `Frame`, and linear in
+    side. At zero attitude below the middle of the target, discs 1 to 4 are clockwise from the upper left.
+    They leave the picture where real discs would. Colours are blue-green-red, as in a `Frame`, and linear in
     light.
 
-    A frame is exposed up to its tick and stamped with the middle of the exposure. It is delivered at the
-    first tick at or after stamp + latency + extra, with an extra drawn from 0 to ``jitter``; until another
-    one comes, the last frame stays on the wire, with its old sequence number. Frames may overtake each other,
-    and those that get lost leave a gap in the sequence numbers. Blur follows the straight way from the pose
-    at the tick before.
+    The exposure of a frame ends at its tick; the stamp is the middle of the exposure. A frame is delivered at
+    the first tick at or after stamp + latency + extra; the extra time is drawn from 0 to ``jitter``. Until
+    another frame arrives, the last frame stays on the wire with its sequence number. Frames may overtake each
+    other, and lost frames leave a gap in the sequence numbers. Motion blur follows the straight way from the
+    pose at the tick before.
 
     Source: pinhole camera of equations (9)-(10) and (38) with OpenCV's lens model; target of sections 5 and
     6.
@@ -79,7 +79,7 @@ class RenderedCamera(DeliveringCamera, numeric=False):
     shown = State(f"float64[{WIDTH}]")
 
     def check(self) -> None:
-        """Read the calibration; refuse discs that overlap, and times that do not go with the period."""
+        """Read the calibration; refuse discs that overlap, and times that are too long for the period."""
         super().check()
         self._load()
         if 2 * self.radius >= self.side:
@@ -120,14 +120,14 @@ class RenderedCamera(DeliveringCamera, numeric=False):
         return self._picture(self._deliver(self._capture(position, attitude, time), time))
 
     def update(self, position: Any, attitude: Any) -> None:
-        """Keep what was captured at this tick, and what is on the wire."""
+        """Keep the frame captured at this tick, and the frame on the wire."""
         if self._is_captured():
             self.grain = uniform(self.stream)
         self._advance()
         self.previous[:] = (*position, *attitude)
 
     def _capture(self, position: Any, attitude: Any, time: float) -> Row | None:
-        """Return the frame whose exposure ends at this tick, unless there is none or it gets lost."""
+        """Return the frame whose exposure ends at this tick; None if there is none, or if it is lost."""
         if not self._is_captured() or self._is_lost(time):
             return None
         pose = np.array([*position, *attitude])

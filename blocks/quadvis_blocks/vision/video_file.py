@@ -15,14 +15,14 @@ from quadvis_vision.pictures.reader import not_a_video, open_video
 
 
 class VideoFile(Block, numeric=False):
-    """Plays a video file, one frame at each tick whatever the file's own rate, in the order of its frames.
+    """Plays a video file in the order of its frames, one frame at each tick, at any frame rate of the file.
 
-    Each frame is stamped with the time of its tick. After the last one it stays on the wire with its stamp
-    and sequence number, and `finished` is true; with `loop` the first one follows, and the sequence numbers
-    go on. A file that is cut short or damaged ends at its last readable frame.
+    Each frame is stamped with the time of its tick. The last frame stays on the wire with its stamp and
+    sequence number, and `finished` is true; with `loop` the first frame follows the last, and the sequence
+    numbers continue. A file that is cut short or damaged ends at its last readable frame.
 
-    After a jump in time (a restored snapshot) the file is decoded again up to the frame: the position that
-    video libraries seek to is not the same for every codec, and replay must give the same bits.
+    After a jump in time (a restored snapshot) the file is decoded again up to the frame: video libraries seek
+    to different positions with different codecs, and replay must give the same bits.
 
     Source: section 6.1, the comparison of pose estimates on a video sequence.
     """
@@ -38,7 +38,7 @@ class VideoFile(Block, numeric=False):
     )
 
     played = State("int64", 0)  # frames that were on the wire
-    stamp = State("float64")  # of the last one
+    stamp = State("float64")  # of the last frame
     at_end = Work("bool")
 
     def check(self) -> None:
@@ -87,13 +87,13 @@ class VideoFile(Block, numeric=False):
 
 
 class _Video:
-    """A video file by frame number: what it returns depends on the file and the number alone."""
+    """A video file by frame number: a result depends on the file and the number alone."""
 
     def __init__(self, path: str) -> None:
         self._path = path
         self._capture: Any = None
         self._next = 0  # the frame that the capture would read now
-        self._length: int | None = None  # known once the end was met
+        self._length: int | None = None  # known after the end was reached
         self._kept: dict[int, NDArray[np.uint8]] = {}  # the last two frames: the end needs one of them again
 
     def begin(self) -> None:
@@ -102,7 +102,7 @@ class _Video:
             raise not_a_video(self._path)
 
     def frame(self, number: int, loop: bool = False) -> NDArray[np.uint8] | None:
-        """Return frame `number` from 0 (height, width, 3) BGR, or None behind the end; `loop` goes round."""
+        """Return frame `number` from 0 (height, width, 3) BGR; None behind the end, unless `loop` is set."""
         if self._length is None and number not in self._kept:
             self._read(number)
         if self._length is not None:
@@ -133,7 +133,7 @@ class _Video:
         self._next = 0
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Release the file."""
         if self._capture is not None:
             self._capture.release()
         self._capture = None

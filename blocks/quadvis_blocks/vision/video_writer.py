@@ -1,4 +1,4 @@
-"""Frames into a video file, to be watched or played again."""
+"""Writes frames into a video file, to be watched or played again."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from quadvis_vision.pictures.drawing import Picture, is_picture
 
 CODECS = {".mp4": "mp4v", ".avi": "MJPG", ".mkv": "FFV1"}
 HEADS = {".mp4": rb"\A[\s\S]{4}ftyp", ".avi": rb"\ARIFF[\s\S]{4}AVI ", ".mkv": rb"\A\x1aE\xdf\xa3"}
-FINEST = 65535  # MPEG-4 counts time in fractions no finer than this
+FINEST = 65535  # parts of a second: MPEG-4 cannot count time in finer parts
 SMALLEST = 16  # px: Motion JPEG of pictures with a smaller side overruns its memory and ends the process
 
 
 class VideoWriter(Block, numeric=False):
-    """Writes frames into a video file; an earlier video of that name is replaced with the first frame.
+    """Writes frames into a video file; the first frame replaces an earlier video of that name.
 
-    The suffix of the file says how: ``.mp4`` is MPEG-4, small and readable everywhere; ``.avi`` is Motion
-    JPEG, of which every picture stands alone; ``.mkv`` is FFV1 and keeps every bit.
+    The suffix of the file chooses the format: ``.mp4`` is MPEG-4, small and readable everywhere; ``.avi`` is
+    Motion JPEG, which codes every picture by itself; ``.mkv`` is FFV1 and keeps every bit.
 
-    With `keep_time` one picture is written at each tick, black before the first frame and the last one again
-    while no new one comes, so that a second of the video is a second of the run. Without it every new frame
-    is written once, so that `vision.video_file` plays exactly those.
+    With `keep_time` one picture is written at each tick: black before the first frame, and the last frame
+    again while no new frame comes. So a second of the video is a second of the run. Without `keep_time` every
+    new frame is written once, so `vision.video_file` plays exactly these frames.
 
-    All pictures of a video have one size, that of the first frame, made even by repeating the last row or
-    column. A frame of another size is fitted into it; one that is not a picture, or has a side below 16 px,
-    is black. ParameterError if the file is something else than a video, or is read by this run; RunError if
-    it cannot be written.
+    All pictures of a video have the size of the first frame, made even by repeating the last row or column. A
+    frame of another size is fitted into that size. A frame that is not a picture, or has a side below 16 px,
+    is black. ParameterError if the file exists and is not a video, or if this run reads it; RunError if it
+    cannot be written.
     """
 
     harmless = "a video moves nothing"
@@ -39,15 +39,15 @@ class VideoWriter(Block, numeric=False):
     frame = In("frame", doc="the frames to write")
 
     file = Param(
-        type="file", writes=True, doc="video file: .mp4, .avi or .mkv; its folder is made if it is not there"
+        type="file", writes=True, doc="video file: .mp4, .avi or .mkv; its folder is made if missing"
     )
     keep_time = Param(True, type="bool", doc="write a picture at each tick, also without a new frame")
 
     last = State("int64", 0)  # sequence number of the last frame
-    due = State("int64", 0)  # pictures up to now; black ones if no frame has told their size
+    due = State("int64", 0)  # pictures up to now; black pictures are due until a frame gives the size
 
     def check(self) -> None:
-        """Refuse a file that is a folder, and formats that are not known."""
+        """Refuse a folder in place of a file, and an unknown format."""
         if self._suffix not in CODECS:
             names = ", ".join(CODECS)
             raise ParameterError("file", f"file must end in one of {names}, got '{Path(self.file).name}'")
@@ -55,9 +55,9 @@ class VideoWriter(Block, numeric=False):
             raise ParameterError("file", f"file must be a file, '{self.file}' is a folder")
 
     def open(self) -> None:
-        """Make the folder; the file is begun with the first frame, which has its size."""
+        """Make the folder; the first frame begins the file, because it gives the size."""
         self._video: Any = None
-        self._held: Any = None  # the file, so that no other run writes it
+        self._held: Any = None  # the open file, so that no other run writes it
         self._picture: Picture | None = None
         try:
             Path(self.file).parent.mkdir(parents=True, exist_ok=True)
@@ -66,7 +66,7 @@ class VideoWriter(Block, numeric=False):
         self.check_written()
 
     def check_written(self) -> None:
-        """Refuse a file that is there and is no video."""
+        """Refuse an existing file that is not a video."""
         if not Path(self.file).parent.is_dir():
             return
         try:
@@ -132,19 +132,19 @@ class VideoWriter(Block, numeric=False):
 
 
 def is_shown(pixels: object) -> TypeGuard[Picture]:
-    """Return whether this is a picture that is large enough for a video."""
+    """Return whether pixels are a picture that is large enough for a video."""
     return is_picture(pixels) and min(pixels.shape[:2]) >= SMALLEST
 
 
 def frame_rate(period: float) -> float:
-    """Return frames/s for a period in s, rounded until an MPEG-4 file can say it."""
+    """Return the frames/s for a period (s), rounded so that an MPEG-4 file can hold the number."""
     rates = (round(1 / period, digits) for digits in (3, 2, 1))
     fits = (rate for digits, rate in zip((3, 2, 1), rates, strict=True) if rate * 10**digits <= FINEST)
     return next(fits, float(round(1 / period)))
 
 
 def fitted(pixels: object, size: tuple[int, int]) -> Picture:
-    """Return a picture of this even width and height that shows `pixels`, shrunk or enlarged if need be."""
+    """Return a picture of this even width and height that shows `pixels`, scaled if necessary."""
     import cv2
 
     wide, high = size
