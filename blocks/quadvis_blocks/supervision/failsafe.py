@@ -41,9 +41,9 @@ class Failsafe(Block):
     In mode LAND the reason is the one that began the landing; 8 means that ``land`` asked for it. In all
     other modes the reason is the first line of this table that holds:
 
-    ====== ========================================
+    ====== =========================================
     reason meaning
-    ====== ========================================
+    ====== =========================================
     3      the IMU is stale
     5      no new frames
     6      the target is not found
@@ -57,7 +57,7 @@ class Failsafe(Block):
     1      a switch is off
     9      a control gave way in the mixer
     0      none of these
-    ====== ========================================
+    ====== =========================================
 
     ``freeze`` stops integrators and disturbance estimates on the channels that the law does not have, and on
     the channels whose control gave way in the mixer.

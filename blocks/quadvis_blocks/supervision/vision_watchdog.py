@@ -42,9 +42,9 @@ class VisionWatchdog(Block):
     The state goes down at most one step per tick. It goes back to FRESH only after ``frames`` good frames in
     a row, never stale in between, over at least ``proof``. It starts at COAST: vision has to prove itself.
 
-    ====== =================================================== ==========================
+    ====== =================================================== =============================
     reason meaning                                             found from
-    ====== =================================================== ==========================
+    ====== =================================================== =============================
     0      none
     1      no new frames                                       the stamps
     2      frames come, but the target is not found            ``valid``
@@ -53,7 +53,7 @@ class VisionWatchdog(Block):
     5      stamps are ahead of the time, back or NaN           the stamps, or ``trouble``
     6      the camera's clock restarted                        the stamps, or ``trouble``
     7      frames contradict the inertial unit                 ``contradicted``, ``trouble``
-    ====== =================================================== ==========================
+    ====== =================================================== =============================
 
     With a camera of 10 frames/s and the control at 20 Hz, the default ``coast`` allows one lost frame, and
     the state changes at most 0.3 s after the last good frame was taken.

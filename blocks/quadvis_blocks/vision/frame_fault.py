@@ -16,14 +16,14 @@ class FrameFault(Block, numeric=False):
 
     Put this block between a camera and the blocks behind it, to see how they react to the fault.
 
-    ===================================================== ===============================================
+    ===================================================== =================================================
     kind                                                  effect
-    ===================================================== ===============================================
+    ===================================================== =================================================
     ``drop``, ``bursts``, ``late``, ``swap``              frames do not come, or come at a wrong time
     ``freeze``, ``alternate``, ``stutter``, ``outdated``  an old picture comes under a new stamp and number
     ``..._stamp``, ``clock_restart``                      only the stamps change
     all others                                            only the pictures change
-    ===================================================== ===============================================
+    ===================================================== =================================================
 
     The block counts one frame per tick, so it must run at the rate of the camera.
     """
