@@ -1,1 +1,1 @@
-"""The checks of the conformance suite, by what they look at."""
+"""The checks of the conformance suite, one module for each subject."""
