@@ -36,7 +36,7 @@ def rotation(attitude: ArrayLike) -> Array:
 
     `attitude` is (phi, theta, psi) in rad: right side down, nose up and clockwise from above are positive.
     """
-    phi, theta, psi = (float(angle) for angle in np.asarray(attitude, dtype=np.float64))
+    phi, theta, psi = np.asarray(attitude, dtype=np.float64).tolist()
     cr, sr = math.cos(phi), math.sin(phi)
     cp, sp = math.cos(theta), math.sin(theta)
     cy, sy = math.cos(psi), math.sin(psi)
@@ -59,7 +59,7 @@ def camera_pose(position: ArrayLike, attitude: ArrayLike, ceiling: float) -> tup
 
     `ceiling` is the height of the target in m. R is (3, 3), t is (3,) in m.
     """
-    x, y, height = (float(value) for value in np.asarray(position, dtype=np.float64))
+    x, y, height = np.asarray(position, dtype=np.float64).tolist()
     turn = CAMERA_FROM_BODY @ rotation(attitude).T
     return turn, -turn @ np.array([x, y, ceiling - height])
 
@@ -73,7 +73,9 @@ def vehicle_pose(turn: ArrayLike, shift: ArrayLike, ceiling: float) -> tuple[Arr
 
 def plane_homography(turn: Array, shift: Array) -> Array:
     """Return H = [r1 r2 t] (3, 3), from target points (x, y, 1) in m to normalised image points."""
-    return np.column_stack((turn[:, 0], turn[:, 1], shift))
+    homography = turn.copy()
+    homography[:, 2] = shift
+    return homography
 
 
 def circle_outline(centre: Sequence[float], radius: float, count: int = 64) -> Array:

@@ -8,14 +8,18 @@ picture only the surroundings of the discs are computed: the empty ceiling and t
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import permutations
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadvis_vision.camera.calibration import CameraCalibration
-from quadvis_vision.camera.projection import camera_pose, circle_outline, plane_homography, target_corners
+from quadvis_vision.camera.lens import by_point
+from quadvis_vision.camera.projection import camera_pose, plane_homography, target_corners
 
 Array = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -23,9 +27,13 @@ Picture = NDArray[np.uint8]
 Box = tuple[slice, slice]  # rows, columns
 
 NOISE_STARTS = 1 << 20  # positions in the bank at which a frame's noise can begin
-_OUTLINE = 24
-_MARGIN = 1.5  # px around a disc: half a pixel's diagonal, plus the bend of a polygon's side by the lens
+_MARGIN = 1.0  # px around a disc: half a pixel's diagonal, and what the grid may miss
+_GRID = 17  # points along an edge of the picture at which the lens is looked at
 _SUB_POSES = 16
+# Rows of the maps of pixels: the ray (x, y, 1), its change from pixel to pixel, the light if it differs from
+# pixel to pixel, and in patches the index of the disc.
+_RAY, _TURN, _SHADE, _DISC = slice(3), slice(3, 7), slice(7, 10), -1
+_HALF_DIAGONAL = 0.72  # px: of a pixel, and what single precision may lose
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,18 +64,27 @@ class Renderer:
         self.discs = target_corners(scene.side)
         self._background = scene.background.astype(np.float32)
         self._contrasts = scene.colours.astype(np.float32) - self._background
-        self._outlines = np.stack([circle_outline(disc, scene.radius, _OUTLINE) for disc in self.discs])
+        # From a ray's (a, b, w) about the middle of the target to (a, b, r w) about the centre of each disc.
+        self._shifts = np.tile(np.diag([1.0, 1.0, scene.radius]), (4, 1, 1))
+        self._shifts[:, :2, 2] = -self.discs[:, :2]
         width, height = calibration.size
         u, v = np.meshgrid(np.arange(width, dtype=np.float64), np.arange(height, dtype=np.float64))
         rays = calibration.normalise(np.column_stack((u.ravel(), v.ravel()))).reshape(height, width, 2)
-        self._x, self._y = rays[..., 0].astype(np.float32), rays[..., 1].astype(np.float32)
         # [row, column, ray axis, pixel axis]: the change of the ray from one pixel to the next.
         turn = np.stack([np.gradient(rays, axis=axis) for axis in (1, 0)], axis=-1).astype(np.float32)
-        self._rays: tuple[Singles, Singles, Singles] = (self._x, self._y, turn)
-        self._steepest = float(np.linalg.norm(turn, axis=(2, 3)).max())
-        self._widest = 1.1 * float(np.hypot(rays[..., 0], rays[..., 1]).max())
+        turns = np.moveaxis(turn.reshape(height, width, 4), -1, 0)
+        self._steepest = float(np.max(_stretch(*turns)))
+        # The outermost pixels reach half a pixel beyond their rays.
+        low, high = rays.min(axis=(0, 1)) - self._steepest, rays.max(axis=(0, 1)) + self._steepest
+        self._field: tuple[list[float], list[float]] = (low.tolist(), high.tolist())
+        grid = np.stack(np.meshgrid(*np.linspace(low, high, _GRID).T), axis=-1)
+        slopes = calibration.matrix[:2, :2] @ by_point(grid, calibration.distortion)
+        self._finest = np.abs(slopes).max(axis=(0, 1)).tolist()
         self._shade = _shade(u, v, scene)
-        self._more, self._less = _noise_bank(scene.noise, 3 * width * height)
+        lights = np.moveaxis(self._shade, -1, 0) if scene.vignette else ()
+        planes = (rays[..., 0], rays[..., 1], np.ones_like(u), *turns, *lights)
+        self._maps = np.stack(planes, dtype=np.float32)
+        self._noise = _noise_bank(scene.noise, 3 * width * height)
         self._scratch = np.empty((height, width, 3), np.uint8)
         self._empty = lru_cache(maxsize=4)(self._make_empty)
 
@@ -79,40 +96,69 @@ class Renderer:
         """
         import cv2
 
-        more, less = self._noise_of(noise)
-        empty = self._empty(light)
+        empty, roomy = self._empty(light)
+        picture = self._scratch
+        np.copyto(picture, empty)
+        if max(start[2], end[2]) <= self.scene.ceiling - 1e-6:  # the discs cannot be seen from behind
+            roomy &= self._draw_discs(picture, start, end, light)
         # The picture is rounded and limited to 0..255 before the whole-numbered noise is added: faster, not
         # exact.
-        picture = np.asarray(cv2.subtract(cv2.add(empty, more, dst=self._scratch), less), dtype=np.uint8)
-        if max(start[2], end[2]) > self.scene.ceiling - 1e-6:
-            return picture  # the discs cannot be seen from behind
-        homographies = self._homographies(start, end)
-        boxes = self._boxes(homographies)
-        covers = self._coverages(homographies, boxes)
-        for disc, box in boxes.items():
-            mixed = self._background + covers[disc][..., None] * self._contrasts[disc]
-            for other, theirs in boxes.items():
-                if other != disc and _meet(box, theirs):
-                    here, there = _overlap(box, theirs)
-                    mixed[here] += covers[other][there][..., None] * self._contrasts[other]
-            patch = cv2.convertScaleAbs(mixed * self._shade[box], alpha=light)
-            picture[box] = cv2.subtract(cv2.add(patch, more[box]), less[box])
-        return picture
-
-    def _make_empty(self, light: float) -> Picture:
-        """Return the ceiling without the discs and without noise."""
-        import cv2
-
-        return np.asarray(cv2.convertScaleAbs(self._background * self._shade, alpha=light), dtype=np.uint8)
-
-    def _noise_of(self, noise: float) -> tuple[Picture, Picture]:
-        """Return the noise to add to a picture and to subtract from it: the bank from a position on."""
         choice = int(noise * 2 * NOISE_STARTS)
         place, swap = choice >> 1, choice & 1
-        shape = self._shade.shape
-        last = place + self._shade.size
-        more, less = (bank[place:last].reshape(shape) for bank in (self._more, self._less))
-        return (less, more) if swap else (more, less)
+        part, shape = slice(place, place + picture.size), picture.shape
+        if roomy:
+            change = np.subtract if swap else np.add
+            return np.asarray(change(picture, self._noise.both[part].reshape(shape)))
+        more, less = (bank[part].reshape(shape) for bank in (self._noise.more, self._noise.less))
+        if swap:
+            more, less = less, more
+        return np.asarray(cv2.subtract(cv2.add(picture, more, dst=picture), less), dtype=np.uint8)
+
+    def _make_empty(self, light: float) -> tuple[Picture, bool]:
+        """Return the ceiling without discs and noise, and whether noise keeps every level within 0..255.
+
+        The second value holds where no pixel is more than a mixture of the ceiling and one disc.
+        """
+        import cv2
+
+        empty = np.asarray(cv2.convertScaleAbs(self._background * self._shade, alpha=light), dtype=np.uint8)
+        palette = np.concatenate((self._background[None], self._background + self._contrasts))
+        shades = self._shade.reshape(-1, 3)
+        extremes = np.stack([palette * shades.min(axis=0), palette * shades.max(axis=0)])
+        levels = cv2.convertScaleAbs(extremes.reshape(-1, 3), alpha=light)
+        largest = self._noise.largest + 1  # the mixture may round otherwise
+        return empty, largest <= int(levels.min()) and int(levels.max()) <= 255 - largest
+
+    def _draw_discs(self, picture: Picture, start: Array, end: Array, light: float) -> bool:
+        """Draw the discs in sight into the picture of the empty ceiling; return whether they are apart."""
+        import cv2
+
+        homographies = self._homographies(start, end)
+        patches = self._patches(homographies)
+        if not patches:
+            return True
+        maps = np.empty((len(self._maps) + 1, patches[-1].part.stop), np.float32)
+        for patch in patches:
+            patch.of(maps)[:_DISC] = self._maps[:, *patch.box]
+            maps[_DISC, patch.part] = patch.disc
+        cover = self._coverage(homographies, patches, maps)
+        mixed = np.empty((3, len(cover)), np.float32)
+        for patch in patches:
+            contrast = self._contrasts[patch.disc][:, None]
+            np.multiply(cover[patch.part], contrast, out=mixed[:, patch.part])
+        mixed += self._background[:, None]
+        apart = True
+        for patch, other in permutations(patches, 2):
+            if _meet(patch.box, other.box):
+                apart = False
+                here, there = _overlap(patch.box, other.box)
+                contrast = self._contrasts[other.disc][:, None, None]
+                patch.of(mixed)[:, *here] += other.of(cover)[there] * contrast
+        mixed *= maps[_SHADE] if self.scene.vignette else self._shade[0, 0, :, None]
+        levels = cv2.convertScaleAbs(mixed, alpha=light)
+        for patch in patches:
+            picture[patch.box] = cv2.merge([*levels[:, patch.part]]).reshape(*patch.shape, 3)
+        return apart
 
     def _homographies(self, start: Array, end: Array) -> list[Array]:
         """Return plane-to-image homographies over the exposure, about one for each pixel of blur."""
@@ -121,104 +167,127 @@ class Renderer:
             pose = start + share * (end - start)
             return plane_homography(*camera_pose(pose[:3], pose[3:], self.scene.ceiling))
 
-        if (start == end).all():
+        if start.tolist() == end.tolist():
             return [at(0.0)]
-        first, last = (_image(self.discs, homography)[0] for homography in (at(0.0), at(1.0)))
+        first, last = (_image(self.discs, homography) for homography in (at(0.0), at(1.0)))
         lengths = self.calibration.matrix[1, 1] * np.hypot(*(last - first).T)
         count = min(max(1, math.ceil(np.nan_to_num(lengths).max())), _SUB_POSES)
         return [at((index + 0.5) / count) for index in range(count)]
 
-    def _boxes(self, homographies: list[Array]) -> dict[int, Box]:
-        """Return the part of the picture that each disc in sight can touch, by the disc's index."""
+    def _patches(self, homographies: list[Array]) -> list[_Patch]:
+        """Return the part of the picture that each disc in sight can touch, at least."""
         width, height = self.calibration.size
-        images = [_image(self._outlines, homography) for homography in homographies]
-        rays = np.stack([ray for ray, _ in images], axis=1)  # disc, pose, point, axis
-        hidden = np.isnan(rays[..., 0])
-        # Far outside the picture the distortion polynomial folds back, so only the ray's length is limited.
-        length = np.maximum(np.hypot(rays[..., 0], rays[..., 1]), 1e-12)
-        rays = rays * np.minimum(1.0, self._widest / length)[..., None]
-        pixels = self.calibration.to_pixels(rays.reshape(-1, 2)).reshape(*rays.shape[:1], -1, 2)
-        lows, highs = pixels.min(axis=1) - _MARGIN, pixels.max(axis=1) + _MARGIN
-        boxes = {}
-        for disc, (low, high) in enumerate(zip(lows.tolist(), highs.tolist(), strict=True)):
-            if hidden[disc].all():
-                continue
-            if hidden[disc].any():  # the disc reaches behind the camera: its image is unbounded
-                low, high = (0.0, 0.0), (width, height)
-            left, top = max(0, math.floor(low[0])), max(0, math.floor(low[1]))
-            right, bottom = min(width, math.ceil(high[0]) + 1), min(height, math.ceil(high[1]) + 1)
-            if left < right and top < bottom:
-                boxes[disc] = (slice(top, bottom), slice(left, right))
-        return boxes
-
-    def _coverages(self, homographies: list[Array], boxes: dict[int, Box]) -> dict[int, Singles]:
-        """Return, for each disc in sight, the share of every pixel that it covers during the exposure."""
-        total = {disc: np.zeros(self._x[box].shape, np.float32) for disc, box in boxes.items()}
-        if not boxes:
-            return total
+        seen: list[tuple[int, float, float]] = []  # disc, and half the size of what it can touch, in rays
+        middles: list[tuple[float, float]] = []
         for homography in homographies:
-            back = np.asarray(np.linalg.inv(homography), dtype=np.float64)
-            edges = []
-            for disc, box in boxes.items():
-                inside, near = self._inside(back, self.discs[disc], box)
-                total[disc] += inside
-                edges.append((disc, near, inside[near]))
-            # All discs together: edges have few pixels, so the number of calls takes the time.
-            index = np.repeat([disc for disc, _, _ in edges], [len(inside) for _, _, inside in edges])
-            rays = (np.concatenate([source[boxes[d]][near] for d, near, _ in edges]) for source in self._rays)
-            shares = _edge_coverage(back, self.scene.radius, self.discs[index], *rays)
-            first = 0
-            for disc, near, inside in edges:
-                last = first + len(inside)
-                total[disc][near] += shares[first:last] - inside
+            for disc, left, top, right, bottom in self._in_sight(homography):
+                seen.append((disc, (right - left) / 2, (bottom - top) / 2))
+                middles.append(((left + right) / 2, (top + bottom) / 2))
+        edges = [[width, height, 0, 0] for _ in self.discs]
+        (u_by_x, u_by_y), (v_by_x, v_by_y) = self._finest
+        pixels = self.calibration.to_pixels(middles).tolist()
+        for (disc, across, down), (u, v) in zip(seen, pixels, strict=True):
+            by_u = across * u_by_x + down * u_by_y + _MARGIN
+            by_v = across * v_by_x + down * v_by_y + _MARGIN
+            left, top, right, bottom = edges[disc]
+            edges[disc] = [
+                min(left, math.floor(u - by_u)),
+                min(top, math.floor(v - by_v)),
+                max(right, math.ceil(u + by_u) + 1),
+                max(bottom, math.ceil(v + by_v) + 1),
+            ]
+        patches, first = [], 0
+        for disc, (left, top, right, bottom) in enumerate(edges):
+            left, top, right, bottom = max(0, left), max(0, top), min(width, right), min(height, bottom)
+            if left < right and top < bottom:
+                last = first + (right - left) * (bottom - top)
+                patches.append(_Patch(disc, (slice(top, bottom), slice(left, right)), slice(first, last)))
                 first = last
-        return {disc: cover / np.float32(len(homographies)) for disc, cover in total.items()}
+        return patches
 
-    def _inside(self, back: Array, disc: Array, box: Box) -> tuple[Singles, tuple[NDArray[np.intp], ...]]:
-        """Return 1 where a pixel's centre is in the disc, and the indices of pixels that may touch its edge.
+    def _in_sight(self, homography: Array) -> Iterator[tuple[int, float, float, float, float]]:
+        """Yield the index of each disc in sight, and the least and largest rays (x, y) that may meet it."""
+        radius, (low, high) = self.scene.radius, self._field
+        (a, b, _), (c, d, _), (e, f, _) = homography.tolist()
+        rise = radius * math.hypot(e, f)
+        middles = self.discs[:, :2] @ homography[:, :2].T + homography[:, 2]
+        for disc, (x, y, depth) in enumerate(middles.tolist()):
+            across = down = math.inf  # where the disc reaches behind the camera
+            if depth - rise > 1e-9:
+                x, y, size = x / depth, y / depth, radius / (depth - rise)
+                across, down = (
+                    size * math.hypot(a - x * e, b - x * f),
+                    size * math.hypot(c - y * e, d - y * f),
+                )
+            left, right = max(x - across, low[0]), min(x + across, high[0])
+            top, bottom = max(y - down, low[1]), min(y + down, high[1])
+            if depth + rise > 0 and left < right and top < bottom:
+                yield disc, left, top, right, bottom
+
+    def _coverage(self, homographies: list[Array], patches: list[_Patch], maps: Singles) -> Singles:
+        """Return the share of every pixel that the patch's disc covers during the exposure.
 
         With (a, b, w) = back (x, y, 1)', taken about the disc's centre, the ray meets the ceiling at the
         distance m / w from the centre, m = |(a, b)|; the disc's edge is where m - r w changes sign.
         """
-        x, y = self._x[box], self._y[box]
-        radius = self.scene.radius
-        centred = back.copy()
-        centred[:2] -= disc[:2, None] * back[2]
-        g = centred.astype(np.float32)
-        a = g[0, 0] * x + g[0, 1] * y + g[0, 2]
-        b = g[1, 0] * x + g[1, 1] * y + g[1, 2]
-        w = g[2, 0] * x + g[2, 1] * y + g[2, 2]
-        beyond = np.sqrt(a * a + b * b) - np.float32(radius) * w
-        slope = np.linalg.norm(centred[:2, :2]) + radius * np.linalg.norm(back[2, :2])
-        near = np.nonzero(np.abs(beyond) < 0.75 * self._steepest * float(slope))
-        return (beyond < 0).astype(np.float32), near
+        import cv2
+
+        total = np.zeros(maps.shape[1], np.float32)
+        met = np.empty((3, maps.shape[1]), np.float32)
+        for homography in homographies:
+            back = np.asarray(np.linalg.inv(homography), dtype=np.float64)
+            tests = (self._shifts @ (back / self._limit(homography, back))).astype(np.float32)
+            for patch in patches:
+                np.matmul(tests[patch.disc], maps[_RAY, patch.part], out=met[:, patch.part])
+            beyond = cv2.magnitude(met[0], met[1]).ravel() - met[2]
+            inside = beyond < 0
+            total += inside
+            # Edges of all discs together: they have few pixels, so the number of calls takes the time.
+            near = np.flatnonzero(np.abs(beyond) < 1)
+            edges = maps.take(near, axis=1).astype(np.float64)
+            middles = self.discs[:, :2].T.take(edges[_DISC].astype(np.intp), axis=1)
+            shares = _edge_coverage(back, self.scene.radius, middles, edges)
+            total[near] += shares - inside[near]
+        return total / np.float32(len(homographies))
+
+    def _limit(self, homography: Array, back: Array) -> float:
+        """Return the largest |m - r w| of a pixel that an edge may cut, see `_coverage`.
+
+        The share of a pixel is 0 or 1 if its centre is farther from the edge than half a diagonal and the
+        bend of the edge, which `_edge_coverage` adds.
+        """
+        radius, away = self.scene.radius, math.hypot(*self.discs[0, :2].tolist())
+        (a, b, _), (c, d, _), (e, f, _) = back.tolist()
+        slope = self._steepest * (_stretch(a, b, c, d) + (radius + away) * math.hypot(e, f))
+        by_x, by_y, depth = homography[2].tolist()
+        farthest = max(0.0, depth + (radius + away) * math.hypot(by_x, by_y))
+        return float(slope * (_HALF_DIAGONAL + slope * farthest / (24 * radius)))
 
 
-def _edge_coverage(back: Array, radius: float, discs: Array, x: Singles, y: Singles, turn: Singles) -> Array:
+def _edge_coverage(back: Array, radius: float, middles: Array, maps: Array) -> Array:
     """Return the covered share of pixels from the distance (px) and direction of their disc's edge."""
-    p, q, w = back @ np.stack((x, y, np.ones_like(x))).astype(np.float64)
-    w = np.maximum(w, 1e-9)  # a ray that does not go up never meets the ceiling
-    a, b = p - discs[:, 0] * w, q - discs[:, 1] * w
-    m = np.maximum(np.hypot(a, b), 1e-12)
-    a, b, out = a / m, b / m, (a * discs[:, 0] + b * discs[:, 1] + m * m / w) / m
-    by_x = a * back[0, 0] + b * back[1, 0] - out * back[2, 0]
-    by_y = a * back[0, 1] + b * back[1, 1] - out * back[2, 1]
-    along_u = by_x * turn[:, 0, 0] + by_y * turn[:, 1, 0]
-    along_v = by_x * turn[:, 0, 1] + by_y * turn[:, 1, 1]
-    steepness = np.maximum(np.hypot(along_u, along_v), 1e-12)
+    met = back @ maps[_RAY]
+    w = np.maximum(met[2], 1e-9)  # a ray that does not go up never meets the ceiling
+    arm = met[:2] - middles * w
+    m = np.maximum(np.hypot(*arm), 1e-12)
+    along, arm = arm * middles, arm / m
+    out = (along[0] + along[1] + m * m / w) / m
+    by_x, by_y = arm[0] * back[0, :2, None] + arm[1] * back[1, :2, None] - out * back[2, :2, None]
+    along = by_x * maps[_TURN][:2] + by_y * maps[_TURN][2:]
+    steepness = np.maximum(np.hypot(*along), 1e-12)
     # The edge deviates from its tangent: on average over a pixel's width by 1/24 of the curvature.
     bend = steepness / (24 * radius * w)
-    return half_plane_share((m - radius * w) / steepness + bend, along_u / steepness, along_v / steepness)
+    return half_plane_share((m - radius * w) / steepness + bend, along / steepness)
 
 
-def half_plane_share(distance: Array, normal_u: Array, normal_v: Array) -> Array:
-    """Return the share of unit pixels in a half plane whose edge is `distance` px away along the normal.
+def half_plane_share(distance: Array, normal: Array) -> Array:
+    """Return the share of unit pixels in a half plane whose edge is `distance` px away along the `normal`.
 
     A positive distance means that the pixel's centre is outside. The share is the integral of the pixel's
-    shadow along the normal, a trapezium.
+    shadow along the normal (u, v), a trapezium.
     """
-    long = np.maximum(np.abs(normal_u), np.abs(normal_v))
-    short = np.maximum(np.minimum(np.abs(normal_u), np.abs(normal_v)), 1e-9)
+    u, v = np.abs(normal)
+    long, short = np.maximum(u, v), np.maximum(np.minimum(u, v), 1e-9)
     away = np.abs(distance)
     ramp = away / long
     corner = np.maximum((long + short) / 2 - away, 0.0) ** 2 / (2 * long * short)
@@ -226,8 +295,34 @@ def half_plane_share(distance: Array, normal_u: Array, normal_v: Array) -> Array
     return np.asarray(np.where(distance > 0, inner, 1 - inner))
 
 
+class _Patch(NamedTuple):
+    """The `box` of the picture that a `disc` (by its index) can touch, and its `part` of all their pixels."""
+
+    disc: int
+    box: Box
+    part: slice
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of rows and columns."""
+        rows, columns = self.box
+        return rows.stop - rows.start, columns.stop - columns.start
+
+    def of(self, values: Singles) -> Singles:
+        """Return the box (..., rows, columns) of values (..., n) of all pixels, to be read or written."""
+        return values[..., self.part].reshape(*values.shape[:-1], *self.shape)
+
+
+def _stretch(a: Any, b: Any, c: Any, d: Any) -> Any:
+    """Return the larger singular value of the matrix [a b; c d], of floats or arrays."""
+    return (np.hypot(a + d, b - c) + np.hypot(a - d, b + c)) / 2
+
+
 def _meet(box: Box, other: Box) -> bool:
-    return all(a.start < b.stop and b.start < a.stop for a, b in zip(box, other, strict=True))
+    (rows, columns), (others, beside) = box, other
+    if rows.start >= others.stop or others.start >= rows.stop:
+        return False
+    return bool(columns.start < beside.stop and beside.start < columns.stop)
 
 
 def _overlap(box: Box, other: Box) -> tuple[Box, Box]:
@@ -240,11 +335,11 @@ def _overlap(box: Box, other: Box) -> tuple[Box, Box]:
     return (here[0], here[1]), (there[0], there[1])
 
 
-def _image(points: Array, homography: Array) -> tuple[Array, Array]:
-    """Return the normalised image (..., 2) and the depth of points (..., 3) of the ceiling plane."""
+def _image(points: Array, homography: Array) -> Array:
+    """Return the normalised image (..., 2) of points (..., 3) of the ceiling plane; NaN behind the camera."""
     images = points[..., :2] @ homography[:, :2].T + homography[:, 2]
-    depth = images[..., 2]
-    return images[..., :2] / np.where(depth > 1e-9, depth, np.nan)[..., None], depth
+    depth = images[..., 2:]
+    return np.asarray(images[..., :2] / np.where(depth > 1e-9, depth, np.nan))
 
 
 def _shade(u: Array, v: Array, scene: Scene) -> Singles:
@@ -255,14 +350,25 @@ def _shade(u: Array, v: Array, scene: Scene) -> Singles:
     return shade
 
 
-@lru_cache(maxsize=2)
-def _noise_bank(sigma: float, size: int) -> tuple[Picture, Picture]:
-    """Return whole grey levels to add and to subtract; at each position one of the two is zero.
+class _Noise(NamedTuple):
+    """Noise in whole grey levels: what to add, what to subtract (one of them is zero), and both modulo 256.
 
-    All cameras of one size and noise share the two arrays, so nobody can write to them.
+    `largest` is the largest of all.
     """
+
+    more: Picture
+    less: Picture
+    both: Picture
+    largest: int
+
+
+@lru_cache(maxsize=2)
+def _noise_bank(sigma: float, size: int) -> _Noise:
+    """Return the noise of a camera; all cameras of one size and noise share it, so nobody can write to it."""
     # numpy promises never to change the numbers of RandomState, so a run repeats on other versions too.
     noise = np.rint(sigma * np.random.RandomState(0).standard_normal(size + NOISE_STARTS))
     more, less = np.clip(noise, 0, 255).astype(np.uint8), np.clip(-noise, 0, 255).astype(np.uint8)
-    more.flags.writeable = less.flags.writeable = False
-    return more, less
+    both = more - less
+    for bank in (more, less, both):
+        bank.flags.writeable = False
+    return _Noise(more, less, both, max(int(more.max()), int(less.max())))

@@ -124,6 +124,12 @@ def slow_coverage(outline: np.ndarray, size: tuple[int, int], lines: int = 64) -
     return coverage
 
 
+def test_a_disc_that_ends_in_the_outer_half_of_the_outermost_pixels_is_drawn() -> None:
+    across = 161 + 438 * 0.12 / 3 + 0.2  # px from the principal point to the disc, whose edge is at v = -0.2
+    ink = ink_of(take((0.0, 0.5 - 3 * across / 438, 1.5)))
+    assert ink[0].max() == pytest.approx(0.3, abs=0.01)
+
+
 LENS = (-0.22, 0.06, 0.002, -0.0015, 0.01)
 
 
