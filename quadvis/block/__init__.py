@@ -4,12 +4,13 @@ from quadvis.block.block import METHODS, OUTSIDE, OWN_MODULES, TAGS, Block, Inte
 from quadvis.block.declare import Declared, In, Out, Param, ParameterError, Random, Safe, State, Work
 from quadvis.block.elements import all_finite, clip, copied, inward, saturated, zeros_like
 from quadvis.block.instants import INSTANT, passed, reached
-from quadvis.block.random import fill_normal, normal, normal_like, random_signs, uniform
+from quadvis.block.random import fill_normal, fill_uniform, normal, normal_like, random_signs, uniform
 from quadvis.block.signals import NO_FRAME, SCALARS, Frame, Shape, SignalType, Sizes
 
 __all__ = [
     "INSTANT", "METHODS", "NO_FRAME", "OUTSIDE", "OWN_MODULES", "SCALARS", "TAGS", "Block", "Declared",
     "Frame", "In", "Interface", "Out", "Param", "ParameterError", "Random", "Safe", "Shape", "SignalType",
-    "Sizes", "State", "Work", "all_finite", "clip", "copied", "fill_normal", "inward", "normal",
-    "normal_like", "passed", "random_signs", "reached", "saturated", "uniform", "units_of", "zeros_like",
+    "Sizes", "State", "Work", "all_finite", "clip", "copied", "fill_normal", "fill_uniform", "inward",
+    "normal", "normal_like", "passed", "random_signs", "reached", "saturated", "uniform", "units_of",
+    "zeros_like",
 ]  # fmt: skip

@@ -53,11 +53,29 @@ def normal(stream: Stream) -> float:
     return radius * math.cos(2.0 * math.pi * uniform(stream))
 
 
+def fill_uniform(stream: Stream, numbers: Any) -> None:
+    """Fill a one-dimensional array with the numbers that `uniform` would return one after the other."""
+    # Interpreted, reading and writing the stream takes most of the time of `uniform`.
+    a, b, c = int(stream[0]), int(stream[1]), int(stream[2])
+    d, e, f = int(stream[3]), int(stream[4]), int(stream[5])
+    for index in range(numbers.size):
+        a, b, c = b, c, (1403580 * b - 810728 * a) % M1
+        d, e, f = e, f, (527612 * f - 1370589 * d) % M2
+        difference = c - f
+        if difference <= 0:
+            difference += M1
+        numbers[index] = difference * SCALE
+    stream[0], stream[1], stream[2] = a, b, c
+    stream[3], stream[4], stream[5] = d, e, f
+
+
 def fill_normal(stream: Stream, numbers: Any) -> None:
     """Fill a one-dimensional array with independent standard normal numbers, in pairs (Box-Muller)."""
+    chances = np.empty(numbers.size + numbers.size % 2)
+    fill_uniform(stream, chances)
     for index in range(0, numbers.size, 2):
-        radius = math.sqrt(-2.0 * math.log(uniform(stream)))
-        angle = 2.0 * math.pi * uniform(stream)
+        radius = math.sqrt(-2.0 * math.log(chances[index]))
+        angle = 2.0 * math.pi * chances[index + 1]
         numbers[index] = radius * math.cos(angle)
         if index + 1 < numbers.size:
             numbers[index + 1] = radius * math.sin(angle)

@@ -1,7 +1,16 @@
 import numpy as np
 import pytest
 
-from quadvis.block.random import M1, M2, fill_normal, normal, normal_like, random_signs, uniform
+from quadvis.block.random import (
+    M1,
+    M2,
+    fill_normal,
+    fill_uniform,
+    normal,
+    normal_like,
+    random_signs,
+    uniform,
+)
 
 
 def stream(*state: int) -> np.ndarray:
@@ -67,6 +76,13 @@ def test_an_array_is_filled_in_the_shape_of_the_model_and_a_float_gives_a_float(
 
 def test_equal_states_give_equal_numbers() -> None:
     assert normal_like(stream(), np.zeros(7)).tolist() == normal_like(stream(), np.zeros(7)).tolist()
+
+
+def test_an_array_of_uniform_numbers_holds_those_that_come_one_by_one() -> None:
+    one_by_one, at_once, numbers = stream(1, 2, 3, 4, 5, 6), stream(1, 2, 3, 4, 5, 6), np.empty(7)
+    fill_uniform(at_once, numbers)
+    assert numbers.tolist() == [uniform(one_by_one) for _ in range(7)]
+    assert at_once.tolist() == one_by_one.tolist()
 
 
 def test_signs_are_fair_and_independent() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.block import Block, Param, ParameterError, Random, State, passed, reached, uniform
+from quadvis.block import Block, Param, ParameterError, Random, State, fill_uniform, passed, reached
 
 QUEUE = 16  # frames that can be on their way at once
 SEQUENCE, STAMP, ARRIVAL = range(3)  # the first columns of a row; the rest is the content of the frame
@@ -77,8 +77,7 @@ class DeliveringCamera(Block, numeric=False):
         self._draw()
 
     def _draw(self) -> None:
-        self.chances[0] = uniform(self.delivery)
-        self.chances[1] = uniform(self.delivery)
+        fill_uniform(self.delivery, self.chances)
 
     def _is_captured(self) -> bool:
         """Return whether this tick has a frame, lost or not."""
@@ -92,9 +91,10 @@ class DeliveringCamera(Block, numeric=False):
         return bool(self.chances[0] < (1 - (1 - rate) / burst if self.dropped else rate / burst))
 
     def _is_lost(self, time: float) -> bool:
-        begin, length = self.blackout
-        inside = reached(time, begin) and not reached(time, begin + length)
-        return self._is_dropped() or (length > 0.0 and inside)
+        if self._is_dropped():
+            return True
+        begin, length = self.blackout.tolist()
+        return bool(length > 0.0 and reached(time, begin) and not reached(time, begin + length))
 
     def _arrival(self, stamp: float) -> float:
         """Return when the frame of this tick arrives."""
@@ -102,19 +102,25 @@ class DeliveringCamera(Block, numeric=False):
 
     def _row(self, stamp: float, content: Any) -> Row:
         """Return the frame of this tick as a row of the queue."""
-        return np.concatenate(([self.captured + 1, stamp, self._arrival(stamp)], content))
+        row = np.empty(CONTENT + len(content))
+        row[SEQUENCE], row[STAMP], row[ARRIVAL] = self.captured + 1, stamp, self._arrival(stamp)
+        row[CONTENT:] = content
+        return row
 
     def _arrived(self, fresh: Row | None, time: float) -> tuple[Row, list[Row]]:
         """Return the row on the wire at this time, and the rows that are still on their way.
 
         ``fresh`` is the row of the frame that is captured now; None if there is none or if it is lost.
         """
-        queue = [row.copy() for row in self.pending[: self.waiting]] + ([] if fresh is None else [fresh])
-        due = [row for row in queue if reached(time, row[ARRIVAL])]
-        if not due:
-            return self.shown.copy(), queue
-        last = max(due, key=lambda row: (row[ARRIVAL], row[SEQUENCE]))
-        return last, [row for row in queue if not reached(time, row[ARRIVAL])]
+        queue = [*self.pending[: self.waiting].copy()] + ([] if fresh is None else [fresh])
+        shown, newest, rest = None, (0.0, 0.0), []
+        for row in queue:
+            sequence, _, arrival = row[:CONTENT].tolist()
+            if not reached(time, arrival):
+                rest.append(row)
+            elif shown is None or (arrival, sequence) > newest:
+                shown, newest = row, (arrival, sequence)
+        return self.shown.copy() if shown is None else shown, rest
 
     def _deliver(self, fresh: Row | None, time: float) -> Row:
         """Return the row on the wire at this time, and keep all rows for `_advance`; for ``output``."""
@@ -125,8 +131,8 @@ class DeliveringCamera(Block, numeric=False):
         """Keep the rows on the wire and on their way, and go to the next tick; for ``update``."""
         shown, rest = self._arrivals
         self.shown[:] = shown
-        if rest:
-            self.pending[: len(rest)] = rest
+        for place, row in enumerate(rest):
+            self.pending[place] = row
         self.waiting = len(rest)
         if self._is_captured():
             self.dropped = self._is_dropped()

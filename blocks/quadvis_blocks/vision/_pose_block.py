@@ -37,8 +37,14 @@ class PinholeRays:
 
     def rays(self, pixels: Array) -> Array:
         """Return the vectors (n, 3) in camera axes along which pixels (n, 2) look."""
-        xy = self.camera.normalise(pixels)
-        return np.column_stack((xy, np.ones(len(xy))))
+        if self.camera.bends:
+            return np.column_stack((self.camera.normalise(pixels), np.ones(len(pixels))))
+        # The same in plain numbers, which on four pixels are faster than arrays.
+        fx, skew, cx, fy, cy = self.camera.pinhole
+        heights = [(v - cy) / fy for v in pixels[:, 1].tolist()]
+        return np.array(
+            [((u - cx - skew * y) / fx, y, 1.0) for u, y in zip(pixels[:, 0].tolist(), heights, strict=True)]
+        )
 
     def pixels(self, points: Array) -> Array:
         """Return the pixels (n, 2) of normalised points (n, 2)."""
@@ -47,7 +53,7 @@ class PinholeRays:
     def slopes(self, points: Array) -> Array:
         """Return the derivatives (n, 2, 2) of pixels by normalised points (n, 2), the lens included."""
         matrix, lens = self.camera.matrix[:2, :2], self.camera.distortion
-        return matrix @ by_point(points, lens) if lens.any() else _alike(matrix, points)
+        return matrix @ by_point(points, lens) if self.camera.bends else _alike(matrix, points)
 
 
 class TwoPlanesRays:

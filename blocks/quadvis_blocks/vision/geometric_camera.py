@@ -92,10 +92,9 @@ class GeometricCamera(DeliveringCamera, numeric=False):
             nothing = np.full((4, 2), math.nan), np.full(4, math.nan)
             return *nothing, STALE, False, False, math.nan, 0, False, False
         centres = row[CONTENT:].reshape(4, 2)
-        seen = np.isfinite(centres[:, 0])
-        count = int(seen.sum())
+        quality = [1.0 if math.isfinite(u) else math.nan for u in row[CONTENT::2].tolist()]
+        count = quality.count(1.0)
         status = 4 - count if count >= 2 else NOT_FOUND
-        quality = np.where(seen, 1.0, math.nan)
         lost = fresh and status > TWO_CIRCLES
         return centres, quality, status, status == 0, lost, row[STAMP], sequence, fresh, False
 
@@ -110,22 +109,24 @@ class GeometricCamera(DeliveringCamera, numeric=False):
         """Return the measurement of this tick; None if there is none, or if it is lost."""
         if not self._is_captured() or self._is_lost(time):
             return None
-        return self._row(time, self._measure(position, attitude).ravel())
+        return self._row(time, self._measure(position, attitude))
 
     def _measure(self, position: Any, attitude: Any) -> Any:
-        """Return the four centres (4, 2) in px; NaN where a circle is not wholly in the picture."""
+        """Return u, v of the four centres (8,) in px; NaN where a circle is not wholly in the picture."""
         turn, shift = camera_pose(position, attitude, self.ceiling)
         depth = self._corners @ turn[2] + shift[2]
-        pixels = np.full((4, 2), math.nan)
-        ahead = depth > self.radius
-        if ahead.any():
-            middles = ellipse_centres(plane_homography(turn, shift), self._corners[ahead], self.radius)
-            pixels[ahead] = self._camera.to_pixels(middles)
+        depths, radius = depth.tolist(), self.radius
+        behind = min(depths) <= radius
+        corners = self._corners[depth > radius] if behind else self._corners
+        pixels = self._camera.to_pixels(ellipse_centres(plane_homography(turn, shift), corners, radius))
+        if behind:
+            seen, pixels = pixels, np.full((4, 2), math.nan)
+            pixels[depth > radius] = seen
         if self.field_of_view == PICTURE:
             width, height = self._camera.size
-            reach = self._camera.matrix[1, 1] * self.radius / np.maximum(depth, self.radius)
-            inside = (pixels >= reach[:, None]).all(axis=1) & (
-                pixels <= np.array([width - 1, height - 1]) - reach[:, None]
-            ).all(axis=1)
-            pixels[~inside] = math.nan
-        return pixels + self.noise * np.asarray(self.drawn).reshape(4, 2)
+            size = float(self._camera.matrix[1, 1]) * radius
+            for corner, ((u, v), away) in enumerate(zip(pixels.tolist(), depths, strict=True)):
+                reach = size / max(away, radius)
+                if not (reach <= u <= width - 1 - reach and reach <= v <= height - 1 - reach):
+                    pixels[corner] = math.nan
+        return pixels.ravel() + self.noise * self.drawn

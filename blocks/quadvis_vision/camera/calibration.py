@@ -7,6 +7,7 @@ applied to normalised points before K. OpenCV itself ignores the skew K[0, 1], s
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -84,17 +85,32 @@ class CameraCalibration:
         head = "".join(f"# {line}\n" for line in comment.splitlines())
         write_output(path, CAMERA, head + dump_yaml(data | self.evidence.facts()))
 
+    @cached_property
+    def pinhole(self) -> tuple[float, float, float, float, float]:
+        """Fx, s, cx, fy, cy of the matrix."""
+        (fx, skew, cx), (_, fy, cy), _ = self.matrix.tolist()
+        return fx, skew, cx, fy, cy
+
+    @cached_property
+    def _affine(self) -> tuple[Array, Array]:
+        return self.matrix[:2, :2].T, self.matrix[:2, 2]
+
+    @cached_property
+    def bends(self) -> bool:
+        """Whether the lens bends anything."""
+        return bool(self.distortion.any())
+
     def normalise(self, pixels: ArrayLike) -> Array:
         """Return the rays (n, 2), as (x, y) at depth 1, of pixels (n, 2): K and the lens are removed.
 
         Rows with NaN stay NaN; a pixel that no ray reaches through this lens becomes NaN.
         """
         uv = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
-        (fx, skew, cx), (_, fy, cy) = self.matrix[0], self.matrix[1]
-        y = (uv[:, 1] - cy) / fy
-        x = (uv[:, 0] - cx - skew * y) / fx
-        distorted = np.column_stack((x, y))
-        return self._undistort(distorted) if self.distortion.any() else distorted
+        fx, skew, cx, fy, cy = self.pinhole
+        distorted = np.empty(uv.shape)
+        distorted[:, 1] = y = (uv[:, 1] - cy) / fy
+        distorted[:, 0] = (uv[:, 0] - cx - skew * y) / fx
+        return self._undistort(distorted) if self.bends else distorted
 
     def project(self, points_camera: ArrayLike) -> Array:
         """Return the pixels (n, 2) of points (n, 3) in camera axes (m); NaN if not in front of the camera."""
@@ -105,9 +121,10 @@ class CameraCalibration:
     def to_pixels(self, rays: ArrayLike) -> Array:
         """Return the pixels (n, 2) of normalised points (n, 2): the inverse of `normalise`."""
         xy = np.asarray(rays, dtype=np.float64).reshape(-1, 2)
-        if self.distortion.any():
+        if self.bends:
             xy = lens_model.distort(xy, self.distortion)
-        return np.asarray(xy @ self.matrix[:2, :2].T + self.matrix[:2, 2])
+        scale, middle = self._affine
+        return np.asarray(xy @ scale + middle)
 
     def _undistort(self, distorted: Array) -> Array:
         """Invert the distortion by Newton's method; NaN where no point fits, or only one behind a fold."""

@@ -49,9 +49,8 @@ def rotation(attitude: ArrayLike) -> Array:
 
 def attitude_of(body_rotation: ArrayLike) -> Array:
     """Return (phi, theta, psi) in rad of a rotation (3, 3) from body to level axes; inverts `rotation`."""
-    r = np.asarray(body_rotation, dtype=np.float64)
-    theta = math.atan2(-r[2, 0], math.hypot(r[2, 1], r[2, 2]))
-    return np.array([math.atan2(r[2, 1], r[2, 2]), theta, math.atan2(r[1, 0], r[0, 0])])
+    (forward, _, _), (right, _, _), (x, y, z) = np.asarray(body_rotation, dtype=np.float64).tolist()
+    return np.array([math.atan2(y, z), math.atan2(-x, math.hypot(y, z)), math.atan2(right, forward)])
 
 
 def camera_pose(position: ArrayLike, attitude: ArrayLike, ceiling: float) -> tuple[Array, Array]:
@@ -93,8 +92,9 @@ def ellipse_centres(homography: Array, centres: Array, radius: float) -> Array:
     The centre of an ellipse is not the image of the circle's centre: the conic's centre is w H p - r^2 H
     (h31, h32, 0)' with p = (x, y, 1) and w the depth of p.
     """
-    points = np.column_stack((centres[:, :2], np.ones(len(centres))))
+    points = np.ones((len(centres), 3))
+    points[:, :2] = centres[:, :2]
     depth = points @ homography[2]
-    bent = homography @ np.array([homography[2, 0], homography[2, 1], 0.0])
+    bent = homography @ (*homography[2, :2].tolist(), 0.0)
     middle = depth[:, None] * (points @ homography.T) - radius * radius * bent
     return np.asarray(middle[:, :2] / middle[:, 2:])

@@ -104,8 +104,9 @@ def seen_centres(pose: Pose, points: Array, radius: float) -> Array:
     returned. The centre of an ellipse is the pole of the image of the plane's horizon; see also
     `quadvis_vision.camera.projection.ellipse_centres`.
     """
-    r = pose.rotation
-    middle = points[:, 2:] * points - radius * radius * (r[:, :2] @ r[2, :2])
+    middle = points[:, 2:] * points
+    if radius:
+        middle -= radius * radius * (pose.rotation[:, :2] @ pose.rotation[2, :2])
     return np.asarray(middle[:, :2] / middle[:, 2:])
 
 
