@@ -40,7 +40,7 @@ class PinholeRays:
         if self.camera.bends:
             return np.column_stack((self.camera.normalise(pixels), np.ones(len(pixels))))
         # The same in plain numbers, which on four pixels are faster than arrays.
-        fx, skew, cx, fy, cy = self.camera.pinhole
+        fx, skew, cx, fy, cy = self.camera.intrinsics
         heights = [(v - cy) / fy for v in pixels[:, 1].tolist()]
         return np.array(
             [((u - cx - skew * y) / fx, y, 1.0) for u, y in zip(pixels[:, 0].tolist(), heights, strict=True)]

@@ -124,18 +124,17 @@ class RenderedCamera(DeliveringCamera, numeric=False):
         if self._is_captured():
             self.grain = uniform(self.stream)
         self._advance()
-        self.previous[:] = (*position, *attitude)
+        self.previous[:3], self.previous[3:] = position, attitude
 
     def _capture(self, position: Any, attitude: Any, time: float) -> Row | None:
         """Return the frame whose exposure ends at this tick; None if there is none, or if it is lost."""
         if not self._is_captured() or self._is_lost(time):
             return None
-        pose = np.array([*position, *attitude])
-        way = np.zeros(6)
+        pose = begin = np.concatenate((position, attitude))
         if self.ticks and self.exposure_time:
             way = pose - self.previous
             way[3:] -= 2 * math.pi * np.round(way[3:] / (2 * math.pi))  # the short way round
-        begin = pose - way * (self.exposure_time / self.period)
+            begin = pose - way * (self.exposure_time / self.period)
         content = np.concatenate(([self.exposure, self.grain], begin, pose))
         return self._row(time - self.exposure_time / 2, content)
 

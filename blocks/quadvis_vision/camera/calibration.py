@@ -86,8 +86,8 @@ class CameraCalibration:
         write_output(path, CAMERA, head + dump_yaml(data | self.evidence.facts()))
 
     @cached_property
-    def pinhole(self) -> tuple[float, float, float, float, float]:
-        """Fx, s, cx, fy, cy of the matrix."""
+    def intrinsics(self) -> tuple[float, float, float, float, float]:
+        """The matrix in plain numbers: fx, s, cx, fy, cy (px)."""
         (fx, skew, cx), (_, fy, cy), _ = self.matrix.tolist()
         return fx, skew, cx, fy, cy
 
@@ -106,7 +106,7 @@ class CameraCalibration:
         Rows with NaN stay NaN; a pixel that no ray reaches through this lens becomes NaN.
         """
         uv = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
-        fx, skew, cx, fy, cy = self.pinhole
+        fx, skew, cx, fy, cy = self.intrinsics
         distorted = np.empty(uv.shape)
         distorted[:, 1] = y = (uv[:, 1] - cy) / fy
         distorted[:, 0] = (uv[:, 0] - cx - skew * y) / fx
