@@ -30,9 +30,9 @@ NOISE_STARTS = 1 << 20  # positions in the bank at which a frame's noise can beg
 _MARGIN = 1.0  # px around a disc: half a pixel's diagonal, and what the grid may miss
 _GRID = 17  # points along an edge of the picture at which the lens is looked at
 _SUB_POSES = 16
-# Rows of the maps of pixels: the ray (x, y, 1), its change from pixel to pixel, the light if it differs from
-# pixel to pixel, and in patches the index of the disc.
-_RAY, _TURN, _SHADE, _DISC = slice(3), slice(3, 7), slice(7, 10), -1
+# Rows of the maps of pixels: the ray (x, y, 1), the light and the change of the ray from pixel to pixel where
+# they are not the same for all pixels, and in patches the index of the disc.
+_RAY, _SHADE, _TURN, _DISC = slice(3), slice(3, 6), slice(-5, -1), -1
 _HALF_DIAGONAL = 0.72  # px: of a pixel, and what single precision may lose
 
 
@@ -82,7 +82,9 @@ class Renderer:
         self._finest = np.abs(slopes).max(axis=(0, 1)).tolist()
         self._shade = _shade(u, v, scene)
         lights = np.moveaxis(self._shade, -1, 0) if scene.vignette else ()
-        planes = (rays[..., 0], rays[..., 1], np.ones_like(u), *turns, *lights)
+        alike = bool((turn == turn[0, 0]).all())  # without a lens
+        self._turn = turns[:, :1, 0].astype(np.float64) if alike else None
+        planes = (rays[..., 0], rays[..., 1], np.ones_like(u), *lights, *(() if alike else turns))
         self._maps = np.stack(planes, dtype=np.float32)
         self._noise = _noise_bank(scene.noise, 3 * width * height)
         self._scratch = np.empty((height, width, 3), np.uint8)
@@ -246,7 +248,8 @@ class Renderer:
             near = np.flatnonzero(np.abs(beyond) < 1)
             edges = maps.take(near, axis=1).astype(np.float64)
             middles = self.discs[:, :2].T.take(edges[_DISC].astype(np.intp), axis=1)
-            shares = _edge_coverage(back, self.scene.radius, middles, edges)
+            turn = edges[_TURN] if self._turn is None else self._turn
+            shares = _edge_coverage(back, self.scene.radius, middles, edges[_RAY], turn)
             total[near] += shares - inside[near]
         return total / np.float32(len(homographies))
 
@@ -264,16 +267,20 @@ class Renderer:
         return float(slope * (_HALF_DIAGONAL + slope * farthest / (24 * radius)))
 
 
-def _edge_coverage(back: Array, radius: float, middles: Array, maps: Array) -> Array:
-    """Return the covered share of pixels from the distance (px) and direction of their disc's edge."""
-    met = back @ maps[_RAY]
+def _edge_coverage(back: Array, radius: float, middles: Array, rays: Array, turn: Array) -> Array:
+    """Return the covered share of pixels from the distance (px) and direction of their disc's edge.
+
+    `middles` (2, n) are the centres of the discs (m); `turn` (4, n or 1) holds the derivatives of the `rays`
+    (3, n) by the pixels: those of x by u and v, and those of y.
+    """
+    met = back @ rays
     w = np.maximum(met[2], 1e-9)  # a ray that does not go up never meets the ceiling
     arm = met[:2] - middles * w
     m = np.maximum(np.hypot(*arm), 1e-12)
     along, arm = arm * middles, arm / m
     out = (along[0] + along[1] + m * m / w) / m
     by_x, by_y = arm[0] * back[0, :2, None] + arm[1] * back[1, :2, None] - out * back[2, :2, None]
-    along = by_x * maps[_TURN][:2] + by_y * maps[_TURN][2:]
+    along = by_x * turn[:2] + by_y * turn[2:]
     steepness = np.maximum(np.hypot(*along), 1e-12)
     # The edge deviates from its tangent: on average over a pixel's width by 1/24 of the curvature.
     bend = steepness / (24 * radius * w)
