@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from quadvis.block import Param, SignalType
-from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar, measure
+from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar
 from quadvis.document.number_lists import Numbers
 from quadvis.errors import UNKNOWN, Faults, Unknown, known, quoted, suggestion
 from quadvis.units import Unit, parse_quantity, split_quantity
@@ -95,7 +95,7 @@ def _spread(value: YamlNode, unit: YamlNode | None, key: str) -> YamlNode:
     if unit is not None:
         if any(each.variables for each in units):
             raise unit.fault(f"{quoted(unit.text())} is not a unit")
-        shape = measure(value)
+        shape = value.shape()
         if len(units) not in (1, *shape[-1:], math.prod(shape)):
             raise unit.fault(f"there are {len(units)} units for {shape[-1] if shape else 1} values")
     if isinstance(value, Numbers) and not value.element_units:
@@ -139,7 +139,7 @@ def read_value(signal: SignalType, units: Sequence[Unit], node: YamlNode) -> tup
     """
     if signal.scalar == "frame":
         raise node.wrong("a wire from a camera or a file")
-    shape = measure(node)
+    shape = node.shape()
     if not signal.unify(shape, {}):
         label = quoted(node.key) if node.key else "this"
         raise node.fault(f"{label} takes {shape_text(signal.shape)}, not {shape_text(shape)}")

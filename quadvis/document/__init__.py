@@ -1,7 +1,8 @@
 """Read YAML files that may be wrong or hostile, within limits, as untyped nodes with their places."""
 
-from quadvis.document.nodes import YamlList, YamlMap, YamlNode, YamlScalar, measure
+from quadvis.document.node import YamlNode
 from quadvis.document.reader import MAX_BYTES, dump_yaml, parse_yaml, read_yaml
+from quadvis.document.tree import YamlList, YamlMap, YamlScalar
 
 __all__ = [
     "MAX_BYTES",
@@ -10,7 +11,6 @@ __all__ = [
     "YamlNode",
     "YamlScalar",
     "dump_yaml",
-    "measure",
     "parse_yaml",
     "read_yaml",
 ]  # fmt: skip

@@ -11,21 +11,19 @@ from typing import Any
 import yaml
 
 from quadvis.document.damage import ORIGINALS
-from quadvis.document.nodes import YamlList, YamlMap, YamlNode, YamlScalar
+from quadvis.document.keys import mend_fraction, refuse_repeated, split_pair, wrong_key
+from quadvis.document.node import YamlNode
 from quadvis.document.number_lists import MARK, NumberList, Numbers, numbers_in
+from quadvis.document.tree import YamlList, YamlMap, YamlScalar
 from quadvis.errors import DiagramError, Fault, Faults, Odd, Place, quoted
 from quadvis.errors.characters import (
     NAMELESS,
     character_name,
-    first_odd,
     odd_characters,
-    replacement,
-    with_article,
 )
 
 MAX_NODES = 100_000
 MAX_DEPTH = 50
-MAX_KEY = 200
 
 # Control characters, line breaks that editors do not count, and signs that reorder the visible text.
 FORBIDDEN = re.compile(
@@ -33,12 +31,8 @@ FORBIDDEN = re.compile(
     "\ufffe\uffff]"
 )
 LINE_END = re.compile("\r\n|\r|\n")
-_NO_BLANK = re.compile(r"([A-Za-z_]\w*)([:\u2236\ua789\ufe55\uff1a])([^\s/\\].*| .*)", re.ASCII)
 # In a block, a beginning list or map, or a blank that YAML does not know, makes the key go on after its ':'.
 _RUN_ON = re.compile("[A-Za-z_][A-Za-z0-9_]*:(?=[{\\[\u00a0\u1680\u2000-\u200a\u202f\u205f\u3000])")
-_FRACTION = re.compile(r"[0-9]+(?:[eE][+-]?[0-9]+)?(?: *[A-Za-z%/°µ].*)?")
-_WHOLE = re.compile(r"[+-]?[0-9]+")
-_MOST_LINES = 5  # lines that are named for a repeated key
 
 
 class MisreadError(Exception):
@@ -181,7 +175,7 @@ class Composer:
         level = self.stack.pop()
         if level.doubles:
             assert isinstance(level.node, YamlMap)
-            self._refuse_doubles(level.node, level.doubles)
+            refuse_repeated(level.node, level.doubles, self.faults)
 
     def _add(self, node: YamlNode, event: Any) -> None:
         """Put a node in its place: under the waiting key, at the end of the list, or as a key itself."""
@@ -207,67 +201,14 @@ class Composer:
     def _put(self, level: _Level, parent: YamlMap, key: YamlScalar, node: YamlNode) -> None:
         """Put a value under its key; a key without a value in ``{}`` may be a slip with ':' or ','."""
         if level.is_flow and key.plain and isinstance(node, YamlScalar) and node.plain and not node.value:
-            if self._is_fraction(parent, key):
+            if mend_fraction(parent, key, self.faults):
                 return
-            key, node = self._split(key, node)
+            key, node = split_pair(key, node, self.faults)
         node.key = key.value
         if key.value in parent.keys:
             level.doubles.append((key, node))
         else:
             parent.keys[key.value], parent.values[key.value] = key, node
-
-    def _is_fraction(self, parent: YamlMap, key: YamlScalar) -> bool:
-        """Refuse the second half of ``0,5 m``, which YAML reads as a key after the value 0."""
-        before = next(reversed(parent.values.values()), None)
-        if (
-            not isinstance(before, YamlScalar)
-            or not before.plain
-            or (before.line, before.column + len(before.value) + 1) != (key.line, key.column)
-            or not _WHOLE.fullmatch(before.value)
-            or not _FRACTION.fullmatch(key.value)
-        ):
-            return False
-        wrong, right = f"{before.value},{key.value}", f"{before.value}.{key.value}"
-        self.faults.add(before.place, f"{quoted(wrong)} has a decimal comma", f"write {quoted(right)}")
-        before.value = right
-        return True
-
-    def _split(self, key: YamlScalar, node: YamlScalar) -> tuple[YamlScalar, YamlScalar]:
-        """Refuse ``c:10 Hz`` and return its two halves."""
-        match = _NO_BLANK.fullmatch(key.value)
-        if match is None:
-            return key, node
-        name, colon, rest = match.groups()
-        value = rest.lstrip()
-        column = key.column + len(name)
-        if colon != ":":
-            problem, remedy = f"this is {with_article(colon)}", replacement(colon)
-            self.faults.add(Place(key.file, key.line, column), problem, remedy)
-        elif value == rest:
-            problem = f"a blank is missing behind {quoted(name + ':')}"
-            self.faults.add(Place(*_where(key)), problem, f"write {quoted(f'{name}: {value}')}")
-        else:  # a blank character that YAML reads as a letter
-            problem = f"this is {with_article(rest[0])}"
-            self.faults.add(Place(key.file, key.line, column + 1), problem, replacement(rest[0]))
-        odd = key.odd if first_odd(value) else None
-        column += 1 + len(rest) - len(value)
-        return YamlScalar(name, True, key.file, key.line, key.column), YamlScalar(
-            value, True, key.file, key.line, column, odd=odd
-        )
-
-    def _refuse_doubles(self, parent: YamlMap, doubles: list[tuple[YamlScalar, YamlNode]]) -> None:
-        """Refuse repeated keys, each once; the other values under them are read, too."""
-        again: dict[str, list[YamlScalar]] = {}
-        for key, node in doubles:
-            again.setdefault(key.value, []).append(key)
-            _merge(parent.values[key.value], node)
-        for name, keys in again.items():
-            lines = [str(key.line) for key in keys[1 : 1 + _MOST_LINES]]
-            if len(keys) > 1 + _MOST_LINES:
-                lines.append("...")
-            more = f", and again in line {', '.join(lines)}" if lines else ""
-            problem = f"key {quoted(name)} is already in line {parent.keys[name].line}{more}"
-            self.faults.add(Place(*_where(keys[0])), problem, "keep one of them")
 
     def _check_properties(self, event: Any) -> None:
         if getattr(event, "style", "") == '"':
@@ -288,7 +229,7 @@ class Composer:
         """Return the key for the next value, or `_NO_KEY` if the key is refused."""
         if type(event) is yaml.AliasEvent:
             return _NO_KEY
-        problem, remedy = _wrong_key(node)
+        problem, remedy = wrong_key(node)
         if isinstance(node, YamlScalar) and not problem:
             if node.plain and ":" in node.value and not self.stack[-1].is_flow:
                 self._check_run_on(node, event)
@@ -310,45 +251,6 @@ def forbidden(found: re.Match[str]) -> tuple[str, str]:
     name = character_name(char).partition(" (")[0]
     remedy = "remove it" if name == NAMELESS else f"remove this {name}"
     return f"the control character U+{ord(char):04X} is not allowed", remedy
-
-
-def _where(node: YamlNode) -> tuple[str, int, int]:
-    return node.file, node.line, node.column
-
-
-def _merge(first: YamlNode, second: YamlNode) -> None:
-    """Add the values under a repeated key, unless they describe another thing of the same name."""
-    if not isinstance(first, YamlMap) or not isinstance(second, YamlMap) or not _agree(first, second):
-        return
-    for key, node in second.pairs():
-        if key.value in first:
-            _merge(first[key.value], node)
-        else:
-            first.keys[key.value], first.values[key.value] = key, node
-
-
-def _agree(first: YamlMap, second: YamlMap) -> bool:
-    """Return whether the texts under common keys are equal."""
-    pairs = [(first[key], second[key]) for key in second if key in first]
-    return all(
-        one.value == other.value
-        if isinstance(one, YamlScalar) and isinstance(other, YamlScalar)
-        else isinstance(one, YamlMap) and isinstance(other, YamlMap)
-        for one, other in pairs
-    )
-
-
-def _wrong_key(node: YamlNode) -> tuple[str, str]:
-    """Return the problem and the remedy for a key; ("", "") if it is right."""
-    if not isinstance(node, YamlScalar):
-        return "a key must be a text", "put a text that begins with '{' or '[' in quotes"
-    if not node.value:
-        return "a key is missing before ':'", "write 'key: value'"
-    if len(node.value) > MAX_KEY:
-        return f"the key {quoted(node.value)} is longer than {MAX_KEY} characters", "shorten it"
-    if node.value == "<<" and node.plain:
-        return "the merge key '<<' is not allowed", "write the values out"
-    return "", ""
 
 
 _NO_KEY = YamlScalar("", True, "", 0, 0)

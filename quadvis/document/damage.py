@@ -3,6 +3,8 @@
 Parsers differ in their words and change them, so only places are taken from them. `Scan` examines the text at
 such a place. If the intention is clear, a repair of the same length lets the rest be read: the fault is kept,
 no place moves, and the other faults of the file are reported in the same run.
+
+The file is long because it holds one look for each way in which a text is no YAML, in the order of `explain`.
 """
 
 from __future__ import annotations

@@ -12,7 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from quadvis.document.nodes import YamlList, YamlNode, YamlScalar
+from quadvis.document.node import YamlNode
+from quadvis.document.tree import YamlList, YamlScalar
 from quadvis.units import Unit
 
 MARK = "\ue000"
@@ -107,9 +108,8 @@ class Numbers(YamlList):
         found = NumberList(0, 0, self.numbers, 0)
         return Numbers(found, self.source, self.file, self.line, self.column, key, units)
 
-    @property
     def shape(self) -> tuple[int, ...]:
-        """The sizes along the axes."""
+        """Return the sizes along the axes."""
         sizes, level = [], self.numbers
         while isinstance(level, list):
             sizes.append(len(level))

@@ -24,8 +24,9 @@ from quadvis.document.composer import (
     forbidden,
 )
 from quadvis.document.damage import STAND_INS, Trouble, explain, run_on
-from quadvis.document.nodes import YamlNode, plain_value
+from quadvis.document.node import YamlNode
 from quadvis.document.number_lists import find_lists, hide_lists
+from quadvis.document.tree import plain_value
 from quadvis.errors import DiagramError, Fault, Faults, Place, QuadvisError
 from quadvis.machine.inputs import note_input
 from quadvis.machine.missing_file import file_trouble, system_reason

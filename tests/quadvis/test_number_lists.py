@@ -70,7 +70,7 @@ def test_a_list_read_whole_is_the_list_read_element_by_element(
 def test_long_lists_are_read_whole() -> None:
     for text, count in ((TEXTS[0], 120), (TEXTS[2], 60), (TEXTS[3], 150)):
         node = parse_yaml(text).mapping()["a"]
-        assert isinstance(node, Numbers) and node.shape[0] == count
+        assert isinstance(node, Numbers) and node.shape()[0] == count
         assert node.to_python() == [each.to_python() for each in node.items()]
 
 
