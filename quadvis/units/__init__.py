@@ -1,5 +1,6 @@
 """Units, and quantities in text: "50 ms", "1/30 s", "2.5 rad/s", "90 %"."""
 
+from quadvis.units.grammar import UnitError
 from quadvis.units.quantity import (
     format_quantity,
     parse_number,
@@ -10,7 +11,7 @@ from quadvis.units.quantity import (
     require_unit,
     split_quantity,
 )
-from quadvis.units.unit import Unit, UnitError, advised, parse_units, unify
+from quadvis.units.unit import Unit, advised, parse_units, unify
 
 __all__ = [
     "Unit", "UnitError", "advised", "format_quantity", "parse_number", "parse_period", "parse_quantity",

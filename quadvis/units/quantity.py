@@ -8,7 +8,8 @@ from fractions import Fraction
 from functools import lru_cache
 
 from quadvis.errors import quoted
-from quadvis.units.unit import LONGEST, Unit, UnitError, advised
+from quadvis.units.grammar import LONGEST, UnitError
+from quadvis.units.unit import Unit, advised
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _OTHER_BASE = re.compile(r"[+-]?0(?:[xX][0-9a-fA-F]|[oO][0-7]|[bB][01])")  # 0x10, but not 0 ohm

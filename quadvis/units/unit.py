@@ -1,4 +1,4 @@
-"""Physical units of ports and parameters: reading, comparing, combining and unifying them.
+"""Physical units of ports and parameters: comparing, combining, naming and unifying them.
 
 A unit is a product of powers: of primes and pi for its scale to SI, of the dimensions m, kg, s, rad, px, A,
 K, and of the unit variables a, b, c. So scales are exact and never rounded. Angles have their own dimension,
@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property, lru_cache
 
-from quadvis.errors import QuadvisError, quoted, sentence
+from quadvis.errors import quoted
+from quadvis.units.grammar import LONGEST, UnitError, plain_spelling, read_powers
 from quadvis.units.names import (
     BASES,
     DERIVED,
@@ -22,27 +23,11 @@ from quadvis.units.names import (
     PREFIXES,
     PRIMES,
     SCALES,
-    SPELLINGS,
     VARIABLES,
 )
 from quadvis.units.spelling import elsewhere, spellings
 
 _LARGEST_POWER = 60
-LONGEST = 80
-_GENERAL = "use m, s, rad, kg, N, V, Hz, px ..."
-
-_TOKEN = re.compile(r"([A-Za-z%]+)|([0-9]+(?:\.[0-9]+)?)|([*/^()-])")
-_RAISED = re.compile("\N{SUPERSCRIPT MINUS}([¹²³])")
-_AROUND_OPERATOR = re.compile(r"\s*([*/^])\s*")
-
-
-class UnitError(QuadvisError):
-    """A text that is not a unit or not a quantity: the problem and the remedy."""
-
-    def __init__(self, problem: str, remedy: str = "") -> None:
-        """Keep both halves of the sentence separately, for messages that name a place."""
-        self.problem, self.remedy = problem, remedy
-        super().__init__(sentence(problem, remedy))
 
 
 def _powers(items: Iterable[tuple[str, Fraction]]) -> tuple[tuple[str, Fraction], ...]:
@@ -223,7 +208,7 @@ def _table() -> dict[str, Unit]:
     one = Fraction(1)
     table = {name: Unit(frozenset({(name, one)}), ((name, one),)) for name in (*BASES, *SCALES)}
     for name, made_of in DERIVED.items():
-        table[name] = Unit(_Reader(made_of, table).unit().exponents, ((name, one),))
+        table[name] = Unit(_product(made_of, table).exponents, ((name, one),))
     for name in sorted(PREFIXED):
         power = Fraction(PREFIXES[name[0]])
         scaled = _unit((("2", power), ("5", power), *table[name[1:]].exponents), ((name, one),))
@@ -233,118 +218,28 @@ def _table() -> dict[str, Unit]:
     return table
 
 
-def _plain(text: str) -> str:
-    """Return the text in the spelling of the parser, without blanks around operators."""
-    powers = _RAISED.sub(lambda match: f"^-{'¹²³'.index(match[1]) + 1}", text)
-    return _AROUND_OPERATOR.sub(r"\1", powers.translate(SPELLINGS)).strip()
-
-
 @lru_cache(maxsize=1024)
 def _parse(text: str) -> Unit:
-    plain = _plain(text)
+    plain = plain_spelling(text)
     if not plain:
         raise UnitError("the unit is empty", "write '1' for a number without unit")
     if len(plain) > LONGEST:
         raise UnitError(f"{quoted(text)} is too long for a unit")
     if re.search(r"\s", plain):
         raise UnitError(f"{quoted(text)} holds a space", "write '*' for a product")
-    return _Reader(plain, _table()).unit()
+    return _product(plain, _table())
 
 
-class _Reader:
-    """Reads one unit: factors joined by `*` and `/`, left to right, each with an optional `^` power."""
-
-    def __init__(self, text: str, table: Mapping[str, Unit]) -> None:
-        self.text, self.table = text, table
-        self.tokens = self._split()
-        self.at = 0
-
-    def _split(self) -> list[str]:
-        tokens, position = [], 0
-        while position < len(self.text):
-            match = _TOKEN.match(self.text, position)
-            if match is None:
-                wrong = quoted(self.text[position])
-                raise UnitError(f"{quoted(self.text)} is not a unit", f"{wrong} is no part of one")
-            tokens.append(match.group())
-            position = match.end()
-        return tokens
-
-    def _next(self) -> str:
-        return self.tokens[self.at] if self.at < len(self.tokens) else ""
-
-    def _take(self) -> str:
-        token = self._next()
-        self.at += 1
-        return token
-
-    def unit(self) -> Unit:
-        result = self._product()
-        if self._next():
-            raise self._fault(self.at)
-        return result
-
-    def _product(self) -> Unit:
-        result = self._factor()
-        while self._next() in ("*", "/"):
-            result = result * self._factor() if self._take() == "*" else result / self._factor()
-        return result
-
-    def _factor(self) -> Unit:
-        token = self._take()
-        if token == "(":
-            result = self._product()
-            if self._take() != ")":
-                raise UnitError(f"{quoted(self.text)} lacks a ')'")
-        elif token == "1":
-            result = Unit()
-        elif token in self.table:
-            result = self.table[token]
-        else:
-            raise self._fault(self.at - 1)
-        if self._next() == "^":
-            self.at += 1
-            result **= self._exponent()
-        return result
-
-    def _exponent(self) -> Fraction:
-        if self._next() != "(":
-            return self._signed()
-        self.at += 1
-        result = self._signed()
-        if self._next() == "/":
-            self.at += 1
-            below = self._signed()
-            if not below:
-                raise UnitError(f"{quoted(self.text)} divides by zero")
-            result /= below
-        if self._take() != ")":
-            raise UnitError(f"{quoted(self.text)} lacks a ')'")
-        return result
-
-    def _signed(self) -> Fraction:
-        sign = 1
-        if self._next() == "-":
-            self.at += 1
-            sign = -1
-        token = self._take()
-        if not token[:1].isdigit() or len(token) > 5:
-            raise UnitError(f"{quoted(self.text)} has no exponent after '^'", "write such as 's^2' or 's^-1'")
-        return sign * Fraction(token)
-
-    def _fault(self, position: int) -> UnitError:
-        token = self.tokens[position] if position < len(self.tokens) else ""
-        if token in ("", *"*/^()-"):
-            missing = "a unit is missing at its end" if not token else f"'{token}' stands where it cannot"
-            return UnitError(f"{quoted(self.text)} is not a unit", missing)
-        if token[0].isdigit():
-            return UnitError(f"{quoted(self.text)} is not a unit", f"leave out the number {token}")
-        return UnitError(f"{quoted(token)} is not a unit", _GENERAL)
+def _product(text: str, table: Mapping[str, Unit]) -> Unit:
+    """Return the product of the powers that a text in plain spelling names."""
+    powers = read_powers(text, table)
+    parts = [(table[name].exponents, exponent) for name, exponent in powers]
+    return _unit(((base, power * exponent) for bases, exponent in parts for base, power in bases), powers)
 
 
 def advised(error: UnitError, text: str, wanted: Sequence[Unit] = ()) -> UnitError:
     """Return the error with a suggestion, which has the dimension of a wanted unit if any is known."""
-    plain = _plain(text)
+    plain = plain_spelling(text)
     name, why, remedy = elsewhere(plain) or ("", "", "")
     if name:
         return UnitError(f"{quoted(name)} is not a unit here{why}", remedy)
@@ -369,7 +264,7 @@ def advised(error: UnitError, text: str, wanted: Sequence[Unit] = ()) -> UnitErr
 
 def parse_units(text: str) -> tuple[Unit, ...]:
     """Return the units of a port's elements: one for all elements ("m/s"), or one each ("m m m rad")."""
-    plain = _plain(text).split()
+    plain = plain_spelling(text).split()
     if not plain:
         raise UnitError("the unit is empty", "write '1' for a number without unit")
     return tuple(map(Unit.parse, plain))
