@@ -1,9 +1,7 @@
 """A diagram's closed loop as matrices, by central differences of the engine's own run.
 
-A wholly continuous loop gives the derivative of its states. Any other loop is lifted over one hyperperiod:
-its state is that part of memory which lasts from one hyperperiod to the next and which a disturbance of some
-signal can reach. Delay lines, queues of measurements and held values belong to the state; stamps, counters
-and random streams follow the clock and do not belong to it.
+A wholly continuous loop gives the derivative of its states. Any other loop is lifted over one hyperperiod,
+and `state` finds its state.
 
 Source: lifting of multirate loops, Kranc (1957); Meyer and Burrus (1975).
 """
@@ -12,16 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
 from quadvis.analysis.cut import with_breaks
 from quadvis.analysis.probe import (
     STEP,
     AnalysisError,
     Channel,
+    Matrix,
     Positions,
     Probe,
     Vector,
@@ -29,13 +26,11 @@ from quadvis.analysis.probe import (
     silence,
 )
 from quadvis.analysis.progress import announce
+from quadvis.analysis.state import Columns, find_state, slope, stacked
 from quadvis.diagram.sections.analyse import Cut
 from quadvis.engine.engine import Engine
-from quadvis.errors import RunError
 from quadvis.graph.graph import Graph
 
-Matrix = NDArray[np.float64]
-Columns = dict[int, tuple[Vector, Vector]]  # by slot: the derivatives of the later memory and of the channels
 SETTLED = 1e-6  # of the state's size: the largest change at an operating point
 TRIALS = 12
 LATER = 8.0
@@ -43,7 +38,6 @@ CHECKED = 4  # hyperperiods that the matrix must predict
 CLOSE = 0.01
 IDLE = 1e-9
 MENTIONED = 8  # blocks that a message names
-CHUNK = 32  # slots that are changed together
 
 
 class Unsettled(AnalysisError):
@@ -114,7 +108,7 @@ def _few_names(names: Sequence[str]) -> str:
 
 def _linearise(probe: Probe) -> Linear:
     for _ in range(TRIALS):
-        places, columns = _columns(probe)
+        places, columns = find_state(probe)
         if _is_continuous(probe, places):
             places = places[np.isin(places, probe.continuous)]
             return _continuous(probe, places)
@@ -123,7 +117,7 @@ def _linearise(probe: Probe) -> Linear:
             linear = _lifted(probe, places, columns)
             _check(probe, places, linear.a)
             return _without_idle(linear)
-        a = _stacked(columns, places)[0]
+        a = stacked(columns, places)[0]
         probe.move(places, _solved(np.eye(len(places)) - a, residual))
     raise _unsettled(probe, places, residual)
 
@@ -147,140 +141,16 @@ def _is_continuous(probe: Probe, places: Positions) -> bool:
     return all(task.continuous for task in probe.tasks) and bool(np.isin(places, probe.continuous).all())
 
 
-def _columns(probe: Probe) -> tuple[Positions, Columns]:
-    """Return the slots of the state, and for each slot the derivatives of the memory and of the channels."""
-    still = probe.after(probe.positions[:0], 0.0)
-    columns: Columns = {}
-    slots, rounds = _reached(probe, still)
-    known = set(slots.tolist())
-    fresh = np.setdiff1d(slots, _unread(probe, slots, rounds, still))
-    while fresh.size:
-        reached: set[int] = set()
-        passing = np.isin(fresh, probe.signals)
-        for place in [*fresh[~passing].tolist(), *_influential(probe, fresh[passing], still)]:
-            announce(f"{len(columns)} states disturbed")
-            step = STEP * probe.scale[place]
-            one = np.array([place], np.intp)
-            above, below = (probe.after(one, sign * step) for sign in (1.0, -1.0))
-            changed = _changed(probe, above[0], below[0])
-            if changed.size or not np.array_equal(above[1], below[1]):
-                columns[place] = _slope(above[0], below[0], step), _slope(above[1], below[1], step)
-                reached.update(changed.tolist())
-        fresh = np.array(sorted(reached - known), np.intp)
-        known |= reached
-    return _observable(np.array(sorted(columns), np.intp), columns), columns
-
-
-def _observable(places: Positions, columns: Columns) -> Positions:
-    """Drop, until no more can be dropped, the slots on which no channel and no remaining slot depends."""
-    a, c = _stacked(columns, places)
-    left = np.arange(places.size)
-    while left.size:
-        matter = (a[np.ix_(left, left)] != 0.0).any(axis=0) | (c[:, left] != 0.0).any(axis=0)
-        if matter.all():
-            break
-        left = left[matter]
-    return places[left]
-
-
-def _reached(probe: Probe, still: tuple[Vector, Vector]) -> tuple[Positions, int]:
-    """Return the slots that a disturbance of some signal reaches, and after how many hyperperiods."""
-    found = np.union1d(_changed(probe, probe.shaken(), still[0]), probe.continuous).astype(np.intp)
-    rounds, known = 1, found[:0]
-    while found.size > known.size:
-        rounds, known = rounds + 1, found
-        found = np.union1d(known, _changed(probe, _nudged(probe, known)[0], still[0])).astype(np.intp)
-    return found, rounds
-
-
-def _nudged(probe: Probe, places: Positions, count: int = 1) -> tuple[Vector, Vector]:
-    """Return the effects of a small random change of all these slots together."""
-    random = np.random.default_rng(2)
-    return probe.after(
-        places, STEP * probe.scale[places] * random.uniform(0.5, 1.0, places.size), count=count
-    )
-
-
-def _unread(probe: Probe, places: Positions, rounds: int, still: tuple[Vector, Vector]) -> Positions:
-    """Return slots whose value no block reads any more, such as the tail of an overlong shift register.
-
-    No channel and no other slot depends on them, and their poles are at zero.
-    """
-    chunks: list[Positions] = []
-    for _, array in groupby(places.tolist(), lambda place: probe.names[place].partition("[")[0]):
-        slots = np.array(list(array), np.intp)
-        chunks += np.split(slots, range(CHUNK, slots.size, CHUNK))
-    results = [_nudged(probe, chunk) for chunk in chunks]
-    left = [
-        (chunk, _changed(probe, memory, still[0]))
-        for chunk, (memory, read) in zip(chunks, results, strict=True)
-        if np.array_equal(read, still[1], equal_nan=True)
-    ]
-    while left:
-        ends = np.concatenate([chunk for chunk, _ in left])
-        inside = [(chunk, changed) for chunk, changed in left if np.isin(changed, ends).all()]
-        if len(inside) == len(left):
-            return ends if _passes(probe, ends, rounds) else places[:0]
-        left = inside
-    return places[:0]
-
-
-def _passes(probe: Probe, places: Positions, rounds: int) -> bool:
-    """Return whether a change of all these slots together is gone after so many hyperperiods.
-
-    A change that makes a block fail, such as that of a covariance, is not gone.
-    """
-    try:
-        changed = _nudged(probe, places, rounds)[0]
-    except RunError:
-        return False
-    return not _changed(probe, changed, probe.after(places[:0], 0.0, count=rounds)[0]).size
-
-
-@np.errstate(invalid="ignore")  # a parameter may be infinite, and a signal NaN
-def _slope(above: Vector, below: Vector, step: float) -> Vector:
-    return np.asarray((above - below) / (2 * step), np.float64)
-
-
-def _changed(probe: Probe, one: Vector, other: Vector) -> Positions:
-    """Return the slots whose bits differ."""
-    places = probe.positions
-    return np.asarray(places[one[places].view(np.int64) != other[places].view(np.int64)], np.intp)
-
-
-def _influential(probe: Probe, places: Positions, still: tuple[Vector, Vector]) -> list[int]:
-    """Return the signals with an effect a hyperperiod later, found by halving, as most signals have none."""
-    found: list[int] = []
-    waiting = [places] if places.size else []
-    while waiting:
-        group = waiting.pop()
-        memory, read = _nudged(probe, group)
-        if not _changed(probe, memory, still[0]).size and np.array_equal(read, still[1]):
-            continue
-        if group.size == 1:
-            found.append(int(group[0]))
-        else:
-            waiting += [group[: group.size // 2], group[group.size // 2 :]]
-    return found
-
-
-def _stacked(columns: Columns, places: Positions) -> tuple[Matrix, Matrix]:
-    """Return the derivatives of the state and of the channels by the state."""
-    a = [columns[place][0][places] for place in places.tolist()]
-    c = [columns[place][1] for place in places.tolist()]
-    return np.reshape(a, (len(a), len(a))).T, np.reshape(c, (len(a), -1 if c else 0)).T
-
-
 def _lifted(probe: Probe, places: Positions, columns: Columns) -> Linear:
     count, none = len(probe.channels), places[:0]
-    a, c = _stacked(columns, places)
+    a, c = stacked(columns, places)
     b, d = np.zeros((len(places), count)), np.zeros((count, count))
     for column, channel in enumerate(probe.channels):
         added = np.zeros(count)
         added[column] = STEP * probe.scale[channel.read]
         above, below = (probe.after(none, 0.0, sign * added) for sign in (1.0, -1.0))
-        b[:, column] = _slope(above[0], below[0], added[column])[places]
-        d[:, column] = _slope(above[1], below[1], added[column])
+        b[:, column] = slope(above[0], below[0], added[column])[places]
+        d[:, column] = slope(above[1], below[1], added[column])
     return Linear(a, b, c, d, probe.period, _states(probe, places), tuple(probe.channels))
 
 
@@ -319,8 +189,8 @@ def _derivative(probe: Probe, places: Positions) -> Linear:
             step = float(STEP * probe.scale[probe.channels[column - states].read])
             added[column - states] = step
         above, below = (probe.slopes(place, sign * step, sign * added) for sign in (1.0, -1.0))
-        matrix[:states, column] = _slope(above[0], below[0], step)[places]
-        matrix[states:, column] = _slope(above[1], below[1], step)
+        matrix[:states, column] = slope(above[0], below[0], step)[places]
+        matrix[states:, column] = slope(above[1], below[1], step)
     a, b = matrix[:states, :states], matrix[:states, states:]
     c, d = matrix[states:, :states], matrix[states:, states:]
     return Linear(a, b, c, d, 0.0, _states(probe, places), tuple(probe.channels))
@@ -337,7 +207,7 @@ def _check(probe: Probe, places: Positions, a: Matrix) -> None:
     size = STEP * probe.scale[places]
     delta = size * np.random.default_rng(3).uniform(-1.0, 1.0, places.size)
     above, below = (probe.after(places, sign * delta, count=CHECKED)[0] for sign in (1.0, -1.0))
-    found = _slope(above, below, 1.0)[places]
+    found = slope(above, below, 1.0)[places]
     wrong = np.abs(found - np.linalg.matrix_power(a, CHECKED) @ delta) / size
     if not wrong.max() <= CLOSE * max(1.0, float((np.abs(found) / size).max())):
         name = probe.names[int(places[int(np.nanargmax(wrong))])]

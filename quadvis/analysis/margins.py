@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.analysis.linearise import Linear, Matrix
+from quadvis.analysis.linearise import Linear
+from quadvis.analysis.probe import Matrix
 from quadvis.analysis.systems import library, state_space
 
 Complexes = NDArray[np.complex128]

@@ -21,6 +21,7 @@ from quadvis.errors import QuadvisError
 from quadvis.graph.graph import Graph, Task, Wire
 
 Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
 Positions = NDArray[np.intp]  # of slots
 STEP = 1e-5  # of a central difference, relative to values above 1; it gives errors near 1e-10
 LONGEST = 20_000  # ticks of the longest hyperperiod

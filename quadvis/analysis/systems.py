@@ -5,7 +5,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from quadvis.analysis.linearise import Linear, Matrix
+from quadvis.analysis.linearise import Linear
+from quadvis.analysis.probe import Matrix
 from quadvis.errors import QuadvisError
 
 
