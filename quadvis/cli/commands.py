@@ -9,11 +9,11 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from quadvis.cli.default_places import default_name, log_path, runs_folder
 from quadvis.errors import Fault, QuadvisError, RunError
-from quadvis.machine.files import SVG, Kind, file_name, write_output
+from quadvis.machine.files import SVG, Kind, write_output
 
 if TYPE_CHECKING:
-    from quadvis.diagram.diagram import Diagram
     from quadvis.library.catalogue import Catalogue, OwnBlocks
 
 SCHEMA = Kind("the schema", (b"{",), rb'"\$schema"')
@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
     from quadvis.run.session import run as run_diagram
 
     diagram = _load(options, stop_time=options.stop_time, seed=options.seed)
-    log = _log_path(options.log, diagram)
+    log = log_path(options.log, diagram)
     _print_warnings(diagram, options)
     gc.enable()
     try:
@@ -78,8 +78,8 @@ def sweep(options: argparse.Namespace) -> int:
     several = len(options.variant) > 1
     over = [f"variant={','.join(options.variant)}"] * several + options.over
     one = None if several else next(iter(options.variant), None)
-    name = f"{_default_name(options, one)}-sweep.csv"
-    table_path = Path(options.output or _runs_folder("table", "-o") / name)
+    name = f"{default_name(options, one)}-sweep.csv"
+    table_path = Path(options.output or runs_folder("table", "-o") / name)
     plot = table_path.parent / f"{table_path.stem}.png" if options.plot is None else Path(options.plot)
     if options.plot and plot.suffix != ".png":
         raise QuadvisError(f"cannot write the plot '{plot}': give a name that ends in .png")
@@ -97,35 +97,6 @@ def sweep(options: argparse.Namespace) -> int:
     if options.plot != "":
         print(f"plot: {plot}")
     return 0 if table.passed else FAILED
-
-
-def _log_path(given: str | None, diagram: Diagram) -> Path | None:
-    """Return the path of the log: the given path, or one in a folder that is made for logs."""
-    if given is not None:
-        return Path(given) if given else None
-    from quadvis.output.log_place import claim_log
-    from quadvis.run.session import metadata
-
-    names = diagram.name, diagram.variant, *(file.name for file in diagram.parameter_files)
-    return claim_log(_runs_folder("log", "--log"), "-".join(filter(None, names)), metadata(diagram))
-
-
-def _default_name(options: argparse.Namespace, variant: str | None) -> str:
-    """Return a name for the outputs of a diagram; it differs for other variants and parameter files."""
-    stem = Path(options.file).stem
-    name = [file_name(stem) if set(stem) & set("+,") else stem, *([file_name(variant)] if variant else [])]
-    return ",".join(("+".join(name), *(file_name(Path(file).stem) for file in options.params)))
-
-
-def _runs_folder(what: str, option: str) -> Path:
-    """Return the default folder for outputs; `option` can name another place."""
-    path = Path("runs")
-    try:
-        path.mkdir(exist_ok=True)
-    except OSError as error:
-        problem = f"cannot make the folder '{path}' for the {what}: {(error.strerror or str(error)).lower()}"
-        raise QuadvisError(f"{problem}; name another place with {option}") from error
-    return path
 
 
 def check(options: argparse.Namespace) -> int:
@@ -243,7 +214,7 @@ def draw(options: argparse.Namespace) -> int:
     from quadvis.diagram.picture import draw_diagram
 
     diagram = _load(options)
-    output = options.output or f"{_default_name(options, options.variant)}.svg"
+    output = options.output or f"{default_name(options, options.variant)}.svg"
     return _write(draw_diagram(diagram), output, SVG, diagram.inputs)
 
 

@@ -10,10 +10,11 @@ from quadvis.diagram.build import Builder, Made
 from quadvis.diagram.check import WireCheck
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.doubts import warn_parameters, warn_rates
-from quadvis.diagram.expand import Expansion, Parts
+from quadvis.diagram.expand import Expansion
 from quadvis.diagram.keys import RUN_SECTIONS
 from quadvis.diagram.loader import read_part
 from quadvis.diagram.outputs import check_writers
+from quadvis.diagram.parts import Parts
 from quadvis.diagram.sections.blocks import BLOCKS
 from quadvis.diagram.sections.context import Context
 from quadvis.diagram.sections.files import FILES, check_files

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from quadvis.diagram.expand import Parts
+from quadvis.diagram.parts import Parts
 from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec
 from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.rates import RATES

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from quadvis.block import Block, ParameterError
 from quadvis.diagram.names import remedy_for
+from quadvis.diagram.parts import Parts
 from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec, InputSpec
 from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.ports import PORTS
@@ -98,36 +99,6 @@ def _is_unit(text: str) -> bool:
         return bool(Unit.parse(text).dimension) if text else False
     except UnitError:
         return False
-
-
-class Parts:
-    """The files of parts, each read once; its faults are reported then."""
-
-    def __init__(self, read: Callable[[Path, Faults], FileSpec | Unknown], faults: Faults) -> None:
-        self._read, self.faults = read, faults
-        self._specs: dict[str, FileSpec | Unknown] = {}
-
-    @property
-    def files(self) -> list[Path]:
-        """The files that were read."""
-        return list(map(Path, self._specs))
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether all of them are known."""
-        return UNKNOWN not in self._specs.values()
-
-    def specs(self) -> list[FileSpec]:
-        """Return the files that have been read."""
-        return [spec for spec in self._specs.values() if known(spec)]
-
-    def read(self, file: Path) -> FileSpec | Unknown:
-        """Return the contents of a file."""
-        real = os.path.realpath(file)
-        if real not in self._specs:
-            with self.faults.about(""):
-                self._specs[real] = self._read(file, self.faults)
-        return self._specs[real]
 
 
 class Expansion:
