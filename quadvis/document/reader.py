@@ -28,8 +28,9 @@ from quadvis.document.node import YamlNode
 from quadvis.document.number_lists import find_lists, hide_lists
 from quadvis.document.tree import plain_value
 from quadvis.errors import DiagramError, Fault, Faults, Place, QuadvisError
+from quadvis.machine.files import reason
 from quadvis.machine.inputs import note_input
-from quadvis.machine.missing_file import file_trouble, system_reason
+from quadvis.machine.missing_file import file_trouble
 
 MAX_BYTES = 1_000_000
 
@@ -55,7 +56,7 @@ def read_yaml(path: str | os.PathLike[str], faults: Faults | None = None) -> Yam
                 raise _fault(Place(name), "this is not a file", "name a YAML file")
             data = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
-        raise _fault(Place(name), f"the file cannot be read: {system_reason(error)}") from None
+        raise _fault(Place(name), f"the file cannot be read: {reason(error)}") from None
     if len(data) > MAX_BYTES:
         raise _fault(Place(name, 1, 1), f"the file is larger than {MAX_BYTES // 1000} kB", "split it")
     note_input(name, data)

@@ -233,10 +233,12 @@ def same_file(path: PathLike, others: Iterable[PathLike]) -> Path | None:
 
 
 def reason(error: OSError | ValueError) -> str:
-    """Return the system's reason for an error, as a part of a sentence."""
+    """Return the system's reason for an error, as a part of a sentence; ValueError is that of a bad name."""
     if isinstance(error, FileNotFoundError):
         return "there is no such file or folder"
-    return ((error.strerror if isinstance(error, OSError) else None) or str(error)).lower()
+    if isinstance(error, ValueError):
+        return "no file can have this name"
+    return (error.strerror or str(error)).lower()
 
 
 def _identity(found: os.stat_result) -> Identity:

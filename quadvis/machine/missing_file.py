@@ -8,6 +8,7 @@ import stat
 from collections.abc import Container
 
 from quadvis.errors import closest, quoted
+from quadvis.machine.files import reason
 
 RELATIVE = "a path is relative to the file in which it stands"
 
@@ -26,17 +27,12 @@ def file_trouble(name: str, shown: str = "", but: Container[str] = ()) -> tuple[
     except (OSError, ValueError) as error:
         if shown and getattr(error, "errno", None) in (errno.ENAMETOOLONG, errno.ENOTDIR):
             return missing, RELATIVE
-        return f"the file cannot be read: {system_reason(error)}", ""
+        return f"the file cannot be read: {reason(error)}", ""
     if stat.S_ISREG(mode):
         return "", ""
     if not stat.S_ISDIR(mode):
         return "this is not a file but a pipe or a device", "name a YAML file"
     return (missing, RELATIVE) if shown else ("this is not a file", "name a YAML file")
-
-
-def system_reason(error: OSError | ValueError) -> str:
-    """Return the system's reason for refusing a file; ValueError is its error for an impossible name."""
-    return (error.strerror if isinstance(error, OSError) else None) or "embedded null byte"
 
 
 def _near_file(name: str, shown: str, but: Container[str]) -> str:
