@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import re
-import stat
 from typing import Any
 
 import yaml
@@ -28,8 +27,7 @@ from quadvis.document.node import YamlNode
 from quadvis.document.number_lists import find_lists, hide_lists
 from quadvis.document.tree import plain_value
 from quadvis.errors import DiagramError, Fault, Faults, Place, QuadvisError
-from quadvis.machine.files import reason
-from quadvis.machine.inputs import note_input
+from quadvis.machine.inputs import InputError, TooLongError, read_input
 from quadvis.machine.missing_file import file_trouble
 
 MAX_BYTES = 1_000_000
@@ -47,19 +45,16 @@ _MOST_REPAIRS, _MOST_READ = 50, 3 * MAX_BYTES
 def read_yaml(path: str | os.PathLike[str], faults: Faults | None = None) -> YamlNode:
     """Read a YAML file of at most 1 MB; see `parse_yaml`. Any fault raises `DiagramError`."""
     name = os.fspath(path)
+    problem, remedy = file_trouble(name)
+    if problem:
+        raise _fault(Place(name), problem, remedy)
     try:
-        problem, remedy = file_trouble(name)
-        if problem:
-            raise _fault(Place(name), problem, remedy)
-        with open(os.open(name, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                raise _fault(Place(name), "this is not a file", "name a YAML file")
-            data = file.read(MAX_BYTES + 1)
-    except (OSError, ValueError) as error:
-        raise _fault(Place(name), f"the file cannot be read: {reason(error)}") from None
-    if len(data) > MAX_BYTES:
-        raise _fault(Place(name, 1, 1), f"the file is larger than {MAX_BYTES // 1000} kB", "split it")
-    note_input(name, data)
+        data = read_input(name, MAX_BYTES)
+    except TooLongError:
+        problem, remedy = f"the file is larger than {MAX_BYTES // 1000} kB", "split it"
+        raise _fault(Place(name, 1, 1), problem, remedy) from None
+    except InputError as error:
+        raise _fault(Place(name), f"the file cannot be read: {error.why}") from None
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:

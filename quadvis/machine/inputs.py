@@ -1,7 +1,7 @@
 """Read input files: each one once, whole, within bounds, and note the SHA-256 of its contents.
 
-A run must use the same files that were checked. So every reader of a file calls `note_input`, and the loader
-of a diagram keeps the noted digests: a file that changes between two readings is refused.
+A run must use the same files that were checked. So what reads a file notes its digest, and the loader of a
+diagram keeps the noted digests: a file that changes between two readings is refused.
 """
 
 from __future__ import annotations
@@ -19,11 +19,25 @@ from quadvis.machine.files import PathLike, reason
 
 MOST_BYTES = 256_000_000
 
+
+class InputError(QuadvisError):
+    """A file that cannot be read; ``why`` is the reason without the file's name."""
+
+    def __init__(self, path: PathLike, why: str, what: str = "") -> None:
+        """Keep the reason separately, for messages that name the place of the file by themselves."""
+        self.why = why
+        super().__init__(f"cannot read {f'{what} ' if what else ''}'{os.fspath(path)}': {why}")
+
+
+class TooLongError(InputError):
+    """A file that has more bytes than are read."""
+
+
 _noted: ContextVar[dict[str, str] | None] = ContextVar("noted", default=None)
 
 
 def read_input(path: PathLike, most: int | None = MOST_BYTES, what: str = "") -> bytes:
-    """Return a file's contents; QuadvisError if it is no file, unreadable, or longer than `most` bytes.
+    """Return a file's contents; InputError if it is no file, unreadable, or longer than `most` bytes.
 
     `what` names the file in the error, such as "the log". Pipes and devices are refused without waiting.
     """
@@ -31,31 +45,26 @@ def read_input(path: PathLike, most: int | None = MOST_BYTES, what: str = "") ->
         try:
             data = file.read() if most is None else file.read(most + 1)
         except OSError as error:
-            raise _refusal(path, reason(error), what) from error
+            raise InputError(path, reason(error), what) from error
     if most is not None and len(data) > most:
-        raise _refusal(path, f"it has more than {most / 1e6:g} MB", what)
-    note_input(path, data)
+        raise TooLongError(path, f"it has more than {most / 1e6:g} MB", what)
+    if _noted.get() is not None:
+        note_digest(path, hashlib.sha256(data).hexdigest())
     return data
 
 
 def open_input(path: PathLike, what: str = "") -> BufferedReader:
-    """Open a file for reading. QuadvisError if it is missing, or a pipe or device, without waiting."""
+    """Open a file for reading. InputError if it is missing, or a pipe or device, without waiting."""
     try:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
     except (OSError, ValueError) as error:
-        raise _refusal(path, reason(error), what) from error
+        raise InputError(path, reason(error), what) from error
     kind = os.fstat(descriptor).st_mode
     if not stat.S_ISREG(kind):
         os.close(descriptor)
         why = "it is a folder" if stat.S_ISDIR(kind) else "it is a device or a pipe, not a file"
-        raise _refusal(path, why, what)
+        raise InputError(path, why, what)
     return os.fdopen(descriptor, "rb")
-
-
-def note_input(path: PathLike, data: bytes) -> None:
-    """Note the contents that were read from a file; QuadvisError if an earlier reading gave others."""
-    if _noted.get() is not None:
-        note_digest(path, hashlib.sha256(data).hexdigest())
 
 
 def note_digest(path: PathLike, digest: str) -> None:
@@ -66,12 +75,12 @@ def note_digest(path: PathLike, digest: str) -> None:
 
 
 def file_digest(path: PathLike) -> str:
-    """Return the SHA-256 of a file of any size, and note it; QuadvisError if it cannot be read."""
+    """Return the SHA-256 of a file of any size, and note it; InputError if it cannot be read."""
     with open_input(path) as file:
         try:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
         except OSError as error:
-            raise _refusal(path, reason(error)) from error
+            raise InputError(path, reason(error)) from error
     note_digest(path, digest)
     return digest
 
@@ -85,7 +94,3 @@ def noted_inputs() -> Iterator[Mapping[str, str]]:
         yield found
     finally:
         _noted.reset(token)
-
-
-def _refusal(path: PathLike, why: str, what: str = "") -> QuadvisError:
-    return QuadvisError(f"cannot read {f'{what} ' if what else ''}'{os.fspath(path)}': {why}")

@@ -17,7 +17,7 @@ import quadvis
 from quadvis.api import Diagram, load_text
 from quadvis.block import Block, Frame, Out, Param, ParameterError
 from quadvis.errors import QuadvisError
-from quadvis.machine.inputs import file_digest, note_digest, note_input, noted_inputs, open_input, read_input
+from quadvis.machine.inputs import file_digest, note_digest, noted_inputs, open_input, read_input
 from quadvis.output.log_reader import read_log
 from quadvis.sweeps import sweep as sweeping
 from quadvis.sweeps import worker
@@ -363,7 +363,7 @@ def test_files_that_are_read_are_noted_once(tmp_path: Path) -> None:
         assert read_input(path) == b"first" and read_input(str(path)) == b"first"
         digest = file_digest(path)
         with noted_inputs() as inner:
-            note_input("b", b"second")
+            note_digest("b", "second")
         note_digest("c", "xyz")
         path.write_bytes(b"other")
         with pytest.raises(QuadvisError, match="was changed while it was being read"):
