@@ -19,6 +19,7 @@ from quadvis.analysis.systems import closed_loop
 from quadvis.analysis.vary import STABLE, Limits
 from quadvis.diagram.sections.analyse import Cut
 from quadvis.errors import DiagramError
+from quadvis.errors.caller import as_given
 from quadvis.graph.graph import Graph
 from quadvis.output.statistics import finite
 
@@ -147,5 +148,6 @@ def _way_out(diagram: Diagram) -> str:
         with suppress(DiagramError):  # the variant may not fit the settings of this diagram
             other = load(diagram.path, variant=variant, settings=diagram.settings, params=params)
             if _seen(other.graph) is None:
-                return f"the variant '{variant}' has none: --variant {variant}"
+                choice = as_given(f"--variant {variant}", f"variant={variant!r}")
+                return f"the variant '{variant}' has none: {choice}"
     return "use a camera without pictures, such as vision.geometric_camera"

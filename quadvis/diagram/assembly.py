@@ -31,6 +31,7 @@ from quadvis.diagram.times import read_duration
 from quadvis.diagram.wiring import Wiring
 from quadvis.document import YamlScalar
 from quadvis.errors import UNKNOWN, DiagramError, Faults, Place, Unknown, known, quoted
+from quadvis.errors.caller import as_given
 from quadvis.graph.graph import Graph
 from quadvis.graph.names import wire_text
 from quadvis.library.catalogue import Catalogue, OwnBlocks
@@ -120,17 +121,19 @@ class Assembly:
 
 
 def _stop_time(spec: FileSpec, given: str | float | None, faults: Faults) -> Fraction:
+    name = as_given("--stop-time", "stop_time")
     if given is not None:
         text = given if isinstance(given, str) else f"{float(given)!r} s"
-        return faults.collect(read_duration, YamlScalar(text, False, "--stop-time", 0, 0)) or Fraction(0)
+        return faults.collect(read_duration, YamlScalar(text, False, name, 0, 0)) or Fraction(0)
     written = spec[STOP_TIME]
     if written is None:
-        faults.add(spec.top, "key 'stop_time' is missing", "add 'stop_time: 10 s', or give --stop-time")
+        faults.add(spec.top, "key 'stop_time' is missing", f"add 'stop_time: 10 s', or give {name}")
         return Fraction(0)
     return written if known(written) else Fraction(0)
 
 
 def _seed(seed: int, faults: Faults) -> int:
     if not -(2**63) <= seed < 2**63:
-        faults.add(Place("--seed"), f"the seed {quoted(seed)} does not fit 64 bits", "give a smaller one")
+        place, problem = Place(as_given("--seed", "seed")), f"the seed {quoted(seed)} does not fit 64 bits"
+        faults.add(place, problem, "give a smaller one")
     return seed

@@ -10,6 +10,7 @@ from quadvis.diagram.sections.section import DIAGRAM, PART, Values
 from quadvis.diagram.spec import FileSpec
 from quadvis.document import YamlMap, YamlNode, parse_yaml, read_yaml
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown
+from quadvis.errors.caller import as_given
 
 
 def read_file(path: Path, faults: Faults) -> FileSpec | Unknown:
@@ -44,7 +45,7 @@ def _is_kind(root: YamlMap, faults: Faults, kind: str) -> bool:
     problem = remedy = ""
     if "set" in root and "blocks" not in root:
         key, problem = "set", "this is a parameter file, since it has 'set'"
-        remedy = "give the diagram, and this file with --params"
+        remedy = f"give the diagram, and this file with {as_given('--params', 'params')}"
     elif kind == DIAGRAM and "ports" in root:
         key, problem = "ports", "this is a part of a diagram, since it has 'ports'"
         remedy = "give a diagram that names it as 'part: file.yaml'"

@@ -24,11 +24,10 @@ from quadvis.diagram.sections.header import is_version
 from quadvis.diagram.values import read_constant
 from quadvis.document import YamlList, YamlMap, YamlNode, parse_yaml, read_yaml
 from quadvis.errors import UNKNOWN, DiagramError, Faults, Odd, Place, Unknown, known
+from quadvis.errors.caller import as_given
 from quadvis.errors.characters import first_odd
 from quadvis.machine.missing_file import file_trouble
 
-COMMAND_LINE = "--set"
-ARGUMENT = "settings"  # of the functions for those who work in Python
 PARAMETERS_REQUIRED = ("quadvis", "name", "set")
 PARAMETERS_KEYS = ("doc", "base")
 MAX_DEPTH = 30  # of files that build on files
@@ -69,8 +68,7 @@ def read_settings(given: Given, params: Files, faults: Faults) -> tuple[Settings
         bases: list[Path] = []
         name = _read_file(path, (), found, bases, faults)
         files.append(ParameterFile(name or path.stem, path, tuple(bases)))
-    origin = ARGUMENT if isinstance(given, Mapping) else COMMAND_LINE
-    for path_and_name, setting in _from_texts(setting_texts(given), origin, faults):
+    for path_and_name, setting in _from_texts(setting_texts(given), faults):
         _put(found, path_and_name, setting)
     return found, tuple(files)
 
@@ -148,20 +146,25 @@ def _wrong_base(path: Path, text: str, users: tuple[str, ...]) -> tuple[str, str
     return file_trouble(str(path), text, users)
 
 
-def _from_texts(texts: Iterable[str], origin: str, faults: Faults) -> Iterator[tuple[str, Setting]]:
+def settings_origin() -> str:
+    """Return the file name in the places of settings that stand in no file."""
+    return as_given("--set", "settings")
+
+
+def _from_texts(texts: Iterable[str], faults: Faults) -> Iterator[tuple[str, Setting]]:
     """Yield the names and values of ``block.parameter=value``; report their faults."""
     for number, setting in enumerate(texts, 1):
         name, _, text = (part.strip(" \r\n") for part in setting.partition("="))
-        place = Place(origin, 0, number, _odd(name))
+        place = Place(settings_origin(), 0, number, _odd(name))
         parameter = name.rpartition(".")[2]
         with faults.about(f"'{name}'"):
             if not text or not parameter:
                 problem = "there is no value" if parameter else "there is no parameter"
-                example = "control/roll.bandwidth", "2 rad/s"
-                remedy = "write block.parameter=value, such as {}='{}'".format(*example)
-                if origin == ARGUMENT:
-                    remedy = "write block.parameter and value, such as {{'{}': '{}'}}".format(*example)
-                faults.add(place, problem, remedy)
+                example = as_given(
+                    "block.parameter=value, such as control/roll.bandwidth='2 rad/s'",
+                    "block.parameter and value, such as {'control/roll.bandwidth': '2 rad/s'}",
+                )
+                faults.add(place, problem, f"write {example}")
                 continue
             node = faults.read(read_setting, text, parameter, place)
             yield name, Setting(place, read_constant(node, faults) if known(node) else UNKNOWN)

@@ -21,6 +21,7 @@ from types import ModuleType
 
 from quadvis.block import OWN_MODULES, Block
 from quadvis.errors import QuadvisError, sentence, suggestion
+from quadvis.errors.caller import as_given
 from quadvis.machine.source_line import source_line
 
 STANDARD = "quadvis_blocks"
@@ -104,7 +105,8 @@ class Catalogue:
             problem = (
                 f"block '{name}' is code of this diagram's own, in {str(file)!r}, and such code is refused"
             )
-            raise CatalogueError(problem, "read it, and leave out --no-own-blocks if you trust it")
+            refusal = as_given("--no-own-blocks", "own_blocks=False")
+            raise CatalogueError(problem, f"read it, and leave out {refusal} if you trust it")
         if callable(self.own_blocks) and self.own is not None:
             self.own_blocks(self.own)
 

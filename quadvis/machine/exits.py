@@ -15,6 +15,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from quadvis.errors import QuadvisError
+from quadvis.errors.caller import command_words
 from quadvis.machine.failures import MEMORY, surroundings
 from quadvis.machine.files import reason
 
@@ -69,7 +70,7 @@ def ended(command: Callable[[], int], name: str = "", enough: int = PIPE_BROKEN)
     """
     global _ctrl_c
     _ctrl_c = False
-    with _streams():
+    with _streams(), command_words():
         try:
             code = _flushed(command)
         except BrokenPipeError:  # the reader, such as head, has ended

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from quadvis.diagram.settings import value_text
 from quadvis.errors import QuadvisError, quoted
+from quadvis.errors.caller import as_given
 from quadvis.units import Unit, UnitError, split_quantity
 
 SEED, VARIANT, PARAMS = "seed", "variant", "params"
@@ -74,7 +75,8 @@ def read_axes(over: Over) -> tuple[Axis, ...]:
         texts = _read(name, values) if isinstance(values, str) else [_text(name, value) for value in values]
         axes[name] = _axis(name, texts)
     if not axes:
-        raise QuadvisError("there is nothing to sweep over; give --over, such as seed=0..29")
+        example = as_given("--over, such as seed=0..29", "an axis, such as {'seed': range(30)}")
+        raise QuadvisError(f"there is nothing to sweep over; give {example}")
     count = math.prod(len(axis.values) for axis in axes.values())
     if count > MOST_RUNS:
         raise QuadvisError(f"these are {count} runs; at most {MOST_RUNS} go into one sweep")

@@ -8,8 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from quadvis.diagram.diagram import Diagram
-from quadvis.diagram.settings import COMMAND_LINE
+from quadvis.diagram.settings import settings_origin
 from quadvis.errors import DiagramError, Fault, Place, QuadvisError
+from quadvis.errors.caller import as_given
 from quadvis.library.catalogue import OwnBlocks
 from quadvis.sweeps.axes import NONE, PARAMS, SEED, VARIANT, Axis
 from quadvis.sweeps.worker import Configuration, Job
@@ -76,15 +77,16 @@ class Grid:
             if str(found) == str(error):  # no fault names the value and the axis that caused it
                 for axis, index in zip(self.axes, point, strict=True):
                     if index and axis.name not in NOT_SET:
-                        found.add_note(f"with --over {axis.name}={axis.values[index]}")
+                        found.add_note(f"with {_origin(axis, index)}")
             raise found from None
 
     def _placed(self, fault: Fault, point: Sequence[int]) -> Fault:
         """Return the fault; a fault of an axis's value gets the place where the value was given."""
         for axis, index in zip(self.axes, point, strict=True):
             parameter = axis.name.rpartition(".")[2]
-            if fault.place.file == COMMAND_LINE and axis.name not in NOT_SET and parameter in str(fault):
-                return replace(fault, place=Place(f"--over {axis.name}={axis.values[index]}"))
+            is_set = fault.place.file == settings_origin() and axis.name not in NOT_SET
+            if is_set and parameter in str(fault):
+                return replace(fault, place=Place(_origin(axis, index)))
         return fault
 
     def jobs(self, folder: Path | None) -> Iterator[Job]:
@@ -101,3 +103,8 @@ class Grid:
         values = [f"{axis.name}={axis.label(index)}" for axis, index in zip(self.axes, point, strict=True)]
         digits = len(str(len(self.points) - 1))
         return re.sub(r"[^A-Za-z0-9_.=-]+", "-", "-".join([f"{row:0{digits}}", *values]))[:120]
+
+
+def _origin(axis: Axis, index: int) -> str:
+    """Return where a value of an axis was given."""
+    return f"{as_given('--over', 'over')} {axis.name}={axis.values[index]}"

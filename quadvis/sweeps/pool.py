@@ -20,6 +20,7 @@ from queue import Empty, SimpleQueue
 from types import ModuleType
 
 from quadvis.errors import RunError
+from quadvis.errors.caller import IS_COMMAND
 from quadvis.machine.interrupts import held_back
 from quadvis.sweeps.worker import ONE_THREAD, Job, Row, begin, perform
 
@@ -44,7 +45,10 @@ def perform_all(jobs: Sequence[Job], workers: int) -> Generator[Row | None, None
     with held_back():  # Python's own helper process must survive the terminal, too
         resource_tracker.ensure_running()
     executor = ProcessPoolExecutor(
-        min(workers, len(jobs)), multiprocessing.get_context("spawn"), initializer=begin
+        min(workers, len(jobs)),
+        multiprocessing.get_context("spawn"),
+        initializer=begin,
+        initargs=(IS_COMMAND.get(),),
     )
     finished = False
     try:
@@ -64,7 +68,7 @@ def perform_all(jobs: Sequence[Job], workers: int) -> Generator[Row | None, None
         finished = True
     except BrokenProcessPool:
         problem = "a worker process was killed, perhaps by the system for lack of memory"
-        raise RunError(f"{problem}; try fewer with --workers") from None
+        raise RunError(f"{problem}; try fewer workers") from None
     finally:
         children: set[BaseProcess] = set(multiprocessing.active_children()) - before
         executor.shutdown(wait=finished, cancel_futures=True)

@@ -16,6 +16,7 @@ import numpy as np
 
 from quadvis.diagram.settings import Files, Given, value_text
 from quadvis.errors import QuadvisError, quoted
+from quadvis.errors.caller import as_given
 from quadvis.library.catalogue import OwnBlocks
 from quadvis.machine.files import PLOT, Claim, check_output
 from quadvis.sweeps.axes import SEED, VARIANT, Axis, Over, points, read_axes
@@ -122,7 +123,7 @@ class _Saving:
     def words(self) -> str:
         """The advice on how to continue a stopped sweep."""
         kept = self.path is not None and self.collection.rows
-        return f" and in {self.path}; --resume does the rest" if kept else ""
+        return f" and in {self.path}; {as_given('--resume', 'resume=True')} does the rest" if kept else ""
 
     def now_and_then(self) -> None:
         """Append new rows if the last time is long enough ago; after `kill -9` these rows are left."""
@@ -198,7 +199,7 @@ def _earlier(path: Path, quantities: Sequence[Quantity]) -> dict[str, Row]:
         names = (HASH, FAILURE, PASSED, *(quantity.column for quantity in quantities))
         if any(name not in cells for name in names):
             problem = f"cannot go on with '{path}': it is not a table of this sweep"
-            raise QuadvisError(f"{problem}; leave --resume out to begin anew")
+            raise QuadvisError(f"{problem}; leave {as_given('--resume', 'resume')} out to begin anew")
         if not cells[FAILURE]:
             numbers = tuple(_number(cells[quantity.column]) for quantity in quantities)
             units = tuple(quantity.unit for quantity in quantities)

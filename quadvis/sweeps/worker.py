@@ -10,6 +10,7 @@ from multiprocessing import parent_process
 from typing import TYPE_CHECKING
 
 from quadvis.errors import QuadvisError
+from quadvis.errors.caller import IS_COMMAND
 from quadvis.machine.interrupts import leave_to_parent
 from quadvis.output.statistics import COUNT, FINAL
 
@@ -158,8 +159,9 @@ def _limit(diagram: Diagram, selection: Selection, statistic: str) -> float | No
 _loaded: tuple[Configuration, Diagram] | None = None
 
 
-def begin() -> None:
-    """Prepare a worker process."""
+def begin(is_command: bool) -> None:
+    """Prepare a worker process, for a sweep that a command or Python has asked for."""
+    IS_COMMAND.set(is_command)
     leave_to_parent()
     threading.Thread(target=_end_with_parent, daemon=True).start()
 

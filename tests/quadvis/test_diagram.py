@@ -124,7 +124,7 @@ def test_a_stop_time_that_is_none_is_a_fault(
 ) -> None:
     with pytest.raises(DiagramError) as caught:
         small(stop_time=stop_time)
-    assert [fault.place.file for fault in caught.value.faults] == ["--stop-time"]
+    assert [fault.place.file for fault in caught.value.faults] == ["stop_time"]
 
 
 def test_the_first_and_the_last_tick_are_run(small: Callable[..., quadvis.Diagram]) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from quadvis.api import check, load
 from quadvis.errors import DiagramError, Fault
+from quadvis.errors.caller import command_words
 
 from .corpus import Case, all_cases
 
@@ -26,17 +27,18 @@ def faults(case: Case, folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[Fa
     options = parser.parse_args(case.arguments)
     settings = options.set
     try:
-        if options.variant or options.stop_time or options.seed:
-            load(
-                "case.yaml",
-                variant=options.variant,
-                settings=settings,
-                params=options.params,
-                stop_time=options.stop_time,
-                seed=options.seed,
-            )
-        else:
-            check("case.yaml", settings, options.params)
+        with command_words():
+            if options.variant or options.stop_time or options.seed:
+                load(
+                    "case.yaml",
+                    variant=options.variant,
+                    settings=settings,
+                    params=options.params,
+                    stop_time=options.stop_time,
+                    seed=options.seed,
+                )
+            else:
+                check("case.yaml", settings, options.params)
     except DiagramError as error:
         return error.faults
     return []

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+import quadvis
 from quadvis.api import check, load, load_text
 from quadvis.document import read_yaml
-from quadvis.errors import DiagramError, Fault, closest, suggestion
+from quadvis.errors import DiagramError, Fault, QuadvisError, closest, suggestion
+from quadvis.errors.caller import command_words
 from quadvis.machine.missing_file import file_trouble
 
 HEAD = "quadvis: 1\nname: n\nrates: {fast: 100 Hz, slow: 10 Hz}\nstop_time: 1 s\n"
@@ -97,17 +102,45 @@ def test_a_wrong_setting_is_one_fault_that_names_where_it_was_given(name: str, t
     path = tmp_path / "d.yaml"
     path.write_text(DIAGRAM.replace("with: {after: $size}", "with: {after: $size, before: $size}"))
     for value in SETTINGS[name]:
-        for settings, origin in (([f"{name}={value}"], "--set"), ({name: value}, "settings")):
+        texts, mapping = [f"{name}={value}"], {name: value}
+        for words, settings in ((command_words, texts), (nullcontext, texts), (nullcontext, mapping)):
+            origin = "--set" if words is command_words else "settings"
             for function in (load, check):
                 try:
-                    function(path, settings=settings)
+                    with words():
+                        function(path, settings=settings)
                 except DiagramError as error:
                     (fault,) = error.faults
                     assert str(fault).startswith(f"{origin}: ") and (
-                        origin == "--set" or "--set" not in str(fault)
+                        origin == "--set" or "--" not in str(fault)
                     )
                 else:
                     assert name == "size" and value in ("1", "[1 m, 2 m]")
+
+
+CALLS: dict[str, tuple[Callable[[Path], Any], str]] = {
+    "stop_time": (lambda path: load(path, stop_time="5"), "stop_time: '5' has no unit"),
+    "seed": (lambda path: load(path, seed=2**64), "seed: the seed '18446744073709551616' does not fit"),
+    "settings": (lambda path: quadvis.sweep(path, ["seed=1"], settings={"sise": "1 m"}), "settings: "),
+    "over": (lambda path: quadvis.sweep(path, {"lag.time_constant": ["1 s", "2"]}), "over lag.time_"),
+    "nothing": (lambda path: quadvis.sweep(path, {}), "give an axis, such as {'seed': range(30)}"),
+    "cuts": (lambda path: load(path).analyse(cuts={"a": "lagg.y"}), "cuts: there is no block 'lagg'"),
+    "limits": (lambda path: load(path).analyse(limits={"a": ("sise", "1 m", "2 m")}), "limits: "),
+    "own_blocks": (lambda path: load(path.with_name("own.yaml"), own_blocks=False), "out own_blocks=False"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_python_is_answered_in_its_own_words(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "d.yaml"
+    path.write_text(DIAGRAM)
+    (tmp_path / "own.yaml").write_text(DIAGRAM.replace("signal.low_pass", "mine.lag"))
+    (tmp_path / "blocks" / "mine").mkdir(parents=True)
+    (tmp_path / "blocks" / "mine" / "lag.py").touch()
+    call, words = CALLS[name]
+    with pytest.raises(QuadvisError) as caught:
+        call(path)
+    assert words in str(caught.value) and "--" not in str(caught.value)
 
 
 def test_several_settings_are_told_apart_by_their_number(tmp_path: Path) -> None:
@@ -127,7 +160,7 @@ def test_a_range_of_a_parameter_is_not_blamed_for_its_value(tmp_path: Path) -> N
     load(path)
     with pytest.raises(DiagramError) as caught:
         load(path, settings=["lag=1"])
-    assert str(caught.value) == "--set: 'lag': '1' has no unit; did you mean '1 s'?"
+    assert str(caught.value) == "settings: 'lag': '1' has no unit; did you mean '1 s'?"
 
 
 @pytest.mark.parametrize("step", ["3 ms", "7 ms", "1/3 s", "0.3 ms", "11 ms"])

@@ -275,9 +275,11 @@ def test_what_is_wrong_in_the_middle_of_a_long_axis_is_a_row_and_at_its_ends_a_f
     values = [f"{number} mm" for number in range(120)]
     table = quadvis.sweep("loop.yaml", {"noise.sigma": [*values[:60], "-1 mm", *values[60:]]})
     assert [row for row, failure in enumerate(table["failure"]) if failure] == [60]
-    assert "sigma must be at least 0" in table["failure"][60]
+    assert (
+        table["failure"][60].startswith("settings: ") and "sigma must be at least 0" in table["failure"][60]
+    )
     for wrong in ([*values, "-1 mm"], ["-1 mm", *values], [values[0], "-1 mm", *values[1:]]):
-        with pytest.raises(QuadvisError, match=r"--over noise.sigma=-1 mm: .* at least 0"):
+        with pytest.raises(QuadvisError, match=r"^over noise.sigma=-1 mm: .* at least 0"):
             quadvis.sweep("loop.yaml", {"noise.sigma": wrong})
 
 
@@ -601,7 +603,7 @@ def test_a_worker_that_is_killed_is_told_in_one_sentence() -> None:
     _, told = process.communicate(timeout=60)
     assert process.returncode == 1
     assert told.splitlines() == [
-        "a worker process was killed, perhaps by the system for lack of memory; try fewer with --workers",
+        "a worker process was killed, perhaps by the system for lack of memory; try fewer workers",
         "0 of 10 runs are finished",
     ]
     assert all(wait_for(lambda pid=pid: gone(pid)) for pid in workers)

@@ -17,6 +17,7 @@ from quadvis.diagram.variable import Variable, find_variable
 from quadvis.diagram.wiring import Wiring
 from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar
 from quadvis.errors import UNKNOWN, Faults, Unknown, known
+from quadvis.errors.caller import as_given
 from quadvis.graph.names import wire_text
 from quadvis.units import Unit, split_quantity
 
@@ -131,14 +132,16 @@ def _text(text: str, place: str, key: str = "") -> YamlScalar:
 
 def _list(signals: str | Sequence[str]) -> YamlNode:
     texts = [signals] if isinstance(signals, str) else list(signals)
-    return YamlList([_text(text, "--cut") for text in texts], "--cut", 0, 0)
+    place = as_given("--cut", "cuts")
+    return YamlList([_text(text, place) for text in texts], place, 0, 0)
 
 
 def _map(limit: tuple[str, str, str]) -> YamlMap:
+    place = as_given("--vary", "limits")
     values: dict[str, YamlNode] = {
-        key: _text(text, "--vary", key) for key, text in zip(LIMIT_KEYS, limit, strict=True)
+        key: _text(text, place, key) for key, text in zip(LIMIT_KEYS, limit, strict=True)
     }
-    return YamlMap({}, values, "--vary", 0, 0)
+    return YamlMap({}, values, place, 0, 0)
 
 
 def _cut(label: str, node: YamlNode, context: Context) -> Cut | Unknown:

@@ -92,7 +92,7 @@ def test_a_value_that_the_block_does_not_take_is_told_as_for_set(tmp_path) -> No
 
 def test_a_question_that_names_nothing_is_told() -> None:
     with pytest.raises(
-        DiagramError, match=r"--vary: the diagram has no parameter 'lagg'; did you mean 'lag'\?"
+        DiagramError, match=r"^limits: the diagram has no parameter 'lagg'; did you mean 'lag'\?"
     ):
         limit(bare("margins.yaml"), "lagg", "0 s", "1 s")
 
