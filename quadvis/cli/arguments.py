@@ -1,4 +1,4 @@
-"""Read the arguments of `quadvis`, and report a wrong one in one sentence.
+"""Read the arguments of `quadvis` and of the tools, and report a wrong one in one sentence.
 
 argparse writes the help and makes the options. This module makes the sentences, from the declared options.
 """
@@ -6,7 +6,7 @@ argparse writes the help and makes the options. This module makes the sentences,
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 
 from quadvis.errors import QuadvisError, quoted, sentence, suggestion
@@ -40,10 +40,12 @@ class Parser(argparse.ArgumentParser):
 
 
 def understood(parser: Parser, arguments: Sequence[str]) -> argparse.Namespace:
-    """Return the options of a command; QuadvisError says which one is wrong, and why."""
+    """Return the options of a command, or of a tool; QuadvisError says which one is wrong, and why."""
     for argument in arguments:
         if "\0" in argument:
             raise QuadvisError(f"{quoted(argument)} holds a character that no name and no value can have")
+    if not parser.commands:
+        return parser.parse_args(_checked(parser, arguments))
     for index, word in enumerate(arguments):
         if word in HELP or word in parser.options:
             break
@@ -62,7 +64,7 @@ def understood(parser: Parser, arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def _checked(parser: Parser, words: Sequence[str]) -> list[str]:
-    """Return the words of a command with each value joined to its option, so that it may begin with '-'."""
+    """Return the words with each value joined to its option, so that it may begin with '-'."""
     found: list[str] = []
     placed: list[str] = []
     waiting = list(words)
@@ -77,15 +79,17 @@ def _checked(parser: Parser, words: Sequence[str]) -> list[str]:
             ended = True
         else:
             found += _option(parser, word, waiting)
-    for place, word in zip(parser.places, placed, strict=False):
+    needed = [place for place in parser.places if place.nargs is None]
+    further = [place for place in parser.places if place.nargs == "*"] * (len(placed) - len(needed))
+    for place, word in zip([*needed, *further], placed, strict=False):
         if place.choices is not None and word not in place.choices:
             remedy = suggestion(word, map(str, place.choices))
             raise QuadvisError(sentence(f"{_name(place)} cannot be {quoted(word)}", remedy))
-    if len(placed) < len(parser.places):
-        missing = " and ".join(_name(place) for place in parser.places[len(placed) :])
+    if len(placed) < len(needed):
+        missing = " and ".join(_name(place) for place in needed[len(placed) :])
         raise QuadvisError(f"{missing} is missing; write {_usage(parser)}")
-    if len(placed) > len(parser.places):
-        raise QuadvisError(f"{quoted(placed[len(parser.places)])} is one too many; write {_usage(parser)}")
+    if len(placed) > len(needed) + len(further):
+        raise QuadvisError(f"{quoted(placed[len(needed)])} is one too many; write {_usage(parser)}")
     return [*found, "--", *placed] if placed else found
 
 
@@ -107,18 +111,19 @@ def _option(parser: Parser, word: str, waiting: list[str]) -> list[str]:
         equals, value = "=", waiting.pop(0)
     if not equals or value == "--":
         raise QuadvisError(f"{name} needs a value; write {name} {_name(action)}")
-    if action.type is not None and not _is_read(action.type, value):
-        raise QuadvisError(f"{name}: {quoted(value)} is not a whole number; write one, such as 3")
+    _check_value(action, name, value)
     return [f"{action.option_strings[0]}={value}"]
 
 
-def _is_read(read: Callable[[str], Any] | argparse.FileType | str, value: str) -> bool:
-    """Return whether an option takes a value; options without texts take whole numbers."""
+def _check_value(action: argparse.Action, name: str, value: str) -> None:
+    """Refuse a value that an option does not take; ArgumentTypeError of its type is what is wrong."""
     try:
-        read(value)  # type: ignore[operator]
+        if action.type is not None:
+            action.type(value)  # type: ignore[operator]
+    except argparse.ArgumentTypeError as error:
+        raise QuadvisError(f"{name}: {error}; write {name} {_name(action)}") from None
     except ValueError:
-        return False
-    return True
+        raise QuadvisError(f"{name}: {quoted(value)} is not a whole number; write one, such as 3") from None
 
 
 def _name(action: argparse.Action) -> str:

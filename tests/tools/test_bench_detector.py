@@ -95,7 +95,7 @@ def test_without_apriltag_its_row_says_how_to_install_it(tmp_path):
 def test_a_section_that_is_none_is_refused():
     done = run("speeds")
     assert done.returncode == 2
-    assert "unknown section 'speeds'; there are conditions, speed, occlusion" in done.stderr
+    assert done.stderr == "bench_detector: there is no section 'speeds'; did you mean 'speed'?\n"
 
 
 def test_a_marker_is_drawn_where_its_corners_are_and_with_its_own_modules(bench):

@@ -142,4 +142,7 @@ def test_anyone_can_run_it(tmp_path):
 def test_a_size_that_is_none_is_refused():
     done = run("--picture", "big")
     assert done.returncode == 2
-    assert "'big' is not a size such as 320x240" in done.stderr
+    assert (
+        done.stderr
+        == "bench_pose: --picture: 'big' is not two numbers from 1 to 9999; write --picture 320x240\n"
+    )

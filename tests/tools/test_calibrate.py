@@ -45,7 +45,8 @@ def refused(*arguments, **options):
     done = calibrate(*arguments, **options)
     assert done.returncode == 2
     assert "Traceback" not in done.stderr and not done.stdout
-    return done.stderr.strip().splitlines()[-1]
+    assert done.stderr.startswith("calibrate: ") and done.stderr.count("\n") == 1
+    return done.stderr
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +87,7 @@ def test_help_loads_nothing_heavy():
     assert "examples:" in done.stdout and "--residuals" in done.stdout
     loaded = {line.rsplit("|", 1)[-1].strip().split(".")[0] for line in done.stderr.splitlines()}
     assert "argparse" in loaded
-    assert not loaded & {"cv2", "numpy", "yaml", "quadvis", "quadvis_blocks"}
+    assert not loaded & {"cv2", "numpy", "yaml", "quadvis_blocks", "quadvis_vision"}
 
 
 def test_the_program_can_be_started_by_its_name():
@@ -261,6 +262,12 @@ def test_two_pictures_of_the_board_are_too_few(photographs):
     ("arguments", "said"),
     [
         ((), "no photographs"),
+        (("--bord", "9x6"), "there is no option '--bord'; did you mean '--board'?"),
+        (("view0.png", "--board"), "--board needs a value; write --board 9x6"),
+        (
+            ("view0.png", "--board", "0x6"),
+            "--board: '0x6' is not two numbers from 1 to 9999; write --board 9x6",
+        ),
         (("absent.png", *BOARD), "absent.png"),
         (("note.png", *BOARD), "not a picture"),
         (("cut.png", *BOARD), "cut.png is damaged, or cut short"),
@@ -274,7 +281,7 @@ def test_two_pictures_of_the_board_are_too_few(photographs):
         (("view0.png", "--board", "7x5", "--square", "25"), "25 mm"),
         (("view0.png", "--board", "7x5", "--square", "0mm"), "above 0"),
         (("view0.png", "--board", "7x5", "--square", "25 s"), "25 s"),
-        (("view0.png", *BOARD, "--window", "0"), "1 to 100"),
+        (("view0.png", *BOARD, "--window", "0"), "1 to 100; write --window PX|auto"),
         (("view0.png", *BOARD, "--points", "points.csv"), "not both"),
         (("view0.png", *BOARD, "--size", "452x322"), "belong to --points"),
         (("view0.png", *BOARD, "--picture", "small.png"), "belong to --points"),

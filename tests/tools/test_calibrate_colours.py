@@ -80,7 +80,7 @@ def test_help_loads_nothing_heavy(tmp_path):
     assert "examples:" in done.stdout and "--order" in done.stdout
     loaded = {line.rsplit("|", 1)[-1].strip().split(".")[0] for line in done.stderr.splitlines()}
     assert "argparse" in loaded
-    assert not loaded & {"cv2", "numpy", "yaml", "quadvis", "quadvis_blocks"}
+    assert not loaded & {"cv2", "numpy", "yaml", "quadvis_blocks", "quadvis_vision"}
 
 
 def test_the_program_can_be_started_by_its_name():
@@ -217,6 +217,7 @@ def test_a_reader_that_stops_early_sees_no_traceback(scenes, tmp_path):
     ("arguments", "said"),
     [
         ((), "no pictures; give one to 5"),
+        (["clean.png", "--sied", "1m"], "there is no option '--sied'; did you mean '--side'?"),
         (["clean.png"] * 6, "6 pictures; give one to 5"),
         (["empty.png"], "empty.png: no circle"),
         (["clean.png", "1 missing.png"], "1 missing.png: 3 circles"),

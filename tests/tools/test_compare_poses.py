@@ -49,7 +49,8 @@ def refused(*arguments, folder):
     done = compare(*arguments, folder=folder)
     assert done.returncode == 2
     assert "Traceback" not in done.stderr and not done.stdout
-    return done.stderr.strip().splitlines()[-1]
+    assert done.stderr.startswith("compare_poses: ") and done.stderr.count("\n") == 1
+    return done.stderr
 
 
 def test_help_loads_nothing_heavy(tmp_path):
@@ -57,7 +58,7 @@ def test_help_loads_nothing_heavy(tmp_path):
     assert done.returncode == 0 and "examples:" in done.stdout
     loaded = {line.rsplit("|", 1)[-1].strip().split(".")[0] for line in done.stderr.splitlines()}
     assert "argparse" in loaded
-    assert not loaded & {"cv2", "numpy", "matplotlib", "yaml", "quadvis", "quadvis_blocks"}
+    assert not loaded & {"cv2", "numpy", "matplotlib", "yaml", "quadvis_blocks", "quadvis_vision"}
 
 
 def test_without_arguments_it_plays_the_recording_prints_the_table_and_draws_the_figure(tmp_path):
@@ -162,7 +163,7 @@ def test_the_comparison_of_the_paper_with_a_calibration_of_its_own_for_each_meth
     [
         (("--folder", "absent"), "folder 'absent' does not exist"),
         (("--video", "absent.mp4"), "file 'absent.mp4' does not exist"),
-        (("--folder", "a", "--video", "b"), "not allowed with"),
+        (("--folder", "a", "--video", "b"), "--folder and --video exclude each other; keep one"),
         (("--calibration", "absent.yaml"), "absent.yaml"),
         (("--pictures", "31"), "there is no picture 31; there are 30"),
         (("--pictures", "0"), "not a list of pictures"),
@@ -171,6 +172,8 @@ def test_the_comparison_of_the_paper_with_a_calibration_of_its_own_for_each_meth
         (("--set", "plane.sides=1 m"), "sides"),
         (("--diagram", ROOT / "diagrams" / "record.yaml", "--set", "folder=made"), "needs two or more"),
         (("--figure", "file/figure.png"), "cannot write the figure"),
+        (("--figre", "x.png"), "there is no option '--figre'; did you mean '--figure'?"),
+        (("x.png",), "'x.png' is one too many; write 'compare_poses'"),
     ],
 )
 def test_bad_input_ends_with_one_sentence(tmp_path, arguments, said):
