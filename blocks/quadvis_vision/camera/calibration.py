@@ -18,6 +18,7 @@ from quadvis.errors import DiagramError, Fault
 from quadvis.machine.files import Kind, write_output
 from quadvis_vision.camera import lens as lens_model
 from quadvis_vision.camera.calibration_file import read_fields
+from quadvis_vision.camera.picture_size import BOUND, is_too_large
 from quadvis_vision.camera.provenance import KEYS, CalibrationError, Evidence
 
 Array = NDArray[np.float64]
@@ -168,6 +169,8 @@ def _check(camera: CameraCalibration) -> None:
         raise CalibrationError(
             "size", f"size is {width} x {height} px", "width and height must be at least 2"
         )
+    if is_too_large(camera.size):
+        raise CalibrationError("size", f"size is {width} x {height} px", BOUND)
     if not np.isfinite(matrix).all():
         raise CalibrationError("matrix", "matrix is not finite", "it needs nine ordinary numbers")
     if not np.isfinite(camera.distortion).all():

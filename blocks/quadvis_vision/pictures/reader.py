@@ -18,6 +18,7 @@ import numpy as np
 
 from quadvis.errors import QuadvisError
 from quadvis.machine.inputs import open_input, read_input
+from quadvis_vision.camera.picture_size import BOUND, is_too_large
 from quadvis_vision.pictures.formats import FormatFault, layout
 
 if TYPE_CHECKING:
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 
     Pixels = NDArray[np.uint8]
 
-MOST_PIXELS = 64_000_000  # in one picture: more than cameras on a craft have, and 200 MB of memory
 SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png")  # files in a folder with other suffixes are no pictures
 
 
@@ -73,9 +73,8 @@ def read_coded(path: str | Path) -> CodedPicture:
     size = found.width, found.height
     if min(size) < 1:
         raise QuadvisError(f"{name} declares {size[0]} x {size[1]} px; give a picture with pixels")
-    if size[0] * size[1] > MOST_PIXELS:
-        bound = f"at most {MOST_PIXELS // 1_000_000} million pixels are read"
-        raise QuadvisError(f"{name} declares {size[0]} x {size[1]} px; {bound}")
+    if is_too_large(size):
+        raise QuadvisError(f"{name} declares {size[0]} x {size[1]} px; {BOUND}")
     return CodedPicture(name, size, found.turned, found.coded)
 
 
@@ -102,7 +101,7 @@ def open_video(path: str | Path) -> Any:
     video = cv2.VideoCapture(os.fspath(path))
     video.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
     size = int(video.get(cv2.CAP_PROP_FRAME_WIDTH)), int(video.get(cv2.CAP_PROP_FRAME_HEIGHT))
-    if not video.isOpened() or not 0 < size[0] * size[1] <= MOST_PIXELS:
+    if not video.isOpened() or size[0] * size[1] <= 0 or is_too_large(size):
         video.release()
         raise not_a_video(path)
     return video
