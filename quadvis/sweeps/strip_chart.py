@@ -14,18 +14,23 @@ from numpy.typing import NDArray
 
 from quadvis.machine.files import PLOT, write_output
 from quadvis.output.canvas import blank_sheet
-from quadvis.output.style import COLOURS, STYLE, WIDTHS
+from quadvis.output.style import COLOURS, ELLIPSIS, STYLE, WIDTHS, fitted, measure
+from quadvis.sweeps.strip_head import EDGE, GAP, GREY, LINES, draw_head, head_of, more_lines
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Sheet
 
-HEIGHT, TOP, BOTTOM = 2.9, 0.7, 0.5  # inches: height of a row, and of the spaces above and below all rows
-MARGIN = 0.012  # of the picture's width
+HEIGHT, BOTTOM = 2.9, 0.5  # inches: height of a row, and of the space below all rows
+WIDER = 0.96  # measured over drawn width of a long text: its letters keep to whole pixels
+BESIDE_AXES = 0.85  # inches beside the axes, for numbers and the gap to the neighbour
+NOTE_SIZE = 8.5
+MOST_NOTES = 3  # lines about what is the same in all runs
 PERCENTILES = (5.0, 25.0, 75.0, 95.0)
 FEW = 5  # fewer runs get no box
 MOST_LABELS = 12  # labels along an axis
-LONGEST_LABEL = 64  # characters of all labels of an axis; longer ones are turned
+BETWEEN_LABELS = 0.06  # inches between the labels along an axis; if there is no room, they are turned
+LEAST_LINE = 0.9  # inches; narrower labels are not broken into two lines
+TURN, LONGEST_TURNED = 25.0, 1.6  # degrees and inches of a turned label
 FAILED = "#C0392B"
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 NEAR = 2.0  # a limit is drawn if it is at most so many spreads away from the values
@@ -69,36 +74,81 @@ def draw_strips(strips: Strips, path: Path, inputs: Iterable[Path] = ()) -> None
     count = len(strips.panels)
     columns = 2 if count == 4 else min(len(WIDTHS), max(1, count))
     rows = max(1, math.ceil(count / columns))
-    height = TOP + HEIGHT * rows + BOTTOM
+    width = WIDTHS[columns - 1]
+    room = width / columns - BESIDE_AXES
+    ticks = _ticks(strips.places, room)
+    room = min(room, width / columns - GAP - ticks.overhang(room))
+    inside = WIDER * (width - 2 * EDGE)
+    head = head_of(strips.title, strips.subtitle, strips.legend, strips.series, inside)
+    axis = fitted(strips.axis, room, measure(STYLE["font.size"]))
+    titles = [_title(panel, room) for panel in strips.panels]
+    notes = [KEY] if _has_spread(strips) else []
+    notes += [fitted(strips.note, inside, measure(NOTE_SIZE), MOST_NOTES)] if strips.note else []
+    note = "\n".join(notes)
+    row = HEIGHT + max((more_lines(title, STYLE["axes.titlesize"]) for title in titles), default=0.0)
+    bottom = BOTTOM + max(0.0, more_lines(note, NOTE_SIZE) - more_lines("\n", NOTE_SIZE))
+    panels = rows * row + more_lines(axis, STYLE["font.size"])
+    height = head.height + panels + bottom
     style = {**STYLE, "axes.grid.axis": "y", "axes.axisbelow": True}
-    with blank_sheet(WIDTHS[columns - 1], height, style) as sheet:
-        inside = (0.0, BOTTOM / height, 1.0, HEIGHT * rows / height)
-        sheet.set_layout_engine("constrained", rect=inside, w_pad=0.1)
-        for number, panel in enumerate(strips.panels, 1):
+    with blank_sheet(width, height, style) as sheet:
+        sheet.set_layout_engine("constrained", rect=(0.0, bottom / height, 1.0, panels / height), w_pad=0.1)
+        for number, (panel, title) in enumerate(zip(strips.panels, titles, strict=True), 1):
             axes = sheet.add_subplot(rows, columns, number)
-            _draw_panel(axes, strips, panel)
+            _draw_panel(axes, strips, panel, title, ticks)
             if number > count - columns:
-                axes.set_xlabel(strips.axis)
-        _frame(sheet, strips, height)
+                axes.set_xlabel(axis)
+        draw_head(sheet, head)
+        edge, below = EDGE / width, 0.06 / height
+        sheet.text(edge, below, note, color=GREY, fontsize=NOTE_SIZE, linespacing=LINES)
         write_output(path, PLOT, lambda file: sheet.savefig(file, format="png"), inputs)
 
 
-def _frame(sheet: Sheet, strips: Strips, height: float) -> None:
-    """Write title, legend and key around the panels."""
-    sheet.text(MARGIN, 1.0 - 0.1 / height, strips.title, fontsize=13, fontweight="bold", va="top")
-    sheet.text(MARGIN, 1.0 - 0.36 / height, strips.subtitle, color="#555555", va="top")
-    spread = any(len(cloud.values) > 1 for panel in strips.panels for row in panel.clouds for cloud in row)
-    notes = "\n".join(filter(None, (KEY if spread else "", strips.note)))
-    sheet.text(MARGIN, 0.06 / height, notes, color="#555555", fontsize=8.5, linespacing=1.5)
-    if len(strips.series) > 1 and sheet.axes:
-        named = list(zip(*sheet.axes[0].get_legend_handles_labels(), strict=True))[:MOST_LABELS]
-        sheet.legend(
-            *zip(*named, strict=True), title=strips.legend, loc="upper right", ncols=min(len(named), 6),
-            bbox_to_anchor=(1.0 - MARGIN, 1.0 - 0.06 / height), title_fontsize=9, alignment="right",
-        )  # fmt: skip
+@dataclass(frozen=True)
+class _Ticks:
+    """The positions along the axis that have a label, and their labels, cut to fit."""
+
+    places: range
+    labels: tuple[str, ...]
+    are_turned: bool
+
+    def overhang(self, room: float) -> float:
+        """Return how far (inches) turned labels reach beyond the left end of axes of about this width."""
+        if not self.are_turned:
+            return 0.0
+        widest = max(map(measure(STYLE["font.size"]), self.labels))
+        return math.cos(math.radians(TURN)) * widest - 0.4 * room / self.places.stop
 
 
-def _draw_panel(axes: Axes, strips: Strips, panel: StripPanel) -> None:
+def _ticks(names: Sequence[str], room: float) -> _Ticks:
+    """Return the labels in one line or two, where all are whole so; turned and cut, where they are not."""
+    places = range(0, len(names), math.ceil(len(names) / MOST_LABELS))
+    width, each = measure(STYLE["font.size"]), room / len(places) - BETWEEN_LABELS
+    lines = 2 if each >= LEAST_LINE else 1
+    labels = tuple(fitted(names[place], each, width, lines) for place in places)
+    if not any(ELLIPSIS in label for label in labels):
+        return _Ticks(places, labels, are_turned=False)
+    labels = tuple(fitted(names[place], LONGEST_TURNED, width, lines=1) for place in places)
+    return _Ticks(places, labels, are_turned=True)
+
+
+def _title(panel: StripPanel, room: float) -> str:
+    """Return the title of a panel; its last line is empty where the expectation would not fit beside it."""
+    text = f"{panel.title} [{panel.unit}]" if panel.unit else panel.title
+    width = measure(STYLE["axes.titlesize"])
+    title = fitted(text, room, width)
+    used = width(title.rpartition("\n")[2]) + GAP + measure(NOTE_SIZE)(_expected(panel))
+    return f"{title}\n" if panel.limit is not None and used > room else title
+
+
+def _expected(panel: StripPanel) -> str:
+    return f"expected {panel.limit:.4g} {panel.unit}".rstrip() if panel.limit is not None else ""
+
+
+def _has_spread(strips: Strips) -> bool:
+    return any(len(cloud.values) > 1 for panel in strips.panels for row in panel.clouds for cloud in row)
+
+
+def _draw_panel(axes: Axes, strips: Strips, panel: StripPanel, title: str, ticks: _Ticks) -> None:
     count = len(strips.series)
     width = min(0.76 / count, 0.5 if len(strips.places) > 1 else 0.3)
     lonely = all(len(cloud.values) <= 1 for row in panel.clouds for cloud in row)
@@ -115,7 +165,7 @@ def _draw_panel(axes: Axes, strips: Strips, panel: StripPanel) -> None:
             for position, cloud in zip(positions, row, strict=True):
                 _draw_cloud(axes, position, 0.86 * width, cloud, colour)
         _draw_failed(axes, positions, row, 0.0 if lonely else 0.86 * width)
-    _finish(axes, strips, panel)
+    _finish(axes, strips, panel, title, ticks)
 
 
 def _draw_cloud(axes: Axes, position: float, width: float, cloud: Cloud, colour: str) -> None:
@@ -158,17 +208,14 @@ def _offsets(count: int, width: float) -> NDArray[np.floating]:
     return ((np.arange(count) * GOLDEN + 0.5) % 1.0 - 0.5) * 0.8 * width
 
 
-def _finish(axes: Axes, strips: Strips, panel: StripPanel) -> None:
+def _finish(axes: Axes, strips: Strips, panel: StripPanel, title: str, ticks: _Ticks) -> None:
     """Write labels and title, draw the limit, and leave room for all of them."""
     count = len(strips.places)
-    step = math.ceil(count / MOST_LABELS)
-    shown = range(0, count, step)
-    labels = [strips.places[index] for index in shown]
-    turned = sum(map(len, labels)) > LONGEST_LABEL
-    axes.set_xticks(list(shown), labels, rotation=25 if turned else 0, ha="right" if turned else "center")
-    axes.tick_params(axis="x", length=0 if step == 1 else 3)
+    turned, alignment = (TURN, "right") if ticks.are_turned else (0.0, "center")
+    axes.set_xticks(list(ticks.places), ticks.labels, rotation=turned, ha=alignment)
+    axes.tick_params(axis="x", length=0 if ticks.places.step == 1 else 3)
     axes.set_xlim(-0.6, count - 0.4)
-    axes.set_title(f"{panel.title} [{panel.unit}]" if panel.unit else panel.title, loc="left")
+    axes.set_title(title, loc="left")
     values = np.concatenate([cloud.values for cloud in itertools.chain(*panel.clouds)] or [np.zeros(0)])
     values = values[np.isfinite(values)]
     if not values.size:
@@ -177,8 +224,7 @@ def _finish(axes: Axes, strips: Strips, panel: StripPanel) -> None:
     for line in _limits(panel, values):
         axes.axhline(line, color=FAILED, linewidth=1.0, linestyle=(0, (5, 3)), zorder=1)
     if panel.limit is not None:
-        words = f"expected {panel.limit:.4g} {panel.unit}".rstrip()
-        axes.set_title(words, loc="right", fontsize=8.5, color=FAILED)
+        axes.set_title(_expected(panel), loc="right", fontsize=NOTE_SIZE, color=FAILED)
 
 
 def _limits(panel: StripPanel, values: NDArray[np.floating]) -> Iterator[float]:
