@@ -12,6 +12,7 @@ import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, TypeVar
 
 from quadvis.block.declare import Declared, In, Out, Param, ParameterError, Safe, State, Work
@@ -48,15 +49,35 @@ class Interface:
     safe: Mapping[str, Safe]  # by the input that each value replaces
     arguments: Mapping[str, tuple[str, ...]]  # method -> the names that it asks for
 
-    @property
+    @cached_property
     def feedthrough(self) -> frozenset[str]:
         """The inputs that ``output`` asks for."""
         return frozenset(self.arguments.get("output", ())) & frozenset(self.inputs)
 
-    @property
+    @cached_property
     def continuous(self) -> tuple[State, ...]:
         """The states that a solver integrates."""
         return tuple(state for state in self.states.values() if state.continuous)
+
+    @cached_property
+    def wanted(self) -> tuple[str, ...]:
+        """The inputs that must be fed, since they have no default."""
+        return tuple(name for name, port in self.inputs.items() if port.default is None)
+
+    @cached_property
+    def required(self) -> tuple[str, ...]:
+        """The parameters that must be given."""
+        return tuple(name for name, param in self.params.items() if param.required)
+
+    @cached_property
+    def files_read(self) -> tuple[Param, ...]:
+        """The parameters that name a file or folder which the block reads."""
+        return tuple(param for param in self.params.values() if param.is_file and not param.writes)
+
+    @cached_property
+    def files_written(self) -> tuple[Param, ...]:
+        """The parameters that name a file or folder which the block writes."""
+        return tuple(param for param in self.params.values() if param.writes)
 
 
 class Block:
@@ -128,9 +149,8 @@ class Block:
         self.check()
         self._digests = {
             param.name: file_digest(getattr(self, param.name))
-            for param in declared.values()
-            if param.is_file and not param.writes and param.name not in self._kept
-            if os.path.isfile(getattr(self, param.name))
+            for param in self.interface.files_read
+            if param.name not in self._kept and os.path.isfile(getattr(self, param.name))
         }
 
     def check(self) -> None:
@@ -150,8 +170,8 @@ class Block:
 
     def reads(self) -> list[str]:
         """Return the files that a run reads: the files that parameters name, and all files of a folder."""
-        files = (param for param in self.interface.params.values() if param.is_file and not param.writes)
-        return [path for path in (getattr(self, param.name) for param in files) if path]
+        paths = (getattr(self, param.name) for param in self.interface.files_read)
+        return [path for path in paths if path]
 
     def doubts(self) -> list[ParameterError]:
         """Return the warnings: values that can run, but are surely a mistake at ``self.period`` (s)."""

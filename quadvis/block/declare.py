@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -147,6 +149,9 @@ class Param(Declared):
             if not isinstance(value, str):
                 raise ParameterError(self.name, f"{self.name} must be a text, got {value!r}")
             return value
+        if type(value) is float and self._takes_number and not math.isnan(value):
+            self._check_range(np.asarray(value))
+            return value
         array = _numbers(value)
         if array is None or not _fits(array, self.signal.scalar):
             raise ParameterError(self.name, f"{self.name} must be {self.wanted()}, got {value!r}")
@@ -158,6 +163,14 @@ class Param(Declared):
             return array.astype(self.signal.scalar)
         return SCALARS[self.signal.scalar](array)
 
+    @cached_property
+    def _takes_number(self) -> bool:
+        return self.signal.scalar == "float64" and self.signal.unify((), {})
+
+    @property
+    def _has_bounds(self) -> bool:
+        return (self.min, self.max, self.above, self.below) != (None, None, None, None)
+
     def _accept_choice(self, value: Any) -> int:
         if value in self.choices:
             return self.choices.index(value)
@@ -165,6 +178,8 @@ class Param(Declared):
         raise ParameterError(self.name, sentence(problem, suggestion(str(value), self.choices)))
 
     def _check_range(self, array: NDArray[np.float64]) -> None:
+        if not self._has_bounds:
+            return
         unit = "" if self.unit == "1" else f" {self.unit}"
         for bound, words, holds in (
             (self.min, "at least", np.greater_equal),

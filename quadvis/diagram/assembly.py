@@ -11,6 +11,7 @@ from quadvis.diagram.check import WireCheck
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.doubts import warn_parameters, warn_rates
 from quadvis.diagram.expand import Expansion
+from quadvis.diagram.flow import Cases
 from quadvis.diagram.keys import RUN_SECTIONS
 from quadvis.diagram.loader import read_part
 from quadvis.diagram.outputs import check_writers
@@ -52,7 +53,8 @@ class Assembly:
         self.spec, self.faults = spec, faults
         self.catalogue = Catalogue(spec.path.parent, own_blocks)
         self.parts = Parts(read_part, faults)
-        self.made: Made = {}
+        self.made = Made()
+        self.cases: Cases = {}
         self._params = [path for file in params for path in (file.path, *file.bases)]
         self._base: Wiring | None = None  # of the diagram without a variant
 
@@ -75,7 +77,7 @@ class Assembly:
         builder = Builder(spec, expansion, wiring, self.made, faults)
         drafts = builder.drafts()
         step = builder.step if known(builder.step) else None
-        nodes = WireCheck(drafts, faults, spec[TASKING]).run()
+        nodes = WireCheck(drafts, faults, self.cases, spec[TASKING]).run()
         graph = Graph(spec.name, nodes, spec[SOLVER].method, step, spec[TASKING])
         stop = _stop_time(spec, stop_time, faults)
         if known(builder.step):

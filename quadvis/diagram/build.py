@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
@@ -18,7 +19,7 @@ from quadvis.diagram.spec import FileSpec
 from quadvis.diagram.times import time_text
 from quadvis.diagram.values import OpenUnits, read_parameter, read_value
 from quadvis.diagram.wiring import OpenInput, Wiring
-from quadvis.document import YamlNode
+from quadvis.document import YamlNode, YamlScalar
 from quadvis.errors import (
     UNKNOWN,
     DiagramError,
@@ -32,8 +33,15 @@ from quadvis.errors import (
 )
 from quadvis.graph.graph import CONTINUOUS, Constant, Task, Wire, common_divisor
 
-# By path, class, parameters and period: variants share most.
-Made = dict[tuple[str, type[Block], str, Fraction | None], Block]
+
+@dataclass
+class Made:
+    """What has been made: the variants of a diagram share most of it."""
+
+    blocks: dict[tuple[str, type[Block], str, Fraction | None], Block] = field(default_factory=dict)
+    values: dict[tuple[Param, str], tuple[Any, OpenUnits]] = field(default_factory=dict)  # of right texts
+
+
 _ANY_STEP = Fraction(1, 100)  # the continuous task needs one; no check looks at it
 
 
@@ -48,6 +56,8 @@ class Builder:
             name: Task(name, rate.period, rate.offset) for name, rate in spec[RATES].items() if known(rate)
         }
         self.step = self._choose_step()
+        step = self.step if self.step is not None and known(self.step) else _ANY_STEP
+        self._continuous = Task(CONTINUOUS, step, continuous=True)
 
     def drafts(self) -> list[Draft]:
         """Return the blocks whose class is known."""
@@ -66,11 +76,9 @@ class Builder:
         task = self._task(flat, flat.kind)
         block, units = self._build(flat, flat.kind, task)
         connections = dict(self._connections(flat, flat.kind))
-        places = {name: flat.place(name) for name in flat.parameters}
-        origins = {name: node.place for name, node in flat.parameters.items() if known(node)}
         return Draft(
-            flat.path, flat.spec.place, flat.spec.kind, flat.kind, block, task, connections, places, units,
-            origins,
+            flat.path, flat.spec.place, flat.spec.kind, flat.kind, block, task, connections, flat.places,
+            units, flat.parameters,
         )  # fmt: skip
 
     def _choose_step(self) -> Fraction | Unknown | None:
@@ -104,16 +112,14 @@ class Builder:
 
     def _task(self, flat: FlatBlock, kind: type[Block]) -> Task | Unknown:
         """Return the task of a block."""
-        step = self.step if self.step is not None and known(self.step) else _ANY_STEP
-        continuous = Task(CONTINUOUS, step, continuous=True)
         own = flat.spec.rate
         if kind.interface.continuous:
             if own is not None and known(own) and own[0] != CONTINUOUS:
                 problem = f"{flat.spec.kind} has continuous states, rate '{own[0]}' cannot hold it"
                 self.faults.add(own[1], problem, "leave 'rate' out, or write 'continuous'")
-            return continuous
-        names = [*self.spec[RATES], CONTINUOUS]
+            return self._continuous
         if flat.rate is None:
+            names = [*self.spec[RATES], CONTINUOUS]
             choice = f"choose from {', '.join(names)}" if len(names) > 1 else "declare one under 'rates'"
             self.faults.add(list(flat.around)[-1].place, "key 'rate' is missing", choice)
             return UNKNOWN
@@ -121,9 +127,9 @@ class Builder:
             return UNKNOWN
         name, place = flat.rate
         if name == CONTINUOUS:
-            return continuous
+            return self._continuous
         if name not in self.spec[RATES]:
-            remedy = suggestion(name, names) if self.spec[RATES] else ""
+            remedy = suggestion(name, [*self.spec[RATES], CONTINUOUS]) if self.spec[RATES] else ""
             self.faults.add(place, f"there is no rate '{name}'", remedy or "declare it under 'rates'")
         return self.tasks.get(name, UNKNOWN)
 
@@ -141,16 +147,16 @@ class Builder:
                 self.faults.add(flat.place(name), f"{flat.spec.kind} has no parameter '{name}'", remedy)
                 whole = False
                 continue
-            read = self.faults.read(read_parameter, declared[name], node) if known(node) else UNKNOWN
-            if not known(node) or not known(read) or not self._accepts(declared[name], read[0], node):
+            read = self._value(declared[name], node) if known(node) else UNKNOWN
+            if not known(read):
                 whole = False
                 continue
             values[name] = read[0]
             if read[1]:
                 units[name] = read[1]
-        required = [name for name, param in declared.items() if param.required]
-        whole &= all(name in flat.parameters for name in required)
-        for name in absent(required, flat.parameters, declared) if known(flat.spec.parameters) else ():
+        missing = [name for name in kind.interface.required if name not in flat.parameters]
+        whole &= not missing
+        for name in absent(missing, flat.parameters, declared) if known(flat.spec.parameters) else ():
             wanted = "a path" if declared[name].is_file else declared[name].wanted()
             self.faults.add(flat.spec.place, f"parameter '{name}' is missing", f"give {wanted} under 'with'")
         period = task.period if known(task) and known(self.step) else None
@@ -159,13 +165,21 @@ class Builder:
             self.faults.warn(self._place(flat, doubt), str(doubt))
         return block, units
 
-    def _accepts(self, param: Param, value: Any, node: YamlNode) -> bool:
-        try:
-            param.accept(value)
-        except ParameterError as error:
-            self.faults.add(node.place, str(error))
-            return False
-        return True
+    def _value(self, param: Param, node: YamlNode) -> tuple[Any, OpenUnits] | Unknown:
+        """Return a parameter's value and its open units; a text that was right once is not read again."""
+        text = node.value if isinstance(node, YamlScalar) and not param.is_text else None
+        if text is not None and (param, text) in self.made.values:
+            return self.made.values[param, text]
+        read = self.faults.read(read_parameter, param, node)
+        if known(read):
+            try:
+                param.accept(read[0])
+            except ParameterError as error:
+                self.faults.add(node.place, str(error))
+                return UNKNOWN
+            if text is not None:
+                self.made.values[param, text] = read
+        return read
 
     def _construct(
         self, flat: FlatBlock, kind: type[Block], values: Mapping[str, Any], period: Fraction | None
@@ -173,9 +187,10 @@ class Builder:
         """Make the block, which checks its parameters against each other, its files and its period."""
         key = (flat.path, kind, repr(sorted(values.items())), period)
         try:
-            if key not in self.made:
-                self.made[key] = kind(period=math.nan if period is None else float(period), **values)
-            return self.made[key]
+            if key not in self.made.blocks:
+                made = kind(period=math.nan if period is None else float(period), **values)
+                self.made.blocks[key] = made
+            return self.made.blocks[key]
         except ParameterError as error:
             self.faults.add(self._place(flat, error), str(error))
         except DiagramError as error:

@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import cast
 
 from quadvis.block import Block
-from quadvis.diagram.flow import Draft, Key, Link, ShapeFlow, unconnected
+from quadvis.diagram.flow import Cases, Draft, Key, Link, ShapeFlow, unconnected
 from quadvis.diagram.names import absent, remedy_for
 from quadvis.diagram.unit_repair import follow_units
 from quadvis.diagram.values import shape_text
@@ -25,9 +25,9 @@ _ANY_TASK = Task("unknown", Fraction(1))  # a node needs one; no check looks at 
 class WireCheck:
     """Checks the wires between drafts, and turns them into the nodes of a graph."""
 
-    def __init__(self, drafts: Sequence[Draft], faults: Faults, tasking: str = SINGLE) -> None:
+    def __init__(self, drafts: Sequence[Draft], faults: Faults, cases: Cases, tasking: str = SINGLE) -> None:
         self.drafts = {draft.path: draft for draft in drafts}
-        self.faults, self.tasking = faults, tasking
+        self.faults, self.cases, self.tasking = faults, cases, tasking
         self.unknown: set[Key] = set()  # inputs of which nothing is known
         self.nodes = {draft.path: self._node(draft) for draft in drafts}
 
@@ -58,10 +58,12 @@ class WireCheck:
         links = list(self._links())
         self._check_connected()
         self._check_rates(links)
-        shapes = ShapeFlow(self.drafts, self.nodes, self._known(links), self.unknown, self.faults)
+        shapes = ShapeFlow(self.drafts, self.nodes, self._known(links), self.unknown, self.faults, self.cases)
         shapes.run()
         self.unknown = shapes.unknown
-        units = follow_units(self.drafts, self.nodes, self._known(links), self.unknown, self.faults)
+        units = follow_units(
+            self.drafts, self.nodes, self._known(links), self.unknown, self.faults, self.cases
+        )
         for path, port in units.unknown | {link.key for link in links if link.connection.across is UNKNOWN}:
             # A loop through such a wire would be reported twice.
             self.nodes[path].inputs.pop(port, None)
@@ -99,8 +101,10 @@ class WireCheck:
     def _check_connected(self) -> None:
         for draft in self.drafts.values():
             inputs = draft.interface.inputs
-            wanted = [port for port, declared in inputs.items() if declared.default is None]
-            self.unknown |= {(draft.path, port) for port in wanted if port not in draft.connections}
+            wanted = [port for port in draft.interface.wanted if port not in draft.connections]
+            if not wanted:
+                continue
+            self.unknown |= {(draft.path, port) for port in wanted}
             for port in absent(wanted, draft.connections, inputs):
                 self._fault(draft, draft.place, *unconnected(port, inputs[port]))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ from quadvis.library.catalogue import Catalogue, CatalogueError
 from quadvis.machine.missing_file import file_trouble
 from quadvis.units import Unit, UnitError, split_quantity
 
-MAX_BLOCKS = 5_000  # parts in parts multiply
+MAX_BLOCKS = 50_000  # in parts, since parts in parts multiply; a file by itself is as long as it is
 MAX_DEPTH = 30
 
 
@@ -75,7 +76,7 @@ class FlatBlock:
     parameters: dict[str, YamlNode | Unknown]
     places: Mapping[str, Place]  # of the names of the parameters
 
-    @property
+    @cached_property
     def rate(self) -> tuple[str, Place] | Unknown | None:
         """The block's rate, or that of the nearest part around it that has one."""
         return next((spec.rate for spec in self.around if spec.rate is not None), None)
@@ -167,9 +168,9 @@ class Expansion:
                 self._unknown.add(path)
                 continue
             with self.faults.about(f"block '{path}'"):
-                self._count += 1
+                self._count += scope.parent is not None
                 if self._count > MAX_BLOCKS:
-                    problem = f"there are more than {MAX_BLOCKS} blocks"
+                    problem = f"there are more than {MAX_BLOCKS} blocks in parts"
                     self.faults.add(block.place, problem, "use fewer parts in parts")
                     raise DiagramError(self.faults)
                 if block.slot is not None and known(block.slot) and scope.parent is not None:
@@ -197,6 +198,8 @@ class Expansion:
     def _places(self, block: BlockSpec, path: str) -> Mapping[str, Place]:
         """Return where the parameters of a block or part are given their values."""
         settings = self.settings.get(path, {})
+        if not settings:
+            return block.parameter_places
         return block.parameter_places | {name: setting.place for name, setting in settings.items()}
 
     def _find_kind(

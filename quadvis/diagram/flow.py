@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from heapq import heappop, heappush
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from quadvis.block import Block, In, Interface
+from quadvis.block import Block, In, Interface, Shape, Sizes
 from quadvis.diagram.values import OpenUnits, shape_text
-from quadvis.errors import UNKNOWN, Faults, Place, Unknown
+from quadvis.document import YamlNode
+from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known
 from quadvis.graph.graph import Constant, Node, Task, Wire, selected
 from quadvis.graph.names import index_text
 from quadvis.units import Unit
 
 ONE = Unit()
 Key = tuple[str, str]  # block and input
+Cases = dict[Hashable, Any]  # what was found, by the case
 
 
 @dataclass
@@ -42,7 +45,14 @@ class Draft:
     connections: dict[str, Connection]
     places: Mapping[str, Place] = field(default_factory=dict)  # of the parameters that are given
     units: Mapping[str, OpenUnits] = field(default_factory=dict)  # of the parameters where they are open
-    origins: Mapping[str, Place] = field(default_factory=dict)  # where their values are written
+    given: Mapping[str, YamlNode | Unknown] = field(default_factory=dict)  # their values as written
+
+    def origin(self, name: str) -> Place:
+        """Return where the value of a parameter or constant is written."""
+        if name in self.connections:
+            return self.connections[name].place
+        node = self.given[name]
+        return node.place if known(node) else self.places[name]
 
     @property
     def interface(self) -> Interface:
@@ -71,52 +81,75 @@ class Flow:
     ``unknown`` are inputs without any known fact: blocks that depend on them are left out. A cycle has no
     first block: there one block goes ahead with what it has. What is found does not depend on the order of
     the blocks in the file: where a choice is left the names decide.
+
+    Blocks of one class with equal inputs are one case: what follows is worked out for the first of them, and
+    kept in ``cases``, which the variants of a diagram share. A case with a fault is never kept.
     """
 
     def __init__(self, drafts: Mapping[str, Draft], nodes: Mapping[str, Node], links: Sequence[Link],
-                 unknown: Collection[Key], faults: Faults) -> None:  # fmt: skip
-        self.drafts, self.nodes, self.faults = drafts, nodes, faults
+                 unknown: Collection[Key], faults: Faults, cases: Cases) -> None:  # fmt: skip
+        self.drafts, self.nodes, self.faults, self.cases = drafts, nodes, faults, cases
         self.unknown = set(unknown)
-        self._waiting = {link.key: link for link in links}
-        self._ready: dict[Key, Link] = {}  # those that wait only for the other inputs of their block
         self._settled: set[str] = set()
         self._reported: set[Place] = set()
-        self._into: dict[str, list[Link]] = {path: [] for path in drafts}
+        self._faulty = False  # whether anything was found wrong in the present case
+        self._begun: set[str] = set()  # blocks that know some of their facts before the others
+        # By reader and port, in the order of the names and ports: wires that still carry no fact, and those
+        # of them that wait only for the other inputs of their block.
+        self._waiting: dict[str, dict[str, Link]] = {}
+        self._ready: dict[str, set[str]] = {path: set() for path in drafts}
+        self._early: list[tuple[str, int, str]] = []  # a heap of the latter
         self._from: dict[str, list[Link]] = {path: [] for path in drafts}
-        for link in sorted(links, key=self._order):
-            self._into[link.draft.path].append(link)
-            self._from[link.wire.block].append(link)
-
-    @staticmethod
-    def _order(link: Link) -> tuple[str, int]:
-        """Return a key that sorts wires by the block and the port that they feed."""
-        return link.draft.path, list(link.draft.interface.inputs).index(link.port)
+        given: dict[str, dict[str, Link]] = {}
+        for link in links:
+            given.setdefault(link.draft.path, {})[link.port] = link
+        for path in sorted(given):
+            ports, found = drafts[path].interface.inputs, given[path]
+            self._waiting[path] = {port: found[port] for port in ports if port in found}
+            for link in self._waiting[path].values():
+                self._from[link.wire.block].append(link)
 
     def run(self) -> None:
         """Follow every wire."""
         for path in sorted(self.drafts):
-            if not self._pending(path) and path not in self._settled:
-                self._settle(path)
+            if path not in self._waiting and path not in self._settled:
+                self._enter(path)
+                self._spread(path)
+        producers = sorted(self._from, reverse=True)
         while self._waiting:
-            if self._ready:
-                link = min(self._ready.values(), key=self._order)
+            link = self._first_early()
+            if link is not None:
+                self._begun.add(link.draft.path)
                 self._take(link)
                 self._spread(link.draft.path)
                 continue
-            path = max(sorted(self._first_ring()), key=self.knowledge)
+            while not any(map(self._waits, self._from[producers[-1]])):
+                producers.pop()
+            path = max(sorted(self._first_ring(producers[-1])), key=self.knowledge)
+            self._begun.add(path)
             if self.prepare(path):
                 self._spread(path)
             else:
-                self._settle(path)
+                self._settled.add(path)
+                self.settle(path)
+                self._spread(path)
 
-    def _pending(self, path: str) -> list[Link]:
-        return [link for link in self._into[path] if link.key in self._waiting]
+    def _waits(self, link: Link) -> bool:
+        return link.port in self._waiting.get(link.draft.path, ())
 
-    def _first_ring(self) -> list[str]:
+    def _first_early(self) -> Link | None:
+        """Return the first wire that waits only for the other inputs of its block."""
+        while self._early:
+            path, _, port = heappop(self._early)
+            if port in self._waiting.get(path, ()):
+                return self._waiting[path][port]
+        return None
+
+    def _first_ring(self, start: str) -> list[str]:
         """Return blocks that wait for each other and for no others.
 
-        They are the first strongly connected component that Tarjan's search closes on its way against the
-        signals.
+        They are the first strongly connected component that Tarjan's search closes on its way from a block
+        against the signals.
         """
         number: dict[str, int] = {}
         lowest: dict[str, int] = {}
@@ -124,9 +157,9 @@ class Flow:
 
         def enter(path: str) -> None:
             number[path] = lowest[path] = len(number)
-            trail.append((path, iter(self._pending(path))))
+            trail.append((path, iter(self._waiting.get(path, {}).values())))
 
-        enter(min(link.wire.block for link in self._waiting.values()))
+        enter(start)
         while True:
             path, links = trail[-1]
             link = next(links, None)
@@ -141,43 +174,79 @@ class Flow:
                 before = trail[-1][0]
                 lowest[before] = min(lowest[before], lowest[path])
 
-    def _settle(self, path: str) -> None:
-        self._settled.add(path)
-        self.settle(path)
-        self._spread(path)
-
     def _spread(self, path: str) -> None:
         """Pass the known facts of a block to its readers, and from them to their readers."""
         changed = [path]
         while changed:
             path = changed.pop()
             for link in self._from[path]:
-                if link.key in self._waiting and (self.knows(link) or path in self._settled):
-                    self._ready[link.key] = link
-                    pending = self._pending(link.draft.path)
-                    if all(each.key in self._ready for each in pending):
-                        # In the order of the ports, so that of two that disagree the second is wrong.
-                        for each in pending:
-                            self._take(each)
-                        if link.draft.path not in self._settled:
-                            self._settled.add(link.draft.path)
-                            self.settle(link.draft.path)
-                        changed.append(link.draft.path)
+                reader = link.draft.path
+                if self._waits(link) and (self.knows(link) or path in self._settled):
+                    ready = self._ready[reader]
+                    ready.add(link.port)
+                    if len(ready) == len(self._waiting[reader]):
+                        self._enter(reader)
+                        changed.append(reader)
+                    else:
+                        place = list(link.draft.interface.inputs).index(link.port)
+                        heappush(self._early, (reader, place, link.port))
+
+    def _enter(self, path: str) -> None:
+        """Let a block take all wires that it waits for, and decide what stays open; or do as in its case."""
+        # In the order of the ports, so that of two that disagree the second is wrong.
+        links = list(self._waiting.get(path, {}).values())
+        case = None
+        if path not in self._begun:
+            case = (type(self), self.drafts[path].type, self.case(path, links))
+            if case in self.cases:
+                self._waiting.pop(path, None)
+                self._settled.add(path)
+                self.adopt(path, self.cases[case])
+                return
+        self._faulty = False
+        for link in links:
+            self._take(link)
+        if path not in self._settled:
+            self._settled.add(path)
+            self.settle(path)
+        if case is not None and not self._faulty:
+            self.cases[case] = self.found(path)
 
     def _take(self, link: Link) -> None:
-        del self._waiting[link.key]
-        del self._ready[link.key]
+        path = link.draft.path
+        del self._waiting[path][link.port]
+        if not self._waiting[path]:
+            del self._waiting[path]
+        self._ready[path].discard(link.port)
         if not self.knows(link) or not self.take(link):
             self.unknown.add(link.key)
+            self._faulty = True
 
     def fault(self, path: str, place: Place, problem: str, remedy: str = "") -> None:
         """Report a fault of a block, once for a wire that leads to several blocks of a part."""
+        self._faulty = True
         if place not in self._reported:
             self._reported.add(place)
             self.faults.add(place, problem, remedy, subject=f"block '{path}'")
 
+    def undecided(self, path: str) -> tuple[str, ...]:
+        """Return the inputs of a block of which nothing is known."""
+        return tuple([port for port in self.drafts[path].interface.inputs if (path, port) in self.unknown])
+
     def knows(self, link: Link) -> bool:
         """Return whether the fact that a wire carries is known."""
+        raise NotImplementedError
+
+    def case(self, path: str, links: Sequence[Link]) -> Hashable:
+        """Return all from which the facts of a block follow, besides its class, when it takes these wires."""
+        raise NotImplementedError
+
+    def found(self, path: str) -> Any:
+        """Return the facts that were found for a block."""
+        raise NotImplementedError
+
+    def adopt(self, path: str, found: Any) -> None:
+        """Give a block the facts that were found for another one in the same case."""
         raise NotImplementedError
 
     def take(self, link: Link) -> bool:
@@ -216,6 +285,33 @@ class ShapeFlow(Flow):
         node = self.nodes[link.wire.block]
         shape = node.block.interface.outputs[link.wire.port].signal.shape
         return all(size in node.sizes for size in shape if isinstance(size, str))
+
+    def case(self, path: str, links: Sequence[Link]) -> Hashable:
+        """Return the shapes that come in and those of its constants; parameters have fixed some sizes."""
+        draft = self.drafts[path]
+        constants = [
+            (port, np.shape(connection.source.value))
+            for port, connection in draft.connections.items()
+            if isinstance(connection.source, Constant)
+        ]
+        return (
+            draft.block is UNKNOWN,
+            tuple(self.nodes[path].sizes.items()),
+            tuple([(link.port, self._shape(link), index_text(link.wire.index)) for link in links]),
+            tuple(constants),
+            self.undecided(path),
+        )
+
+    def _shape(self, link: Link) -> Shape | None:
+        return self.nodes[link.wire.block].shape(link.wire.port) if self.knows(link) else None
+
+    def found(self, path: str) -> Sizes:
+        """Return the sizes of a block."""
+        return dict(self.nodes[path].sizes)
+
+    def adopt(self, path: str, found: Sizes) -> None:
+        """Take these sizes."""
+        self.nodes[path].sizes.update(found)
 
     def take(self, link: Link) -> bool:
         """Match the part that the index takes."""
@@ -262,10 +358,7 @@ class ShapeFlow(Flow):
         if draft.block is UNKNOWN:
             return
         interface = node.block.interface
-        undecided = {
-            size for port, declared in interface.inputs.items() if (path, port) in self.unknown
-            for size in declared.signal.shape
-        }  # fmt: skip
+        undecided = {size for port in self.undecided(path) for size in interface.inputs[port].signal.shape}
         for declared in (*interface.outputs.values(), *interface.inputs.values()):
             for size in declared.signal.shape:
                 if isinstance(size, str) and size not in undecided:

@@ -26,9 +26,14 @@ class Writer(NamedTuple):
 def files_read(blocks: Iterable[Block], sources: Iterable[Path]) -> list[Path]:
     """Return every file that a run depends on: the YAML files, those of parameters, and the blocks' own."""
     found = dict.fromkeys(sources)
+    kinds: set[type[Block]] = set()
     for block in blocks:
-        module = getattr(sys.modules.get(type(block).__module__), "__file__", None)
-        found |= dict.fromkeys(map(Path, [*([module] if module else []), *block.reads()]))
+        kind = type(block)
+        if kind not in kinds:
+            kinds.add(kind)
+            module = getattr(sys.modules.get(kind.__module__), "__file__", None)
+            found |= {Path(module): None} if module else {}
+        found |= dict.fromkeys(map(Path, block.reads()))
     return list(found)
 
 
@@ -94,12 +99,12 @@ def file_key(path: str | os.PathLike[str]) -> object:
 
 
 def _written(block: Block) -> Iterator[tuple[str, str]]:
-    for name, param in block.interface.params.items():
-        if param.writes and getattr(block, name):
-            yield name, getattr(block, name)
+    for param in block.interface.files_written:
+        if getattr(block, param.name):
+            yield param.name, getattr(block, param.name)
 
 
 def _folders_read(block: Block) -> Iterator[str]:
-    for name, param in block.interface.params.items():
-        if param.is_file and not param.writes and os.path.isdir(getattr(block, name)):
-            yield getattr(block, name)
+    for param in block.interface.files_read:
+        if os.path.isdir(getattr(block, param.name)):
+            yield getattr(block, param.name)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -61,8 +62,7 @@ class Selection:
         return f"{number} {self.shown}" if self.shown.symbols else number
 
 
-@dataclass(frozen=True)
-class Criterion:
+class Criterion(NamedTuple):
     """A criterion for samples: the statistic, its comparison with the limit, and the words for it."""
 
     statistic: str
@@ -80,8 +80,7 @@ EXPECTATIONS: Mapping[str, Criterion] = {
 }
 
 
-@dataclass(frozen=True)
-class Expectation:
+class Expectation(NamedTuple):
     """One requirement on a run: ``kind`` is a key of EXPECTATIONS, ``limit`` in the unit of the elements."""
 
     selection: Selection
@@ -103,8 +102,7 @@ class Expectation:
         return f"{value:g}" if self.statistic == COUNT else self.selection.shows(value)
 
 
-@dataclass(frozen=True)
-class Entry:
+class Entry(NamedTuple):
     """A line of the summary: statistics of a selection."""
 
     label: str

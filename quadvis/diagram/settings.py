@@ -15,9 +15,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from quadvis.diagram.sections.forms import TEXT, Schema, map_of, ref
 from quadvis.diagram.sections.header import is_version
@@ -34,16 +34,14 @@ MAX_DEPTH = 30  # of files that build on files
 SETTING: Schema = {"pattern": r"^([A-Za-z_][A-Za-z0-9_/]*\.)?[A-Za-z_][A-Za-z0-9_]*$"}
 
 
-@dataclass(frozen=True)
-class Setting:
+class Setting(NamedTuple):
     """A value given from outside, and where its name stands."""
 
     place: Place
     value: YamlNode | Unknown
 
 
-@dataclass(frozen=True)
-class ParameterFile:
+class ParameterFile(NamedTuple):
     """A file of settings that a diagram was loaded with."""
 
     name: str

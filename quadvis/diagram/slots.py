@@ -73,7 +73,7 @@ def _fitting(
 def _in_slot(base: BlockSpec, block: BlockSpec) -> BlockSpec:
     """Return the block for a slot: it has the slot's wires and rate unless it has its own."""
     inputs = base.inputs if block.inputs is None else block.inputs
-    return replace(block, slot=base.slot, inputs=inputs, rate=block.rate or base.rate)
+    return block._replace(slot=base.slot, inputs=inputs, rate=block.rate or base.rate)
 
 
 def check_slots(

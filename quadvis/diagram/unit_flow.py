@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 
-import numpy as np
-
-from quadvis.block import Declared, Param
+from quadvis.block import Declared
 from quadvis.diagram.flow import ONE, Flow, Key, Link
 from quadvis.diagram.values import Bare, OpenUnits
 from quadvis.errors import UNKNOWN, Place, known
@@ -20,6 +18,7 @@ class Bindings:
 
     def __init__(self) -> None:
         self.elements: list[dict[str, Unit]] = [{}]
+        self._known: dict[tuple[Declared, int], tuple[Unit, ...]] = {}
 
     def match(self, pattern: tuple[Unit, ...], units: OpenUnits) -> int | None:
         """Bind variables by the units of the elements; return the first unit that does not fit, or None."""
@@ -72,6 +71,18 @@ class Bindings:
         if not unit.variables:
             return unit
         return bound.get(_variable(unit)) or unit.substitute(bound)
+
+    def units(self, declared: Declared, count: int) -> tuple[Unit, ...]:
+        """Return the units of the elements of a port or parameter."""
+        found = self._known.get((declared, count))
+        if found is None:
+            if len(declared.units) == len(self.elements) == 1:
+                found = (self.unit(declared.units, 0),) * count
+            else:
+                found = tuple([self.unit(declared.units, index) for index in range(count)])
+            if not any(unit.variables for unit in found):
+                self._known[declared, count] = found  # what is bound stays so
+        return found
 
     def open(self, declared: Iterable[Declared]) -> list[str]:
         """Return the variables of some ports and parameters that nothing has bound yet, in some element."""
@@ -126,33 +137,54 @@ class UnitFlow(Flow):
         super().run()
 
     def note(self) -> None:
-        """Note the units of all ports and parameters."""
+        """Note the units of all ports and parameters; blocks of one case and with equal sizes share them."""
+        noted: dict[Hashable, dict[str, tuple[Unit, ...]]] = {}
         for path, node in self.nodes.items():
-            interface = node.block.interface
-            params = interface.params.values() if known(self.drafts[path].block) else ()
-            for declared in (*interface.outputs.values(), *params, *interface.inputs.values()):
-                units = self._units(path, declared)
-                if not any(unit.variables for unit in units):
-                    node.units[declared.name] = tuple(unit.reduced for unit in units)
+            draft, block = self.drafts[path], self.drafts[path].block
+            params = draft.interface.params if known(block) else {}
+            counts = {name: int(getattr(getattr(block, name), "size", 1)) for name in params}
+            case = (self.bindings[path], draft.type, tuple(node.sizes.items()), tuple(counts.values()))
+            if case not in noted:
+                inputs, outputs = draft.interface.inputs, draft.interface.outputs
+                counts |= {name: math.prod(node.shape(name)) for name in (*inputs, *outputs)}
+                every = {**outputs, **params, **inputs}
+                noted[case] = dict(self._noted(self.bindings[path], every, counts))
+            node.units.update(noted[case])
 
-    def _count(self, path: str, declared: Declared) -> int:
-        if isinstance(declared, Param):
-            return int(np.size(getattr(self.drafts[path].block, declared.name)))
-        return math.prod(self.nodes[path].shape(declared.name))
-
-    def _units(self, path: str, declared: Declared) -> tuple[Unit, ...]:
-        count = self._count(path, declared)
-        if len(declared.units) == len(self.bindings[path].elements) == 1:
-            return (self.bindings[path].unit(declared.units, 0),) * count
-        return tuple(self.bindings[path].unit(declared.units, index) for index in range(count))
+    @staticmethod
+    def _noted(
+        bindings: Bindings, declared: Mapping[str, Declared], counts: Mapping[str, int]
+    ) -> Iterator[tuple[str, tuple[Unit, ...]]]:
+        for name, item in declared.items():
+            units = bindings.units(item, counts[name])
+            if not any(unit.variables for unit in units):
+                yield name, tuple([unit.reduced for unit in units])
 
     def _of(self, link: Link) -> tuple[Unit, ...]:
         wire = link.wire
         node = self.nodes[wire.block]
-        units = self._units(wire.block, node.block.interface.outputs[wire.port])
-        part = selected(node.shape(wire.port), wire.index)
+        shape = node.shape(wire.port)
+        units = self.bindings[wire.block].units(node.block.interface.outputs[wire.port], math.prod(shape))
+        part = selected(shape, wire.index)
         assert part is not None, "the shapes have been checked"
         return units[part[0] : part[0] + math.prod(part[1])]
+
+    def case(self, path: str, links: Sequence[Link]) -> Hashable:
+        """Return the units that come in, and those of the values that are given."""
+        return (
+            self.drafts[path].block is UNKNOWN,
+            tuple([(link.port, self._of(link) if self.knows(link) else None) for link in links]),
+            tuple([(name, units) for name, _, units in self._given(path)]),
+            self.undecided(path),
+        )
+
+    def found(self, path: str) -> Bindings:
+        """Return the bindings of a block, which are final then."""
+        return self.bindings[path]
+
+    def adopt(self, path: str, found: Bindings) -> None:
+        """Share these bindings."""
+        self.bindings[path] = found
 
     def knows(self, link: Link) -> bool:
         """Say whether the producer's variables are bound."""
@@ -208,7 +240,7 @@ class UnitFlow(Flow):
         """Let given values bind variables that wires leave open; others then count as plain numbers."""
         bindings, interface = self.bindings[path], self.drafts[path].interface
         self._match_given(path)
-        undecided = [port for name, port in interface.inputs.items() if (path, name) in self.unknown]
+        undecided = [interface.inputs[port] for port in self.undecided(path)]
         if bindings.open(undecided) or self.drafts[path].block is UNKNOWN:
             return
         self._match_bare(path)
@@ -260,7 +292,7 @@ class UnitFlow(Flow):
         units = {type(unit) for _, _, units in self._given(path) for unit in units}
         if Unit in units and path not in self._prepared:
             return 3
-        if any((path, port) in self.unknown for port in self.drafts[path].interface.inputs):
+        if self.undecided(path):
             return 2
         return int(Bare in units)
 

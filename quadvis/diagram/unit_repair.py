@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from quadvis.diagram.flow import Draft, Key, Link
+from quadvis.diagram.flow import Cases, Draft, Key, Link
 from quadvis.diagram.unit_flow import UnitFlow, words
 from quadvis.diagram.values import OpenUnits
 from quadvis.errors import Fault, Faults, Place
@@ -42,11 +42,12 @@ def follow_units(
     links: Sequence[Link],
     unknown: Collection[Key],
     faults: Faults,
+    cases: Cases,
 ) -> UnitFlow:
     """Let the units flow along the wires, note them in the nodes, and report units that do not fit."""
 
     def flow(changed: Mapping[Key, Unit]) -> UnitFlow:
-        found = UnitFlow(drafts, nodes, links, unknown, _Trial())
+        found = UnitFlow(drafts, nodes, links, unknown, _Trial(), cases)
         found.changed = changed
         found.run()
         return found
@@ -107,7 +108,7 @@ def _values(flow: UnitFlow) -> Iterator[_Value]:
     for path, draft in sorted(flow.drafts.items()):
         for name, units in (*draft.units.items(), *_constants(draft)):
             fixed = [unit for unit in units if isinstance(unit, Unit)]
-            origin = draft.connections[name].place if name in draft.connections else draft.origins[name]
+            origin = draft.origin(name)
             # A value of the command line has no place of its own.
             key = origin if origin.line else (path, name)
             if fixed and (path, name) not in flow.changed:

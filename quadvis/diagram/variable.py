@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,7 @@ from quadvis.units import Unit, UnitError, parse_quantity
 NAME = re.compile(rf"(?:(?P<block>{PATH})\.)?(?P<parameter>{PORT})(?:\[(?P<element>\d{{1,6}})\])?", re.ASCII)
 
 
-@dataclass(frozen=True)
-class Variable:
+class Variable(NamedTuple):
     """A parameter, or an element of one; ``parameter`` is its name for ``--set``, ``others`` all elements."""
 
     name: str

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 from quadvis.block import Out
 from quadvis.diagram.expand import Expansion, FlatBlock, Scope
@@ -18,16 +19,14 @@ from quadvis.graph.graph import Index, Wire
 MAX_PORTS = 50  # of parts, that a signal passes without meeting a block
 
 
-@dataclass(frozen=True)
-class OpenInput:
+class OpenInput(NamedTuple):
     """An input of a part that nothing feeds, so that its readers take their own defaults."""
 
     part: Scope
     port: str
 
 
-@dataclass(frozen=True)
-class Source:
+class Source(NamedTuple):
     """The source of an input, and the place of the word for its crossing between rates."""
 
     place: Place
@@ -107,7 +106,7 @@ class Wiring:
             return Source(reference.place, Wire(path, reference.port, reference.index))
         if not self._offers(path, reference, child.spec[PORTS].outputs):
             return Source(reference.place, UNKNOWN)
-        return self._indexed(replace(self._export(child, reference.port), place=reference.place), reference)
+        return self._indexed(self._export(child, reference.port)._replace(place=reference.place), reference)
 
     def _offers(self, path: str, reference: Reference, outputs: Mapping[str, object]) -> bool:
         if (path, reference.port) in self.unknown:
@@ -127,7 +126,7 @@ class Wiring:
         if not isinstance(found.source, Wire) or given.across is None:
             return found
         if given.across is UNKNOWN:
-            return replace(found, across=UNKNOWN)
+            return found._replace(across=UNKNOWN)
         return Source(found.place, replace(found.source, crossing=given.across), given.across_place)
 
     def _inside(self, scope: Scope, reference: Reference) -> Source:

@@ -22,7 +22,9 @@ from quadvis.errors.characters import (
     odd_characters,
 )
 
-MAX_NODES = 100_000
+# A diagram has a value in about 7 characters. Many more values than that would cost more memory than the
+# length of the file explains.
+MAX_NODES, LEAST_CHARACTERS = 100_000, 4
 MAX_DEPTH = 50
 
 # Control characters, line breaks that editors do not count, and signs that reorder the visible text.
@@ -88,6 +90,7 @@ class Composer:
         self.stack: list[_Level] = []
         self.root: YamlNode | None = None
         self.documents = self.nodes = 0
+        self.most = max(MAX_NODES, len(text) // LEAST_CHARACTERS)
 
     def compose(self, events: Iterator[Any]) -> YamlNode:
         """Return the root; raise an error for an empty file."""
@@ -130,7 +133,7 @@ class Composer:
                 raise MisreadError
             found, source = self.lists[mark.line, mark.column]
             self.nodes += found.count
-            if self.nodes >= MAX_NODES:
+            if self.nodes >= self.most:
                 raise MisreadError  # read it again element by element, to find where it exceeds the limit
             return Numbers(found, source, *self._position(event))
         if value.isascii() and "\t" not in value:
@@ -180,8 +183,8 @@ class Composer:
     def _add(self, node: YamlNode, event: Any) -> None:
         """Put a node in its place: under the waiting key, at the end of the list, or as a key itself."""
         self.nodes += 1
-        if self.nodes > MAX_NODES:
-            raise self._fatal(event, f"the file holds more than {MAX_NODES} values", "split it")
+        if self.nodes > self.most:
+            raise self._fatal(event, f"the file holds more than {self.most} values", "split it")
         self._check_properties(event)
         if not self.stack:
             self.root = node

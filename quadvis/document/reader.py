@@ -30,7 +30,7 @@ from quadvis.errors import DiagramError, Fault, Faults, Place, QuadvisError
 from quadvis.machine.inputs import InputError, TooLongError, read_input
 from quadvis.machine.missing_file import file_trouble
 
-MAX_BYTES = 1_000_000
+MAX_BYTES = 16_000_000
 
 _Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _Dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
@@ -39,11 +39,11 @@ _Dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 _DIRECTIVE = re.compile("(?:^|[\r\n])%")
 
 # Repairs of a refused text; each one costs a further reading.
-_MOST_REPAIRS, _MOST_READ = 50, 3 * MAX_BYTES
+_MOST_REPAIRS, _MOST_READ = 50, 3_000_000
 
 
 def read_yaml(path: str | os.PathLike[str], faults: Faults | None = None) -> YamlNode:
-    """Read a YAML file of at most 1 MB; see `parse_yaml`. Any fault raises `DiagramError`."""
+    """Read a YAML file of at most 16 MB; see `parse_yaml`. Any fault raises `DiagramError`."""
     name = os.fspath(path)
     problem, remedy = file_trouble(name)
     if problem:
@@ -51,7 +51,7 @@ def read_yaml(path: str | os.PathLike[str], faults: Faults | None = None) -> Yam
     try:
         data = read_input(name, MAX_BYTES)
     except TooLongError:
-        problem, remedy = f"the file is larger than {MAX_BYTES // 1000} kB", "split it"
+        problem, remedy = f"the file is larger than {MAX_BYTES // 1_000_000} MB", "split it"
         raise _fault(Place(name, 1, 1), problem, remedy) from None
     except InputError as error:
         raise _fault(Place(name), f"the file cannot be read: {error.why}") from None
@@ -72,7 +72,7 @@ def parse_yaml(text: str, name: str = "<text>", faults: Faults | None = None) ->
     """
     text = text.removeprefix("\ufeff")
     if len(text) > MAX_BYTES:
-        raise _fault(Place(name, 1, 1), f"the text is larger than {MAX_BYTES // 1000} kB", "split it")
+        raise _fault(Place(name, 1, 1), f"the text is larger than {MAX_BYTES // 1_000_000} MB", "split it")
     bad = FORBIDDEN.search(text)
     if bad is not None:
         raise _fault(_place(text[: bad.start()], name), *forbidden(bad))

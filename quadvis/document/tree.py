@@ -196,6 +196,8 @@ def _check_keys(
     found: YamlMap, required: Collection[str], optional: Collection[str], faults: Faults
 ) -> YamlMap:
     """Add a fault for each unknown and each missing key; return the map with misspelt keys corrected."""
+    if all(key in required or key in optional for key in found) and all(name in found for name in required):
+        return found
     known = list(dict.fromkeys((*required, *optional)))
     free = [name for name in known if name not in found]
     result = found

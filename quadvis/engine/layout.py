@@ -7,13 +7,13 @@ Frames lie in a list beside it, and so do frames that a block keeps as states.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 from quadvis.block import Block, Shape
 from quadvis.engine.memory import SLOT, Record, Slot
-from quadvis.graph.graph import Constant, Graph, Node, Wire, selected
+from quadvis.graph.graph import Constant, Graph, Node, Task, Wire, selected
 
 TIME = Slot("float64", (), 0)
 
@@ -88,6 +88,7 @@ class Layout:
     def __init__(self, graph: Graph) -> None:
         self._graph = graph
         self.size, self.frames = 1, 0
+        self._records: dict[Hashable, Record] = {}
         self.continuous = 1  # the slot at which the continuous task's signals end
         self._outputs = self._signals()
         self._constants = {
@@ -107,6 +108,8 @@ class Layout:
     def _whole(self, node: Node, wire: Wire) -> Slot:
         """Return the slot from which a wire reads: an output, or a copy of it, for which room is made."""
         slot = self._outputs[wire.block][wire.port]
+        if not (wire.delayed or wire.latched):
+            return slot
         producer = self._graph[wire.block]
         for copied, copies, task in (
             (wire.delayed, self.delays, producer.task),
@@ -121,11 +124,13 @@ class Layout:
 
     def _signals(self) -> dict[str, Slots]:
         found = {}
-        for task in self._graph.tasks:
-            for node in self._graph.nodes:
-                if node.task == task:
-                    ports = node.block.interface.outputs
-                    found[node.path] = Slots({port: self._take(node, port) for port in ports})
+        nodes: dict[Task, list[Node]] = {task: [] for task in self._graph.tasks}
+        for node in self._graph.nodes:
+            nodes[node.task].append(node)
+        for task, mine in nodes.items():
+            for node in mine:
+                ports = node.block.interface.outputs
+                found[node.path] = Slots({port: self._take(node, port) for port in ports})
             if task.continuous:
                 self.continuous = self.size
         return found
@@ -135,7 +140,7 @@ class Layout:
         return Slots({state.name: self._room("float64", node.shape(state.name)) for state in states})
 
     def _place(self, node: Node, slopes: Slots) -> Placed:
-        record, position = Record.of(node.block, node.sizes), self.size
+        record, position = self._record(node), self.size
         self.size += record.size
         ports = node.block.interface.outputs
         return Placed(
@@ -150,6 +155,13 @@ class Layout:
             position,
             tuple(port for port in ports if ports[port].nan),
         )
+
+    def _record(self, node: Node) -> Record:
+        """Return the record of a block, which those of one class and with equal sizes share."""
+        kind = type(node.block), tuple(node.sizes.items())
+        if kind not in self._records:
+            self._records[kind] = Record.of(node.block, node.sizes)
+        return self._records[kind]
 
     def _frames(self, block: Block) -> Slots:
         states = [name for name, state in block.interface.states.items() if state.signal.scalar == "frame"]

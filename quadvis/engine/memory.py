@@ -13,21 +13,21 @@ import math
 import types
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.block import Block, Shape, Sizes
 from quadvis.block.returned import CALL
+from quadvis.block.signals import SCALARS
 
 SLOT = 8
 C_TYPES = {"float64": ctypes.c_double, "int64": ctypes.c_int64, "bool": ctypes.c_bool}
 VIEWS = {"float64": "d", "int64": "q", "bool": "?"}
 
 
-@dataclass(frozen=True)
-class Slot:
+class Slot(NamedTuple):
     """Where a signal or field lives: kind, shape, first slot; for ``frame`` its place in a list of frames."""
 
     scalar: str
@@ -50,8 +50,7 @@ def packed(scalar: str, shape: Shape) -> np.dtype[Any]:
     return np.dtype("int64" if shape and scalar == "bool" else scalar)
 
 
-@dataclass(frozen=True)
-class Field:
+class Field(NamedTuple):
     """One field of a block's record: its offset in slots counts from the start of the record."""
 
     name: str
@@ -135,8 +134,10 @@ class Memory:
         """Store a value that fits the slot's shape."""
         if slot.scalar == "frame":
             self.frames[slot.position] = value
-        else:
+        elif slot.shape:
             self.view(slot)[...] = value
+        else:
+            self._scalars[slot.scalar][self._place(slot)] = SCALARS[slot.scalar](value)
 
     def content(self) -> bytes:
         """Return the bytes for a snapshot, with zeros for Work, which no tick hands to the next."""

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from typing import NamedTuple
 
 from quadvis.block import Random
 from quadvis.block.random import stream_start
@@ -24,8 +25,7 @@ NO_BLOCK = -1
 PHASES = ("read", "output", "write", "update")
 
 
-@dataclass(frozen=True)
-class Op:
+class Op(NamedTuple):
     """One call of a block's method, from slots to slots; or the copy of one slot to another.
 
     ``block`` is the block's number in the program, the order of execution; a copy has ``NO_BLOCK``.
@@ -137,10 +137,13 @@ def make_program(graph: Graph, seed: int) -> Program:
     """Lay out memory and list the calls of every task; states hold their initial values, seeded."""
     layout = Layout(graph)
     blocks = layout.blocks
-    calls = {method: _calls(graph, blocks, method) for method in (*PHASES, "deriv")}
+    calls = _calls(graph, blocks)
+    numbers: dict[str, list[int]] = {task.name: [] for task in graph.tasks}
+    for number, block in enumerate(blocks):
+        numbers[block.task].append(number)
     tasks = []
     for task in graph.tasks:
-        mine = [number for number, block in enumerate(blocks) if block.task == task.name]
+        mine = numbers[task.name]
         read, output, write, update = (
             tuple(calls[phase][number] for number in mine if number in calls[phase]) for phase in PHASES
         )
@@ -183,15 +186,15 @@ def _copies(slots: Mapping[Slot, Slot]) -> tuple[Op, ...]:
     return tuple(Op(NO_BLOCK, COPY, (source,), (target,)) for source, target in slots.items())
 
 
-def _calls(graph: Graph, blocks: Sequence[Placed], method: str) -> dict[int, Op]:
-    """Return the calls of one method by the number of the block."""
-    found = {}
+def _calls(graph: Graph, blocks: Sequence[Placed]) -> dict[str, dict[int, Op]]:
+    """Return the calls of each method by the number of the block."""
+    found: dict[str, dict[int, Op]] = {method: {} for method in (*PHASES, "deriv")}
     for number, (node, block) in enumerate(zip(graph.nodes, blocks, strict=True)):
-        names = node.block.interface.arguments.get(method)
-        if names is not None:
-            targets: Mapping[str, Slot] = {"output": block.outputs, "deriv": block.slopes}.get(method, {})
-            sources = (TIME if name == "time" else block.inputs[name] for name in names)
-            found[number] = Op(number, method, tuple(sources), tuple(targets.values()))
+        targets = {"output": tuple(block.outputs.values()), "deriv": tuple(block.slopes.values())}
+        for method, names in node.block.interface.arguments.items():
+            if method in found:
+                sources = tuple([TIME if name == "time" else block.inputs[name] for name in names])
+                found[method][number] = Op(number, method, sources, targets.get(method, ()))
     return found
 
 
@@ -237,10 +240,10 @@ def _minor(nodes: Sequence[Node]) -> list[int]:
     moving = _moving(nodes)
     found: list[int] = []
     for number, node in reversed(list(enumerate(nodes))):
-        if node.path in needed & moving:
-            found.insert(0, number)
+        if node.path in needed and node.path in moving:
+            found.append(number)
             needed.update(_sources(node, node.block.interface.feedthrough))
-    return found
+    return found[::-1]
 
 
 def _moving(nodes: Sequence[Node]) -> set[str]:

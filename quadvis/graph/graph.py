@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,14 +28,16 @@ DELAY = "delay"
 Index = tuple[Any, ...]  # integers, then slices, as numpy takes them
 
 
-@dataclass(frozen=True)
-class Task:
+class Task(NamedTuple):
     """Blocks that share a rate. The continuous task runs at every solver step. Times are exact (s)."""
 
     name: str
     period: Fraction
     offset: Fraction = Fraction(0)
     continuous: bool = False
+
+    def __hash__(self) -> int:
+        return hash(self.name)  # no two tasks share one, and fractions are slow to hash
 
 
 @dataclass(frozen=True)
@@ -64,8 +66,7 @@ class Wire:
         return self.late or self.crossing == DELAY
 
 
-@dataclass(frozen=True)
-class Constant:
+class Constant(NamedTuple):
     """An input that a diagram sets to a value instead of wiring it."""
 
     value: Any
@@ -163,6 +164,8 @@ def selected(shape: Shape, index: Index) -> tuple[int, Shape] | None:
 
     IndexError if the index goes beyond the shape or takes nothing: unlike numpy's, a slice is not cut short.
     """
+    if not index and 0 not in shape:
+        return 0, shape
     for part, length in zip(index, shape, strict=False):
         if isinstance(part, slice) and ((part.stop or 0) > length or not range(length)[part]):
             raise IndexError(f"{part.start}:{part.stop} of {length} elements")

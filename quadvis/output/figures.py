@@ -6,7 +6,7 @@ A diagram asks for figures under its key `figures`; without that there is one fi
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,16 +16,14 @@ from quadvis.output.recording import Recorded
 from quadvis.units import Unit, parse_units
 
 
-@dataclass(frozen=True)
-class Trace:
+class Trace(NamedTuple):
     """A signal or some of its elements, with its label in the legend."""
 
     signal: Wire
     label: str = ""
 
 
-@dataclass(frozen=True)
-class Panel:
+class Panel(NamedTuple):
     """One pair of axes; without a unit it has the unit of its first signal. The reference is in that unit."""
 
     traces: tuple[Trace, ...]
@@ -34,8 +32,7 @@ class Panel:
     reference: float | None = None
 
 
-@dataclass(frozen=True)
-class Figure:
+class Figure(NamedTuple):
     """One picture, of the run between `start` and `stop` (s)."""
 
     title: str

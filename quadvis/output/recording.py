@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,8 +42,7 @@ class Recorded(Protocol):
         """Return the stamps (ns) of its rows."""
 
 
-@dataclass(frozen=True)
-class RecordedPort:
+class RecordedPort(NamedTuple):
     """One output port in a recording: its type ("float64", "int64" or "bool"), shape and unit."""
 
     name: str
@@ -63,8 +61,7 @@ class RecordedPort:
         return (values != 0 if self.type == "bool" else values).reshape(len(slots), *self.shape)
 
 
-@dataclass(frozen=True)
-class RecordedBlock:
+class RecordedBlock(NamedTuple):
     """One recorded block: its path ("/vision/detector"), its ports in the order of memory, its rate."""
 
     path: str

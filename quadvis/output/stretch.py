@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import NamedTuple
 
 NANOSECONDS = 10**9
 
@@ -37,8 +38,7 @@ class Sampling:
         return self.offset + row * self.spacing
 
 
-@dataclass(frozen=True)
-class Stretch:
+class Stretch(NamedTuple):
     """The rows from ``after`` to ``before`` (s), both included; ``before`` None is the end of the run."""
 
     sampling: Sampling

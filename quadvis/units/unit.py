@@ -34,7 +34,7 @@ def _powers(items: Iterable[tuple[str, Fraction]]) -> tuple[tuple[str, Fraction]
     """Return the sum of the exponents of each symbol, in the order of first occurrence."""
     total: dict[str, Fraction] = {}
     for symbol, exponent in items:
-        total[symbol] = total.get(symbol, Fraction(0)) + exponent
+        total[symbol] = total[symbol] + exponent if symbol in total else exponent
     if any(abs(exponent) > _LARGEST_POWER for exponent in total.values()):
         raise UnitError(f"a unit has an exponent beyond {_LARGEST_POWER}")
     return tuple((symbol, exponent) for symbol, exponent in total.items() if exponent)
@@ -143,8 +143,9 @@ def _reduced(exponents: frozenset[tuple[str, Fraction]], symbols: tuple[tuple[st
     unit = Unit(exponents, symbols)
     if unit.exponents != unit.dimension or len(symbols) < 2:
         return unit
-    powers = dict(exponents)
-    name, _ = min(_named_powers(), key=lambda named: _length_beside(powers, *named))
+    scale = math.lcm(*(power.denominator for _, power in exponents))  # whole numbers: fractions are slow
+    powers = {base: int(power * scale) for base, power in exponents}
+    name, _ = min(_named_powers(), key=lambda named: _length_beside(powers, scale, *named))
     best = name * _in_bases(unit / name)
     shorter = len(best.symbols) <= 1 if _length(unit) <= _SHORT else True
     return best if shorter and _length(best) < _length(unit) else _in_order(unit)
@@ -157,10 +158,14 @@ def _named_powers() -> tuple[tuple[Unit, dict[str, int]], ...]:
     return tuple((unit, {base: int(power) for base, power in unit.exponents}) for unit in powers)
 
 
-def _length_beside(powers: Mapping[str, Fraction], name: Unit, bases: Mapping[str, int]) -> Fraction:
-    """Return the length of a unit, given by powers of bases, when it is written as a name times bases."""
-    rest = (abs(powers.get(base, Fraction(0)) - bases.get(base, 0)) for base in {*powers, *bases})
-    return _length(name) + sum(rest, Fraction(0))
+def _length_beside(powers: Mapping[str, int], scale: int, name: Unit, bases: Mapping[str, int]) -> int:
+    """Return the length of a unit, given by powers of bases, when it is written as a name times bases.
+
+    Powers and length are multiplied by ``scale``.
+    """
+    named = sum(abs(int(power)) for _, power in name.symbols)
+    rest = (abs(powers.get(base, 0) - scale * bases.get(base, 0)) for base in {*powers, *bases})
+    return scale * named + sum(rest)
 
 
 def _in_bases(unit: Unit) -> Unit:

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 
 import quadvis
 from quadvis.api import check, load, load_text
+from quadvis.document import MAX_BYTES
 from quadvis.errors import DiagramError, Faults
 from quadvis.graph.graph import Constant, Wire
 
@@ -287,7 +288,7 @@ def diagram(blocks: str) -> str:
         ("quadvis: 1\n---\nquadvis: 1\n", "a second document begins here"),
         ("%YAML 1.1\n---\nquadvis: 1\n", "a line that begins with '%' is not allowed"),
         ("quadvis: 1\n\tname: x\n", "a tab cannot indent a line"),
-        ("a: " + "x" * 1_000_001, "the text is larger than 1000 kB"),
+        ("a: " + "x" * MAX_BYTES, "the text is larger than 16 MB"),
         ("a: [" + "1," * 100_001 + "]", "the file holds more than 100000 values"),
     ],
     ids=range(17),
@@ -359,7 +360,7 @@ def test_parts_that_multiply_are_refused(tmp_path: Path) -> None:
         twice = f"{{part: {level + 1}.yaml, rate: fast}}"
         (tmp_path / f"{level}.yaml").write_text(f"{head}  a: {twice}\n  b: {twice}\n")
     (tmp_path / "20.yaml").write_text(f"{head}  a: {{block: sources.sine}}\n")
-    assert "there are more than 5000 blocks" in refused(
+    assert "there are more than 50000 blocks in parts" in refused(
         diagram("  a: {part: 0.yaml, rate: fast}\n"), tmp_path
     )
 

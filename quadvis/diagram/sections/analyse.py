@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,8 +26,7 @@ LIMIT_KEYS = ("vary", "from", "to")
 AT = 3.0  # s, long enough for most queues to be full
 
 
-@dataclass(frozen=True)
-class CutSignal:
+class CutSignal(NamedTuple):
     """A signal, or some elements of it, counted as if it lay flat."""
 
     text: str
@@ -36,16 +35,14 @@ class CutSignal:
     elements: tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class Cut:
+class Cut(NamedTuple):
     """A place where the loop is opened: one signal, or several at once."""
 
     label: str
     signals: tuple[CutSignal, ...]
 
 
-@dataclass(frozen=True)
-class Limit:
+class Limit(NamedTuple):
     """A question: how far a parameter can go from ``start`` toward ``end`` (SI) before the loop is unstable.
 
     ``shown`` is the unit that people read it in.

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from quadvis.block import Block
 from quadvis.diagram.entries import PATH, refuse_name, with_clean_names
@@ -21,8 +20,7 @@ from quadvis.graph.graph import CROSSINGS
 INSIDE = "in"  # the name of a part's inputs for its blocks
 
 
-@dataclass(frozen=True)
-class InputSpec:
+class InputSpec(NamedTuple):
     """The source of an input: a signal or a constant, and how the wire crosses between rates."""
 
     place: Place
@@ -31,8 +29,7 @@ class InputSpec:
     across_place: Place | None = None
 
 
-@dataclass(frozen=True)
-class BlockSpec:
+class BlockSpec(NamedTuple):
     """One entry under ``blocks``: a block of the catalogue, or a part from a file."""
 
     name: str
@@ -40,10 +37,10 @@ class BlockSpec:
     kind: str
     kind_place: Place
     is_part: bool
+    parameters: dict[str, YamlNode] | Unknown
+    parameter_places: dict[str, Place]
     rate: tuple[str, Place] | Unknown | None = None
     slot: Place | Unknown | None = None
-    parameters: dict[str, YamlNode] | Unknown = field(default_factory=dict)
-    parameter_places: dict[str, Place] = field(default_factory=dict)
     inputs: dict[str, InputSpec] | Unknown | None = None  # None: no 'in' was written
 
 

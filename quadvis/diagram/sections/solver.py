@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 from quadvis.diagram.sections.forms import QUANTITY, Schema, closed
 from quadvis.diagram.sections.section import Checked, FileSection
@@ -16,8 +15,7 @@ from quadvis.graph.graph import SOLVERS
 SOLVER_KEYS = ("method", "step")
 
 
-@dataclass(frozen=True)
-class SolverSpec:
+class SolverSpec(NamedTuple):
     """The method and the step (s) of the solver, and where the step is written."""
 
     method: str = "ode4"
