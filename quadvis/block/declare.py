@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -150,7 +151,7 @@ class Param(Declared):
                 raise ParameterError(self.name, f"{self.name} must be a text, got {value!r}")
             return value
         if type(value) is float and self._takes_number and not math.isnan(value):
-            self._check_range(np.asarray(value))
+            self._check_range(value)
             return value
         array = _numbers(value)
         if array is None or not _fits(array, self.signal.scalar):
@@ -167,28 +168,25 @@ class Param(Declared):
     def _takes_number(self) -> bool:
         return self.signal.scalar == "float64" and self.signal.unify((), {})
 
-    @property
-    def _has_bounds(self) -> bool:
-        return (self.min, self.max, self.above, self.below) != (None, None, None, None)
-
     def _accept_choice(self, value: Any) -> int:
         if value in self.choices:
             return self.choices.index(value)
         problem = f"{self.name} must be {self.wanted()}, got {value!r}"
         raise ParameterError(self.name, sentence(problem, suggestion(str(value), self.choices)))
 
-    def _check_range(self, array: NDArray[np.float64]) -> None:
-        if not self._has_bounds:
-            return
+    def _check_range(self, value: float | NDArray[np.float64]) -> None:
         unit = "" if self.unit == "1" else f" {self.unit}"
         for bound, words, holds in (
-            (self.min, "at least", np.greater_equal),
-            (self.max, "at most", np.less_equal),
-            (self.above, "above", np.greater),
-            (self.below, "below", np.less),
+            (self.min, "at least", operator.ge),
+            (self.max, "at most", operator.le),
+            (self.above, "above", operator.gt),
+            (self.below, "below", operator.lt),
         ):
-            if bound is not None and not holds(array, bound).all():
-                wrong = array[~holds(array, bound)].flat[0] if array.shape else float(array)
+            if bound is None:
+                continue
+            held = holds(value, bound)
+            if not (held if isinstance(held, bool) else held.all()):
+                wrong = value if isinstance(held, bool) else np.asarray(value)[~held].flat[0]
                 problem = f"{self.name} must be {words} {bound:g}{unit}, got {wrong:g}{unit}"
                 raise ParameterError(self.name, problem)
 

@@ -10,7 +10,7 @@ from quadvis.diagram.build import Builder, Made
 from quadvis.diagram.check import WireCheck
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.doubts import warn_parameters, warn_rates
-from quadvis.diagram.expand import Expansion
+from quadvis.diagram.expand import Expansion, Kept
 from quadvis.diagram.flow import Cases
 from quadvis.diagram.keys import RUN_SECTIONS
 from quadvis.diagram.loader import read_part
@@ -53,7 +53,8 @@ class Assembly:
         self.spec, self.faults = spec, faults
         self.catalogue = Catalogue(spec.path.parent, own_blocks)
         self.parts = Parts(read_part, faults)
-        self.made = Made()
+        self.kept: dict[str, Kept] = {}
+        self.made: dict[str, Made] = {}
         self.cases: Cases = {}
         self._params = [path for file in params for path in (file.path, *file.bases)]
         self._base: Wiring | None = None  # of the diagram without a variant
@@ -68,7 +69,7 @@ class Assembly:
         """Return the diagram; it may run if there are no faults."""
         spec, faults = self.spec, self.faults
         filled = fill_slots(spec, variant, faults)
-        expansion = Expansion(filled, self.catalogue, settings, self.parts, faults)
+        expansion = Expansion(filled, self.catalogue, settings, self.parts, faults, self.kept)
         wiring = Wiring(expansion, faults)
         promised = self._promised(filled)
         given = {slot: wiring.outputs(slot) for slot in promised if expansion.knows(slot)}
@@ -118,7 +119,9 @@ class Assembly:
         spec = self.spec
         changed = [name for name, block in spec[BLOCKS].items() if filled[BLOCKS][name] is not block]
         if changed and self._base is None:
-            self._base = Wiring(Expansion(spec, self.catalogue, {}, self.parts, Faults()), Faults())
+            self._base = Wiring(
+                Expansion(spec, self.catalogue, {}, self.parts, Faults(), self.kept), Faults()
+            )
         return {slot: self._base.outputs(slot) for slot in changed if self._base is not None}
 
 

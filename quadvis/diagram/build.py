@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 from quadvis.block import Block, In, Param, ParameterError
 from quadvis.diagram.expand import Expansion, FlatBlock
@@ -34,12 +33,14 @@ from quadvis.errors import (
 from quadvis.graph.graph import CONTINUOUS, Constant, Task, Wire, common_divisor
 
 
-@dataclass
-class Made:
-    """What has been made: the variants of a diagram share most of it."""
+class Made(NamedTuple):
+    """A block that was made without a fault: for the variants that have it, too."""
 
-    blocks: dict[tuple[str, type[Block], str, Fraction | None], Block] = field(default_factory=dict)
-    values: dict[tuple[Param, str], tuple[Any, OpenUnits]] = field(default_factory=dict)  # of right texts
+    kind: type[Block]
+    parameters: Mapping[str, YamlNode | Unknown]
+    period: Fraction | None
+    block: Block
+    units: dict[str, OpenUnits]
 
 
 _ANY_STEP = Fraction(1, 100)  # the continuous task needs one; no check looks at it
@@ -49,7 +50,7 @@ class Builder:
     """Makes the blocks and reports their faults. ``step`` is the solver's step, if a solver is needed."""
 
     def __init__(
-        self, spec: FileSpec, expansion: Expansion, wiring: Wiring, made: Made, faults: Faults
+        self, spec: FileSpec, expansion: Expansion, wiring: Wiring, made: dict[str, Made], faults: Faults
     ) -> None:
         self.spec, self.expansion, self.wiring, self.made, self.faults = spec, expansion, wiring, made, faults
         self.tasks = {
@@ -57,6 +58,7 @@ class Builder:
         }
         self.step = self._choose_step()
         step = self.step if self.step is not None and known(self.step) else _ANY_STEP
+        self._right: dict[tuple[Param, str], tuple[Any, OpenUnits]] = {}  # texts that were right, as values
         self._continuous = Task(CONTINUOUS, step, continuous=True)
 
     def drafts(self) -> list[Draft]:
@@ -136,6 +138,10 @@ class Builder:
     def _build(
         self, flat: FlatBlock, kind: type[Block], task: Task | Unknown
     ) -> tuple[Block | Unknown, dict[str, OpenUnits]]:
+        period = task.period if known(task) and known(self.step) else None
+        made = self.made.get(flat.path)
+        if made is not None and made[:3] == (kind, flat.parameters, period):
+            return made.block, made.units
         declared = kind.interface.params
         values: dict[str, Any] = {}
         units: dict[str, OpenUnits] = {}
@@ -159,17 +165,18 @@ class Builder:
         for name in absent(missing, flat.parameters, declared) if known(flat.spec.parameters) else ():
             wanted = "a path" if declared[name].is_file else declared[name].wanted()
             self.faults.add(flat.spec.place, f"parameter '{name}' is missing", f"give {wanted} under 'with'")
-        period = task.period if known(task) and known(self.step) else None
         block = self._construct(flat, kind, values, period) if whole else UNKNOWN
-        for doubt in block.doubts() if known(block) and period is not None else ():
-            self.faults.warn(self._place(flat, doubt), str(doubt))
+        if known(block):
+            self.made[flat.path] = Made(kind, flat.parameters, period, block, units)
+            for doubt in block.doubts() if period is not None else ():
+                self.faults.warn(self._place(flat, doubt), str(doubt))
         return block, units
 
     def _value(self, param: Param, node: YamlNode) -> tuple[Any, OpenUnits] | Unknown:
         """Return a parameter's value and its open units; a text that was right once is not read again."""
         text = node.value if isinstance(node, YamlScalar) and not param.is_text else None
-        if text is not None and (param, text) in self.made.values:
-            return self.made.values[param, text]
+        if text is not None and (param, text) in self._right:
+            return self._right[param, text]
         read = self.faults.read(read_parameter, param, node)
         if known(read):
             try:
@@ -178,19 +185,15 @@ class Builder:
                 self.faults.add(node.place, str(error))
                 return UNKNOWN
             if text is not None:
-                self.made.values[param, text] = read
+                self._right[param, text] = read
         return read
 
     def _construct(
         self, flat: FlatBlock, kind: type[Block], values: Mapping[str, Any], period: Fraction | None
     ) -> Block | Unknown:
         """Make the block, which checks its parameters against each other, its files and its period."""
-        key = (flat.path, kind, repr(sorted(values.items())), period)
         try:
-            if key not in self.made.blocks:
-                made = kind(period=math.nan if period is None else float(period), **values)
-                self.made.blocks[key] = made
-            return self.made.blocks[key]
+            return kind(period=math.nan if period is None else float(period), **values)
         except ParameterError as error:
             self.faults.add(self._place(flat, error), str(error))
         except DiagramError as error:

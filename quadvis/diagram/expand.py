@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from quadvis.block import Block, ParameterError
 from quadvis.diagram.names import remedy_for
@@ -102,13 +102,32 @@ def _is_unit(text: str) -> bool:
         return False
 
 
+class Kept(NamedTuple):
+    """The parts of an entry without a fault, for the variants that have the same entry."""
+
+    entry: BlockSpec
+    params: Mapping[str, YamlNode | Unknown]  # that its scope has
+    values: dict[str, YamlNode | Unknown]
+    kind: type[Block] | Unknown  # `UNKNOWN` of a part
+
+
 class Expansion:
-    """The flat form of a diagram; ``blocks`` are in the order of the files, by path."""
+    """The flat form of a diagram; ``blocks`` are in the order of the files, by path.
+
+    ``kept`` holds entries by path, and is handed on from variant to variant.
+    """
 
     def __init__(
-        self, spec: FileSpec, catalogue: Catalogue, settings: Settings, parts: Parts, faults: Faults
+        self,
+        spec: FileSpec,
+        catalogue: Catalogue,
+        settings: Settings,
+        parts: Parts,
+        faults: Faults,
+        kept: dict[str, Kept],
     ) -> None:
         self.catalogue, self.settings, self.parts, self.faults = catalogue, settings, parts, faults
+        self.kept = kept
         self.blocks: dict[str, FlatBlock] = {}
         self._unknown: set[str] = set()  # paths of blocks and parts that exist, and are `UNKNOWN`
         self._count = 0
@@ -177,15 +196,29 @@ class Expansion:
                     self.faults.add(
                         block.slot, "a part has no slots", "make the whole part a slot of the diagram"
                     )
-                values = self._values(scope, block, path)
+                if path in self.blocks and not block.is_part:
+                    self._values(scope, block, path)
+                    self.faults.add(block.place, f"there is a block '{path}' already", "choose another name")
+                    continue
+                _, _, values, kind = self._read(scope, block, path)
                 if block.is_part:
                     self._expand_part(scope, block, values, files)
-                elif path in self.blocks:
-                    self.faults.add(block.place, f"there is a block '{path}' already", "choose another name")
                 else:
-                    kind = self._find_kind(block, path, values)
                     places = self._places(block, path)
                     self.blocks[path] = FlatBlock(path, block, scope, kind, values, places)
+
+    def _read(self, scope: Scope, block: BlockSpec, path: str) -> Kept:
+        """Return the parameters of a block or part, and the class of a block."""
+        kept = self.kept.get(path)
+        if kept is not None and kept.entry is block and kept.params == scope.params:
+            return kept
+        before = len(self.faults)
+        values = self._values(scope, block, path)
+        kind = UNKNOWN if block.is_part else self._find_kind(block, path, values)
+        found = Kept(block, scope.params, values, kind)
+        if len(self.faults) == before and path not in self.settings:
+            self.kept[path] = found
+        return found
 
     def _values(self, scope: Scope, block: BlockSpec, path: str) -> dict[str, YamlNode | Unknown]:
         """Return the parameters of a block or part."""

@@ -138,18 +138,17 @@ class UnitFlow(Flow):
 
     def note(self) -> None:
         """Note the units of all ports and parameters; blocks of one case and with equal sizes share them."""
-        noted: dict[Hashable, dict[str, tuple[Unit, ...]]] = {}
         for path, node in self.nodes.items():
             draft, block = self.drafts[path], self.drafts[path].block
             params = draft.interface.params if known(block) else {}
             counts = {name: int(getattr(getattr(block, name), "size", 1)) for name in params}
             case = (self.bindings[path], draft.type, tuple(node.sizes.items()), tuple(counts.values()))
-            if case not in noted:
+            if case not in self.cases:
                 inputs, outputs = draft.interface.inputs, draft.interface.outputs
                 counts |= {name: math.prod(node.shape(name)) for name in (*inputs, *outputs)}
                 every = {**outputs, **params, **inputs}
-                noted[case] = dict(self._noted(self.bindings[path], every, counts))
-            node.units.update(noted[case])
+                self.cases[case] = dict(self._noted(self.bindings[path], every, counts))
+            node.units.update(self.cases[case])
 
     @staticmethod
     def _noted(

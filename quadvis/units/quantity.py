@@ -55,6 +55,7 @@ def _not_a_number(text: str) -> UnitError:
     return UnitError(f"{quoted(text)} is not a number", remedy)
 
 
+@lru_cache(maxsize=4096)
 def split_quantity(text: str) -> tuple[str, str]:
     """Return the number and the unit of "50 ms", "50ms", "1/30 s" or "5/s", as texts; either may be empty."""
     plain = text.strip()
@@ -162,6 +163,7 @@ def _likely(value: float, unit: Unit) -> str:
     return small[0] if small and value >= small[1] else str(unit)
 
 
+@lru_cache(maxsize=4096)
 def _parts(text: str, *wanted: Unit | None) -> tuple[Fraction, Unit]:
     """Return the number and the unit of a text; advice on a wrong text depends on the wanted units."""
     number, unit = split_quantity(text)
