@@ -15,6 +15,7 @@ from quadvis.diagram.settings import Files, Given, read_settings, setting_texts
 from quadvis.errors import DiagramError, Fault, Faults, Place
 from quadvis.errors.discretion import quoting_only
 from quadvis.library.catalogue import OwnBlocks
+from quadvis.machine.garbage import uncollected
 from quadvis.machine.inputs import noted_inputs
 
 
@@ -94,7 +95,7 @@ def _reported_once(faults: Faults) -> Iterator[Mapping[str, str]]:
     One cause may be met from several blocks: its place and problem are the same.
     """
     try:
-        with noted_inputs() as digests:
+        with uncollected(), noted_inputs() as digests:
             yield digests
         faults.check()
     except DiagramError as error:

@@ -19,6 +19,7 @@ from quadvis.block.random import stream_start
 from quadvis.engine.layout import TIME, Layout, Placed
 from quadvis.engine.memory import Memory, Slot
 from quadvis.graph.graph import Constant, Graph, Node
+from quadvis.machine.garbage import uncollected
 
 COPY = "copy"
 NO_BLOCK = -1
@@ -133,6 +134,7 @@ class Program:
         return hashlib.sha256(repr(self).encode()).hexdigest()
 
 
+@uncollected()
 def make_program(graph: Graph, seed: int) -> Program:
     """Lay out memory and list the calls of every task; states hold their initial values, seeded."""
     layout = Layout(graph)
