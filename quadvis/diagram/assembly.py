@@ -56,6 +56,7 @@ class Assembly:
         self.kept: dict[str, Kept] = {}
         self.made: dict[str, Made] = {}
         self.cases: Cases = {}
+        self._warned = 0  # files whose unused parameters are reported
         self._params = [path for file in params for path in (file.path, *file.bases)]
         self._base: Wiring | None = None  # of the diagram without a variant
 
@@ -84,7 +85,10 @@ class Assembly:
         if known(builder.step):
             tasks = {draft.task for draft in drafts if known(draft.task)}
             check_ticks(spec, tasks, builder.step, stop, faults)
-        warn_parameters(spec, self.parts, faults)
+        files = [spec, *self.parts.specs()]
+        for file in files[self._warned :]:
+            warn_parameters(file, faults)
+        self._warned = len(files)
         if not self.variants:
             self.warn_rates()
         written = spec[STOP_TIME]

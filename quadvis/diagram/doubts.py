@@ -15,19 +15,13 @@ from quadvis.document import YamlNode
 from quadvis.errors import Faults, known
 
 
-def warn_parameters(spec: FileSpec, parts: Parts, faults: Faults) -> None:
-    """Warn of parameters that no block of their file uses: of a diagram, and of the parts that it read."""
-    for file in (spec, *parts.specs()):
-        _warn_parameters(file, faults)
-
-
 def _blocks(spec: FileSpec) -> Iterator[BlockSpec]:
     """Yield the entries of all blocks of a file and of its variants."""
     for blocks in (spec[BLOCKS], *(variant.slots for variant in spec[VARIANTS].values())):
         yield from (block for block in blocks.values() if known(block))
 
 
-def _warn_parameters(spec: FileSpec, faults: Faults) -> None:
+def warn_parameters(spec: FileSpec, faults: Faults) -> None:
     """Warn of parameters that no block of their file uses."""
     used: set[str] = set()
     for block in _blocks(spec):

@@ -6,7 +6,6 @@ import os
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from quadvis.block import Block, ParameterError
@@ -31,7 +30,6 @@ from quadvis.errors import (
     suggestion,
 )
 from quadvis.library.catalogue import Catalogue, CatalogueError
-from quadvis.machine.missing_file import file_trouble
 from quadvis.units import Unit, UnitError, split_quantity
 
 MAX_BLOCKS = 50_000  # in parts, since parts in parts multiply; a file by itself is as long as it is
@@ -51,8 +49,9 @@ class Scope:
 
     def knows(self, name: str) -> bool:
         """Say whether nothing that a name leads to, block or part, is `UNKNOWN`."""
-        names = (name, name.partition("/")[0])
-        return all(known(found.get(each)) for found in (self.spec[BLOCKS], self.children) for each in names)
+        blocks, children, head = self.spec[BLOCKS], self.children, name.partition("/")[0]
+        found = blocks.get(name), blocks.get(head), children.get(name), children.get(head)
+        return all(map(known, found))
 
     @property
     def parts(self) -> Iterator[Scope]:
@@ -275,8 +274,7 @@ class Expansion:
     def _expand_part(
         self, scope: Scope, block: BlockSpec, values: dict[str, YamlNode | Unknown], files: tuple[str, ...]
     ) -> None:
-        file = Path(block.kind_place.file).parent / block.kind
-        spec = self._part(block, file, files)
+        spec = self._part(block, files)
         if spec is UNKNOWN:
             scope.children[block.name] = UNKNOWN
             self._unknown.add(scope.prefix + block.name)
@@ -291,7 +289,7 @@ class Expansion:
             self._check_inputs(block, block.inputs or {}, spec[PORTS].inputs)
         child = Scope(f"{scope.prefix}{block.name}/", spec, spec[PARAMS] | values, scope, block)
         scope.children[block.name] = child
-        self._expand(child, (*files, os.path.realpath(file)))
+        self._expand(child, (*files, self.parts.locate(block)[1]))
 
     def _check_inputs(
         self, block: BlockSpec, inputs: Mapping[str, InputSpec], declared: Collection[str]
@@ -301,15 +299,15 @@ class Expansion:
                 problem = f"part '{block.kind}' has no input '{name}'"
                 self.faults.add(given.place, problem, remedy_for(name, inputs, declared))
 
-    def _part(self, block: BlockSpec, file: Path, files: tuple[str, ...]) -> FileSpec | Unknown:
+    def _part(self, block: BlockSpec, files: tuple[str, ...]) -> FileSpec | Unknown:
         problem, remedy = "", ""
-        if os.path.realpath(file) in files:
+        if self.parts.locate(block)[1] in files:
             problem, remedy = f"part '{block.kind}' contains itself", "use another file"
         elif len(files) > MAX_DEPTH:
             problem, remedy = f"parts are nested deeper than {MAX_DEPTH} files", "write them flatter"
         else:
-            problem, remedy = file_trouble(str(file), block.kind, files)
+            problem, remedy = self.parts.trouble(block, files)
         if problem:
             self.faults.add(block.kind_place, problem, remedy)
             return UNKNOWN
-        return self.parts.read(file)
+        return self.parts.read(block)

@@ -135,16 +135,12 @@ def _libraries() -> dict[str, str]:
 def _exists(module: str) -> bool:
     """Return whether a module exists, without importing it; its package may fail to import."""
     try:
-        return importlib.util.find_spec(module) is not None and not _is_package(module)
+        spec = importlib.util.find_spec(module)
+        return spec is not None and spec.submodule_search_locations is None  # None: it is no package
     except ModuleNotFoundError as error:
         return not f"{module}.".startswith(f"{error.name}.")  # True if another module is missing
     except Exception:
         return True
-
-
-def _is_package(module: str) -> bool:
-    spec = importlib.util.find_spec(module)
-    return spec is not None and spec.submodule_search_locations is not None
 
 
 def _walk(package: str, prefix: str = "") -> Iterator[str]:

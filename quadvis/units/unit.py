@@ -35,9 +35,9 @@ def _powers(items: Iterable[tuple[str, Fraction]]) -> tuple[tuple[str, Fraction]
     total: dict[str, Fraction] = {}
     for symbol, exponent in items:
         total[symbol] = total[symbol] + exponent if symbol in total else exponent
-    if any(abs(exponent) > _LARGEST_POWER for exponent in total.values()):
+    if any(abs(power.numerator) > _LARGEST_POWER * power.denominator for power in total.values()):
         raise UnitError(f"a unit has an exponent beyond {_LARGEST_POWER}")
-    return tuple((symbol, exponent) for symbol, exponent in total.items() if exponent)
+    return tuple([(symbol, power) for symbol, power in total.items() if power.numerator])
 
 
 @dataclass(frozen=True)
