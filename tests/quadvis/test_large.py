@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -143,6 +145,16 @@ def test_a_fault_in_one_of_many_equal_blocks_is_that_block_s() -> None:
     with pytest.raises(DiagramError) as caught:
         load_text(text + end)
     assert [fault.subject for fault in caught.value.faults] == ["block 'end'"]
+
+
+@pytest.mark.parametrize("text", [chain(3), "name: [broken"])
+def test_loading_leaves_the_garbage_collector_as_it_was(text: str) -> None:
+    for switch in (gc.disable, gc.enable):
+        switch()
+        before = gc.isenabled()
+        with suppress(DiagramError):
+            Engine(load_text(text).graph)
+        assert gc.isenabled() == before
 
 
 @pytest.mark.slow
