@@ -183,14 +183,15 @@ class Probe:
     def _named(self) -> Iterator[tuple[int, str]]:
         """Yield the slots of real numbers of the blocks of the loop, with their names.
 
-        Signals in seconds are instants and ages. They follow the clock, so they do not belong to the state.
+        Instants and ages follow the clock, so they do not belong to the state.
         """
+        instants = _instants(self.graph)
         for node, block in zip(self.graph.nodes, self.program.blocks, strict=True):
             if node.path not in self.loop:
                 continue
             interface, path = node.block.interface, node.path
             for port, slot in block.outputs.items():
-                if slot.scalar == "float64" and not _is_time(interface.outputs[port].units):
+                if slot.scalar == "float64" and (path, port) not in instants:
                     yield from _elements(slot, f"{path}.{port}")
             for name, state in interface.states.items():
                 if state.signal.scalar == "float64":
@@ -257,8 +258,28 @@ class Probe:
         return block.path in self.loop and any(each.signal.scalar == "float64" for each in work.values())
 
 
-def _is_time(units: Sequence[Any]) -> bool:
-    return all(str(unit) == "s" for unit in units)
+def _instants(graph: Graph) -> set[tuple[str, str]]:
+    """Return the outputs that are instants or ages: declared in seconds, or in seconds and made from such."""
+    found = {
+        (node.path, port)
+        for node in graph.nodes
+        for port, declared in node.block.interface.outputs.items()
+        if _in_seconds(declared.units)
+    }
+    while True:
+        more = {
+            (node.path, port)
+            for node in graph.nodes
+            for port, units in node.units.items()
+            if _in_seconds(units) and any((wire.block, wire.port) in found for _, wire in node.wires())
+        }
+        if more <= found:
+            return found
+        found |= more
+
+
+def _in_seconds(units: Sequence[Any]) -> bool:
+    return bool(units) and all(str(unit) == "s" for unit in units)
 
 
 def _elements(slot: Slot, name: str) -> Iterator[tuple[int, str]]:

@@ -7,6 +7,7 @@ and random streams follow the clock and do not belong to it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import groupby
 
 import numpy as np
@@ -88,25 +89,37 @@ def _unread(probe: Probe, places: Positions, rounds: int, still: tuple[Vector, V
         for chunk, (memory, read) in zip(chunks, results, strict=True)
         if np.array_equal(read, still[1], equal_nan=True)
     ]
-    while left:
-        ends = np.concatenate([chunk for chunk, _ in left])
-        inside = [(chunk, changed) for chunk, changed in left if np.isin(changed, ends).all()]
-        if len(inside) == len(left):
-            return ends if _passes(probe, ends, rounds) else places[:0]
-        left = inside
+    while (ends := _closed(left)).size:
+        lasting = _lasting(probe, ends, rounds)
+        if not lasting.size:
+            return ends
+        left = [(chunk, changed) for chunk, changed in left if not np.isin(chunk, lasting).any()]
+        if not np.isin(ends, lasting).any():
+            break  # it lasts outside, and no chunk is to blame
     return places[:0]
 
 
-def _passes(probe: Probe, places: Positions, rounds: int) -> bool:
-    """Return whether a change of all these slots together is gone after so many hyperperiods.
+def _closed(chunks: Sequence[tuple[Positions, Positions]]) -> Positions:
+    """Return the slots of those chunks whose change changes only slots of the same and of earlier ones."""
+    found, left = np.array([], np.intp), list(chunks)
+    while True:
+        inside = [chunk for chunk, changed in left if np.isin(changed, np.append(found, chunk)).all()]
+        if not inside:
+            return found
+        found = np.concatenate([found, *inside])
+        left = [(chunk, changed) for chunk, changed in left if not np.isin(chunk, found).any()]
 
-    A change that makes a block fail, such as that of a covariance, is not gone.
+
+def _lasting(probe: Probe, places: Positions, rounds: int) -> Positions:
+    """Return the slots that still differ so many hyperperiods after a change of all these slots together.
+
+    A change that makes a block fail, such as that of a covariance, lasts in all of them.
     """
     try:
         changed = _nudged(probe, places, rounds)[0]
     except RunError:
-        return False
-    return not _changed(probe, changed, probe.after(places[:0], 0.0, count=rounds)[0]).size
+        return places
+    return _changed(probe, changed, probe.after(places[:0], 0.0, count=rounds)[0])
 
 
 def stacked(columns: Columns, places: Positions) -> tuple[Matrix, Matrix]:
@@ -116,7 +129,7 @@ def stacked(columns: Columns, places: Positions) -> tuple[Matrix, Matrix]:
     return np.reshape(a, (len(a), len(a))).T, np.reshape(c, (len(a), -1 if c else 0)).T
 
 
-@np.errstate(invalid="ignore")  # a parameter may be infinite, and a signal NaN
+@np.errstate(invalid="ignore", over="ignore")  # a parameter may be infinite, and a signal NaN
 def slope(above: Vector, below: Vector, step: float) -> Vector:
     """Return the central difference of two results of changes by ``step`` up and down."""
     return np.asarray((above - below) / (2 * step), np.float64)

@@ -1,3 +1,5 @@
+from fractions import Fraction
+
 import control
 import numpy as np
 import pytest
@@ -5,7 +7,16 @@ from scipy.linalg import expm
 from scipy.signal import cont2discrete
 
 import quadvis
-from quadvis.analysis.probe import AnalysisError
+from quadvis.analysis import linearise
+from quadvis.analysis.probe import AnalysisError, Positions, Probe
+from quadvis.analysis.state import Columns, find_state
+from quadvis.block import Block, In, Out, State
+from quadvis.engine.engine import Engine
+from quadvis.graph.graph import Graph, Node, Task, Wire
+from quadvis.units import parse_units
+from quadvis_blocks.signal.gain import Gain
+from quadvis_blocks.signal.unit_delay import UnitDelay
+from tests.stages import mostly_slow
 
 from .loops import DIAGRAMS, lifted, sampled, write
 
@@ -323,3 +334,73 @@ blocks:
     assert analysis.poles == pytest.approx([-5.0], rel=1e-6)
     with pytest.raises(AnalysisError, match="nothing to analyse: the diagram has no loop and no state"):
         quadvis.load(write(tmp_path, text.partition("  lag:")[0])).analyse()
+
+
+class Instant(Block):
+    """The instant of now."""
+
+    y = Out(unit="s")
+
+    def output(self, time: float) -> float:
+        return time
+
+
+def test_instants_are_no_signals_wherever_they_pass_but_a_loop_in_seconds_has_signals() -> None:
+    task, seconds = Task("main", Fraction(1, 10)), {"y": parse_units("s")}
+    nodes = [
+        Node("clock", "", Instant(), task, {}, units=seconds),
+        Node("later", "", UnitDelay(), task, {"u": Wire("clock", "y")}, {"*": ()}, seconds),
+        Node("twice", "", Gain(factor=2.0), task, {"u": Wire("later", "y")}, {"*": ()}, seconds),
+        Node("held", "", UnitDelay(), task, {"u": Wire("less", "y")}, {"*": ()}, seconds),
+        Node("less", "", Gain(factor=0.5), task, {"u": Wire("held", "y")}, {"*": ()}, seconds),
+    ]
+    for some, signals in ((nodes, {"held", "less"}), (nodes[:3], set[str]())):
+        probe = Probe(Engine(Graph("instants", some)), [], 0.0)
+        assert {probe.names[int(place)].partition(".")[0] for place in probe.signals} == signals
+
+
+class Record(Block):
+    """What comes in, 30 periods of it, and a fading mean that nobody reads."""
+
+    u, y = In(), Out()
+    past = State("float64[300]")
+    mean = State()
+
+    def output(self, u: float) -> float:
+        return u + self.past[295]
+
+    def update(self, u: float) -> None:
+        self.past[:-1] = self.past[1:].copy()
+        self.past[-1] = u
+        self.mean += 0.5 * (u - self.mean)
+
+
+def test_what_no_block_reads_is_not_disturbed_slot_by_slot(monkeypatch: pytest.MonkeyPatch) -> None:
+    """u[k] = 0.2 y[k-1], y[k] = u[k] + u[k-5]: z^5 (z - 0.2) = 0.2; the mean has its pole at 0.5."""
+    disturbed: list[int] = []
+
+    def counted(probe: Probe) -> tuple[Positions, Columns]:
+        found = find_state(probe)
+        disturbed.append(len(found[1]))
+        return found
+
+    monkeypatch.setattr(linearise, "find_state", counted)
+    task = Task("main", Fraction(1, 10))
+    nodes = [
+        Node("later", "", UnitDelay(), task, {"u": Wire("record", "y")}, {"*": ()}),
+        Node("less", "", Gain(factor=0.2), task, {"u": Wire("later", "y")}, {"*": ()}),
+        Node("record", "", Record(), task, {"u": Wire("less", "y")}),
+    ]
+    linear = linearise.linearised(Graph("record", nodes), [], 0.0)
+    expected = [*np.roots([1.0, -0.2, 0.0, 0.0, 0.0, 0.0, -0.2]), 0.5]
+    assert nonzero(linear.a) == pytest.approx(np.sort_complex(expected), abs=1e-6)
+    assert len(linear.states) == 7 and max(disturbed) < 50
+
+
+GUARDED = [("blackout", None), ("landing", "fused"), ("takeover", "fused"), ("blackout", "fused")]
+
+
+@pytest.mark.parametrize(("name", "variant"), mostly_slow(GUARDED, 1))
+def test_a_hover_under_the_failsafe_is_stable(name: str, variant: str | None) -> None:
+    analysis = quadvis.load(DIAGRAMS / f"{name}.yaml", variant=variant).analyse()
+    assert analysis.stable and not [state for state in analysis.linear.states if "stamp" in state]
