@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.analysis.linearise import Linear, linearised
+from quadvis.analysis.loops import AnalysisError
 from quadvis.analysis.margins import Loop, rates
-from quadvis.analysis.probe import AnalysisError
 from quadvis.analysis.systems import closed_loop
 from quadvis.analysis.vary import STABLE, Limits
 from quadvis.diagram.sections.analyse import Cut

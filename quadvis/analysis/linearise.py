@@ -14,17 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from quadvis.analysis.cut import with_breaks
-from quadvis.analysis.probe import (
-    STEP,
-    AnalysisError,
-    Channel,
-    Matrix,
-    Positions,
-    Probe,
-    Vector,
-    blocks_on_loops,
-    silence,
-)
+from quadvis.analysis.loops import AnalysisError, blocks_on_loops
+from quadvis.analysis.probe import STEP, Channel, Matrix, Positions, Probe, Vector, silence
 from quadvis.analysis.progress import announce
 from quadvis.analysis.state import Columns, find_state, slope, stacked
 from quadvis.diagram.sections.analyse import Cut

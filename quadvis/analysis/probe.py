@@ -2,33 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from math import lcm
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.analysis.cut import break_path
+from quadvis.analysis.loops import blocks_on_loops, hyperperiod, instants_of
 from quadvis.block import Random
 from quadvis.diagram.sections.analyse import Cut
 from quadvis.engine.engine import Engine
 from quadvis.engine.layout import TIME, Placed
 from quadvis.engine.memory import Slot
-from quadvis.errors import QuadvisError
-from quadvis.graph.graph import Graph, Task, Wire
+from quadvis.graph.graph import Wire
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Positions = NDArray[np.intp]  # of slots
 STEP = 1e-5  # of a central difference, relative to values above 1; it gives errors near 1e-10
-LONGEST = 20_000  # ticks of the longest hyperperiod
-
-
-class AnalysisError(QuadvisError):
-    """A diagram that cannot be linearised: the obstacle, and the way out."""
 
 
 @dataclass(frozen=True)
@@ -52,16 +46,6 @@ def silence(engine: Engine) -> None:
         for name, state in node.block.interface.states.items():
             if isinstance(state, Random):
                 engine.write(node.path, name, 0)
-
-
-def hyperperiod(graph: Graph, tasks: Iterable[Task]) -> int:
-    """Return the number of ticks after which these tasks are due together again."""
-    span = lcm(*(graph.ticks(task.period) for task in tasks))
-    if span > LONGEST:
-        time = float(span * graph.tick)
-        problem = f"the rates of the loop repeat only after {time:g} s, {span} ticks"
-        raise AnalysisError(f"{problem}; choose rates that fit into each other")
-    return span
 
 
 class Probe:
@@ -185,7 +169,7 @@ class Probe:
 
         Instants and ages follow the clock, so they do not belong to the state.
         """
-        instants = _instants(self.graph)
+        instants = instants_of(self.graph)
         for node, block in zip(self.graph.nodes, self.program.blocks, strict=True):
             if node.path not in self.loop:
                 continue
@@ -258,50 +242,6 @@ class Probe:
         return block.path in self.loop and any(each.signal.scalar == "float64" for each in work.values())
 
 
-def _instants(graph: Graph) -> set[tuple[str, str]]:
-    """Return the outputs that are instants or ages: declared in seconds, or in seconds and made from such."""
-    found = {
-        (node.path, port)
-        for node in graph.nodes
-        for port, declared in node.block.interface.outputs.items()
-        if _in_seconds(declared.units)
-    }
-    while True:
-        more = {
-            (node.path, port)
-            for node in graph.nodes
-            for port, units in node.units.items()
-            if _in_seconds(units) and any((wire.block, wire.port) in found for _, wire in node.wires())
-        }
-        if more <= found:
-            return found
-        found |= more
-
-
-def _in_seconds(units: Sequence[Any]) -> bool:
-    return bool(units) and all(str(unit) == "s" for unit in units)
-
-
 def _elements(slot: Slot, name: str) -> Iterator[tuple[int, str]]:
     for flat, index in enumerate(np.ndindex(*slot.shape)):
         yield slot.position + flat, f"{name}[{','.join(map(str, index))}]" if slot.shape else name
-
-
-def blocks_on_loops(graph: Graph) -> set[str]:
-    """Return the blocks that lie on a loop of wires."""
-    readers: dict[str, set[str]] = {node.path: set() for node in graph.nodes}
-    for node in graph.nodes:
-        for _, wire in node.wires():
-            readers[wire.block].add(node.path)
-    return {path for path in readers if path in _downstream(readers, path)}
-
-
-def _downstream(readers: dict[str, set[str]], path: str) -> set[str]:
-    found: set[str] = set()
-    waiting = list(readers[path])
-    while waiting:
-        reader = waiting.pop()
-        if reader not in found:
-            found.add(reader)
-            waiting.extend(readers[reader])
-    return found

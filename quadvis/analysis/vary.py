@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from quadvis.analysis.linearise import linearised
+from quadvis.analysis.loops import AnalysisError
 from quadvis.analysis.margins import growth
-from quadvis.analysis.probe import AnalysisError
 from quadvis.analysis.progress import task
 from quadvis.analysis.systems import library
 from quadvis.diagram.load import varied

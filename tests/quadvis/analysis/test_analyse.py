@@ -12,7 +12,7 @@ import pytest
 from pytest import approx
 
 import quadvis
-from quadvis.analysis.probe import AnalysisError
+from quadvis.analysis.loops import AnalysisError
 from quadvis.analysis.questions import read_cuts, read_limits
 from quadvis.cli import main
 from quadvis.errors import QuadvisError

@@ -8,7 +8,8 @@ from scipy.signal import cont2discrete
 
 import quadvis
 from quadvis.analysis import linearise
-from quadvis.analysis.probe import AnalysisError, Positions, Probe
+from quadvis.analysis.loops import AnalysisError
+from quadvis.analysis.probe import Positions, Probe
 from quadvis.analysis.state import Columns, find_state
 from quadvis.block import Block, In, Out, State
 from quadvis.engine.engine import Engine
