@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from types import MappingProxyType
@@ -32,11 +32,13 @@ class Diagram(Checked):
         log: str | Path | None = None,
         progress: Progress | None = None,
         keep: Sequence[str] | None = None,
+        engine: str = "auto",
+        announce: Callable[[str], None] | None = None,
     ) -> Result:
         """Run to the stop time; see ``quadvis.run.session.run``."""
         from quadvis.run.session import run
 
-        return run(self, log=log, progress=progress, keep=keep)
+        return run(self, log=log, progress=progress, keep=keep, engine=engine, announce=announce)
 
     def start(self) -> LiveRun:
         """Return a run to be advanced step by step; see ``quadvis.run.live.LiveRun``."""
@@ -58,11 +60,12 @@ class Diagram(Checked):
         cuts: Mapping[str, str | Sequence[str]] = MappingProxyType({}),
         limits: Mapping[str, tuple[str, str, str]] = MappingProxyType({}),
         at: float | None = None,
+        engine: str = "auto",
     ) -> Analysis:
         """Linearise the closed loop at its operating point; see ``quadvis.analysis.analyse.analyse``."""
         from quadvis.analysis.analyse import analyse
 
-        return analyse(self, cuts, limits, at)
+        return analyse(self, cuts, limits, at, engine)
 
     def varied(self, setting: str) -> Diagram:
         """Return the diagram, loaded again with one more parameter replaced: ``block.parameter=value``."""

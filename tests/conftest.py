@@ -1,13 +1,18 @@
 """Settings of all tests."""
 
 import gc
+import os
 import signal
+from pathlib import Path
 
 from hypothesis import settings
 
 # Whoever starts the tests in the background of a script leaves Ctrl-C ignored, and programs inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup leaves it ignored, and so would all commands under test
+
+# Machine code is compiled once for all tests, and for all processes that run some of them.
+os.environ.setdefault("QUADVIS_CACHE", str(Path(__file__).parents[1] / ".pytest_cache" / "machine_code"))
 
 # The same examples in every run, and no time limit for one: the machines that run the tests are shared.
 # The second stage tries more of them: `-m "slow or hypothesis" --hypothesis-profile thorough`.

@@ -21,6 +21,7 @@ from quadvis.diagram.sections.analyse import Cut
 from quadvis.errors import DiagramError
 from quadvis.errors.caller import as_given
 from quadvis.graph.graph import Graph
+from quadvis.native.choice import AUTO
 from quadvis.output.statistics import finite
 
 if TYPE_CHECKING:
@@ -96,21 +97,22 @@ def analyse(
     cuts: Mapping[str, str | Sequence[str]] = MappingProxyType({}),
     limits: Mapping[str, tuple[str, str, str]] = MappingProxyType({}),
     at: float | None = None,
+    engine: str = AUTO,
 ) -> Analysis:
     """Linearise a diagram's closed loop, and answer the questions of its section ``analyse`` and the caller.
 
     ``cuts`` maps names of cut points to signals. ``limits`` maps names to a parameter and the first and last
     value of its search: ``("eyes/camera.latency", "50 ms", "2 s")``. ``at`` (s) is the time at which the
-    operating point is sought. AnalysisError if no operating point is found, or if the loop has no derivative;
-    DiagramError if a cut or a limit names nothing that exists.
+    operating point is sought. ``engine`` is that of `Diagram.run`. AnalysisError if no operating point is
+    found, or if the loop has no derivative; DiagramError if a cut or a limit names nothing that exists.
     """
     opened, sought = diagram.questions.more(cuts, limits)
     at = diagram.questions.at if at is None else at
     _check_pictures(diagram)
-    linear = linearised(diagram.graph, opened, at)
+    linear = linearised(diagram.graph, opened, at, engine)
     stable = bool((rates(linear).real < STABLE).all())
     loops = {cut.label: _loop(linear, cut, stable) for cut in opened}
-    return Analysis(diagram, linear, loops, Limits(diagram, sought, at))
+    return Analysis(diagram, linear, loops, Limits(diagram, sought, at, engine))
 
 
 def _loop(linear: Linear, cut: Cut, stable: bool) -> Loop:

@@ -14,13 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from quadvis.analysis.cut import with_breaks
-from quadvis.analysis.loops import AnalysisError, blocks_on_loops
+from quadvis.analysis.loops import AnalysisError, blocks_on_loops, hyperperiod
 from quadvis.analysis.probe import STEP, Channel, Matrix, Positions, Probe, Vector, silence
 from quadvis.analysis.progress import announce
 from quadvis.analysis.state import Columns, find_state, slope, stacked
 from quadvis.diagram.sections.analyse import Cut
 from quadvis.engine.engine import Engine
 from quadvis.graph.graph import Graph
+from quadvis.native.choice import AUTO, choose, use
 
 SETTLED = 1e-6  # of the state's size: the largest change at an operating point
 TRIALS = 12
@@ -52,24 +53,28 @@ class Linear:
     channels: tuple[Channel, ...]
 
 
-def linearised(graph: Graph, cuts: Sequence[Cut], at: float) -> Linear:
+def linearised(graph: Graph, cuts: Sequence[Cut], at: float, engine: str = AUTO) -> Linear:
     """Return the loop at its operating point, found by Newton's method from the state at a time (s).
 
-    If the method fails, it starts again from a later time. AnalysisError if no steady state is near, if the
-    loop is not smooth there, if a cut is not on the loop, or if the graph has neither a loop nor a state.
+    ``engine`` is that of `Diagram.run`. If the method fails, it starts again from a later time. AnalysisError
+    if no steady state is near, if the loop is not smooth there, if a cut is not on the loop, or if the graph
+    has neither a loop nor a state.
     """
     try:
-        return _linearised(graph, cuts, at)
+        return _linearised(graph, cuts, at, engine)
     except Unsettled:
-        return _linearised(graph, cuts, LATER * max(at, 1.0))
+        return _linearised(graph, cuts, LATER * max(at, 1.0), engine)
 
 
-def _linearised(graph: Graph, cuts: Sequence[Cut], at: float) -> Linear:
+def _linearised(graph: Graph, cuts: Sequence[Cut], at: float, wanted: str) -> Linear:
     looped = blocks_on_loops(graph)
     _check_cuts(graph, looped, cuts)
     signals = {(signal.block, signal.port) for cut in cuts for signal in cut.signals}
     engine = Engine(with_breaks(graph, signals))
     silence(engine)
+    loop = {node.task for node in graph.nodes if node.path in looped}
+    ticks = int(at / graph.tick) + hyperperiod(graph, loop) * (len(engine.memory.floats) if looped else 1)
+    use(engine, choose(engine, ticks, wanted, announce))
     with engine:
         announce("running to the operating point")
         probe = Probe(engine, cuts, at)

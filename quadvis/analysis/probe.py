@@ -17,6 +17,7 @@ from quadvis.diagram.sections.analyse import Cut
 from quadvis.engine.engine import Engine
 from quadvis.engine.layout import TIME, Placed
 from quadvis.engine.memory import Slot
+from quadvis.engine.taps import Observer
 from quadvis.graph.graph import Wire
 
 Vector = NDArray[np.float64]
@@ -71,8 +72,6 @@ class Probe:
         self._added = np.array([channel.added for channel in self.channels], np.intp)
         self._ticks = np.array([channel.tick for channel in self.channels], np.intp)
         self._moments = self._events()
-        self._shaken = False
-        self._shake()
         begin = max([Fraction(at), *(task.offset for task in self.tasks)])
         engine.run(self.span * -(-begin // (self.span * self.graph.tick)))
         self.keep()
@@ -132,11 +131,12 @@ class Probe:
 
     def shaken(self) -> Vector:
         """Return the memory after a hyperperiod in which every signal of the loop is disturbed at random."""
-        self._shaken = True
+        disturbances = self._shake()
         try:
             return self.after(self.positions[:0], 0.0)[0]
         finally:
-            self._shaken = False
+            for disturbance in disturbances:
+                self.engine.detach(disturbance)
 
     def _disturb(self, added: Vector, tick: int) -> None:
         """Add the disturbances to the channels of a tick, and to no others."""
@@ -205,11 +205,12 @@ class Probe:
             np.intp,
         )
 
-    def _shake(self) -> None:
-        """Prepare the random disturbance of every signal of the loop; `shaken` turns it on.
+    def _shake(self) -> list[Observer]:
+        """Let every signal of the loop be disturbed at random from now on; return what does it.
 
         An update may take what its output computed as Work, so those outputs run again on what is disturbed.
         """
+        found = []
         for task in dict.fromkeys(block.task for block in self.program.blocks):
             blocks = [block for block in self.program.blocks if block.task == task]
             places = np.array([place for block in blocks for place in self._signals(block)], np.intp)
@@ -217,15 +218,15 @@ class Probe:
             random = np.random.default_rng(1)
 
             def disturb(_: int, places: Positions = places, again: Any = again, random: Any = random) -> None:
-                if self._shaken:
-                    size = STEP * np.maximum(1.0, np.abs(np.nan_to_num(self.floats[places])))
-                    self.floats[places] += size * random.uniform(0.5, 1.0, places.size)
-                    disturbed = self.floats[places]
-                    for output in again:
-                        output()
-                    self.floats[places] = disturbed
+                size = STEP * np.maximum(1.0, np.abs(np.nan_to_num(self.floats[places])))
+                self.floats[places] += size * random.uniform(0.5, 1.0, places.size)
+                disturbed = self.floats[places]
+                for output in again:
+                    output()
+                self.floats[places] = disturbed
 
-            self.engine.observe(task, disturb)
+            found.append(self.engine.observe(task, disturb))
+        return found
 
     def _signals(self, block: Placed) -> list[int]:
         return [

@@ -19,6 +19,7 @@ from quadvis.analysis.systems import library
 from quadvis.diagram.load import varied
 from quadvis.diagram.sections.analyse import Limit
 from quadvis.errors import RunError
+from quadvis.native.choice import AUTO
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
@@ -57,14 +58,14 @@ class Tolerance:
         return found if self.reached else f"{found} and perhaps further"
 
 
-def tolerance(diagram: Diagram, limit: Limit, at: float) -> Tolerance:
+def tolerance(diagram: Diagram, limit: Limit, at: float, engine: str = AUTO) -> Tolerance:
     """Search from the start of a range for the first value at which the loop is lost.
 
     The search first goes in ten steps, so it may miss an unstable stretch that is shorter than a step; then
     it uses Brent's method. AnalysisError if the loop cannot be analysed at the start; DiagramError if the
     diagram refuses a value.
     """
-    excess = functools.cache(lambda value: _growth_at(diagram, limit, at, value) - STABLE)
+    excess = functools.cache(lambda value: _growth_at(diagram, limit, at, engine, value) - STABLE)
     if excess(limit.start) >= 0.0:
         return Tolerance(limit, math.nan)
     reasons: dict[float, str] = {}  # by value, why the loop cannot be analysed there
@@ -87,10 +88,11 @@ def tolerance(diagram: Diagram, limit: Limit, at: float) -> Tolerance:
     return Tolerance(limit, limit.end)
 
 
-def _growth_at(diagram: Diagram, limit: Limit, at: float, value: float) -> float:
+def _growth_at(diagram: Diagram, limit: Limit, at: float, engine: str, value: float) -> float:
     words = f"at {shown(limit, value)}, from {shown(limit, limit.start)} to {shown(limit, limit.end)}"
     with task(words):
-        return growth(linearised(varied(diagram, limit.variable.setting(value)).graph, (), at))
+        graph = varied(diagram, limit.variable.setting(value)).graph
+        return growth(linearised(graph, (), at, engine))
 
 
 def shown(limit: Limit, value: float) -> str:
@@ -102,15 +104,15 @@ def shown(limit: Limit, value: float) -> str:
 class Limits(Mapping[str, Tolerance]):
     """The answers to all questions about limits, by name; each is computed when it is first read."""
 
-    def __init__(self, diagram: Diagram, limits: Sequence[Limit], at: float) -> None:
-        self._diagram, self._at = diagram, at
+    def __init__(self, diagram: Diagram, limits: Sequence[Limit], at: float, engine: str) -> None:
+        self._diagram, self._at, self._engine = diagram, at, engine
         self._limits = {limit.label: limit for limit in limits}
         self._found: dict[str, Tolerance] = {}
 
     def __getitem__(self, label: str) -> Tolerance:
         if label not in self._found:
             with task(f"limit '{label}'"):
-                self._found[label] = tolerance(self._diagram, self._limits[label], self._at)
+                self._found[label] = tolerance(self._diagram, self._limits[label], self._at, self._engine)
         return self._found[label]
 
     def __iter__(self) -> Iterator[str]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quadvis.cli.default_places import default_name, log_path, runs_folder
-from quadvis.errors import Fault, QuadvisError, RunError
+from quadvis.errors import Fault, QuadvisError, RunError, counted
 from quadvis.machine.files import SVG, Kind, write_output
 
 if TYPE_CHECKING:
@@ -53,7 +53,9 @@ def run(options: argparse.Namespace) -> int:
     gc.enable()
     try:
         with ProgressLine(diagram.duration) as progress:
-            result = run_diagram(diagram, log=log, progress=progress, keep=())
+            result = run_diagram(
+                diagram, log=log, progress=progress, keep=(), engine=options.engine, announce=progress.say
+            )
     except (RunError, KeyboardInterrupt):
         if log is not None and log.is_file():
             print(f"log up to there: {log}", file=sys.stderr)
@@ -89,6 +91,7 @@ def sweep(options: argparse.Namespace) -> int:
             options.file, over, variant=one,
             settings=options.set, params=options.params, stop_time=options.stop_time, seed=options.seed,
             workers=options.workers, output=table_path, timings=options.timings, resume=options.resume,
+            engine=options.engine, announce=progress.say,
             plot=None if options.plot == "" else plot, logs=options.logs, own_blocks=_own_blocks(options),
             progress=progress,
         )  # fmt: skip
@@ -192,7 +195,7 @@ def analyse(options: argparse.Namespace) -> int:
     diagram = _load(options)
     cuts, limits, at = read_cuts(options.cut), read_limits(options.vary), read_time(options.at)
     with AnalysisLine() as progress, watched(progress):
-        analysis = analyse_loop(diagram, cuts, limits, at)
+        analysis = analyse_loop(diagram, cuts, limits, at, options.engine)
         if options.json:
             facts = analysis.facts()
         else:
@@ -250,6 +253,21 @@ def schema(options: argparse.Namespace) -> int:
     blocks, failures = _catalogue(options).load_all()
     _write(_json(diagram_schema(blocks), indent=1) + "\n", options.output or "-", SCHEMA)
     return _all_loaded(failures)
+
+
+def cache(options: argparse.Namespace) -> int:
+    """Print where machine code is kept, and how much; remove it if asked for."""
+    from quadvis.native import cache as kept
+
+    files = list(kept.files())
+    size = sum(size for _, size in files)
+    what = f"{counted(len(files), 'block type')}, {size / 1e6:.1f} MB"
+    if options.clear:
+        kept.clear()
+        print(f"removed from {kept.folder()}: {what}")
+    else:
+        print(f"{kept.folder()}: {what}")
+    return 0
 
 
 def new(options: argparse.Namespace) -> int:

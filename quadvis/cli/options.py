@@ -11,7 +11,7 @@ from quadvis.version import __version__
 
 JSON_HELP = """\
 --json prints one object: diagram, variant, params, hash, seed, passed, duration_s, wall_s, cpu_s,
-real_time_factor, log, lost (what the log lacks, and why);
+engine, real_time_factor, log, lost (what the log lacks, and why);
 summary: {label: {signal, unit, and the statistics by name, final of a vector as a list}};
 expect: [{expectation, signal, kind, unit, limit, found, met, lack (why the run cannot be judged)}];
 warnings: [{file, line, column, subject, problem, remedy}], about what runs but is surely a mistake.
@@ -62,6 +62,7 @@ def parser() -> Parser:
         metavar="PATH",
         help="where to write the log; default runs/NAME-VARIANT-SETS.mcap, '' for none",
     )
+    _engine_option(run)
     run.add_argument("--json", action="store_true", help="print one JSON object instead of the summary")
     _sweep_options(add("sweep", commands.sweep, "run a diagram at every point of a grid", SWEEP_HELP))
     check = add("check", commands.check, "check a diagram and report all its faults")
@@ -83,6 +84,7 @@ def parser() -> Parser:
     words = "how far a parameter can go, such as eyes/camera.latency='100 ms..2 s'; may be repeated"
     analyse.add_argument("--vary", action="append", default=[], metavar="PARAM=FROM..TO", help=words)
     analyse.add_argument("--at", metavar="T", help="time at which the operating point is sought")
+    _engine_option(analyse)
     analyse.add_argument("--json", action="store_true", help="print one JSON object instead of the tables")
     analyse.add_argument("--output", "-o", metavar="FOLDER", help="write Bode plots there, as PNG")
     draw = add("draw", commands.draw, "draw a diagram as SVG")
@@ -101,10 +103,17 @@ def parser() -> Parser:
     schema = add("schema", commands.schema, "print the JSON schema of diagrams, for editors")
     schema.add_argument("--output", "-o", metavar="PATH", help="default: standard output")
     _own_block_option(schema)
+    cache = add("cache", commands.cache, "say where compiled blocks are kept, and how large they are")
+    cache.add_argument("--clear", action="store_true", help="remove them all")
     new = add("new", commands.new, "write the skeleton of a block or of a diagram")
     new.add_argument("kind", choices=("block", "diagram"))
     new.add_argument("name", metavar="NAME", help="a block as group.block, a diagram as FILE.yaml")
     return made
+
+
+def _engine_option(parser: Parser) -> None:
+    words = "python starts at once; native compiles, once, and is much faster; auto takes the sooner one"
+    parser.add_argument("--engine", choices=("auto", "python", "native"), default="auto", help=words)
 
 
 def _own_block_option(parser: Parser) -> None:
@@ -137,6 +146,7 @@ def _sweep_options(parser: Parser) -> None:
     _setting_options(parser)
     parser.add_argument("--stop-time", metavar="T", help="such as '20 s'; replaces the diagram's")
     parser.add_argument("--seed", type=int, metavar="N", help="seed of every run; replaces the diagram's")
+    _engine_option(parser)
     parser.add_argument("--workers", type=int, metavar="N", help="processes; default: one per processor")
     words = "the table, .csv or .parquet; default runs/NAME-sweep.csv, with variant and sets in its name"
     parser.add_argument("--output", "-o", metavar="TABLE", help=words)

@@ -121,16 +121,26 @@ class Engine:
             path, block = self.program.blocks[number].path, self._selves[number]
             raise cannot(method, path, block, error, self.time) from error
 
+    def run_with(self, make: Callable[[Interpreter], Executor]) -> None:
+        """Run with another executor from the next tick on; it works over the interpreter's memory."""
+        self._executor = make(self._interpreter)
+
     def attach(self, tap: Tap) -> None:
         """Have a block's rows taken from now on."""
         self._executor.attach(tap)
 
-    def observe(self, task: str, call: Callable[[int], None], every: int = 1) -> None:
-        """Call ``call(tick)`` at a task's first and then every so many of its ticks.
+    def observe(self, task: str, call: Callable[[int], None], every: int = 1) -> Observer:
+        """Call ``call(tick)`` at a task's first and then every so many of its ticks, until it is detached.
 
         It is called when the outputs are there and before the updates, as taps are.
         """
-        self._executor.attach(Observer(task, every, call))
+        observer = Observer(task, every, call)
+        self._executor.attach(observer)
+        return observer
+
+    def detach(self, observer: Tap | Observer) -> None:
+        """Take no rows any more, or do no more what was done at the ticks of a task."""
+        self._executor.detach(observer)
 
     @np.errstate(all="ignore")  # what is not finite is found here, and reported with its block
     def run(self, ticks: int) -> None:

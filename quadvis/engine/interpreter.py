@@ -16,7 +16,6 @@ from quadvis.engine.memory import SLOT, Memory
 from quadvis.engine.program import COPY, Op, Program, TaskProgram
 from quadvis.engine.solver import Solver, Vector
 from quadvis.engine.taps import Observer, Tap
-from quadvis.graph.graph import SINGLE
 
 Call = Callable[[], None]
 NOT_FINITE_OUTPUT = "output"
@@ -47,6 +46,9 @@ class Executor(Protocol):
 
     def attach(self, observer: Tap | Observer) -> None:
         """Have rows taken from now on, or something done at the ticks of a task."""
+
+    def detach(self, observer: Tap | Observer) -> None:
+        """End what `attach` has begun."""
 
 
 @dataclass
@@ -86,7 +88,7 @@ class Interpreter:
         self._slopes = np.array(program.slopes, np.intp)
         self._held = slice(0, program.held * SLOT)
         self._solver = Solver(program.solver, float(program.period))
-        self._observers: list[Tap | Observer] = []
+        self.observers: list[Tap | Observer] = []
         self._rhythms = [(task.every, task.offset) for task in program.tasks]
         self._moments: dict[tuple[bool, ...], _Moment] = {}
 
@@ -101,15 +103,21 @@ class Interpreter:
             self._owners[id(made)] = op.block
         return self._calls[op]
 
+    def detach(self, observer: Tap | Observer) -> None:
+        """End what `attach` has begun."""
+        self.observers.remove(observer)
+        self._moments.clear()
+
     def attach(self, observer: Tap | Observer) -> None:
         """Have rows taken from now on, or something done at the ticks of a task."""
-        self._observers.append(observer)
-        rhythm = self._rhythm(observer)
+        self.observers.append(observer)
+        rhythm = self.rhythm(observer)
         if rhythm not in self._rhythms:
             self._rhythms.append(rhythm)
         self._moments.clear()
 
-    def _rhythm(self, observer: Tap | Observer) -> tuple[int, int]:
+    def rhythm(self, observer: Tap | Observer) -> tuple[int, int]:
+        """Return after how many ticks an observer is due again, and its first tick."""
         name = observer.task if isinstance(observer, Observer) else self.program[observer.block].task
         task = self.program.task(name)
         return task.every * observer.every, task.offset
@@ -150,7 +158,7 @@ class Interpreter:
             except Exception as error:
                 return self._stop(call, error)
             if continuous:
-                stop = self._integrate(clock[TIME.position])
+                stop = self.integrate()
                 if stop is not None:
                     return stop
             self.tick = tick + 1
@@ -162,29 +170,37 @@ class Interpreter:
     def _prepare(self, due: tuple[bool, ...]) -> _Moment:
         rhythms = {rhythm for rhythm, flag in zip(self._rhythms, due, strict=True) if flag}
         tasks = [task for task in self.program.tasks if (task.every, task.offset) in rhythms]
-        groups = [tasks] if self.program.tasking == SINGLE else [[task] for task in tasks]
-        before = [op for task in tasks for op in task.delays]
-        for group in groups:
-            before += [op for task in group for op in task.latches]
-            before += [*_in_order(group, "read"), *_in_order(group, "output")]
         finite = np.array([position for task in tasks for position in task.finite], np.intp)
-        names = {task.name for task in tasks}
-        attached = [observer for observer in self._observers if self._rhythm(observer) in rhythms]
+        attached = [observer for observer in self.observers if self.rhythm(observer) in rhythms]
         made = _Moment(
-            [self.call(op) for op in before],
-            [self.call(op) for group in groups for op in _in_order(group, "write")],
-            [self.call(op) for group in groups for op in _in_order(group, "update")],
+            self._due_calls("before", tasks),
+            self._due_calls("write", tasks),
+            self._due_calls("update", tasks),
             finite,
             np.zeros(finite.size),
             [observer.call for observer in attached if isinstance(observer, Observer)],
             [(tap.take, self.program[tap.block].row) for tap in attached if not isinstance(tap, Observer)],
-            tuple(number for number, block in enumerate(self.program.blocks) if block.task in names),
+            self.due_blocks(self.tick),
         )
         self._moments[due] = made
         return made
 
-    def _integrate(self, time: float) -> Stop | None:
+    def _due_calls(self, phase: str, tasks: Sequence[TaskProgram]) -> list[Call]:
+        return [self.call(op) for task, op in self.program.phase(phase) if task in tasks]
+
+    def due_blocks(self, tick: int) -> tuple[int, ...]:
+        """Return the numbers of the blocks that run at a tick."""
+        names = {
+            task.name
+            for task in self.program.tasks
+            if tick >= task.offset and (tick - task.offset) % task.every == 0
+        }
+        return tuple(number for number, block in enumerate(self.program.blocks) if block.task in names)
+
+    def integrate(self) -> Stop | None:
+        """Carry the continuous states over one tick, as the solver does."""
         raw, floats = self.memory.raw, self.memory.floats
+        time = float(floats[TIME.position])
         # Minor steps write over time and signals, but delays and readers want those of the tick.
         held = bytes(raw[self._held])
         call = None
@@ -214,11 +230,6 @@ class Interpreter:
         except Exception as error:
             raise _MinorError(call, error) from error
         return floats[self._slopes]
-
-
-def _in_order(tasks: Sequence[TaskProgram], phase: str) -> list[Op]:
-    """Return the calls of a phase in the order of execution."""
-    return sorted((op for task in tasks for op in task.phases[phase]), key=lambda op: op.block)
 
 
 class _MinorError(Exception):

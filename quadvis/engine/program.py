@@ -18,7 +18,7 @@ from quadvis.block import Random
 from quadvis.block.random import stream_start
 from quadvis.engine.layout import TIME, Layout, Placed
 from quadvis.engine.memory import Memory, Slot
-from quadvis.graph.graph import Constant, Graph, Node
+from quadvis.graph.graph import SINGLE, Constant, Graph, Node
 from quadvis.machine.garbage import uncollected
 
 COPY = "copy"
@@ -128,6 +128,20 @@ class Program:
         """Return a task by its name."""
         return next(task for task in self.tasks if task.name == name)
 
+    def phase(self, name: str) -> tuple[tuple[TaskProgram, Op], ...]:
+        """Return all calls of a phase in the order of one tick, each with its task.
+
+        ``before``: copies, reads and outputs; ``write``; ``update``. A tick leaves out what is not due.
+        """
+        groups = [self.tasks] if self.tasking == SINGLE else [(task,) for task in self.tasks]
+        if name != "before":
+            return tuple(pair for group in groups for pair in _in_order(group, name))
+        found = [(task, op) for task in self.tasks for op in task.delays]
+        for group in groups:
+            found += [(task, op) for task in group for op in task.latches]
+            found += [*_in_order(group, "read"), *_in_order(group, "output")]
+        return tuple(found)
+
     @cached_property
     def hash(self) -> str:
         """The SHA-256 of everything in the program."""
@@ -182,6 +196,11 @@ def make_program(graph: Graph, seed: int) -> Program:
         tuple(calls["output"][number] for number in _minor(graph.nodes) if number in calls["output"]),
         tuple(_tunables(graph, blocks)),
     )
+
+
+def _in_order(tasks: Sequence[TaskProgram], phase: str) -> list[tuple[TaskProgram, Op]]:
+    """Return the calls of a phase of several tasks in the order of execution."""
+    return sorted(((task, op) for task in tasks for op in task.phases[phase]), key=lambda pair: pair[1].block)
 
 
 def _copies(slots: Mapping[Slot, Slot]) -> tuple[Op, ...]:

@@ -2,28 +2,32 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 
-class Tap(Protocol):
+class Tap(ABC):
     """Takes a block's outputs at the block's first and then at every ``every`` ticks of the block's own.
 
-    A row is taken when the outputs of the tick are there and before the updates. A restored run is tapped at
-    the same ticks as the first one.
+    ``block`` is the path of the block. A row is taken when the outputs of the tick are there and before the
+    updates. A restored run is tapped at the same ticks as the first one.
     """
 
-    @property
-    def block(self) -> str:
-        """The path of the block."""
+    block: str
+    every: int
 
-    @property
-    def every(self) -> int:
-        """The number of the block's ticks from one row to the next."""
-
+    @abstractmethod
     def take(self, tick: int, row: memoryview) -> None:
         """Take the bytes of the outputs, side by side as in memory; a tap that keeps them makes a copy."""
+
+    def take_all(self, ticks: NDArray[np.int64], rows: NDArray[np.int64]) -> None:
+        """Take the rows (N, slots) of N ticks (N,); both are the tap's own from now on."""
+        for tick, row in zip(ticks.tolist(), rows, strict=True):
+            self.take(tick, memoryview(row).cast("B"))
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,13 @@ class StatusLine:
         """Show a text in place of the previous one."""
         self._put(f"\r\x1b[K{text} ")
 
+    def say(self, text: str) -> None:
+        """Show a text in place of the previous one; print it where there is no terminal."""
+        if self.shown:
+            self.show(text)
+        else:
+            print(text, file=self.stream, flush=True)
+
     def _put(self, text: str) -> None:
         if not self.shown:
             return

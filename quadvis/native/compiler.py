@@ -1,142 +1,133 @@
-"""A block's methods compiled by numba, from the same source and over the same memory as the interpreted ones.
-
-Each method becomes a C function of pointers: to the block's record, to each argument and to each result. The
-native tier will call these from one compiled loop; today the conformance suite holds them against the
-interpreted methods.
-"""
+"""Block types compiled by numba, from the source of their interpreted methods and for the same memory."""
 
 from __future__ import annotations
 
-import ast
-import ctypes
-import inspect
-import textwrap
 import types
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from quadvis.block import Block
-from quadvis.engine.memory import SLOT, Memory, Record, Slot, packed
+from quadvis.engine.memory import packed
+from quadvis.native.block_type import BlockType, Kind, MethodType
+from quadvis.native.cache import MachineCode
+from quadvis.native.checked import power, replacements
+from quadvis.native.machine_code import Compiled, Unlinkable, emit
+from quadvis.native.source import POWER, Unreadable, names_in, prepared
 
-Compiled = Callable[[Memory, int], None]
+# A division by zero and a wrong index are noticed. Nobody calls the functions from Python.
+OPTIONS = {"error_model": "python", "boundscheck": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
-class Compiler:
-    """Compiles the methods of one block type; the helper functions that they share are compiled once.
+def compile_block(kind: BlockType, prefix: str) -> MachineCode:
+    """Compile all methods of a block type; the functions' names begin with ``prefix``.
 
-    Done afresh in each process: numba's own cache does not see edits in the files of called functions.
+    Code that has a ``refusal`` if numba cannot compile one of them; it names the method.
     """
+    import numba
 
-    def __init__(self, block: type[Block], record: Record) -> None:
-        self.block, self.record = block, record
+    scope = _Scope({field.name for field in kind.record.fields if field.shape})
+    pointer: Callable[[Any], Any] = numba.types.CPointer
+    compiled: dict[str, Compiled] = {}
+    try:
+        for method in kind.methods:
+            body = scope.jit(kind.function(method.name))
+            pointers = [
+                pointer(numba.from_dtype(kind.record.dtype)),
+                *(pointer(_pointed(each)) for each in (*method.arguments, *method.results)),
+            ]
+            compiled[method.name] = compile_function(_wrapper(method, body), pointers)
+        return machine_code(compiled, prefix)
+    except (Unreadable, Unlinkable, NotImplementedError, numba.core.errors.NumbaError) as error:
+        failed = next((method.name for method in kind.methods if method.name not in compiled), "")
+        return MachineCode(refusal=f"method '{failed}': {_cause(error)}" if failed else str(error))
+
+
+def _cause(error: Exception) -> str:
+    """Return the first line of a message that says something; files may have changed when it is read."""
+    lines = [line for line in str(error).splitlines() if line.strip() and not line.startswith("Failed in ")]
+    return lines[0].strip() if lines else type(error).__name__
+
+
+def machine_code(compiled: Mapping[str, Compiled], prefix: str) -> MachineCode:
+    """Return the object file of functions, which are named after the prefix there."""
+    names = {name: f"{prefix}_{name}" for name in compiled}
+    content, fallible = emit({names[name]: function for name, function in compiled.items()})
+    return MachineCode(content, names, frozenset(name for name in names if names[name] in fallible))
+
+
+def compile_loop_code(prefix: str) -> MachineCode:
+    """Compile the loop."""
+    from quadvis.native.loop import compile_loop
+
+    return machine_code({"loop": compile_loop()}, prefix)
+
+
+def compile_function(
+    function: Any, pointers: Sequence[Any], options: Mapping[str, Any] = OPTIONS
+) -> Compiled:
+    """Compile a function of pointers (types of numba) that returns nothing."""
+    import numba
+
+    jit: Any = numba.njit
+    made = jit(numba.void(*pointers), **options)(function)
+    result = made.overloads[made.signatures[0]]
+    return Compiled(result.library.get_llvm_str(), result.fndesc.llvm_func_name, len(pointers))
+
+
+class _Scope:
+    """Functions compiled with their helpers; each helper once. ``arrays`` are the array fields of `self`."""
+
+    def __init__(self, arrays: set[str]) -> None:
+        self._arrays = arrays
         self._known: dict[Any, Any] = {}
 
-    def compile(self, method: str, arguments: Sequence[Slot], targets: Sequence[Slot]) -> Compiled:
-        """Return ``call(memory, position)``, which runs a compiled method on the record at a position.
-
-        The slots give kinds and shapes, which are compiled in, and the places, which are not. numba's own
-        errors pass through: they name the line that it cannot compile.
-        """
-        import numba
-
-        slots = (*arguments, *targets)
-        body = self._jit(_with_array_stores(getattr(self.block, method), self.record))
-        namespace: dict[str, Any] = {"carray": vars(numba)["carray"], "body": body}
-        exec(_wrapper(arguments, targets), namespace)
-        kinds: Any = numba.types
-        pointers = [kinds.CPointer(_pointed(slot)) for slot in slots]
-        signature = numba.void(kinds.CPointer(numba.from_dtype(self.record.dtype)), *pointers)
-        function: Any = numba.cfunc(signature, error_model="numpy")(namespace["call"])
-        native = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * (len(slots) + 1))(function.address)
-        places = [slot.position * SLOT for slot in slots]
-
-        def call(memory: Memory, position: int) -> None:
-            base = ctypes.addressof(ctypes.c_char.from_buffer(memory.raw))
-            native(base + position * SLOT, *[base + place for place in places])
-
-        call.__dict__["function"] = function  # keeps the machine code alive
-        return call
-
-    def _jit(self, function: Any) -> Any:
-        """Compile a plain function and the plain functions that it calls."""
+    def jit(self, function: types.FunctionType) -> Any:
+        """Return numba's dispatcher for a plain function and the plain functions that it calls."""
         import numba
 
         if function not in self._known:
+            checked = replacements()
             scope = dict(function.__globals__)
-            copy = types.FunctionType(
-                function.__code__, scope, function.__name__, function.__defaults__, function.__closure__
-            )
-            self._known[function] = numba.njit(copy, error_model="numpy")
+            scope |= {"int": checked[int], "round": checked[round], "pow": checked[pow], POWER: power()}
+            copy = prepared(function, self._arrays, scope)
+            jit: Any = numba.njit
+            self._known[function] = jit(copy, **OPTIONS)
             for name in names_in(function.__code__):
-                if isinstance(scope.get(name), types.FunctionType):
-                    scope[name] = self._jit(scope[name])
+                value = function.__globals__.get(name)
+                if isinstance(value, types.FunctionType):
+                    scope[name] = self.jit(value)
+                elif _hashable(value) and value in checked:
+                    scope[name] = checked[value]
         return self._known[function]
 
 
-def names_in(code: types.CodeType) -> Iterator[str]:
-    """Yield the names of globals and attributes in a function and in what is nested in it."""
-    yield from code.co_names
-    for constant in code.co_consts:
-        if isinstance(constant, types.CodeType):
-            yield from names_in(constant)
+def _hashable(value: Any) -> bool:
+    return isinstance(value, types.ModuleType | types.BuiltinFunctionType | type)
 
 
-def _pointed(slot: Slot) -> Any:
-    """Return numba's type for the target of a slot's pointer; numba cannot store through pointers to bool."""
+def _pointed(kind: Kind) -> Any:
+    """Return numba's type for the target of a pointer; numba cannot store through pointers to bool."""
     import numba
 
-    return (
-        numba.uint8
-        if slot.scalar == "bool" and not slot.shape
-        else numba.from_dtype(packed(slot.scalar, slot.shape))
-    )
+    scalar, shape = kind
+    return numba.uint8 if scalar == "bool" and not shape else numba.from_dtype(packed(scalar, shape))
 
 
-class _ArrayStores(ast.NodeTransformer):
-    """Turns ``self.last = value`` into ``self.last[...] = value`` where ``last`` is an array.
+def _wrapper(method: MethodType, body: Any) -> Any:
+    """Return the function of pointers that calls a method; its text is made of kinds and shapes alone."""
+    import numba
 
-    Interpreted, the two are the same; numba gives the fields of a record arrays of the exact type only.
-    """
-
-    def __init__(self, names: set[str]) -> None:
-        self.names = names
-
-    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        """Replace the target of an assignment."""
-        mine = isinstance(node.value, ast.Name) and node.value.id == "self" and node.attr in self.names
-        if not mine or not isinstance(node.ctx, ast.Store):
-            return node
-        field = ast.Attribute(node.value, node.attr, ast.Load())
-        return ast.copy_location(ast.Subscript(field, ast.Constant(...), ast.Store()), node)
-
-
-def _with_array_stores(function: Any, record: Record) -> Any:
-    """Return a method with its assignments to array fields written out; lines keep their numbers."""
-    names = {item.name for item in record.fields if item.shape}
-    if not names & set(function.__code__.co_names):
-        return function
-    source, line = inspect.getsourcelines(function)
-    tree = ast.increment_lineno(ast.parse(textwrap.dedent("".join(source))), line - 1)
-    tree = ast.fix_missing_locations(_ArrayStores(names).visit(tree))
-    flags = function.__code__.co_flags & annotations.compiler_flag
-    code = compile(tree, function.__code__.co_filename, "exec", flags, dont_inherit=True)
-    namespace: dict[str, Any] = {}
-    exec(code, function.__globals__, namespace)
-    return namespace[function.__name__]
-
-
-def _wrapper(arguments: Sequence[Slot], targets: Sequence[Slot]) -> str:
-    """Return the source of the function of pointers; its text is made of kinds and shapes alone."""
-    names = [f"p{index}" for index in range(len(arguments) + len(targets))]
-    results = [f"r{index}" for index in range(len(targets))]
+    count = len(method.arguments)
+    names = [f"p{index}" for index in range(count + len(method.results))]
+    results = [f"r{index}" for index in range(len(method.results))]
     reads = ", ".join(
-        (f"carray({name}, {slot.shape})" if slot.shape else f"{name}[0]")
-        + (" != 0" if slot.scalar == "bool" else "")
-        for name, slot in zip(names, arguments, strict=False)
+        (f"carray({name}, {shape})" if shape else f"{name}[0]") + (" != 0" if scalar == "bool" else "")
+        for name, (scalar, shape) in zip(names, method.arguments, strict=False)
     )
     lines = [f"def call({', '.join(['record', *names])}):", "    self = carray(record, 1)[0]"]
     lines.append(f"    {', '.join(results)}{' = ' if results else ''}body(self, {reads})")
-    for result, name, slot in zip(results, names[len(arguments) :], targets, strict=True):
-        target = f"carray({name}, {slot.shape})[...]" if slot.shape else f"{name}[0]"
+    for result, name, (_, shape) in zip(results, names[count:], method.results, strict=True):
+        target = f"carray({name}, {shape})[...]" if shape else f"{name}[0]"
         lines.append(f"    {target} = {result}")
-    return "\n".join(lines)
+    namespace: dict[str, Any] = {"carray": vars(numba)["carray"], "body": body}
+    exec("\n".join(lines), namespace)
+    return namespace["call"]

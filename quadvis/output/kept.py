@@ -49,12 +49,24 @@ class RowJudge:
         """The signals of the block that are judged."""
         return [name for name, _, _ in self._ports]
 
-    def __call__(self, stamp: int, row: bytes) -> None:
+    def take(self, stamp: int, row: bytes) -> None:
         """Take the next row."""
         self._waiting += row
         self._count += 1
         if len(self._waiting) >= PIECE:
             self.flush()
+
+    def take_all(self, stamps: Slots, rows: Slots) -> None:
+        """Take the next N rows (N, slots), in pieces that do not depend on how many come together."""
+        room = max(1, -(-PIECE // self._block.size))  # rows of a piece
+        done = 0
+        while done < len(rows):
+            some = rows[done : done + room - self._count]
+            self._waiting += some.tobytes()
+            self._count += len(some)
+            done += len(some)
+            if self._count >= room:
+                self.flush()
 
     def flush(self) -> None:
         """Hand on the waiting rows."""

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from quadvis.errors import RunError, counted
 from quadvis.machine.files import LOG, open_output
-from quadvis.output.recording import Buffer, RecordedBlock
+from quadvis.output.recording import Buffer, RecordedBlock, Slots
 from quadvis.output.sink import Sink
 
 CDR = b"\x00\x01\x00\x00"  # plain CDR, little endian
@@ -106,14 +106,10 @@ class LogWriter:
             self._patience -= self._sink.wait_for_room(self._patience)
         return not self._sink.full
 
-    def write_rows(self, block: int, times: Sequence[int] | NDArray[np.int64], rows: Buffer) -> None:
-        """Write rows that lie one after another in `rows`; `times` (ns) has one entry for each."""
-        size = self._sizes[block] - len(CDR)
-        if len(rows) != size * len(times):
-            raise ValueError(f"{len(times)} rows of block {block} have {size * len(times)} bytes")
-        view = memoryview(rows)
-        for i, time in enumerate(times.tolist() if isinstance(times, np.ndarray) else times):
-            self.write(block, time, view[i * size : (i + 1) * size])
+    def write_rows(self, block: int, times: NDArray[np.int64], rows: Slots) -> None:
+        """Write N rows (N, slots); `times` (ns) has one entry for each."""
+        for time, row in zip(times.tolist(), rows, strict=True):
+            self.write(block, time, row.tobytes())
 
     def flush(self) -> None:
         """Hand all rows on, so that they survive the end of this process from a moment later on."""

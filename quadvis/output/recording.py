@@ -96,6 +96,11 @@ class Rows:
         self._stamps.append(stamp)
         self._bytes += row
 
+    def extend(self, stamps: NDArray[np.int64], rows: Slots) -> None:
+        """Keep N more rows (N, slots)."""
+        self._stamps.frombytes(stamps.tobytes())
+        self._bytes += rows.tobytes()
+
     def arrays(self) -> tuple[NDArray[np.int64], Slots]:
         """Return the stamps (N,) and the rows (N, slots) without a copy; further rows go to new arrays."""
         if self._whole is None or self._stamps:
@@ -141,6 +146,10 @@ class Recording:
     def append(self, block: int, time: int, row: Buffer) -> None:
         """Keep one row: the outputs of `blocks[block]` at `time` (ns) as in memory."""
         self._rows[block].append(time, row)
+
+    def extend(self, block: int, times: NDArray[np.int64], rows: Slots) -> None:
+        """Keep N rows (N, slots) of `blocks[block]` at `times` (ns)."""
+        self._rows[block].extend(times, rows)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ def summary_lines(result: Result) -> list[str]:
     lines += [f"  {line}" for line in table([_entry_row(entry, outcome) for entry in diagram.summary])]
     lines += [f"  {line}" for line in table([_verdict_row(verdict) for verdict in outcome.verdicts])]
     speed = f", {result.real_time_factor:.0f} x real time" if result.duration and result.wall else ""
-    lines.append(f"  {result.wall:.1f} s of wall time{speed}")
+    lines.append(f"  {result.wall:.1f} s of wall time{speed}; engine: {result.engine}")
     met = sum(verdict.met for verdict in outcome.verdicts)
     if outcome.verdicts:
         count = len(outcome.verdicts)

@@ -18,7 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.engine.engine import Engine
+from quadvis.engine.taps import Tap
 from quadvis.graph.graph import Node
+from quadvis.native.choice import AUTO, PYTHON, Announce, Choice, choose, use
 from quadvis.output.kept import ALL, RowJudge, RunSignals
 from quadvis.output.log import PORTS, LogWriter
 from quadvis.output.recording import RecordedBlock, RecordedPort, Recording
@@ -30,9 +32,17 @@ from quadvis.version import __version__
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
 
-Taker = Callable[[int, bytes], object]  # takes a stamp (ns) and a row
 Progress = Callable[[float, float], None]  # simulated time reached, wall time spent (s)
-SLICE = 0.2  # s of wall time between two calls of the progress; Ctrl-C waits no longer
+PYTHON_ONLY = Choice(PYTHON)
+SLICE = 0.1  # s of wall time between two calls of the progress; Ctrl-C and rows for the log wait no longer
+
+
+@dataclass(frozen=True)
+class Taker:
+    """A consumer of a block's rows: ``one`` takes a stamp (ns) and a row, ``many`` those of N rows."""
+
+    one: Callable[[int, bytes], object]
+    many: Callable[[NDArray[np.int64], NDArray[np.int64]], object]
 
 
 @dataclass(frozen=True)
@@ -41,7 +51,7 @@ class Result:
 
     ``duration`` is the simulated time (s), ``wall`` the wall time (s), ``cpu`` the processor time (s).
     ``lost`` says which rows the log lacks because the disk refused them; "" without a log or without lost
-    rows.
+    rows. ``engine`` is what ran the diagram, and why.
     """
 
     diagram: Diagram
@@ -51,6 +61,7 @@ class Result:
     wall: float
     cpu: float
     lost: str = ""
+    engine: Choice = PYTHON_ONLY
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.signals[name]
@@ -96,7 +107,8 @@ class Result:
 
         ``diagram``, ``variant`` (or None), ``params`` (the parameter files), ``hash`` and ``seed`` identify
         the run. ``passed`` says whether all expectations are met. ``duration_s`` is the simulated time,
-        ``wall_s`` the wall time, ``cpu_s`` the processor time; ``real_time_factor`` their ratio. ``summary``
+        ``wall_s`` the wall time, ``cpu_s`` the processor time, ``engine`` "python" or "native";
+        ``real_time_factor`` is simulated time divided by wall time. ``summary``
         holds ``{signal, unit, rms, max, ...}`` by label; ``final`` of several elements is a list. ``expect``
         is a list of ``{expectation, signal, kind, unit, limit, found, met, lack}``; ``lack`` says why the run
         cannot be judged. Numbers are in the unit beside them; None stands for a number that is unknown or
@@ -120,6 +132,7 @@ class Result:
             "duration_s": self.duration,
             "wall_s": self.wall,
             "cpu_s": self.cpu,
+            "engine": self.engine.engine,
             "real_time_factor": finite(self.real_time_factor),
             "summary": summary,
             "expect": [verdict.facts() for verdict in self.outcome.verdicts],
@@ -132,14 +145,21 @@ def run(
     log: str | Path | None = None,
     progress: Progress | None = None,
     keep: Sequence[str] | None = None,
+    engine: str = AUTO,
+    announce: Announce | None = None,
 ) -> Result:
     """Run a diagram to its stop time; RunError if a block fails, with a log that is readable up to that time.
 
     ``keep`` names the signals whose rows stay in memory, by patterns such as "craft.*". By default these are
     all signals without a log, and no signals with a log: then the result reads signals back from the log.
     Expectations and summary need no rows. A log that the disk refuses does not stop the run.
+
+    ``engine`` is ``python``, ``native`` (machine code, compiled once and kept), or ``auto``: the one that is
+    sooner through. Both give the same bits. ``announce`` takes a sentence on what is compiled or chosen.
     """
-    engine = Engine(diagram.graph, diagram.seed)
+    made = Engine(diagram.graph, diagram.seed)
+    choice = choose(made, diagram.ticks, engine, announce)
+    use(made, choice)
     logged = [node for node in diagram.graph.nodes if diagram.logs(node.path) and _fields(node)]
     recorded = [RecordedBlock(f"/{node.path}", _fields(node), node.task.name) for node in logged]
     patterns = ((ALL,) if log is None else ()) if keep is None else tuple(keep)
@@ -154,10 +174,10 @@ def run(
             judge = RowJudge(recorded[index], judging)
             takers = _takers(index, signals, writer, judge)
             if takers:
-                engine.attach(_RowTap(node.path, diagram.decimation(node.path), engine.period, takers))
+                made.attach(_RowTap(node.path, diagram.decimation(node.path), made.period, takers))
                 judges.append(judge)
-        stack.enter_context(engine)
-        _advance(engine, diagram.ticks, progress)
+        stack.enter_context(made)
+        _advance(made, diagram.ticks, progress)
         for judge in judges:
             judge.flush()
         outcome = judging.outcome()
@@ -166,18 +186,18 @@ def run(
             signals.written(writer.path, writer.loss)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
     lost = writer.loss if writer else ""
-    return Result(diagram, signals, outcome, diagram.duration, wall, cpu, lost)
+    return Result(diagram, signals, outcome, diagram.duration, wall, cpu, lost, choice)
 
 
 def _takers(index: int, signals: RunSignals, writer: LogWriter | None, judge: RowJudge) -> list[Taker]:
-    """Return the consumers of a block's rows, as functions of the stamp (ns) and the row."""
+    """Return the consumers of a block's rows."""
     takers: list[Taker] = []
     if index in signals.kept:
-        takers.append(partial(signals.append, index))
+        takers.append(Taker(partial(signals.append, index), partial(signals.extend, index)))
     if writer:
-        takers.append(partial(writer.write, index))
+        takers.append(Taker(partial(writer.write, index), partial(writer.write_rows, index)))
     if judge.names:
-        takers.append(judge)
+        takers.append(Taker(judge.take, judge.take_all))
     return takers
 
 
@@ -194,19 +214,29 @@ def _advance(engine: Engine, ticks: int, progress: Progress | None) -> None:
             progress(engine.time, time.perf_counter() - began)
 
 
-class _RowTap:
+class _RowTap(Tap):
     """Hands the rows of a block with their stamps (ns) to all its consumers."""
 
     def __init__(self, block: str, every: int, period: Fraction, takers: Sequence[Taker]) -> None:
         self.block, self.every = block, every
-        self._takers = tuple(takers)
+        self._one = tuple(taker.one for taker in takers)
+        self._many = tuple(taker.many for taker in takers)
         self._numerator, self._denominator = (period * NANOSECONDS).as_integer_ratio()
 
     def take(self, tick: int, row: memoryview) -> None:
         """Copy the row once for all."""
         data, stamp = bytes(row), tick * self._numerator // self._denominator
-        for take in self._takers:
+        for take in self._one:
             take(stamp, data)
+
+    def take_all(self, ticks: NDArray[np.int64], rows: NDArray[np.int64]) -> None:
+        """Hand many rows on together."""
+        if int(ticks[-1]) * self._numerator > np.iinfo(np.int64).max:
+            super().take_all(ticks, rows)
+            return
+        stamps = ticks * self._numerator // self._denominator
+        for take in self._many:
+            take(stamps, rows)
 
 
 def _fields(node: Node) -> tuple[RecordedPort, ...]:

@@ -89,14 +89,14 @@ class Grid:
                 return replace(fault, place=Place(_origin(axis, index)))
         return fault
 
-    def jobs(self, folder: Path | None) -> Iterator[Job]:
-        """Yield all runs in the order of the table."""
+    def jobs(self, folder: Path | None, engine: str) -> Iterator[Job]:
+        """Yield all runs in the order of the table, each with this engine."""
         for row, point in enumerate(self.points):
             chosen = {axis.name: index for axis, index in zip(self.axes, point, strict=True)}
             seeds = next((axis.values for axis in self.axes if axis.name == SEED), ())
             seed = int(seeds[chosen[SEED]]) if seeds else self.seed
             log = str(folder / f"{self._log_name(row, point)}.mcap") if folder else None
-            yield Job(row, self.configuration(point), seed, log, self.files)
+            yield Job(row, self.configuration(point), seed, log, engine, self.files)
 
     def _log_name(self, row: int, point: Sequence[int]) -> str:
         """Return the name of a log: the number of the row and the values of the axes."""

@@ -15,11 +15,13 @@ from typing import Any, Self
 import numpy as np
 
 from quadvis.diagram.settings import Files, Given, value_text
+from quadvis.engine.engine import Engine
 from quadvis.errors import QuadvisError, quoted
 from quadvis.errors.caller import as_given
 from quadvis.library.catalogue import OwnBlocks
 from quadvis.machine.files import PLOT, Claim, check_output
-from quadvis.sweeps.axes import SEED, VARIANT, Axis, Over, points, read_axes
+from quadvis.native.choice import AUTO, Announce, choose
+from quadvis.sweeps.axes import PARAMS, SEED, VARIANT, Axis, Over, points, read_axes
 from quadvis.sweeps.grid import Grid
 from quadvis.sweeps.picture import draw
 from quadvis.sweeps.pool import perform_all, processors
@@ -47,6 +49,8 @@ def sweep(
     plot: str | Path | None = None,
     logs: str | Path | None = None,
     own_blocks: OwnBlocks = True,
+    engine: str = AUTO,
+    announce: Announce | None = None,
     progress: Progress | None = None,
 ) -> Table:
     """Run a diagram at every point of a grid, and return a table of the results.
@@ -60,7 +64,8 @@ def sweep(
     for any number of workers. It is written to ``output`` (.csv or .parquet). If the sweep is interrupted, or
     a worker (RunError) or this process is killed, the file keeps all finished runs but those of the last two
     seconds. ``resume`` takes over the runs of that file with the same hash, and does the others. ``plot`` is
-    the file for a picture of the summary (PNG), ``logs`` a folder for a log of every run.
+    the file for a picture of the summary (PNG), ``logs`` a folder for a log of every run. ``engine`` and
+    ``announce`` are as in `Diagram.run`; what has to be compiled is compiled before the workers begin.
 
     A run that stops with an error is a row that says so. QuadvisError if a value does not fit the diagram, or
     if a file cannot be written because it is an input, another kind of file, or the output of another sweep.
@@ -75,7 +80,9 @@ def sweep(
     if plot is not None:
         check_output(plot, PLOT, grid.inputs)
     found = quantities(diagram)
-    jobs = list(grid.jobs(_folder(logs)))
+    chosen = choose(Engine(diagram.graph), diagram.ticks * len(places), engine, announce).engine
+    several = any(axis.name in (VARIANT, PARAMS) for axis in axes)  # block types may differ from run to run
+    jobs = list(grid.jobs(_folder(logs), engine if several else chosen))
     collection = _Collection(diagram.name, axes, places, found)
     with _Saving(collection, target, timings, grid.inputs) as save:
         if resume and target is not None and target.stat().st_size:

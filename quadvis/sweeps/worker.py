@@ -70,6 +70,7 @@ class Job:
     configuration: Configuration
     seed: int | None = None
     log: str | None = None
+    engine: str = "auto"
     files: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -182,7 +183,7 @@ def perform(job: Job) -> Row:
     try:
         diagram = diagram_of(job)
         digest = diagram.hash
-        result = run(diagram, log=job.log, keep=())
+        result = run(diagram, log=job.log, keep=(), engine=job.engine)
     except QuadvisError as error:
         return Row(job.index, digest, failure=" | ".join(str(error).splitlines()))
     units = tuple(quantity.unit for quantity in quantities(diagram))

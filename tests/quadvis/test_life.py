@@ -11,6 +11,7 @@ import pytest
 
 from quadvis.block import Block, In, Out, Param, ParameterError, Safe, State, Work
 from quadvis.engine.engine import Engine
+from quadvis.engine.taps import Tap
 from quadvis.errors import RunError
 from quadvis.graph.graph import Constant, Graph, Node, Task, Wire
 
@@ -182,7 +183,7 @@ def test_the_loop_asks_its_clock_before_ticks_and_runs_no_further_than_it_allows
     assert clock.asked == [(0, 5), (2, 5), (4, 5)] and made.tick == 5
 
 
-class Keeps:
+class Keeps(Tap):
     """A tap that keeps copies of rows."""
 
     def __init__(self, block: str, every: int = 1) -> None:

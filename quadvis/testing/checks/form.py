@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from quadvis.block import Block
-from quadvis.native.compiler import names_in
+from quadvis.native.source import names_in
 from quadvis.testing.rig import Subject
 
 

@@ -1,0 +1,63 @@
+"""Block types: what is compiled together.
+
+A block type is a class, the layout of its record, and for each method the kinds and shapes of what it takes
+and returns. Places in memory are not compiled in, so its machine code serves every block of the type in every
+diagram.
+"""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from quadvis.block import Block, Shape
+from quadvis.engine.memory import Record, Slot
+from quadvis.engine.program import Op
+from quadvis.native.source import fingerprint
+
+Kind = tuple[str, Shape]  # scalar and shape
+
+
+@dataclass(frozen=True)
+class MethodType:
+    """A method by name, and the kinds of what it takes and returns."""
+
+    name: str
+    arguments: tuple[Kind, ...]
+    results: tuple[Kind, ...]
+
+    @staticmethod
+    def of(op: Op) -> MethodType:
+        """Return the type of a call."""
+        return MethodType(op.method, _kinds(op.sources), _kinds(op.targets))
+
+
+@dataclass(frozen=True)
+class BlockType:
+    """A block's class, record and methods, which are compiled together, and a hash of their source."""
+
+    block: type[Block]
+    record: Record
+    methods: tuple[MethodType, ...]
+    source: str
+
+    @staticmethod
+    def of(block: type[Block], record: Record, methods: tuple[MethodType, ...]) -> BlockType:
+        """Return a block type as its source is now."""
+        functions = [getattr(block, method.name) for method in methods]
+        return BlockType(block, record, methods, fingerprint(*functions))
+
+    @property
+    def text(self) -> str:
+        """All that decides over the machine code beside the software and the processor."""
+        return repr((self.source, self.record, self.methods))
+
+    def function(self, method: str) -> types.FunctionType:
+        """Return a method as a plain function."""
+        found: types.FunctionType = getattr(self.block, method)
+        return found
+
+
+def _kinds(slots: Sequence[Slot]) -> tuple[Kind, ...]:
+    return tuple((slot.scalar, slot.shape) for slot in slots)

@@ -1,0 +1,110 @@
+"""The choice between the two ways to run a program: the interpreter, which starts at once, and machine code.
+
+The choice depends on the program, the number of ticks and the cache alone, never on a measured time, so that
+the same command always does the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+
+from quadvis.block import Block
+from quadvis.engine.engine import Engine
+from quadvis.engine.program import COPY, Program
+from quadvis.engine.solver import TABLEAUS
+from quadvis.errors import QuadvisError, counted, quoted, suggestion
+
+AUTO, PYTHON, NATIVE = ENGINES = ("auto", "python", "native")
+Announce = Callable[[str], None]
+
+SHORT = "since the run is short"
+# Times on an ordinary machine (s), as the first guess of all: only their ratios matter.
+CALL = 0.7e-6  # what machine code saves of a block's call
+STAGE = 5e-6  # and of a stage of the solver
+START = 0.08  # to load LLVM
+LOAD = 0.001  # to load a block type
+COMPILER = 0.6  # to load numba
+COMPILE = 1.3  # to compile a block type
+
+
+@dataclass(frozen=True)
+class Choice:
+    """How a program is run: ``python`` or ``native``, and why if that was not asked for."""
+
+    engine: str
+    reason: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.engine}, {self.reason}" if self.reason else self.engine
+
+
+def choose(engine: Engine, ticks: int, wanted: str = AUTO, announce: Announce | None = None) -> Choice:
+    """Choose how to run so many ticks; QuadvisError if machine code is wanted and cannot be had.
+
+    What has to be compiled for the choice is compiled, and announced.
+    """
+    if wanted not in ENGINES:
+        some = suggestion(wanted, ENGINES) or f"choose one of {', '.join(ENGINES)}"
+        raise QuadvisError(f"there is no engine {quoted(wanted)}; {some}")
+    if wanted == PYTHON:
+        return Choice(PYTHON)
+    if find_spec("llvmlite") is None or find_spec("numba") is None:
+        if wanted == NATIVE:
+            raise QuadvisError("the engine 'native' needs the package numba; install it, or choose 'python'")
+        return Choice(PYTHON, "since numba is not installed")
+    program, blocks = engine.program, [node.block for node in engine.graph.nodes]
+    saved = _saved(program, blocks, ticks)
+    if wanted == AUTO and saved < START:
+        return Choice(PYTHON, SHORT)
+    from quadvis.native.library import block_types, is_kept, library
+
+    kinds = list(dict.fromkeys(block_types(program, blocks).values()))
+    missing = [kind for kind in kinds if not library().has(kind) and not is_kept(kind)]
+    cost = START + LOAD * len(kinds) + (COMPILER + COMPILE * len(missing) if missing else 0.0)
+    if wanted == AUTO and saved < cost:
+        which = counted(len(missing), "block type")
+        why = f"since compiling {which} would take about {cost:.0f} s, once; 'native' does it"
+        return Choice(PYTHON, why if missing else SHORT)
+    if missing and announce:
+        announce(f"compiling {counted(len(missing), 'block type')}, once: about {cost:.0f} s")
+    library().prepare(kinds, announce)
+    refused = {kind.block.__name__: library().refusals[kind] for kind in kinds if kind in library().refusals}
+    names = ", ".join(f"{name} ({why})" for name, why in refused.items())
+    return Choice(NATIVE, f"but interpreted: {names}" if names else "")
+
+
+def _saved(program: Program, blocks: Sequence[Block], ticks: int) -> float:
+    """Return how many seconds machine code saves in a run, without the time to load it."""
+    found = 0.0
+    for task in program.tasks:
+        calls = sum(
+            op.method == COPY or blocks[op.block].numeric
+            for ops in (task.delays, task.latches, *task.phases.values())
+            for op in ops
+        )
+        found += CALL * calls * max(0, ticks - task.offset) / task.every
+    if program.states:
+        stages = len(TABLEAUS[program.solver].nodes)
+        calls = len(program.derivatives) + len(program.minor)
+        found += ticks * stages * (STAGE + CALL * calls)
+    return found
+
+
+def use(engine: Engine, choice: Choice) -> None:
+    """Let an engine run as chosen, from now on."""
+    if choice.engine != NATIVE:
+        return
+    from quadvis.native.executor import NativeExecutor
+    from quadvis.native.library import block_types, library
+
+    compiled = library()
+    kinds = block_types(engine.program, [node.block for node in engine.graph.nodes])
+    engine.run_with(
+        lambda interpreter: NativeExecutor(
+            interpreter,
+            compiled.loop(),
+            lambda op: compiled.function(kinds[op.block], op.method) if op.block in kinds else None,
+        )
+    )

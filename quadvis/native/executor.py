@@ -1,0 +1,115 @@
+"""The executor that runs a program in the compiled loop; what is Python's only goes to the interpreter."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+
+from quadvis.engine.interpreter import NOT_FINITE_OUTPUT, Interpreter, Stop
+from quadvis.engine.memory import Memory
+from quadvis.engine.program import Op
+from quadvis.engine.taps import Observer, Tap
+from quadvis.native import loop
+from quadvis.native.tables import EXACT, Function, PythonCall, Tables
+
+INSTRUCTIONS = 1 << 25  # after so many, some tenths of a second, Python has its turn: Ctrl-C
+
+
+class NativeExecutor:
+    """Runs a program's ticks over an interpreter's memory, at the address of the compiled loop.
+
+    A compiled call that fails is repeated by the interpreter: its result, or its exception, is what counts.
+    Rows reach their taps when a ring is full, and at the latest at the end of ``run``.
+    """
+
+    def __init__(
+        self, interpreter: Interpreter, address: int, function: Callable[[Op], Function | None]
+    ) -> None:
+        self.interpreter = interpreter
+        self.memory: Memory = interpreter.memory
+        self._function = function
+        self._run = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(address)
+        self._tables: Tables | None = None
+
+    @property
+    def tick(self) -> int:
+        """The next tick to run."""
+        return self.interpreter.tick
+
+    @tick.setter
+    def tick(self, tick: int) -> None:
+        self.interpreter.tick = tick
+
+    @property
+    def native(self) -> int:
+        """The number of calls that are compiled."""
+        return self._made().native
+
+    def attach(self, observer: Tap | Observer) -> None:
+        """Have rows taken from now on, or something done at the ticks of a task."""
+        self.interpreter.attach(observer)
+        self._tables = None
+
+    def detach(self, observer: Tap | Observer) -> None:
+        """End what `attach` has begun."""
+        self.interpreter.detach(observer)
+        self._tables = None
+
+    def _made(self) -> Tables:
+        if self._tables is None:
+            self._tables = Tables(self.interpreter, self._function)
+        return self._tables
+
+    def run(self, until: int) -> Stop | None:
+        """Run all ticks before ``until``; None if nothing failed."""
+        numerator, denominator = self.interpreter.program.period.as_integer_ratio()
+        if max(until * numerator, denominator) >= EXACT:
+            return self.interpreter.run(until)
+        tables = self._made()
+        turn = max(1, INSTRUCTIONS // max(1, len(tables.code)))
+        while self.tick < until:
+            stop = self._turn(tables, min(until, self.tick + turn))
+            if stop is not None:
+                return stop
+        return None
+
+    def _turn(self, tables: Tables, until: int) -> Stop | None:
+        control, table = tables.control, tables.table.ctypes.data
+        tables.waits(self.tick)
+        control[loop.TICK], control[loop.UNTIL], control[loop.SEGMENT] = self.tick, until, -1
+        while True:
+            self._run(table)
+            self.tick, result = control[loop.TICK], control[loop.RESULT]
+            stop = None
+            if result == loop.ASKED:
+                stop = self._do(tables.python[tables.code[control[loop.PLACE], 1]])
+                control[loop.PLACE] += 1
+            elif result == loop.FAILED:
+                stop = self._repeat(tables, control[loop.PLACE])
+                control[loop.PLACE] += 1
+            elif result == loop.NOT_FINITE:
+                stop = Stop(self.tick, self.interpreter.due_blocks(self.tick), found=NOT_FINITE_OUTPUT)
+            if result in (loop.FULL, loop.DONE) or stop is not None:
+                for tap, ticks, rows in tables.rows():
+                    tap.take_all(ticks, rows)
+            if result == loop.DONE or stop is not None:
+                return stop
+
+    def _do(self, python: PythonCall) -> Stop | None:
+        if python.observer is not None:
+            python.observer(self.tick)
+            return None
+        if python.call is None:
+            return self.interpreter.integrate()
+        try:
+            python.call()
+        except Exception as error:
+            return Stop(self.tick, (python.block,), error)
+        return None
+
+    def _repeat(self, tables: Tables, place: int) -> Stop | None:
+        """Do in Python what has failed; an update begins again with the record that it had."""
+        redo = tables.redo[place]
+        if redo.record is not None:
+            self.memory.raw[redo.record] = tables.saved(redo.record.stop - redo.record.start)
+        return self._do(redo.python)

@@ -1,0 +1,154 @@
+"""The compiled methods of this process: loaded from the cache, or compiled and kept there.
+
+A block type is compiled once for all diagrams; its machine code is loaded once a process.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import hashlib
+import platform
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from importlib.metadata import PackageNotFoundError, version
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+from quadvis.block import Block
+from quadvis.engine.memory import SLOT, Memory
+from quadvis.engine.program import Op, Program
+from quadvis.native import cache
+from quadvis.native.block_type import BlockType, MethodType
+from quadvis.native.cache import MachineCode
+from quadvis.native.machine_code import Loaded, processor
+from quadvis.native.tables import Function
+
+Announce = Callable[[str], None]
+LOOP = "loop"
+COMPILER = ("block_type", "checked", "compiler", "loop", "machine_code", "runtime", "source")  # of this room
+
+
+class Library:
+    """Compiled methods by block type."""
+
+    def __init__(self) -> None:
+        self._loaded = Loaded()
+        self._functions: dict[BlockType | str, dict[str, Function]] = {}
+        self.refusals: dict[BlockType, str] = {}
+
+    def loop(self) -> int:
+        """Return the address of the compiled loop."""
+        if LOOP not in self._functions:
+            from quadvis.native.compiler import compile_loop_code
+
+            key = _key(LOOP)
+            self._add(LOOP, key, cache.load(key) or _kept(key, compile_loop_code(_prefix(key))))
+        return self._functions[LOOP][LOOP].address
+
+    def has(self, kind: BlockType) -> bool:
+        """Return whether a block type is loaded."""
+        return kind in self._functions
+
+    def prepare(self, kinds: Iterable[BlockType], announce: Announce | None = None) -> None:
+        """Load block types, and compile those that are not kept."""
+        missing = []
+        for kind in kinds:
+            if kind not in self._functions:
+                key = _key(kind.text)
+                code = cache.load(key)
+                if code is None or not self._add(kind, key, code):
+                    missing.append((kind, key))
+        for number, (kind, key) in enumerate(missing, 1):
+            from quadvis.native.compiler import compile_block
+
+            if announce:
+                announce(f"compiling {kind.block.__name__}, {number} of {len(missing)} block types, once")
+            self._add(kind, key, _kept(key, compile_block(kind, _prefix(key))))
+
+    def _add(self, kind: BlockType | str, key: str, code: MachineCode) -> bool:
+        """Make code callable; return whether it is what it should be."""
+        functions: dict[str, Function] = {}
+        if code.refusal:
+            assert isinstance(kind, BlockType)
+            self.refusals[kind] = code.refusal
+        elif code.names is not None:
+            try:
+                self._loaded.add(code.content)
+            except RuntimeError:
+                return False
+            for method, name in code.names.items():
+                functions[method] = Function(self._loaded.address(name), method in code.fallible)
+        self._functions[kind] = functions
+        return True
+
+    def function(self, kind: BlockType, method: str) -> Function | None:
+        """Return a method's machine code; None if it has none."""
+        return self._functions[kind].get(method)
+
+    def call(self, kind: BlockType, op: Op, memory: Memory, position: int) -> bool:
+        """Call a compiled method on a record at a position in memory; return whether it did not fail."""
+        function = self._functions[kind][op.method]
+        base = memory.floats.ctypes.data
+        positions = [position, *(slot.position for slot in (*op.sources, *op.targets))]
+        places = (ctypes.c_int64 * len(positions))(*(base + SLOT * place for place in positions))
+        run = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)(function.address)
+        return not run(ctypes.addressof(places))
+
+
+@functools.cache
+def library() -> Library:
+    """Return the library of this process."""
+    return Library()
+
+
+def block_types(program: Program, blocks: Sequence[Block]) -> dict[int, BlockType]:
+    """Return the types of those blocks of a program that can be compiled, by the number of the block."""
+    calls: dict[int, list[Op]] = {}
+    phases = [phase for task in program.tasks for phase in task.phases.values()]
+    for op in chain.from_iterable((*phases, program.derivatives)):
+        calls.setdefault(op.block, []).append(op)
+    known: dict[tuple[Any, ...], BlockType] = {}
+    found = {}
+    for number, ops in calls.items():
+        if blocks[number].numeric:
+            key = (type(blocks[number]), program.blocks[number].record, tuple(map(MethodType.of, ops)))
+            found[number] = known.get(key) or known.setdefault(key, BlockType.of(*key))
+    return found
+
+
+def is_kept(kind: BlockType) -> bool:
+    """Return whether a block type need not be compiled."""
+    return cache.load(_key(kind.text)) is not None
+
+
+def _kept(key: str, code: MachineCode) -> MachineCode:
+    cache.keep(key, code)
+    return code
+
+
+def _prefix(key: str) -> str:
+    """Return the beginning of the names of functions; no two object files have the same."""
+    return f"quadvis_{key[:24]}"
+
+
+def _key(text: str) -> str:
+    return hashlib.sha256(f"{_surroundings()}\n{text}".encode()).hexdigest()
+
+
+@functools.cache
+def _surroundings() -> str:
+    """Return all that machine code depends on beside the blocks: software, processor, and the compiler."""
+    room = hashlib.sha256()
+    for name in COMPILER:
+        room.update((Path(__file__).parent / f"{name}.py").read_bytes())
+    versions = [f"{name} {_version(name)}" for name in ("numba", "llvmlite", "numpy")]
+    return repr((sys.version, platform.machine(), platform.system(), versions, processor(), room.hexdigest()))
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return ""
