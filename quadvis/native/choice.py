@@ -58,10 +58,10 @@ def choose(engine: Engine, ticks: int, wanted: str = AUTO, announce: Announce | 
     saved = _saved(program, blocks, ticks)
     if wanted == AUTO and saved < START:
         return Choice(PYTHON, SHORT)
-    from quadvis.native.library import block_types, is_kept, library
+    from quadvis.native.library import block_types, library
 
     kinds = list(dict.fromkeys(block_types(program, blocks).values()))
-    missing = [kind for kind in kinds if not library().has(kind) and not is_kept(kind)]
+    missing = library().missing(kinds)
     cost = START + LOAD * len(kinds) + (COMPILER + COMPILE * len(missing) if missing else 0.0)
     if wanted == AUTO and saved < cost:
         which = counted(len(missing), "block type")

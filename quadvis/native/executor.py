@@ -74,26 +74,35 @@ class NativeExecutor:
         return None
 
     def _turn(self, tables: Tables, until: int) -> Stop | None:
-        control, table = tables.control, tables.table.ctypes.data
+        control = tables.control
         tables.waits(self.tick)
         control[loop.TICK], control[loop.UNTIL], control[loop.SEGMENT] = self.tick, until, -1
-        while True:
-            self._run(table)
-            self.tick, result = control[loop.TICK], control[loop.RESULT]
-            stop = None
-            if result == loop.ASKED:
-                stop = self._do(tables.python[tables.code[control[loop.PLACE], 1]])
+        try:
+            while True:
+                self._run(tables.table.ctypes.data)
+                self.tick, result = control[loop.TICK], control[loop.RESULT]
+                if result == loop.DONE:
+                    return None
+                if result == loop.FULL:
+                    _hand_on(tables)
+                    continue
+                stop = self._answer(tables, result, control[loop.PLACE])
+                if stop is not None:
+                    return stop
                 control[loop.PLACE] += 1
-            elif result == loop.FAILED:
-                stop = self._repeat(tables, control[loop.PLACE])
-                control[loop.PLACE] += 1
-            elif result == loop.NOT_FINITE:
-                stop = Stop(self.tick, self.interpreter.due_blocks(self.tick), found=NOT_FINITE_OUTPUT)
-            if result in (loop.FULL, loop.DONE) or stop is not None:
-                for tap, ticks, rows in tables.rows():
-                    tap.take_all(ticks, rows)
-            if result == loop.DONE or stop is not None:
-                return stop
+        finally:
+            _hand_on(tables)  # also at Ctrl-C: a log has all rows up to there
+
+    def _answer(self, tables: Tables, result: int, place: int) -> Stop | None:
+        """Do what the loop asks for at an instruction."""
+        if result == loop.NOT_FINITE:
+            return Stop(self.tick, self.interpreter.due_blocks(self.tick), found=NOT_FINITE_OUTPUT)
+        if result == loop.ASKED:
+            return self._do(tables.python[tables.code[place, 1]])
+        redo = tables.redo[place]
+        if redo.record is not None:  # an update begins again with the record that it had
+            self.memory.raw[redo.record] = tables.saved(redo.record.stop - redo.record.start)
+        return self._do(redo.python)
 
     def _do(self, python: PythonCall) -> Stop | None:
         if python.observer is not None:
@@ -107,9 +116,8 @@ class NativeExecutor:
             return Stop(self.tick, (python.block,), error)
         return None
 
-    def _repeat(self, tables: Tables, place: int) -> Stop | None:
-        """Do in Python what has failed; an update begins again with the record that it had."""
-        redo = tables.redo[place]
-        if redo.record is not None:
-            self.memory.raw[redo.record] = tables.saved(redo.record.stop - redo.record.start)
-        return self._do(redo.python)
+
+def _hand_on(tables: Tables) -> None:
+    """Give the rows in the rings to their taps."""
+    for tap, ticks, rows in tables.rows():
+        tap.take_all(ticks, rows)

@@ -44,30 +44,31 @@ class Library:
             from quadvis.native.compiler import compile_loop_code
 
             key = _key(LOOP)
-            self._add(LOOP, key, cache.load(key) or _kept(key, compile_loop_code(_prefix(key))))
+            code = cache.load(key)
+            if code is None or not self._add(LOOP, code):
+                self._add(LOOP, _kept(key, compile_loop_code(_prefix(key))))
         return self._functions[LOOP][LOOP].address
 
-    def has(self, kind: BlockType) -> bool:
-        """Return whether a block type is loaded."""
-        return kind in self._functions
+    def missing(self, kinds: Iterable[BlockType]) -> list[BlockType]:
+        """Load block types that are kept; return those that must be compiled."""
+        return [kind for kind in kinds if kind not in self._functions and not self._load(kind)]
+
+    def _load(self, kind: BlockType) -> bool:
+        code = cache.load(_key(kind.text))
+        return code is not None and self._add(kind, code)
 
     def prepare(self, kinds: Iterable[BlockType], announce: Announce | None = None) -> None:
         """Load block types, and compile those that are not kept."""
-        missing = []
-        for kind in kinds:
-            if kind not in self._functions:
-                key = _key(kind.text)
-                code = cache.load(key)
-                if code is None or not self._add(kind, key, code):
-                    missing.append((kind, key))
-        for number, (kind, key) in enumerate(missing, 1):
+        missing = self.missing(kinds)
+        for number, kind in enumerate(missing, 1):
             from quadvis.native.compiler import compile_block
 
             if announce:
                 announce(f"compiling {kind.block.__name__}, {number} of {len(missing)} block types, once")
-            self._add(kind, key, _kept(key, compile_block(kind, _prefix(key))))
+            key = _key(kind.text)
+            self._add(kind, _kept(key, compile_block(kind, _prefix(key))))
 
-    def _add(self, kind: BlockType | str, key: str, code: MachineCode) -> bool:
+    def _add(self, kind: BlockType | str, code: MachineCode) -> bool:
         """Make code callable; return whether it is what it should be."""
         functions: dict[str, Function] = {}
         if code.refusal:
@@ -116,11 +117,6 @@ def block_types(program: Program, blocks: Sequence[Block]) -> dict[int, BlockTyp
             key = (type(blocks[number]), program.blocks[number].record, tuple(map(MethodType.of, ops)))
             found[number] = known.get(key) or known.setdefault(key, BlockType.of(*key))
     return found
-
-
-def is_kept(kind: BlockType) -> bool:
-    """Return whether a block type need not be compiled."""
-    return cache.load(_key(kind.text)) is not None
 
 
 def _kept(key: str, code: MachineCode) -> MachineCode:

@@ -80,6 +80,7 @@ class Tables:
         self.python: list[PythonCall] = []
         self.redo: dict[int, Redo] = {}  # by instruction
         self.rings: list[Ring] = []
+        self._first_minor = 0  # the instruction of the first call between two ticks
         self._lay_out()
         self._finish()
 
@@ -208,7 +209,7 @@ class Tables:
         control[loop.RHYTHMS], control[loop.SEGMENTS] = len(self._rhythms), len(self.segments)
         control[loop.NUMERATOR], control[loop.DENOMINATOR] = program.period.as_integer_ratio()
         control[loop.STATES], control[loop.HELD], control[loop.STAGES] = count, program.held, stages
-        first = getattr(self, "_first_minor", 0)
+        first = self._first_minor
         control[loop.MINOR], control[loop.MINORS] = first, len(program.minor)
         control[loop.DERIVATIVES] = first + len(program.minor)
         control[loop.DERIVATIVE_COUNT] = len(program.derivatives)

@@ -13,24 +13,26 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
-from typing import Any, Self, cast
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.errors import RunError, counted
 from quadvis.machine.files import LOG, open_output
-from quadvis.output.recording import Buffer, RecordedBlock, Slots
+from quadvis.output.mcap_messages import ChannelRows, message_chunks, message_size
+from quadvis.output.mcap_writer import McapWriter
+from quadvis.output.recording import SLOT, Buffer, RecordedBlock, Rows, Slots
 from quadvis.output.sink import Sink
 
-CDR = b"\x00\x01\x00\x00"  # plain CDR, little endian
 FLUSH = 0.05  # s after which rows are handed to the operating system
-CHUNK = 1 << 16  # bytes after which they are handed on earlier
-AROUND = 47  # bytes that the format puts around a row and into its index
+CHUNK = 1 << 17  # bytes after which they are handed on earlier
+AROUND = message_size(0) + 16  # bytes that the format puts around a row and into its index
+LARGEST = 1 << 20  # bytes of a chunk: readers hold several in memory
 PATIENCE = 2.0  # s that a run waits for a slow disk in total, before rows are left out
 FORMAT = "1"
 DIAGRAM, METADATA, SUMMARY = "diagram.yaml", "quadvis", "summary"
@@ -40,9 +42,12 @@ PORTS = "ports"  # key of the facts of a run: the sources of the ports of parts,
 class LogWriter:
     """Writes the rows of a run so that rows older than `FLUSH` survive the end of the process.
 
-    Rows are handed on when a later row comes, so where rows are rare an idle loop should call `flush`. A run
+    Rows are handed on when a later row comes, so where rows are rare a loop should call `flush_late`. A run
     survives its log: when the disk refuses, or is too slow for longer than `PATIENCE`, rows are left out,
     `loss` says how many, and the file stays readable.
+
+    Rows of several blocks may come in batches, of one block after another. A chunk ends before a batch that
+    is later than all rows that wait, so that chunks follow each other in time.
     """
 
     def __init__(
@@ -52,71 +57,94 @@ class LogWriter:
 
         RunError if this beginning cannot be written.
         """
-        from mcap.writer import CompressionType, Writer
-
         definitions = [message_definition(block) for block in blocks]
         self.path = Path(path)
-        self._sizes = [len(CDR) + block.size for block in blocks]
+        self._blocks = tuple(blocks)
+        self._sizes = [block.size for block in blocks]
         self._closed = False
         self._patience = PATIENCE
-        self._pending = self._rows = self._first = 0
+        self._waiting: dict[int, Rows] = {}  # by block
+        self._pending = 0  # bytes of the messages that wait
+        self._latest = 0  # stamp (ns) of the latest row
         self._sink = Sink(open_output(self.path, LOG))
-        # Only `flush` ends chunks, never `write`.
-        self._writer: Any = Writer(
-            cast(Any, self._sink), chunk_size=1 << 62, compression=CompressionType.NONE
-        )
-        setattr(self._writer, "_Writer__chunk_indices", _ChunkIndexes())  # noqa: B010, a private name
-        self._begin(dict(metadata))
+        facts = dict(metadata)
+        self._file = McapWriter(self._sink, "ros2", f"quadvis {facts.get('quadvis', '')}".strip())
+        self._file.add_attachment(DIAGRAM, "application/yaml", facts.pop("diagram", "").encode())
+        self._file.add_metadata(METADATA, {"format": FORMAT, **facts})
         names = _message_names(block.path for block in blocks)
-        self._ids = list(map(self._register, blocks, names, definitions))
-        self.flush()
+        self._ids = list(map(self._describe, blocks, names, definitions))
+        self._sink.hand_on()
+        self._due = monotonic() + FLUSH
         self._sink.drain()
         if self._sink.failure:
             raise RunError(self._refusal)
 
-    def _begin(self, metadata: dict[str, str]) -> None:
-        self._writer.start(profile="ros2", library=f"quadvis {metadata.get('quadvis', '')}".strip())
-        self._writer.add_attachment(0, 0, DIAGRAM, "application/yaml", metadata.pop("diagram", "").encode())
-        self._writer.add_metadata(METADATA, {"format": FORMAT, **metadata})
-
-    def _register(self, block: RecordedBlock, name: str, definition: str) -> int:
-        schema = self._writer.register_schema(f"quadvis_msgs/msg/{name}", "ros2msg", definition.encode())
+    def _describe(self, block: RecordedBlock, name: str, definition: str) -> int:
         fields = json.dumps([[port.name, port.type, port.shape, port.unit] for port in block.ports])
         described = {"fields": fields, "rate": block.rate}
-        return int(self._writer.register_channel(block.path, "cdr", schema, described))
+        return self._file.add_channel(block.path, f"quadvis_msgs/msg/{name}", definition, described)
 
     def write(self, block: int, time: int, row: Buffer) -> None:
         """Write one row: the outputs of `blocks[block]` at `time` (ns of the run) as in memory."""
-        data = CDR + row
-        if len(data) != self._sizes[block]:
-            raise ValueError(f"a row of block {block} has {self._sizes[block] - len(CDR)} bytes")
+        self._check(block, len(row))
+        if self._takes(1, time):
+            self._rows(block).append(time, row)
+            self._pending += self._sizes[block] + AROUND
+            self._latest = time
+
+    def write_rows(self, block: int, times: NDArray[np.int64], rows: Slots) -> None:
+        """Write N rows (N, slots); `times` (ns) has one entry for each, in ascending order."""
+        if len(times) != len(rows):
+            raise ValueError(f"{len(times)} times for {len(rows)} rows of block {block}")
+        self._check(block, SLOT * rows.shape[1])
+        if len(rows) and self._takes(len(rows), int(times[0])):
+            self._rows(block).extend(times, rows)
+            self._pending += (self._sizes[block] + AROUND) * len(rows)
+            self._latest = max(self._latest, int(times[-1]))
+
+    def _check(self, block: int, size: int) -> None:
+        if size != self._sizes[block]:
+            raise ValueError(f"a row of block {block} has {self._sizes[block]} bytes, not {size}")
+
+    def _takes(self, count: int, first: int) -> bool:
+        """Return whether rows from a stamp (ns) on can be taken; end the chunk if this is due."""
         if self._sink.full and not self._has_room():
-            self._sink.lose(1, time)
-            return
-        self._writer.add_message(self._ids[block], time, data, time)
-        self._first = time if not self._rows else self._first
-        self._rows += 1
-        self._pending += len(data) + AROUND
-        if self._pending >= CHUNK or monotonic() >= self._due:
+            self._sink.lose(count, first)
+            return False
+        if first >= self._latest and (self._pending >= CHUNK or monotonic() >= self._due):
             self.flush()
+        return True
 
     def _has_room(self) -> bool:
-        """Return whether one more row can be taken; wait for room as long as patience is left."""
+        """Return whether more rows can be taken; wait for room as long as patience is left."""
         if not self._sink.failure and self._patience > 0:
             self._patience -= self._sink.wait_for_room(self._patience)
         return not self._sink.full
 
-    def write_rows(self, block: int, times: NDArray[np.int64], rows: Slots) -> None:
-        """Write N rows (N, slots); `times` (ns) has one entry for each."""
-        for time, row in zip(times.tolist(), rows, strict=True):
-            self.write(block, time, row.tobytes())
+    def _rows(self, block: int) -> Rows:
+        """Return where the rows of a block wait."""
+        if block not in self._waiting:
+            self._waiting[block] = Rows(self._blocks[block])
+        return self._waiting[block]
 
     def flush(self) -> None:
         """Hand all rows on, so that they survive the end of this process from a moment later on."""
-        self._writer.flush()
-        self._sink.hand_on(self._rows, self._first)
+        if self._waiting:
+            rows = [
+                ChannelRows(self._ids[block], *self._waiting[block].arrays())
+                for block in sorted(self._waiting)
+            ]
+            for chunk in message_chunks(rows, self._file.head, LARGEST):
+                self._file.add_chunk(chunk)
+                self._sink.hand_on(chunk.count, chunk.first)
+            self._waiting.clear()
+            self._pending = 0
         self._due = monotonic() + FLUSH
-        self._pending = self._rows = 0
+
+    def flush_late(self) -> None:
+        """Hand all rows on if some may have waited for `FLUSH`."""
+        if monotonic() >= self._due:
+            self.flush()
 
     def close(self, summary: Mapping[str, str] | None = None) -> None:
         """End the file with the outcome of the run and a note of lost rows; a second call does nothing."""
@@ -126,8 +154,8 @@ class LogWriter:
         self.flush()
         self._sink.drain()
         lost = {"lost": self.loss} if self.loss else {}
-        self._writer.add_metadata(SUMMARY, {**(summary or {}), **lost})
-        self._writer.finish()
+        self._file.add_metadata(SUMMARY, {**(summary or {}), **lost})
+        self._file.end()
         self._sink.hand_on()
         self._sink.close()
 
@@ -161,29 +189,6 @@ class LogWriter:
         self.close({"stopped": str(error) or type(error).__name__} if error else None)
         if error and self.loss:
             error.add_note(self.loss)
-
-
-class _ChunkIndexes:
-    """The indexes of chunks for the end of a file, packed, because each second of a run adds twenty."""
-
-    def __init__(self) -> None:
-        self._packed = bytearray()
-
-    def append(self, index: Any) -> None:
-        """Keep one more index in its written form."""
-        from mcap.data_stream import RecordBuilder
-
-        builder: Any = RecordBuilder()
-        index.write(builder)
-        self._packed += builder.end()
-
-    def __iter__(self) -> Iterator[_ChunkIndexes]:
-        if self._packed:
-            yield self
-
-    def write(self, builder: Any) -> None:
-        """Write all indexes."""
-        builder.write(bytes(self._packed))
 
 
 def ports_of(metadata: Mapping[str, str]) -> dict[str, str]:

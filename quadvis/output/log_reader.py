@@ -11,7 +11,8 @@ from pathlib import Path
 from quadvis.errors import QuadvisError, quoted
 from quadvis.machine.inputs import read_input
 from quadvis.output import mcap_records as mcap
-from quadvis.output.log import CDR, DIAGRAM, METADATA, SUMMARY, ports_of
+from quadvis.output.log import DIAGRAM, METADATA, SUMMARY, ports_of
+from quadvis.output.mcap_messages import CDR
 from quadvis.output.recording import SLOT_TYPES, RecordedBlock, RecordedPort, Recording
 
 MOST_SLOTS, MOST_AXES = 1 << 20, 32  # of one block, of one output

@@ -18,8 +18,11 @@ from dataclasses import dataclass
 from quadvis.output.mcap_chunks import CHUNK_HEAD, packing_of, unpacked
 
 MAGIC = b"\x89MCAP0\r\n"
-HEADER, FOOTER, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX = 0x01, 0x02, 0x04, 0x05, 0x06, 0x07
-ATTACHMENT, METADATA, DATA_END, LAST, PRIVATE = 0x09, 0x0C, 0x0F, 0x0F, 0x80
+HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = range(0x01, 0x09)
+ATTACHMENT, ATTACHMENT_INDEX, STATISTICS, METADATA, METADATA_INDEX, SUMMARY_OFFSET, DATA_END = range(
+    0x09, 0x10
+)
+LAST, PRIVATE = DATA_END, 0x80
 HEAD = struct.Struct("<BQ")
 FREE, RATIO = 4 << 20, 64  # bytes that any file may unpack to, plus a multiple of its size
 

@@ -38,7 +38,7 @@ class Sink:
         self.lost = 0
         self.lost_from: int | None = None
         self._file = file
-        self._parts: list[bytes] = []
+        self._parts: list[bytes | memoryview] = []
         self._taken = 0
         self._queue: deque[Batch] = deque()
         self._waiting = self._written = self._whole = 0  # in bytes; `_whole` counts whole batches only
@@ -47,18 +47,15 @@ class Sink:
         self._thread = threading.Thread(target=self._work, name="log", daemon=True)
         self._thread.start()
 
-    def write(self, data: bytes) -> int:
-        """Take bytes for the next batch."""
-        self._parts.append(bytes(data))
+    def write(self, data: bytes | memoryview) -> int:
+        """Take bytes for the next batch; they are copied by `hand_on`."""
+        self._parts.append(data)
         self._taken += len(data)
         return len(data)
 
     def tell(self) -> int:
         """Return the number of bytes taken so far."""
         return self._taken
-
-    def flush(self) -> None:
-        """Do nothing: batches are ended by `hand_on`."""
 
     def hand_on(self, rows: int = 0, first: int = 0) -> None:
         """Hand the bytes taken to the thread as one batch; `first` is the stamp (ns) of its first row."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import NamedTuple
+from functools import cached_property
 
 NANOSECONDS = 10**9
 
@@ -38,14 +38,15 @@ class Sampling:
         return self.offset + row * self.spacing
 
 
-class Stretch(NamedTuple):
+@dataclass(frozen=True)
+class Stretch:
     """The rows from ``after`` to ``before`` (s), both included; ``before`` None is the end of the run."""
 
     sampling: Sampling
     after: Fraction = Fraction(0)
     before: Fraction | None = None
 
-    @property
+    @cached_property
     def rows(self) -> range:
         """The numbers of its rows in a run that reaches its end."""
         first = math.ceil((self.after - self.sampling.offset) / self.sampling.spacing)

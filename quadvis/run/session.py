@@ -177,7 +177,7 @@ def run(
                 made.attach(_RowTap(node.path, diagram.decimation(node.path), made.period, takers))
                 judges.append(judge)
         stack.enter_context(made)
-        _advance(made, diagram.ticks, progress)
+        _advance(made, diagram.ticks, progress, writer)
         for judge in judges:
             judge.flush()
         outcome = judging.outcome()
@@ -201,8 +201,8 @@ def _takers(index: int, signals: RunSignals, writer: LogWriter | None, judge: Ro
     return takers
 
 
-def _advance(engine: Engine, ticks: int, progress: Progress | None) -> None:
-    """Run in slices; between slices show the progress and notice an interruption."""
+def _advance(engine: Engine, ticks: int, progress: Progress | None, writer: LogWriter | None) -> None:
+    """Run in slices; between slices hand rows on, show the progress and notice an interruption."""
     began = time.perf_counter()
     count = 1
     while engine.tick < ticks:
@@ -210,6 +210,8 @@ def _advance(engine: Engine, ticks: int, progress: Progress | None) -> None:
         engine.run(min(count, ticks - engine.tick))
         spent = time.perf_counter() - start
         count = max(1, min(2 * count, int(count * SLICE / max(spent, 1e-6))))
+        if writer:
+            writer.flush_late()
         if progress:
             progress(engine.time, time.perf_counter() - began)
 

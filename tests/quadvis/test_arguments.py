@@ -14,7 +14,7 @@ from quadvis.cli.options import parser
 from quadvis.errors import QuadvisError
 
 HELP = "see 'quadvis --help'"
-COMMANDS = "run, sweep, check, list, describe, analyse, draw, program, plot, schema, new"
+COMMANDS = "run, sweep, check, list, describe, analyse, draw, program, plot, schema, cache, new"
 
 
 @pytest.mark.parametrize(
@@ -38,7 +38,7 @@ COMMANDS = "run, sweep, check, list, describe, analyse, draw, program, plot, sch
         (("new", "thing", "a.b"), "KIND cannot be 'thing'; choose from 'block', 'diagram'"),
         (("run", "a", "--stop-tme", "3 s"), "there is no option '--stop-tme'; did you mean '--stop-time'?"),
         (("run", "a", "--stop", "3 s"), "there is no option '--stop'; did you mean '--stop-time'?"),
-        (("run", "a", "-q"), "there is no option '-q'; choose from '--variant', '--params', '--set'"),
+        (("run", "a", "-q"), "there is no option '-q'; see 'quadvis run --help'"),
         (("check", "a", "--zzz=3"), "there is no option '--zzz'; choose from"),
         (("run", "a", "--stop-time"), "--stop-time needs a value; write --stop-time T"),
         (("run", "a", "--log", "--json"), "--log needs a value; write --log PATH"),

@@ -126,7 +126,8 @@ class Run:
             for index, name in enumerate(names):
                 stamps = np.round(self.times(name) * 1e9).astype(np.int64)
                 slot = np.int64 if self[name].dtype == bool else np.float64
-                log.write_rows(index, stamps, self[name].astype(slot).tobytes())
+                rows = self[name].astype(slot).reshape(len(stamps), -1)
+                log.write_rows(index, stamps, rows.view(np.int64))
 
 
 @pytest.fixture(scope="module")

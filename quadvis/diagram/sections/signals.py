@@ -99,5 +99,5 @@ def read_stretch(fields: YamlMap, context: Context) -> Signal | Unknown:
         return UNKNOWN
     selection = found.selection
     of = context.faults.collect(fields["of"].quantity, selection.unit, bare=False) if "of" in fields else None
-    stretch = selection.stretch._replace(after=after or Fraction(0), before=before)
+    stretch = replace(selection.stretch, after=after or Fraction(0), before=before)
     return replace(found, selection=replace(selection, of=of or 0.0, stretch=stretch))
