@@ -99,14 +99,15 @@ def fly(
     seed: int,
     pictures: bool,
     duration: float = DURATION,
+    engine: str = "auto",
 ) -> Flight:
     """Fly with a fault of one kind."""
     where = PLACES[place]
     fault = {"eyes.kind": kind, "eyes.begin": f"{where.begin} s", "eyes.duration": f"{duration} s"}
     path = faulty(folder, where.diagram, pictures)
     settings = where.settings | fault
-    result = quadvis.load(path, variant=variant, seed=seed, settings=settings, stop_time=where.end).run()
-    return _judged(result, where)
+    diagram = quadvis.load(path, variant=variant, seed=seed, settings=settings, stop_time=where.end)
+    return _judged(diagram.run(engine=engine), where)
 
 
 def _judged(result: Any, where: Place) -> Flight:
@@ -134,7 +135,7 @@ def sweep(pictures: bool, places: list[str], designs: list[str], kinds: list[str
     with TemporaryDirectory() as folder:
         for seed, kind, design, place in product(seeds, kinds, designs, places):
             variant = None if design == "paper" else design
-            flight = fly(Path(folder), place, variant, kind, seed, pictures)
+            flight = fly(Path(folder), place, variant, kind, seed, pictures, engine="native")
             flown[kind, design].append(flight)
             late = kind in NO_TRUTH and flight.left > POLICY
             print(
