@@ -1,4 +1,7 @@
-"""The commands. Each takes its options as they were typed and returns the exit code."""
+"""The commands. Each takes its options as they were typed and returns the exit code.
+
+The file is long because it has all commands, each of a few lines.
+"""
 
 from __future__ import annotations
 

@@ -8,9 +8,10 @@ from fractions import Fraction
 from typing import Any, NamedTuple
 
 from quadvis.block import Block, In, Param, ParameterError
-from quadvis.diagram.expand import Expansion, FlatBlock
-from quadvis.diagram.flow import Connection, Draft, unconnected
+from quadvis.diagram.draft import Connection, Draft, unconnected
+from quadvis.diagram.expand import Expansion
 from quadvis.diagram.names import absent, remedy_for
+from quadvis.diagram.scope import FlatBlock
 from quadvis.diagram.sections.ports import PORTS
 from quadvis.diagram.sections.rates import RATES
 from quadvis.diagram.sections.solver import SOLVER

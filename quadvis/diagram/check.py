@@ -10,8 +10,10 @@ from fractions import Fraction
 from typing import cast
 
 from quadvis.block import Block
-from quadvis.diagram.flow import Cases, Draft, Key, Link, ShapeFlow, unconnected
+from quadvis.diagram.draft import Draft, Key, Link, unconnected
+from quadvis.diagram.flow import Cases
 from quadvis.diagram.names import absent, remedy_for
+from quadvis.diagram.shape_flow import ShapeFlow
 from quadvis.diagram.unit_repair import follow_units
 from quadvis.diagram.values import shape_text
 from quadvis.errors import UNKNOWN, Faults, Place, known

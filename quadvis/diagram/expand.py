@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
 from quadvis.block import Block, ParameterError
 from quadvis.diagram.names import remedy_for
 from quadvis.diagram.parts import Parts
+from quadvis.diagram.scope import FlatBlock, Scope
 from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec, InputSpec
 from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.ports import PORTS
@@ -34,64 +33,6 @@ from quadvis.units import Unit, UnitError, split_quantity
 
 MAX_BLOCKS = 50_000  # in parts, since parts in parts multiply; a file by itself is as long as it is
 MAX_DEPTH = 30
-
-
-@dataclass
-class Scope:
-    """The names that one file's blocks see; ``prefix`` is the path of the part that the file is used for."""
-
-    prefix: str
-    spec: FileSpec
-    params: Mapping[str, YamlNode | Unknown]
-    parent: Scope | None = None
-    instance: BlockSpec | None = None
-    children: dict[str, Scope | Unknown] = field(default_factory=dict)
-
-    def knows(self, name: str) -> bool:
-        """Say whether nothing that a name leads to, block or part, is `UNKNOWN`."""
-        blocks, children, head = self.spec[BLOCKS], self.children, name.partition("/")[0]
-        found = blocks.get(name), blocks.get(head), children.get(name), children.get(head)
-        return all(map(known, found))
-
-    @property
-    def parts(self) -> Iterator[Scope]:
-        """The parts whose files are known."""
-        yield from (child for child in self.children.values() if known(child))
-
-    @property
-    def subject(self) -> str:
-        """How a fault names the part."""
-        return f"block '{self.prefix[:-1]}'"
-
-
-@dataclass(frozen=True)
-class FlatBlock:
-    """One block of the catalogue under its full path."""
-
-    path: str
-    spec: BlockSpec
-    scope: Scope
-    kind: type[Block] | Unknown
-    parameters: dict[str, YamlNode | Unknown]
-    places: Mapping[str, Place]  # of the names of the parameters
-
-    @cached_property
-    def rate(self) -> tuple[str, Place] | Unknown | None:
-        """The block's rate, or that of the nearest part around it that has one."""
-        return next((spec.rate for spec in self.around if spec.rate is not None), None)
-
-    @property
-    def around(self) -> Iterator[BlockSpec]:
-        """The block's entry, then those of the parts around it."""
-        yield self.spec
-        scope = self.scope
-        while scope.instance is not None and scope.parent is not None:
-            yield scope.instance
-            scope = scope.parent
-
-    def place(self, parameter: str) -> Place:
-        """Where a parameter is given its value."""
-        return self.places[parameter]
 
 
 def _is_unit(text: str) -> bool:

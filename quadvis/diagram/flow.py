@@ -1,78 +1,16 @@
-"""The flow of shapes and units along wires before a run, from declarations and given values."""
+"""The flow of facts along wires before a run, from declarations and given values."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from heapq import heappop, heappush
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
+from quadvis.diagram.draft import Draft, Key, Link
+from quadvis.errors import Faults, Place
+from quadvis.graph.graph import Node
 
-from quadvis.block import Block, In, Interface, Shape, Sizes
-from quadvis.diagram.values import OpenUnits, shape_text
-from quadvis.document import YamlNode
-from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known
-from quadvis.graph.graph import Constant, Node, Task, Wire, selected
-from quadvis.graph.names import index_text
-from quadvis.units import Unit
-
-ONE = Unit()
-Key = tuple[str, str]  # block and input
 Cases = dict[Hashable, Any]  # what was found, by the case
-
-
-@dataclass
-class Connection:
-    """One input as the diagram gives it, with the place to name in a fault."""
-
-    place: Place
-    source: Wire | Constant | Unknown
-    units: OpenUnits = ()  # of a constant, where the declaration leaves them open
-    across: Place | Unknown | None = None  # where the crossing is written
-
-
-@dataclass
-class Draft:
-    """A block whose wires are not checked yet."""
-
-    path: str
-    place: Place
-    kind: str
-    type: type[Block]
-    block: Block | Unknown
-    task: Task | Unknown
-    connections: dict[str, Connection]
-    places: Mapping[str, Place] = field(default_factory=dict)  # of the parameters that are given
-    units: Mapping[str, OpenUnits] = field(default_factory=dict)  # of the parameters where they are open
-    given: Mapping[str, YamlNode | Unknown] = field(default_factory=dict)  # their values as written
-
-    def origin(self, name: str) -> Place:
-        """Return where the value of a parameter or constant is written."""
-        if name in self.connections:
-            return self.connections[name].place
-        node = self.given[name]
-        return node.place if known(node) else self.places[name]
-
-    @property
-    def interface(self) -> Interface:
-        """The declarations of the block, which are known even if its parameters are not."""
-        return self.type.interface
-
-
-class Link(NamedTuple):
-    """A wire whose two ports exist."""
-
-    draft: Draft
-    port: str
-    connection: Connection
-    wire: Wire
-    declared: In
-
-    @property
-    def key(self) -> Key:
-        """Its identity: block and input."""
-        return self.draft.path, self.port
 
 
 class Flow:
@@ -264,102 +202,3 @@ class Flow:
     def knowledge(self, path: str) -> int:
         """Return how well a block can go ahead in a ring; higher is better."""
         return 0
-
-
-def misfit(wire: Wire, shape: Sequence[int]) -> str:
-    """Say that an index goes beyond a signal."""
-    return f"index {index_text(wire.index)} does not fit '{wire.source}', which has {shape_text(shape)}"
-
-
-def unconnected(port: str, declared: In) -> tuple[str, str]:
-    """Return the problem and the remedy of an input that nothing feeds."""
-    constant = ", or a constant" if declared.signal.scalar != "frame" else ""
-    return f"input '{port}' is not connected", f"add '{port}: block.port' under 'in'{constant}"
-
-
-class ShapeFlow(Flow):
-    """Shapes: fixes the symbolic sizes of every node."""
-
-    def knows(self, link: Link) -> bool:
-        """Say whether the producer's sizes are fixed."""
-        node = self.nodes[link.wire.block]
-        shape = node.block.interface.outputs[link.wire.port].signal.shape
-        return all(size in node.sizes for size in shape if isinstance(size, str))
-
-    def case(self, path: str, links: Sequence[Link]) -> Hashable:
-        """Return the shapes that come in and those of its constants; parameters have fixed some sizes."""
-        draft = self.drafts[path]
-        constants = [
-            (port, np.shape(connection.source.value))
-            for port, connection in draft.connections.items()
-            if isinstance(connection.source, Constant)
-        ]
-        return (
-            draft.block is UNKNOWN,
-            tuple(self.nodes[path].sizes.items()),
-            tuple([(link.port, self._shape(link), index_text(link.wire.index)) for link in links]),
-            tuple(constants),
-            self.undecided(path),
-        )
-
-    def _shape(self, link: Link) -> Shape | None:
-        return self.nodes[link.wire.block].shape(link.wire.port) if self.knows(link) else None
-
-    def found(self, path: str) -> Sizes:
-        """Return the sizes of a block."""
-        return dict(self.nodes[path].sizes)
-
-    def adopt(self, path: str, found: Sizes) -> None:
-        """Take these sizes."""
-        self.nodes[path].sizes.update(found)
-
-    def take(self, link: Link) -> bool:
-        """Match the part that the index takes."""
-        wire = link.wire
-        shape = self.nodes[wire.block].shape(wire.port)
-        source = f"'{wire.source}' has {shape_text(shape)}"
-        try:
-            part = selected(shape, wire.index)
-        except IndexError:
-            remedy = "count from 0" if shape else "leave it out"
-            self.fault(link.draft.path, link.connection.place, misfit(wire, shape), remedy)
-            return False
-        if part is None:
-            problem = f"the elements do not lie side by side, {source}"
-            remedy = "take one element, or a run along the last axis"
-            self.fault(link.draft.path, link.connection.place, problem, remedy)
-            return False
-        if wire.index:
-            source = f"this part of '{wire.source}' has {shape_text(part[1])}"
-        remedy = f"choose an element, such as '{wire.source}[0]'" if part[1] and not wire.index else ""
-        return self._fit(link.draft, link.port, part[1], source, remedy)
-
-    def _fit(self, draft: Draft, port: str, shape: Sequence[int], source: str, remedy: str = "") -> bool:
-        signal = draft.interface.inputs[port].signal
-        sizes = self.nodes[draft.path].sizes
-        trial = dict(sizes)
-        if signal.unify(tuple(shape), trial):
-            sizes.update(trial)
-            return True
-        fixed = not signal.shape or set(signal.shape) & set(sizes)
-        wanted = signal.resolve(sizes) if fixed else signal.shape
-        problem = f"input '{port}' takes {shape_text(wanted)}, {source}"
-        self.fault(draft.path, draft.connections[port].place, problem, remedy if not wanted else "")
-        return False
-
-    def settle(self, path: str) -> None:
-        """Let constants fix sizes that wires leave open; sizes that stay open become a scalar or 1."""
-        draft, node = self.drafts[path], self.nodes[path]
-        for port, connection in draft.connections.items():
-            if isinstance(connection.source, Constant) and (path, port) not in self.unknown:
-                shape = np.shape(connection.source.value)
-                if not self._fit(draft, port, shape, f"the constant has {shape_text(shape)}"):
-                    self.unknown.add((path, port))
-        if draft.block is UNKNOWN:
-            return
-        interface = node.block.interface
-        undecided = {size for port in self.undecided(path) for size in interface.inputs[port].signal.shape}
-        for declared in (*interface.outputs.values(), *interface.inputs.values()):
-            for size in declared.signal.shape:
-                if isinstance(size, str) and size not in undecided:
-                    node.sizes.setdefault(size, () if size == "*" else 1)

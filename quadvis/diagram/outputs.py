@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from quadvis.block import Block
-from quadvis.diagram.flow import Draft
+from quadvis.diagram.draft import Draft
 from quadvis.errors import Faults, Place, QuadvisError, quoted
 from quadvis.machine.files import same_file
 

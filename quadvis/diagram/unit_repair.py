@@ -10,7 +10,8 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from quadvis.diagram.flow import Cases, Draft, Key, Link
+from quadvis.diagram.draft import Draft, Key, Link
+from quadvis.diagram.flow import Cases
 from quadvis.diagram.unit_flow import UnitFlow, words
 from quadvis.diagram.values import OpenUnits
 from quadvis.errors import Fault, Faults, Place

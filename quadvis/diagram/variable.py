@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from quadvis.diagram.expand import Scope
+from quadvis.diagram.scope import Scope
 from quadvis.diagram.values import si
 from quadvis.diagram.wiring import Wiring
 from quadvis.document import YamlList, YamlNode, YamlScalar

@@ -7,8 +7,9 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from quadvis.block import Out
-from quadvis.diagram.expand import Expansion, FlatBlock, Scope
+from quadvis.diagram.expand import Expansion
 from quadvis.diagram.reference import Reference
+from quadvis.diagram.scope import FlatBlock, Scope
 from quadvis.diagram.sections.blocks import BLOCKS, INSIDE, InputSpec
 from quadvis.diagram.sections.ports import PORTS
 from quadvis.diagram.values import substitute

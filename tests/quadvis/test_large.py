@@ -13,7 +13,7 @@ import pytest
 
 from quadvis.api import check, load, load_text
 from quadvis.block import Block
-from quadvis.diagram.flow import ShapeFlow
+from quadvis.diagram.shape_flow import ShapeFlow
 from quadvis.diagram.unit_flow import Bindings, UnitFlow
 from quadvis.document import MAX_BYTES, parse_yaml
 from quadvis.engine.engine import Engine

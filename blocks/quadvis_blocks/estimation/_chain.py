@@ -9,6 +9,8 @@ dd. The axes are independent. The past holds the last ticks, oldest first: insta
 estimates with all frames before that instant. The present tick has the number TICKS. Frames are kept newest
 first. After a late frame the filter runs again from the tick before the frame, through all later frames. The
 result is, to the bit, the result for a frame that came in time.
+
+The file is long because the filter and its way back share one form of memory.
 """
 
 from __future__ import annotations

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import permutations
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +19,14 @@ from numpy.typing import NDArray
 from quadvis_vision.camera.calibration import CameraCalibration
 from quadvis_vision.camera.lens import by_point
 from quadvis_vision.camera.projection import camera_pose, plane_homography, target_corners
+from quadvis_vision.simulation.edges import edge_coverage, stretch
+from quadvis_vision.simulation.noise_bank import NOISE_STARTS, noise_bank
+from quadvis_vision.simulation.patch import Patch, meet, overlap
 
 Array = NDArray[np.float64]
 Singles = NDArray[np.float32]
 Picture = NDArray[np.uint8]
-Box = tuple[slice, slice]  # rows, columns
 
-NOISE_STARTS = 1 << 20  # positions in the bank at which a frame's noise can begin
 _MARGIN = 1.0  # px around a disc: half a pixel's diagonal, and what the grid may miss
 _GRID = 17  # points along an edge of the picture at which the lens is looked at
 _SUB_POSES = 16
@@ -73,7 +73,7 @@ class Renderer:
         # [row, column, ray axis, pixel axis]: the change of the ray from one pixel to the next.
         turn = np.stack([np.gradient(rays, axis=axis) for axis in (1, 0)], axis=-1).astype(np.float32)
         turns = np.moveaxis(turn.reshape(height, width, 4), -1, 0)
-        self._steepest = float(np.max(_stretch(*turns)))
+        self._steepest = float(np.max(stretch(*turns)))
         # The outermost pixels reach half a pixel beyond their rays.
         low, high = rays.min(axis=(0, 1)) - self._steepest, rays.max(axis=(0, 1)) + self._steepest
         self._field: tuple[list[float], list[float]] = (low.tolist(), high.tolist())
@@ -86,7 +86,7 @@ class Renderer:
         self._turn = turns[:, :1, 0].astype(np.float64) if alike else None
         planes = (rays[..., 0], rays[..., 1], np.ones_like(u), *lights, *(() if alike else turns))
         self._maps = np.stack(planes, dtype=np.float32)
-        self._noise = _noise_bank(scene.noise, 3 * width * height)
+        self._noise = noise_bank(scene.noise, 3 * width * height)
         self._scratch = np.empty((height, width, 3), np.uint8)
         self._empty = lru_cache(maxsize=4)(self._make_empty)
 
@@ -151,9 +151,9 @@ class Renderer:
         mixed += self._background[:, None]
         apart = True
         for patch, other in permutations(patches, 2):
-            if _meet(patch.box, other.box):
+            if meet(patch.box, other.box):
                 apart = False
-                here, there = _overlap(patch.box, other.box)
+                here, there = overlap(patch.box, other.box)
                 contrast = self._contrasts[other.disc][:, None, None]
                 patch.of(mixed)[:, *here] += other.of(cover)[there] * contrast
         mixed *= maps[_SHADE] if self.scene.vignette else self._shade[0, 0, :, None]
@@ -176,7 +176,7 @@ class Renderer:
         count = min(max(1, math.ceil(np.nan_to_num(lengths).max())), _SUB_POSES)
         return [at((index + 0.5) / count) for index in range(count)]
 
-    def _patches(self, homographies: list[Array]) -> list[_Patch]:
+    def _patches(self, homographies: list[Array]) -> list[Patch]:
         """Return the part of the picture that each disc in sight can touch, at least."""
         width, height = self.calibration.size
         seen: list[tuple[int, float, float]] = []  # disc, and half the size of what it can touch, in rays
@@ -203,7 +203,7 @@ class Renderer:
             left, top, right, bottom = max(0, left), max(0, top), min(width, right), min(height, bottom)
             if left < right and top < bottom:
                 last = first + (right - left) * (bottom - top)
-                patches.append(_Patch(disc, (slice(top, bottom), slice(left, right)), slice(first, last)))
+                patches.append(Patch(disc, (slice(top, bottom), slice(left, right)), slice(first, last)))
                 first = last
         return patches
 
@@ -226,7 +226,7 @@ class Renderer:
             if depth + rise > 0 and left < right and top < bottom:
                 yield disc, left, top, right, bottom
 
-    def _coverage(self, homographies: list[Array], patches: list[_Patch], maps: Singles) -> Singles:
+    def _coverage(self, homographies: list[Array], patches: list[Patch], maps: Singles) -> Singles:
         """Return the share of every pixel that the patch's disc covers during the exposure.
 
         With (a, b, w) = back (x, y, 1)', taken about the disc's centre, the ray meets the ceiling at the
@@ -249,7 +249,7 @@ class Renderer:
             edges = maps.take(near, axis=1).astype(np.float64)
             middles = self.discs[:, :2].T.take(edges[_DISC].astype(np.intp), axis=1)
             turn = edges[_TURN] if self._turn is None else self._turn
-            shares = _edge_coverage(back, self.scene.radius, middles, edges[_RAY], turn)
+            shares = edge_coverage(back, self.scene.radius, middles, edges[_RAY], turn)
             total[near] += shares - inside[near]
         return total / np.float32(len(homographies))
 
@@ -257,89 +257,14 @@ class Renderer:
         """Return the largest |m - r w| of a pixel that an edge may cut, see `_coverage`.
 
         The share of a pixel is 0 or 1 if its centre is farther from the edge than half a diagonal and the
-        bend of the edge, which `_edge_coverage` adds.
+        bend of the edge, which `edge_coverage` adds.
         """
         radius, away = self.scene.radius, math.hypot(*self.discs[0, :2].tolist())
         (a, b, _), (c, d, _), (e, f, _) = back.tolist()
-        slope = self._steepest * (_stretch(a, b, c, d) + (radius + away) * math.hypot(e, f))
+        slope = self._steepest * (stretch(a, b, c, d) + (radius + away) * math.hypot(e, f))
         by_x, by_y, depth = homography[2].tolist()
         farthest = max(0.0, depth + (radius + away) * math.hypot(by_x, by_y))
         return float(slope * (_HALF_DIAGONAL + slope * farthest / (24 * radius)))
-
-
-def _edge_coverage(back: Array, radius: float, middles: Array, rays: Array, turn: Array) -> Array:
-    """Return the covered share of pixels from the distance (px) and direction of their disc's edge.
-
-    `middles` (2, n) are the centres of the discs (m); `turn` (4, n or 1) holds the derivatives of the `rays`
-    (3, n) by the pixels: those of x by u and v, and those of y.
-    """
-    met = back @ rays
-    w = np.maximum(met[2], 1e-9)  # a ray that does not go up never meets the ceiling
-    arm = met[:2] - middles * w
-    m = np.maximum(np.hypot(*arm), 1e-12)
-    along, arm = arm * middles, arm / m
-    out = (along[0] + along[1] + m * m / w) / m
-    by_x, by_y = arm[0] * back[0, :2, None] + arm[1] * back[1, :2, None] - out * back[2, :2, None]
-    along = by_x * turn[:2] + by_y * turn[2:]
-    steepness = np.maximum(np.hypot(*along), 1e-12)
-    # The edge deviates from its tangent: on average over a pixel's width by 1/24 of the curvature.
-    bend = steepness / (24 * radius * w)
-    return half_plane_share((m - radius * w) / steepness + bend, along / steepness)
-
-
-def half_plane_share(distance: Array, normal: Array) -> Array:
-    """Return the share of unit pixels in a half plane whose edge is `distance` px away along the `normal`.
-
-    A positive distance means that the pixel's centre is outside. The share is the integral of the pixel's
-    shadow along the normal (u, v), a trapezium.
-    """
-    u, v = np.abs(normal)
-    long, short = np.maximum(u, v), np.maximum(np.minimum(u, v), 1e-9)
-    away = np.abs(distance)
-    ramp = away / long
-    corner = np.maximum((long + short) / 2 - away, 0.0) ** 2 / (2 * long * short)
-    inner = np.where(away <= (long - short) / 2, 0.5 - ramp, corner)
-    return np.asarray(np.where(distance > 0, inner, 1 - inner))
-
-
-class _Patch(NamedTuple):
-    """The `box` of the picture that a `disc` (by its index) can touch, and its `part` of all their pixels."""
-
-    disc: int
-    box: Box
-    part: slice
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Number of rows and columns."""
-        rows, columns = self.box
-        return rows.stop - rows.start, columns.stop - columns.start
-
-    def of(self, values: Singles) -> Singles:
-        """Return the box (..., rows, columns) of values (..., n) of all pixels, to be read or written."""
-        return values[..., self.part].reshape(*values.shape[:-1], *self.shape)
-
-
-def _stretch(a: Any, b: Any, c: Any, d: Any) -> Any:
-    """Return the larger singular value of the matrix [a b; c d], of floats or arrays."""
-    return (np.hypot(a + d, b - c) + np.hypot(a - d, b + c)) / 2
-
-
-def _meet(box: Box, other: Box) -> bool:
-    (rows, columns), (others, beside) = box, other
-    if rows.start >= others.stop or others.start >= rows.stop:
-        return False
-    return bool(columns.start < beside.stop and beside.start < columns.stop)
-
-
-def _overlap(box: Box, other: Box) -> tuple[Box, Box]:
-    """Return the common part of two boxes, in the coordinates of the first and of the second."""
-    here, there = [], []
-    for mine, theirs in zip(box, other, strict=True):
-        first, last = max(mine.start, theirs.start), min(mine.stop, theirs.stop)
-        here.append(slice(first - mine.start, last - mine.start))
-        there.append(slice(first - theirs.start, last - theirs.start))
-    return (here[0], here[1]), (there[0], there[1])
 
 
 def _image(points: Array, homography: Array) -> Array:
@@ -355,27 +280,3 @@ def _shade(u: Array, v: Array, scene: Scene) -> Singles:
     square = ((u - centre_u) ** 2 + (v - centre_v) ** 2) / (centre_u**2 + centre_v**2)
     shade: Singles = ((1 - scene.vignette * square)[..., None] * scene.white_balance).astype(np.float32)
     return shade
-
-
-class _Noise(NamedTuple):
-    """Noise in whole grey levels: what to add, what to subtract (one of them is zero), and both modulo 256.
-
-    `largest` is the largest of all.
-    """
-
-    more: Picture
-    less: Picture
-    both: Picture
-    largest: int
-
-
-@lru_cache(maxsize=2)
-def _noise_bank(sigma: float, size: int) -> _Noise:
-    """Return the noise of a camera; all cameras of one size and noise share it, so nobody can write to it."""
-    # numpy promises never to change the numbers of RandomState, so a run repeats on other versions too.
-    noise = np.rint(sigma * np.random.RandomState(0).standard_normal(size + NOISE_STARTS))
-    more, less = np.clip(noise, 0, 255).astype(np.uint8), np.clip(-noise, 0, 255).astype(np.uint8)
-    both = more - less
-    for bank in (more, less, both):
-        bank.flags.writeable = False
-    return _Noise(more, less, both, max(int(more.max()), int(less.max())))

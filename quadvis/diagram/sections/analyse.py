@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from quadvis.diagram.flow import misfit
+from quadvis.diagram.draft import misfit
 from quadvis.diagram.sections.context import Context, RunSection
 from quadvis.diagram.sections.forms import QUANTITY, TEXT, Schema, closed, labelled, list_of, ref
 from quadvis.diagram.times import read_duration

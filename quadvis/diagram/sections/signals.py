@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, Generic, TypeVar
 
-from quadvis.diagram.flow import misfit
+from quadvis.diagram.draft import misfit
 from quadvis.diagram.requirements import Selection
 from quadvis.diagram.sections.context import Context
 from quadvis.diagram.sections.log import LOG
