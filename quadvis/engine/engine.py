@@ -1,11 +1,4 @@
-"""The engine: the life of a run, from opened blocks over ticks to closed blocks, deterministic to the bit.
-
-The life of one tick, at time t = tick * base period: copies for wires that delay, reads from outside, outputs
-of the blocks that are due, writes to outside, taps (log, scopes), updates of the same blocks, continuous
-states to t + base period. Blocks that are
-due at one tick run in one dependency order, whatever their rates. Between ticks a signal is what it was at
-its block's last one.
-"""
+"""The engine: the life of a run, from opened blocks over ticks to closed blocks; see quadvis/README.md."""
 
 from __future__ import annotations
 
@@ -24,6 +17,7 @@ from quadvis.engine.stops import cannot, explained
 from quadvis.engine.taps import Observer, Tap
 from quadvis.engine.tuning import Tuning
 from quadvis.graph.graph import Constant, Graph
+from quadvis.machine.garbage import uncollected
 
 
 @dataclass(frozen=True)
@@ -42,6 +36,7 @@ class Engine:
     and its memory are public: ``program`` says where everything lies, ``memory`` holds it.
     """
 
+    @uncollected()
     def __init__(self, graph: Graph, seed: int = 0, clock: Clock | None = None, buffer: Any = None) -> None:
         self.graph = graph
         self.program: Program = make_program(graph, seed)

@@ -139,11 +139,8 @@ class Interpreter:
             try:
                 for call in moment.before:
                     call()
-            except Exception as error:
-                return self._stop(call, error)
-            if isnan(floats.take(moment.finite).dot(moment.zeros)):
-                return Stop(tick, moment.blocks, found=NOT_FINITE_OUTPUT)
-            try:
+                if isnan(floats.take(moment.finite).dot(moment.zeros)):
+                    return Stop(tick, moment.blocks, found=NOT_FINITE_OUTPUT)
                 for call in moment.writes:
                     call()
             except Exception as error:
