@@ -7,7 +7,7 @@ import pytest
 from quadvis.testing import Driven, drive
 from quadvis_blocks.supervision.pose_gate import PoseGate
 
-NONE, FROZEN, CONTRADICTED = 0, 4, 7
+NONE, REARMING, FROZEN, CONTRADICTED = 0, 3, 4, 7
 TIMES = 0.1 * np.arange(100)
 FAULT = (TIMES >= 3.0) & (TIMES < 6.0)
 PROOF = (TIMES >= 3.0) & (TIMES < 6.15)  # and the two frames after it, until three agree
@@ -65,18 +65,42 @@ def test_a_fast_craft_is_not_refused() -> None:
     assert gate(np.column_stack((4.0 * TIMES, -2.0 * TIMES, 0.0 * TIMES))).plausible.all()
 
 
-def test_after_long_darkness_any_pose_counts() -> None:
+def test_after_long_darkness_any_pose_counts_once_two_more_agree() -> None:
     dark = (TIMES > 1.0) & (TIMES < 9.0)
     yaw = np.where(TIMES > 5.0, math.radians(80.0), 0.0)
     found = gate(np.where(TIMES[:, None] > 5.0, [9.0, 0.0, 0.0], 0.0), yaw, valid=~dark)
-    assert np.array_equal(found.plausible, ~dark)
+    waits = np.isin(np.arange(100), [90, 91])
+    assert np.array_equal(found.plausible, ~dark & ~waits)
+    assert np.array_equal(found.reason == REARMING, waits) and not (found.reason == CONTRADICTED).any()
+
+
+@pytest.mark.parametrize("lost", [1, 2])
+def test_few_frames_without_a_pose_cast_no_doubt(lost: int) -> None:
+    valid = (np.arange(100) < 40) | (np.arange(100) >= 40 + lost)
+    assert np.array_equal(gate(valid=valid).plausible, valid)
+
+
+def test_frames_that_do_not_come_cast_no_doubt() -> None:
+    """The stamp stands still for 3 s, then frames go on."""
+    stamps = np.where(FAULT, 2.9, TIMES)
+    assert gate(stamp=stamps).plausible.all()
+
+
+def test_one_pose_among_frames_without_any_never_counts() -> None:
+    """Noise that looks like the target once: 1.2 m lower, which is in reach by then."""
+    lucky = np.arange(100) == 55
+    found = gate(np.where(lucky[:, None], [0.0, 0.0, -1.2], 0.0), valid=~FAULT | lucky)
+    assert not found.plausible[30:62].any() and found.plausible[62:].all()
+    assert found.reason[55] == REARMING
 
 
 def test_what_gave_no_pose_is_not_plausible_and_no_contradiction() -> None:
     found = gate(
         np.where(FAULT[:, None], np.full(3, math.nan), 0.0), np.where(FAULT, math.nan, 0.0), valid=~FAULT
     )
-    assert np.array_equal(found.plausible, ~FAULT) and (found.reason == NONE).all()
+    waits = np.isin(np.arange(100), [60, 61])
+    assert np.array_equal(found.plausible, ~FAULT & ~waits)
+    assert np.array_equal(found.reason == REARMING, waits) and (found.reason[~waits] == NONE).all()
 
 
 def test_the_verdict_holds_until_the_next_frame_and_trouble_is_handed_on() -> None:
