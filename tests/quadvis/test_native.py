@@ -559,9 +559,9 @@ class It(Block):
 def test_two_processes_that_compile_at_once_both_run(tmp_path: Path, folder: Path) -> None:
     program = (
         "import quadvis, hashlib\n"
-        f"diagram = quadvis.load({str(DIAGRAMS / 'hover.yaml')!r}, variant='geometric', stop_time='1 s')\n"
+        f"diagram = quadvis.load({str(DIAGRAMS / 'margins.yaml')!r}, stop_time='1 s')\n"
         "run = diagram.run(engine='native')\n"
-        "print(hashlib.sha256(run['craft.position'].tobytes()).hexdigest())\n"
+        "print(hashlib.sha256(run['side.position'].tobytes()).hexdigest())\n"
     )
     both = [subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE) for _ in range(2)]
     texts = {process.communicate()[0] for process in both}
