@@ -4,9 +4,9 @@ The source is Python and is compiled once, by `compile_loop`. The loop returns t
 Python can do: the call of a block that is not compiled, a full ring of rows, a fault, the end. The caller
 does it and calls again; the loop continues where it was.
 
-An instruction has ``WIDTH`` numbers: what to do, and up to four operands. Instructions stand in the order of
-the interpreter's tick. A segment is a run of instructions with one rhythm: at ticks at which the rhythm is
-not due, the loop leaves the segment out.
+An instruction has two numbers: what to do, and an operand. Instructions stand in the order of the
+interpreter's tick. A segment is a run of instructions with one rhythm: at ticks at which the rhythm is not
+due, the loop leaves the segment out.
 """
 
 from __future__ import annotations
@@ -18,166 +18,151 @@ from typing import Any
 from quadvis.native.compiler import OPTIONS, compile_function
 from quadvis.native.machine_code import Compiled
 
-WIDTH = 5
-# Instructions, and their operands.
-CALL = 0  # address of a function, address of its places
-COPY = 1  # first slot to read, first slot to write, number of slots
-CHECK = 2  # first slot, number of slots: these must be finite
-ROW = 3  # number of the tap, first slot, number of slots
-PYTHON = 4  # what only Python can do, by its number
-INTEGRATE = 5  # nothing
+WIDTH = 2
+# Instructions. A larger number is the address of a function to call; its operand is that of its places. The
+# operand of the others is a place in ``operands``, where the numbers stand that are named here.
+COPY = 0  # how many slots; for each, the slot to read and the slot to write
+CHECK = 1  # first slot, number of slots: these must be finite
+ROW = 2  # number of the tap, first slot, number of slots
+INTEGRATE = 3
+PYTHON = 4  # what only Python can do; the operand itself is its number
 
 # Why the loop returned.
 DONE, FAILED, NOT_FINITE, FULL, ASKED = range(5)
 
 # The places in ``control``.
 TICK, UNTIL, SEGMENT, PLACE, RESULT, RHYTHMS, SEGMENTS, NUMERATOR, DENOMINATOR = range(9)
-STATES, HELD, STAGES, MINOR, MINORS, DERIVATIVES, DERIVATIVE_COUNT = range(9, 16)
-CONTROLS = 16
+STATES, HELD, STAGES, MINOR, DERIVATIVES, CALLS = range(9, 15)
+CONTROLS = 15
 
 SYMBOL = "quadvis_loop"
 
 
 def loop(
-    control: Any, rhythms: Any, due: Any, segments: Any, code: Any, memory: Any, words: Any,
+    control: Any, rhythms: Any, due: Any, segments: Any, code: Any, operands: Any, memory: Any, words: Any,
     taps: Any, ring: Any, places: Any, stages: Any, scratch: Any,
 ) -> None:  # fmt: skip
     """Run ticks until control[UNTIL], or until something is asked of the caller: control[RESULT].
 
     ``rhythms``: ticks from one time to the next, and ticks to the next time. ``memory`` and ``words`` are the
     engine's slots as floats and as whole numbers. ``taps``: place in ``ring``, room in rows, rows there.
-    ``places`` are the slots of the states, then those of the slopes. ``stages``: the node of each stage in s,
-    then its weights times the step; the last row has the weights of the result.
+    ``places``: each state's slot and that of its slope, then the slots that minor steps write over.
+    ``stages``: the node of each stage in s, then the two weights of its slope times the step, for the next
+    stage and for the result.
     """
-    while control[TICK] < control[UNTIL]:
-        if control[SEGMENT] < 0:
-            _begin(control, rhythms, due, memory)
-        while control[SEGMENT] < control[SEGMENTS]:
-            segment = 3 * control[SEGMENT]
-            if due[segments[segment]]:
-                place = max(control[PLACE], segments[segment + 1])
-                while place < segments[segment + 2]:
-                    result = _do(
-                        control, code, WIDTH * place, memory, words, taps, ring, places, stages, scratch
-                    )
+    tick, segment, place = control[TICK], control[SEGMENT], control[PLACE]
+    result = DONE
+    while tick < control[UNTIL]:
+        if segment < 0:
+            segment = place = 0
+            _begin(control, tick, rhythms, due, memory)
+        while segment < control[SEGMENTS]:
+            if due[segments[3 * segment]]:
+                place = max(place, segments[3 * segment + 1])
+                end = segments[3 * segment + 2]
+                while place < end:
+                    kind, operand = code[WIDTH * place], code[WIDTH * place + 1]
+                    if kind > PYTHON:
+                        if invoke(kind, operand) != 0:
+                            result = FAILED
+                    elif kind == COPY:
+                        _copy(operands, operand, words)
+                    elif kind == CHECK:
+                        if not _finite(memory, operands[operand], operands[operand + 1]):
+                            result = NOT_FINITE
+                    elif kind == ROW:
+                        result = _row(tick, operands, operand, words, taps, ring)
+                    elif kind == INTEGRATE:
+                        result = _integrate(control, code, memory, places, stages, scratch)
+                    else:
+                        result = ASKED
                     if result != DONE:
-                        control[PLACE] = place
+                        control[TICK], control[SEGMENT], control[PLACE] = tick, segment, place
                         control[RESULT] = result
                         return
                     place += 1
-            control[SEGMENT] += 1
-            control[PLACE] = 0
-        control[SEGMENT] = -1
-        control[TICK] += 1
+            segment += 1
+            place = 0
+        segment = -1
+        tick += 1
+    control[TICK], control[SEGMENT], control[PLACE] = tick, segment, place
     control[RESULT] = DONE
 
 
-def _begin(control: Any, rhythms: Any, due: Any, memory: Any) -> None:
+def _begin(control: Any, tick: int, rhythms: Any, due: Any, memory: Any) -> None:
     """Begin a tick: what is due, and the time."""
-    control[SEGMENT] = 0
-    control[PLACE] = 0
     for index in range(control[RHYTHMS]):
         waiting = rhythms[2 * index + 1]
         due[index] = waiting == 0
         rhythms[2 * index + 1] = (rhythms[2 * index] if waiting == 0 else waiting) - 1
     # Both are exact as floats, so that the quotient is rounded once, as in the interpreter.
-    memory[0] = (control[TICK] * control[NUMERATOR]) / control[DENOMINATOR]
+    memory[0] = (tick * control[NUMERATOR]) / control[DENOMINATOR]
 
 
-def _do(
-    control: Any, code: Any, at: int, memory: Any, words: Any, taps: Any, ring: Any, places: Any,
-    stages: Any, scratch: Any,
-) -> int:  # fmt: skip
-    """Do one instruction; return what is asked of the caller, or DONE."""
-    kind = code[at]
-    if kind == CALL:
-        return FAILED if invoke(code[at + 1], code[at + 2]) != 0 else DONE
-    if kind == COPY:
-        for index in range(code[at + 3]):
-            words[code[at + 2] + index] = words[code[at + 1] + index]
-        return DONE
-    if kind == CHECK:
-        total = 0.0
-        for index in range(code[at + 1], code[at + 1] + code[at + 2]):
-            total += 0.0 * memory[index]
-        return DONE if total == 0.0 else NOT_FINITE
-    if kind == ROW:
-        return _row(control, code, at, words, taps, ring)
-    if kind == INTEGRATE:
-        return _integrate(control, code, memory, places, stages, scratch)
-    return ASKED
+def _copy(operands: Any, at: int, words: Any) -> None:
+    """Copy slots, one after the other."""
+    for index in range(at + 1, at + 1 + 2 * operands[at], 2):
+        words[operands[index + 1]] = words[operands[index]]
 
 
-def _row(control: Any, code: Any, at: int, words: Any, taps: Any, ring: Any) -> int:
+def _finite(memory: Any, first: int, count: int) -> bool:
+    """Return whether neighbouring slots hold finite numbers: of others the difference to themselves is NaN."""
+    strange = False
+    for index in range(first, first + count):
+        strange |= memory[index] - memory[index] != 0.0
+    return not strange
+
+
+def _row(tick: int, operands: Any, at: int, words: Any, taps: Any, ring: Any) -> int:
     """Put a row and its tick into the ring of a tap."""
-    tap, size = 3 * code[at + 1], code[at + 3]
+    tap, first, size = 3 * operands[at], operands[at + 1], operands[at + 2]
     if taps[tap + 2] == taps[tap + 1]:
         return FULL
     start = taps[tap] + taps[tap + 2] * (size + 1)
-    ring[start] = control[TICK]
+    ring[start] = tick
     for index in range(size):
-        ring[start + 1 + index] = words[code[at + 2] + index]
+        ring[start + 1 + index] = words[first + index]
     taps[tap + 2] += 1
     return DONE
 
 
 def _integrate(control: Any, code: Any, memory: Any, places: Any, stages: Any, scratch: Any) -> int:
-    """Carry the states over one step as `solver.Solver` does; if a call fails, leave memory as it was."""
+    """Carry the states over one step as `solver.Solver` does; if a call fails, leave memory as it was.
+
+    Of the slopes of all stages the sum alone is kept, added up in the solver's order.
+    """
     count, held, last = control[STATES], control[HELD], control[STAGES]
-    width = last + 1
+    sums, kept = count, 2 * count  # in ``scratch``, behind the states at the begin
     time = memory[0]
     for index in range(held):
-        scratch[index] = memory[index]
+        scratch[kept + index] = memory[places[2 * count + index]]
     for index in range(count):
-        scratch[held + index] = memory[places[index]]
-    begun, moved = held, held + count
+        scratch[index] = scratch[sums + index] = memory[places[2 * index]]
     result = DONE
-    stage = 0
-    while stage < last and result == DONE:
+    for stage in range(last):
+        first = control[DERIVATIVES]
         if stage > 0:
-            memory[0] = time + stages[stage * width]
-            _move(count, stage, width, stages, scratch, begun, moved)
-            for index in range(count):
-                memory[places[index]] = scratch[moved + index]
-            result = _calls(code, control[MINOR], control[MINORS])
-        if result == DONE:
-            result = _calls(code, control[DERIVATIVES], control[DERIVATIVE_COUNT])
+            memory[0] = time + stages[3 * stage]
+            first = control[MINOR]
+        for index in range(first, control[CALLS]):
+            if code[WIDTH * index] <= PYTHON or invoke(code[WIDTH * index], code[WIDTH * index + 1]) != 0:
+                result = FAILED
+        if result != DONE:
+            break
+        onward, weight = stages[3 * stage + 1], stages[3 * stage + 2]
         for index in range(count):
-            scratch[moved + (1 + stage) * count + index] = memory[places[count + index]]
-        stage += 1
-    total = 0.0
-    if result == DONE:
-        _move(count, last, width, stages, scratch, begun, moved)
-        for index in range(count):
-            total += 0.0 * scratch[moved + index]
-    if total != 0.0:
+            slope = memory[places[2 * index + 1]]
+            memory[places[2 * index]] = scratch[index] + onward * slope
+            scratch[sums + index] += weight * slope
+    if result == DONE and not _finite(scratch, sums, count):
         result = FAILED
+    memory[0] = time
     for index in range(held):
-        memory[index] = scratch[index]
-    final = moved if result == DONE else begun
+        memory[places[2 * count + index]] = scratch[kept + index]
+    final = sums if result == DONE else 0
     for index in range(count):
-        memory[places[index]] = scratch[final + index]
+        memory[places[2 * index]] = scratch[final + index]
     return result
-
-
-def _move(count: int, stage: int, width: int, stages: Any, scratch: Any, begun: int, moved: int) -> None:
-    """Add the weighted slopes of the stages before to the states at the begin."""
-    for index in range(count):
-        value = scratch[begun + index]
-        for before in range(stage):
-            weight = stages[stage * width + 1 + before]
-            if weight != 0.0:
-                value = value + weight * scratch[moved + (1 + before) * count + index]
-        scratch[moved + index] = value
-
-
-def _calls(code: Any, first: int, count: int) -> int:
-    """Run calls that belong to no tick of their own."""
-    for index in range(first, first + count):
-        at = WIDTH * index
-        if code[at] != CALL or invoke(code[at + 1], code[at + 2]) != 0:
-            return FAILED
-    return DONE
 
 
 def invoke(address: int, places: int) -> int:
@@ -191,11 +176,11 @@ def compile_loop() -> Compiled:
 
     kinds: Any = numba.types
     scope = {**globals(), "math": math, "invoke": _invoke()}
-    for function in (_begin, _row, _move, _calls, _integrate, _do, loop):
+    for function in (_begin, _copy, _finite, _row, _integrate, loop):
         made = types.FunctionType(function.__code__, scope, function.__name__)
         scope[function.__name__] = numba.njit(made, error_model="numpy")
     whole, real = kinds.CPointer(kinds.int64), kinds.CPointer(kinds.float64)
-    pointers = [whole, whole, whole, whole, whole, real, whole, whole, whole, whole, real, real]
+    pointers = [whole] * 6 + [real] + [whole] * 4 + [real] * 2
     return compile_function(scope["loop"].py_func, pointers, {**OPTIONS, "error_model": "numpy"})
 
 

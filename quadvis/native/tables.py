@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.engine.interpreter import Call, Interpreter
-from quadvis.engine.layout import Placed
-from quadvis.engine.memory import SLOT
+from quadvis.engine.memory import SLOT, Slot
 from quadvis.engine.program import COPY, Op
 from quadvis.engine.solver import TABLEAUS
 from quadvis.engine.taps import Observer, Tap
@@ -25,6 +25,23 @@ Whole = NDArray[np.int64]
 ALWAYS: Rhythm = (1, 0)
 ROOM = 1 << 16  # bytes of the rows of one tap
 EXACT = 1 << 53  # whole numbers below are exact as floats
+
+
+def _gives(self: Any) -> Any:
+    return self.field
+
+
+def _keeps(self: Any, value: Any) -> None:
+    self.field = value
+
+
+def _keeps_too(self: Any, value: Any) -> None:
+    """With a text, the code has its None in another place."""
+    self.field = value
+
+
+# The code of a method that copies a field of its block to its only output, or its only input to a field.
+PLAIN = frozenset(function.__code__.co_code for function in (_gives, _keeps, _keeps_too))
 
 
 @dataclass(frozen=True)
@@ -74,20 +91,18 @@ class Tables:
         )
         self._rhythms: dict[Rhythm, int] = {}
         self._segments: list[list[int]] = []
-        self._code: list[tuple[int, ...]] = []
+        self._code: list[tuple[int, int]] = []
+        self._operands: list[int] = []
+        self._pairs: dict[int, list[tuple[int, int]]] = {}  # what an instruction copies
         self._places: list[int] = []  # addresses for calls
         self._calls: list[tuple[int, int]] = []  # instruction, and the index of its first place
+        self.native = 0  # calls that are compiled
         self.python: list[PythonCall] = []
         self.redo: dict[int, Redo] = {}  # by instruction
         self.rings: list[Ring] = []
         self._first_minor = 0  # the instruction of the first call between two ticks
         self._lay_out()
         self._finish()
-
-    @property
-    def native(self) -> int:
-        """The number of calls that are compiled."""
-        return len(self._calls)
 
     def saved(self, size: int) -> bytes:
         """Return the copy of the record that the last fallible update began with."""
@@ -107,7 +122,7 @@ class Tables:
             self._op((task.every, task.offset), op)
         for task in program.tasks:
             for first, count in _runs(task.finite):
-                self._add((task.every, task.offset), (loop.CHECK, first, count))
+                self._add((task.every, task.offset), loop.CHECK, first, count)
         for task, op in program.phase("write"):
             self._op((task.every, task.offset), op)
         for observer in sorted(self._interpreter.observers, key=lambda each: not isinstance(each, Observer)):
@@ -117,46 +132,73 @@ class Tables:
         if program.states:
             self._solver()
 
-    def _add(self, rhythm: Rhythm, instruction: tuple[int, ...]) -> int:
-        """Add an instruction at a rhythm; return its number."""
+    def _add(self, rhythm: Rhythm, kind: int, *operands: int) -> int:
+        """Add an instruction with its numbers at a rhythm; return its place."""
+        self._operands += operands
+        return self._instruct(rhythm, kind, len(self._operands) - len(operands))
+
+    def _instruct(self, rhythm: Rhythm, kind: int, operand: int) -> int:
         number = self._rhythms.setdefault(rhythm, len(self._rhythms))
         if not self._segments or self._segments[-1][0] != number:
             self._segments.append([number, len(self._code), len(self._code)])
-        self._code.append(instruction)
+        self._code.append((kind, operand))
         self._segments[-1][2] = len(self._code)
         return len(self._code) - 1
 
+    def _copy(self, rhythm: Rhythm, source: int, target: int, size: int) -> None:
+        """Add copies of slots, to those just before if there are any."""
+        before = len(self._code) - 1
+        follows = self._segments and self._segments[-1][0] == self._rhythms.get(rhythm)
+        if not follows or before not in self._pairs:
+            before = self._instruct(rhythm, loop.COPY, 0)
+        self._pairs.setdefault(before, []).extend((source + index, target + index) for index in range(size))
+
     def _op(self, rhythm: Rhythm, op: Op) -> None:
         if op.method == COPY and op.sources[0].scalar != "frame":
-            source, target = op.sources[0], op.targets[0]
-            self._add(rhythm, (loop.COPY, source.position, target.position, source.size))
+            self._copy(rhythm, op.sources[0].position, op.targets[0].position, op.sources[0].size)
             return
         python = PythonCall(self._interpreter.call(op), op.block)
         function = None if op.method == COPY else self._function(op)
         if function is None:
             self._ask(rhythm, python)
             return
+        block = self._interpreter.program.blocks[op.block]
+        self.native += 1
+        copy = self._as_copy(op)
+        if copy is not None:
+            self._copy(rhythm, copy[0].position, copy[1].position, copy[0].size)
+            return
         record = None
         if function.fallible and op.method == "update":
-            block = self._interpreter.program.blocks[op.block]
             record = slice(block.position * SLOT, (block.position + block.record.size) * SLOT)
             saved = (self._saved.ctypes.data - self._base) // SLOT
-            self._add(rhythm, (loop.COPY, block.position, saved, block.record.size))
-        number = self._add(rhythm, self._call(function, op))
-        self._calls.append((number, self._code[number][2]))
+            self._copy(rhythm, block.position, saved, block.record.size)
+        number = self._instruct(rhythm, *self._call(function, op))
         if function.fallible:
             self.redo[number] = Redo(python, record)
 
-    def _call(self, function: Function, op: Op) -> tuple[int, ...]:
-        block: Placed = self._interpreter.program.blocks[op.block]
+    def _as_copy(self, op: Op) -> tuple[Slot, Slot] | None:
+        """Return the slots from which and to which a method copies, if it does nothing else."""
+        code = getattr(self._interpreter.selves[op.block], op.method).__code__
+        block = self._interpreter.program.blocks[op.block]
+        if code.co_code not in PLAIN or code.co_names[0] not in {field.name for field in block.record.fields}:
+            return None
+        field = block.field(code.co_names[0])
+        source, target = (op.sources[0], field) if op.sources else (field, op.targets[0])
+        return (source, target) if source[:2] == target[:2] else None
+
+    def _call(self, function: Function, op: Op) -> tuple[int, int]:
+        """Return the instruction of a call; `_finish` makes an address of its operand."""
+        block = self._interpreter.program.blocks[op.block]
         first = len(self._places)
         positions = [block.position, *(slot.position for slot in (*op.sources, *op.targets))]
         self._places += [self._base + position * SLOT for position in positions]
-        return (loop.CALL, function.address, first)
+        self._calls.append((len(self._code), first))
+        return function.address, first
 
     def _ask(self, rhythm: Rhythm, python: PythonCall) -> int:
         self.python.append(python)
-        return self._add(rhythm, (loop.PYTHON, len(self.python) - 1))
+        return self._instruct(rhythm, loop.PYTHON, len(self.python) - 1)
 
     def _observer(self, observer: Tap | Observer) -> None:
         rhythm = self._interpreter.rhythm(observer)
@@ -167,7 +209,7 @@ class Tables:
         size = (row.stop - row.start) // SLOT
         room = max(1, ROOM // (SLOT * (size + 1)))
         start = self.rings[-1].start + self.rings[-1].room * (self.rings[-1].size + 1) if self.rings else 0
-        self._add(rhythm, (loop.ROW, len(self.rings), row.start // SLOT, size))
+        self._add(rhythm, loop.ROW, len(self.rings), row.start // SLOT, size)
         self.rings.append(Ring(observer, start, room, size))
 
     def _solver(self) -> None:
@@ -179,21 +221,23 @@ class Tables:
         if any(function is None for function in functions):
             self._ask(ALWAYS, python)
             return
-        self.redo[self._add(ALWAYS, (loop.INTEGRATE,))] = Redo(python, None)
+        self.redo[self._instruct(ALWAYS, loop.INTEGRATE, 0)] = Redo(python, None)
         self._first_minor = len(self._code)
         for function, op in zip(functions, ops, strict=True):
             assert function is not None
             self._code.append(self._call(function, op))
-            self._calls.append((len(self._code) - 1, self._code[-1][2]))
+            self.native += 1
 
     def _finish(self) -> None:
         program, memory = self._interpreter.program, self._interpreter.memory
         self.places: Whole = np.array(self._places, np.int64)
-        self.code: Whole = np.zeros((len(self._code), loop.WIDTH), np.int64)
-        for number, instruction in enumerate(self._code):
-            self.code[number, : len(instruction)] = instruction
+        self.code: Whole = np.array(self._code, np.int64).reshape(-1, loop.WIDTH)
         for number, first in self._calls:
-            self.code[number, 2] = self.places.ctypes.data + SLOT * first
+            self.code[number, 1] = self.places.ctypes.data + SLOT * first
+        for number, pairs in self._pairs.items():
+            self.code[number, 1] = len(self._operands)
+            self._operands += (len(pairs), *chain.from_iterable(pairs))
+        self.operands: Whole = np.array(self._operands, np.int64)
         self.rhythms: Whole = np.zeros(2 * len(self._rhythms), np.int64)
         self.due: Whole = np.zeros(len(self._rhythms), np.int64)
         self.segments: Whole = np.array(self._segments, np.int64).reshape(-1, 3)
@@ -201,23 +245,26 @@ class Tables:
             -1, 3
         )
         self.ring: Whole = np.zeros(sum(ring.room * (ring.size + 1) for ring in self.rings), np.int64)
-        self.states: Whole = np.array([*program.states, *program.slopes], np.int64)
+        held = [
+            slot.position + index for op in program.minor for slot in op.targets for index in range(slot.size)
+        ]
+        pairs = zip(program.states, program.slopes, strict=True)
+        self.states: Whole = np.array([*chain.from_iterable(pairs), *held], np.int64)
         self.stages = _stages(program.solver, float(program.period))
-        count, stages = len(program.states), len(self.stages) - 1
-        self.scratch = np.zeros(program.held + (2 + stages) * count)
+        self.scratch = np.zeros(2 * len(program.states) + len(held))
         control = np.zeros(loop.CONTROLS, np.int64)
         control[loop.RHYTHMS], control[loop.SEGMENTS] = len(self._rhythms), len(self.segments)
         control[loop.NUMERATOR], control[loop.DENOMINATOR] = program.period.as_integer_ratio()
-        control[loop.STATES], control[loop.HELD], control[loop.STAGES] = count, program.held, stages
-        first = self._first_minor
-        control[loop.MINOR], control[loop.MINORS] = first, len(program.minor)
-        control[loop.DERIVATIVES] = first + len(program.minor)
-        control[loop.DERIVATIVE_COUNT] = len(program.derivatives)
+        control[loop.STATES], control[loop.HELD] = len(program.states), len(held)
+        control[loop.STAGES] = len(self.stages)
+        control[loop.MINOR] = self._first_minor
+        control[loop.DERIVATIVES] = self._first_minor + len(program.minor)
+        control[loop.CALLS] = control[loop.DERIVATIVES] + len(program.derivatives)
         self._control = control
         # One element of a view costs a third of an array's.
         self.control: memoryview = memoryview(cast(Any, control))
         arrays: Sequence[NDArray[Any]] = (
-            control, self.rhythms, self.due, self.segments, self.code, memory.floats, memory.floats,
+            control, self.rhythms, self.due, self.segments, self.code, self.operands, memory.floats, memory.floats,
             self.taps, self.ring, self.states, self.stages, self.scratch,
         )  # fmt: skip
         self.table: Whole = np.array([array.ctypes.data for array in arrays], np.int64)
@@ -243,12 +290,16 @@ def _runs(positions: Sequence[int]) -> Iterator[tuple[int, int]]:
 
 
 def _stages(solver: str, step: float) -> NDArray[np.float64]:
-    """Return a row for each stage: its node (s), and its weights; then one for the result."""
+    """Return for each stage its node (s), and the weights of its slope for the next stage and the result.
+
+    In all formulas of `TABLEAUS` a stage depends on the slope of the stage before it and on no other.
+    """
     tableau = TABLEAUS[solver]
-    count = len(tableau.nodes)
-    found = np.zeros((count + 1, count + 1))
-    rows = zip((*tableau.nodes, 1.0), (*tableau.stages, tableau.weights), strict=True)
-    for index, (node, weights) in enumerate(rows):
-        found[index, 0] = node * step
-        found[index, 1 : 1 + len(weights)] = [step * weight for weight in weights]
+    found = np.zeros((len(tableau.nodes), 3))
+    for stage, (node, weights) in enumerate(zip(tableau.nodes, tableau.stages, strict=True)):
+        assert not any(weights[:-1]), solver
+        found[stage, 0] = node * step
+        if stage:
+            found[stage - 1, 1] = step * weights[-1]
+    found[:, 2] = [step * weight for weight in tableau.weights]
     return found

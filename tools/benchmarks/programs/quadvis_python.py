@@ -1,0 +1,9 @@
+"""quadvis with interpreted blocks."""
+
+from __future__ import annotations
+
+from benchmarks.programs import _quadvis
+
+TASKS = "abc"
+load = _quadvis.load
+build = _quadvis.builder("python")
