@@ -61,10 +61,12 @@ def loop(
                 place = max(place, segments[3 * segment + 1])
                 end = segments[3 * segment + 2]
                 while place < end:
+                    place = _call(code, place, end)
+                    if place == end:
+                        break
                     kind, operand = code[WIDTH * place], code[WIDTH * place + 1]
                     if kind > PYTHON:
-                        if invoke(kind, operand) != 0:
-                            result = FAILED
+                        result = FAILED
                     elif kind == COPY:
                         _copy(operands, operand, words)
                     elif kind == CHECK:
@@ -99,6 +101,16 @@ def _begin(control: Any, tick: int, rhythms: Any, due: Any, memory: Any) -> None
     memory[0] = (tick * control[NUMERATOR]) / control[DENOMINATOR]
 
 
+def _call(code: Any, place: int, end: int) -> int:
+    """Call functions one after the other; return the place of what is no call, or of the call that failed."""
+    while place < end:
+        address = code[WIDTH * place]
+        if address <= PYTHON or invoke(address, code[WIDTH * place + 1]) != 0:
+            break
+        place += 1
+    return place
+
+
 def _copy(operands: Any, at: int, words: Any) -> None:
     """Copy slots, one after the other."""
     for index in range(at + 1, at + 1 + 2 * operands[at], 2):
@@ -106,7 +118,7 @@ def _copy(operands: Any, at: int, words: Any) -> None:
 
 
 def _finite(memory: Any, first: int, count: int) -> bool:
-    """Return whether neighbouring slots hold finite numbers: of others the difference to themselves is NaN."""
+    """Return whether neighbours hold finite numbers: the difference of others to themselves is NaN."""
     strange = False
     for index in range(first, first + count):
         strange |= memory[index] - memory[index] != 0.0
@@ -144,10 +156,8 @@ def _integrate(control: Any, code: Any, memory: Any, places: Any, stages: Any, s
         if stage > 0:
             memory[0] = time + stages[3 * stage]
             first = control[MINOR]
-        for index in range(first, control[CALLS]):
-            if code[WIDTH * index] <= PYTHON or invoke(code[WIDTH * index], code[WIDTH * index + 1]) != 0:
-                result = FAILED
-        if result != DONE:
+        if _call(code, first, control[CALLS]) != control[CALLS]:
+            result = FAILED
             break
         onward, weight = stages[3 * stage + 1], stages[3 * stage + 2]
         for index in range(count):
@@ -176,7 +186,7 @@ def compile_loop() -> Compiled:
 
     kinds: Any = numba.types
     scope = {**globals(), "math": math, "invoke": _invoke()}
-    for function in (_begin, _copy, _finite, _row, _integrate, loop):
+    for function in (_begin, _call, _copy, _finite, _row, _integrate, loop):
         made = types.FunctionType(function.__code__, scope, function.__name__)
         scope[function.__name__] = numba.njit(made, error_model="numpy")
     whole, real = kinds.CPointer(kinds.int64), kinds.CPointer(kinds.float64)

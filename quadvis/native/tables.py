@@ -248,8 +248,8 @@ class Tables:
         held = [
             slot.position + index for op in program.minor for slot in op.targets for index in range(slot.size)
         ]
-        pairs = zip(program.states, program.slopes, strict=True)
-        self.states: Whole = np.array([*chain.from_iterable(pairs), *held], np.int64)
+        both = zip(program.states, program.slopes, strict=True)
+        self.states: Whole = np.array([*chain.from_iterable(both), *held], np.int64)
         self.stages = _stages(program.solver, float(program.period))
         self.scratch = np.zeros(2 * len(program.states) + len(held))
         control = np.zeros(loop.CONTROLS, np.int64)
@@ -264,8 +264,8 @@ class Tables:
         # One element of a view costs a third of an array's.
         self.control: memoryview = memoryview(cast(Any, control))
         arrays: Sequence[NDArray[Any]] = (
-            control, self.rhythms, self.due, self.segments, self.code, self.operands, memory.floats, memory.floats,
-            self.taps, self.ring, self.states, self.stages, self.scratch,
+            control, self.rhythms, self.due, self.segments, self.code, self.operands, memory.floats,
+            memory.floats, self.taps, self.ring, self.states, self.stages, self.scratch,
         )  # fmt: skip
         self.table: Whole = np.array([array.ctypes.data for array in arrays], np.int64)
 
