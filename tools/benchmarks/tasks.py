@@ -1,8 +1,8 @@
 """Three tasks for programs that run block diagrams, and what comes out of them.
 
-a: the hover of the paper, equations (11) to (23), with the controller each 50 ms and the plant by the classical
-Runge-Kutta formula at 1 ms. b: the same loop at 1 kHz in exactly 30 blocks, the plant by Euler's method. c: a
-chain of gains and unit delays at 1 kHz behind a constant.
+a: the hover of the paper, equations (11) to (23), with the controller each 50 ms and the plant by the
+classical Runge-Kutta formula at 1 ms. b: the same loop at 1 kHz in exactly 30 blocks, the plant by Euler's
+method. c: a chain of gains and unit delays at 1 kHz behind a constant.
 
 Only the standard library is needed here: other programs import this module in their own environment.
 """
@@ -141,9 +141,17 @@ def chain(count: int) -> list[Part]:
     return found
 
 
+def reached(count: int, steps: int) -> list[int]:
+    """Return the number of the last delay that a run of so many steps has reached, and the next one, if any.
+
+    Before the run every delay gives zero; after it the first gives what one gain makes, and so on.
+    """
+    return [index for index in (min(steps, count // 2) - 1, steps) if index < count // 2]
+
+
 def front(count: int, steps: int) -> list[str]:
-    """Return the last delay of the chain that a run of so many steps has reached, and the next one, if any."""
-    return [f"delay{index}" for index in (min(steps, count // 2) - 1, steps) if index < count // 2]
+    """Return the names of the delays that are `reached`."""
+    return [f"delay{index}" for index in reached(count, steps)]
 
 
 # The tasks
@@ -185,8 +193,7 @@ class Task:
             return exact(steps)
         if self.letter == "b":
             return by_definition(steps)
-        reached = min(steps, self.count // 2)
-        return [FACTOR**reached] + [0.0] * (len(front(self.count, steps)) - 1)
+        return [FACTOR ** (index + 1) if index < steps else 0.0 for index in reached(self.count, steps)]
 
     @property
     def tolerance(self) -> float:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import sys
 import time
 from collections.abc import Callable
@@ -19,32 +20,34 @@ from benchmarks.tasks import Task
 
 
 def timed(work: Callable[[], Any]) -> tuple[Any, float]:
-    """Return the result of some work, and its CPU seconds in this process."""
-    begin = time.process_time()
+    """Return the result of some work, and the CPU seconds of this process and of its ended children."""
+    begin = time.process_time() + sum(os.times()[2:4])
     result = work()
-    return result, time.process_time() - begin
+    return result, time.process_time() + sum(os.times()[2:4]) - begin
 
 
 def serve(program: str, name: str) -> None:
     """Answer until standard input ends."""
     answers, sys.stdout = sys.stdout, sys.stderr  # programs print
-    task = Task.named(name)
-    module = import_module(f"benchmarks.programs.{program}")
 
     def answer(**facts: Any) -> None:
         print(json.dumps(facts), file=answers, flush=True)
 
+    task = Task.named(name)
+    module = import_module(f"benchmarks.programs.{program}")
     try:
         version, loading = timed(module.load)
     except ImportError as error:
         answer(missing=str(error))
         return
-    prepare, building = timed(lambda: module.build(task))
-    answer(version=version, load=loading, build=building)
-    for line in sys.stdin:
-        run = prepare(int(line))
-        values, seconds = timed(run)
-        answer(seconds=seconds, values=[float(value) for value in values])
+    try:
+        prepare, building = timed(lambda: module.build(task))
+        answer(version=version, load=loading, build=building)
+        for line in sys.stdin:
+            values, seconds = timed(prepare(int(line)))
+            answer(seconds=seconds, values=[float(value) for value in values])
+    except Exception as error:
+        answer(failed=f"{type(error).__name__}: {error}")
 
 
 if __name__ == "__main__":

@@ -30,6 +30,9 @@ KINDS: dict[str, tuple[str, tuple[str, ...], tuple[str, ...], tuple[str, ...]]] 
 def load() -> str:
     """Return the version."""
     import quadvis
+    import quadvis.api
+    import quadvis.engine.engine
+    import quadvis.native.choice
 
     return quadvis.__version__
 
@@ -55,13 +58,14 @@ def _sampled(blocks: list[Part]) -> Iterator[str]:
     yield f"quadvis: 1\nname: sampled\nrates: {{main: {1 / STEP:g} Hz}}\nstop_time: 100 s\nblocks:"
     for part in blocks:
         kind, params, inputs, _ = KINDS[part.kind]
-        values = dict(zip(params, part.numbers, strict=False))
+        # A shorter sum takes the last places: what a diagram leaves open is zero.
+        values = dict(zip(params[-len(part.numbers) :], part.numbers, strict=False))
         if part.kind == "saturation":
             values["lower"] = -values["upper"]
         with_ = ", ".join(f"{name}: {value!r}" for name, value in values.items())
         in_ = ", ".join(
             f"{name}: {block}.{outputs[block][port]}"
-            for name, (block, port) in zip(inputs, part.inputs, strict=False)
+            for name, (block, port) in zip(inputs[-len(part.inputs) :], part.inputs, strict=False)
         )
         yield f"  {part.name}: {{block: {kind}, rate: main, with: {{{with_}}}, in: {{{in_}}}}}"
 
@@ -79,7 +83,10 @@ def builder(engine: str) -> Callable[[Task], Callable[[int], Callable[[], Values
         def prepare(steps: int) -> Callable[[], Values]:
             running = Engine(diagram.graph, diagram.seed)
             use(running, choose(running, steps, engine))
-            running.__enter__()
+            running.__enter__()  # it opens the blocks, none of which has to be closed
+            start = running.snapshot()
+            running.run(1)  # the first step belongs to the start
+            running.restore(start)
 
             def run() -> Values:
                 running.run(steps)
@@ -87,6 +94,7 @@ def builder(engine: str) -> Callable[[Task], Callable[[int], Callable[[], Values
 
             return run
 
+        prepare(1)  # what is not kept as machine code is compiled
         return prepare
 
     return build

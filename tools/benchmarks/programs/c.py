@@ -9,9 +9,8 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks.tasks import FACTOR, START, STEP, SUBSTEPS, Task, Values
+from benchmarks.tasks import FACTOR, START, STEP, SUBSTEPS, Task, Values, reached
 
-TASKS = "abc"
 # gcc's vectors of the 12 states wait for stores that are not through: scalar code is twice as fast.
 FLAGS = ("-O3", "-march=native", "-fno-tree-vectorize", "-shared", "-fPIC")
 
@@ -36,7 +35,9 @@ def build(task: Task) -> Callable[[int], Callable[[], Values]]:
         values = (ctypes.c_double * 12)(*START)
         if task.letter == "a":
             functions.hybrid.restype = None
-            return lambda: functions.hybrid(values, ctypes.c_long(steps), ctypes.c_long(SUBSTEPS), step) or values
+            return lambda: (
+                functions.hybrid(values, ctypes.c_long(steps), ctypes.c_long(SUBSTEPS), step) or values
+            )
         if task.letter == "b":
             functions.discrete.restype = None
             return lambda: functions.discrete(values, ctypes.c_long(steps), step) or values
@@ -46,7 +47,7 @@ def build(task: Task) -> Callable[[int], Callable[[], Values]]:
 
         def run() -> Values:
             functions.chain(delays, ctypes.c_long(half), ctypes.c_long(steps), factor)
-            return [delays[index] for index in (min(steps, half) - 1, steps) if index < half]
+            return [delays[index] for index in reached(task.count, steps)]
 
         return run
 

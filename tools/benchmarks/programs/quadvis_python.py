@@ -4,6 +4,5 @@ from __future__ import annotations
 
 from benchmarks.programs import _quadvis
 
-TASKS = "abc"
 load = _quadvis.load
 build = _quadvis.builder("python")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from benchmarks.tasks import law
-
 from quadvis.block import Block, In, Out
 
 

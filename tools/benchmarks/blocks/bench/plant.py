@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from benchmarks.tasks import GRAVITY, MASS, START
 from math import cos, sin
 
+from benchmarks.tasks import GRAVITY, MASS, START
 from quadvis.block import Block, In, Out, State
 
 

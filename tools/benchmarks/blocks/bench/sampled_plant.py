@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from benchmarks.tasks import GRAVITY, MASS, START
 from math import cos, sin
 from typing import Any
 
+from benchmarks.tasks import GRAVITY, MASS, START
 from quadvis.block import Block, In, Out, State
 
 
