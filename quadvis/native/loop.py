@@ -24,8 +24,9 @@ WIDTH = 2
 COPY = 0  # how many slots; for each, the slot to read and the slot to write
 CHECK = 1  # first slot, number of slots: these must be finite
 ROW = 2  # number of the tap, first slot, number of slots
-INTEGRATE = 3
-PYTHON = 4  # what only Python can do; the operand itself is its number
+MOVE = 3  # first slot to read, first slot to write, number of slots; the two do not overlap
+INTEGRATE = 4
+PYTHON = 5  # what only Python can do; the operand itself is its number
 
 # Why the loop returned.
 DONE, FAILED, NOT_FINITE, FULL, ASKED = range(5)
@@ -74,6 +75,8 @@ def loop(
                             result = NOT_FINITE
                     elif kind == ROW:
                         result = _row(tick, operands, operand, words, taps, ring)
+                    elif kind == MOVE:
+                        _move(words, operands[operand], operands[operand + 1], operands[operand + 2])
                     elif kind == INTEGRATE:
                         result = _integrate(control, code, memory, places, stages, scratch)
                     else:
@@ -115,6 +118,12 @@ def _copy(operands: Any, at: int, words: Any) -> None:
     """Copy slots, one after the other."""
     for index in range(at + 1, at + 1 + 2 * operands[at], 2):
         words[operands[index + 1]] = words[operands[index]]
+
+
+def _move(words: Any, source: int, target: int, count: int) -> None:
+    """Copy neighbours."""
+    for index in range(count):
+        words[target + index] = words[source + index]
 
 
 def _finite(memory: Any, first: int, count: int) -> bool:
@@ -186,7 +195,7 @@ def compile_loop() -> Compiled:
 
     kinds: Any = numba.types
     scope = {**globals(), "math": math, "invoke": _invoke()}
-    for function in (_begin, _call, _copy, _finite, _row, _integrate, loop):
+    for function in (_begin, _call, _copy, _move, _finite, _row, _integrate, loop):
         made = types.FunctionType(function.__code__, scope, function.__name__)
         scope[function.__name__] = numba.njit(made, error_model="numpy")
     whole, real = kinds.CPointer(kinds.int64), kinds.CPointer(kinds.float64)

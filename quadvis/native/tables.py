@@ -24,6 +24,7 @@ Rhythm = tuple[int, int]  # ticks from one time to the next, and the first tick
 Whole = NDArray[np.int64]
 ALWAYS: Rhythm = (1, 0)
 ROOM = 1 << 16  # bytes of the rows of one tap
+FEW = 16  # slots, which are copied one by one
 EXACT = 1 << 53  # whole numbers below are exact as floats
 
 
@@ -146,7 +147,10 @@ class Tables:
         return len(self._code) - 1
 
     def _copy(self, rhythm: Rhythm, source: int, target: int, size: int) -> None:
-        """Add copies of slots, to those just before if there are any."""
+        """Add copies of slots: many at once, a few to those just before if there are any."""
+        if size > FEW:
+            self._add(rhythm, loop.MOVE, source, target, size)
+            return
         before = len(self._code) - 1
         follows = self._segments and self._segments[-1][0] == self._rhythms.get(rhythm)
         if not follows or before not in self._pairs:
