@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from quadvis.block import Block, In, Out, Param
 from quadvis_vision.camera.calibration import CameraCalibration
 from quadvis_vision.camera.lens import by_point
-from quadvis_vision.camera.projection import CAMERA_FROM_BODY, SIDE, attitude_of, target_corners
+from quadvis_vision.camera.projection import SIDE, camera_attitude, target_corners
 from quadvis_vision.camera.two_planes import TwoPlanesCalibration
 from quadvis_vision.pose.pose import Pose, camera_points, seen_centres
 from quadvis_vision.pose.refine import View, pose_of, refine, unknowns_of
@@ -122,7 +122,7 @@ class PoseFromCircles(_Base):
 
     def _described(self, pose: Pose, seen: Array, centres: Array) -> tuple[Any, ...]:
         """Return the outputs for a pose; `seen` (n, 2) are the normalised points of its circles."""
-        roll, pitch, yaw = attitude_of(pose.rotation.T @ CAMERA_FROM_BODY).tolist()
+        roll, pitch, yaw = camera_attitude(pose.rotation)
         errors = self._camera.pixels(seen) - centres
         residual = math.sqrt(np.vdot(errors, errors) / len(errors))
         yaw = math.pi if yaw <= -math.pi else yaw

@@ -66,15 +66,18 @@ class PoseImu(PoseFromCircles, Block, numeric=False):
     def output(self, centres: Any, imu_roll: float, imu_pitch: float) -> tuple[Any, ...]:
         """Return the pose, its covariance and the status."""
         with np.errstate(all="ignore"):  # pixels may have any values
-            rays = self._camera.rays(centres)
-            seen = np.isfinite(rays).all(axis=1) & (rays[:, 2] > 0)
-            count = int(seen.sum())
+            rays = self._camera.rays(centres).tolist()
+            flags = [z > 0 and all(map(math.isfinite, (x, y, z))) for x, y, z in rays]
+            count = flags.count(True)
             if count < 2:
                 return *NOTHING, UNCERTAIN, NOT_FOUND
             if not (math.isfinite(imu_roll) and math.isfinite(imu_pitch)):
                 return *NOTHING, UNCERTAIN, NO_TILT
-            points = np.full((4, 2), math.nan)
-            points[seen] = rays[seen, :2] / rays[seen, 2:]
+            seen = np.array(flags)
+            points = np.array([
+                (x / z, y / z) if flag else (math.nan, math.nan)
+                for (x, y, z), flag in zip(rays, flags, strict=True)
+            ])  # fmt: skip
             estimate = self._estimate(points, seen, Tilt(imu_roll, imu_pitch, self.tilt_sigma))
             if estimate is None or not np.isfinite(estimate.covariance).all():
                 return *NOTHING, UNCERTAIN, INCONSISTENT

@@ -53,13 +53,37 @@ def attitude_of(body_rotation: ArrayLike) -> Array:
     return np.array([math.atan2(y, z), math.atan2(-x, math.hypot(y, z)), math.atan2(right, forward)])
 
 
+def camera_rotation(roll: float, pitch: float, yaw: float) -> Array:
+    """Return the rotation (3, 3) from target to camera axes of a craft with an attitude in rad.
+
+    It is CAMERA_FROM_BODY times the transpose of `rotation`, written out in plain numbers for speed.
+    """
+    cr, sr = math.cos(roll), math.sin(roll)
+    cp, sp = math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    # 0.0 in front, since a product of matrices has no -0.0.
+    rows = (
+        0.0 + cy * cp, 0.0 + sy * cp, 0.0 - sp,
+        0.0 - (cy * sp * sr - sy * cr), 0.0 - (sy * sp * sr + cy * cr), 0.0 - cp * sr,
+        0.0 - (cy * sp * cr + sy * sr), 0.0 - (sy * sp * cr - cy * sr), 0.0 - cp * cr,
+    )  # fmt: skip
+    return np.array(rows).reshape(3, 3)
+
+
+def camera_attitude(turn: Array) -> tuple[float, float, float]:
+    """Return (phi, theta, psi) in rad from the rotation (3, 3) of the camera; inverts `camera_rotation`."""
+    (forward, right, x), (_, _, y), (_, _, z) = turn.tolist()
+    y, z = 0.0 - y, 0.0 - z
+    return math.atan2(y, z), math.atan2(-(0.0 + x), math.hypot(y, z)), math.atan2(0.0 + right, 0.0 + forward)
+
+
 def camera_pose(position: ArrayLike, attitude: ArrayLike, ceiling: float) -> tuple[Array, Array]:
     """Return (R, t) with X_c = R X_t + t for a vehicle at (x, y, h) in m with (phi, theta, psi) in rad.
 
     `ceiling` is the height of the target in m. R is (3, 3), t is (3,) in m.
     """
     x, y, height = np.asarray(position, dtype=np.float64).tolist()
-    turn = CAMERA_FROM_BODY @ rotation(attitude).T
+    turn = camera_rotation(*np.asarray(attitude, dtype=np.float64).tolist())
     return turn, -turn @ np.array([x, y, ceiling - height])
 
 
@@ -95,6 +119,6 @@ def ellipse_centres(homography: Array, centres: Array, radius: float) -> Array:
     points = np.ones((len(centres), 3))
     points[:, :2] = centres[:, :2]
     depth = points @ homography[2]
-    bent = homography @ (*homography[2, :2].tolist(), 0.0)
+    bent = homography @ np.array((*homography[2, :2].tolist(), 0.0))
     middle = depth[:, None] * (points @ homography.T) - radius * radius * bent
     return np.asarray(middle[:, :2] / middle[:, 2:])

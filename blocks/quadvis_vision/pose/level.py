@@ -23,6 +23,8 @@ from quadvis_vision.pose.refine import View, pose_of, slopes
 
 Array = NDArray[np.float64]
 Level = tuple[float, float, float, float]  # x, y, z (m) of the camera in the target frame, yaw (rad)
+Sines = tuple[float, float, float, float]  # sine and cosine of roll, sine and cosine of pitch
+Seen = tuple[float, float, float, float, float]  # of a circle: forward, right, the ray's height; its corner
 
 # Corners 1..4 of the square of side 1 in target axes: forward and right of its middle.
 _CORNERS = ((-0.5, 0.5), (0.5, 0.5), (0.5, -0.5), (-0.5, -0.5))
@@ -34,13 +36,15 @@ def level_pose(points: Array, roll: float, pitch: float, side: float, radius: fl
     Rows with NaN are missing circles. The points are the centres of the ellipses that the circles become;
     with a `radius` (m) above zero they are corrected to the images of the circles' centres.
     """
-    pose = _fit(points, roll, pitch, side, 0.0)
-    if not radius:
-        return pose
-    for _ in range(2):  # the correction needs the distance, and changes the distance a little
+    tilt = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
+    seen = _levelled(points, tilt)
+    if seen is None:
+        return None
+    pose = _fit(seen, side)
+    for _ in range(2 if radius else 0):  # the correction needs the distance, and changes it a little
         if pose is None:
             return None
-        pose = _fit(points, roll, pitch, side, (radius / pose[2]) ** 2)
+        pose = _fit(_corrected(seen, tilt, (radius / pose[2]) ** 2), side)
     return pose
 
 
@@ -69,37 +73,51 @@ def level_covariance(view: View, unknowns: Array, sigma: float) -> Array | None:
     return np.asarray(by_picture @ by_picture.T + by_tilt @ by_tilt.T)
 
 
-def _fit(points: Array, roll: float, pitch: float, side: float, size: float) -> Level | None:
-    """Return the least squares pose; `size` is the square of the circles' radius in a level camera's picture.
+# Plain numbers, as here, are on four points several times faster than arrays or complex numbers.
 
-    It uses plain numbers, which on four points are several times faster than arrays or complex numbers.
-    """
-    sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
-    count = mx = my = px = py = real = imaginary = 0.0
-    for (x, y), (p, q) in zip(points.tolist(), _CORNERS):  # noqa: B905  # strict takes a tenth of the time
+
+def _levelled(points: Array, tilt: Sines) -> list[Seen] | None:
+    """Return what is seen of each circle that is not missing; None if one is below the camera."""
+    sr, cr, sp, cp = tilt
+    found: list[Seen] = []
+    for (x, y), corner in zip(points.tolist(), _CORNERS):  # noqa: B905  # strict takes a tenth of the time
         w = sr * y + cr
         up = sp * x + cp * w
         if up > 0:
-            forward, right = (cp * x - sp * w) / up, (sr - cr * y) / up
-            if size:
-                # The centre of an ellipse is the pole of the picture's horizon. In level directions the
-                # horizon is the line sp cr forward - sr right = cp cr, and 1 / up is the centre's distance
-                # from it.
-                rise = 4 * size * (sp * sp * cr * cr + sr * sr)
-                shift = 2 * size / (1 / up + math.sqrt(1 / (up * up) + rise))
-                forward -= shift * sp * cr
-                right += shift * sr
-            count += 1.0
-            mx += forward
-            my += right
-            px += p
-            py += q
-            real += p * forward + q * right
-            imaginary += p * right - q * forward
+            found.append(((cp * x - sp * w) / up, (sr - cr * y) / up, up, *corner))
         elif up <= 0:
             return None
+    return found
+
+
+def _corrected(seen: list[Seen], tilt: Sines, size: float) -> list[Seen]:
+    """Return the images of the circles' centres; `size` is their squared radius in a level camera's picture.
+
+    The centre of an ellipse is the pole of the picture's horizon. In level directions the horizon is the line
+    sp cr forward - sr right = cp cr, and 1 / up is the centre's distance from it.
+    """
+    sr, cr, sp, _ = tilt
+    rise = 4 * size * (sp * sp * cr * cr + sr * sr)
+    found: list[Seen] = []
+    for forward, right, up, p, q in seen:
+        shift = 2 * size / (1 / up + math.sqrt(1 / (up * up) + rise))
+        found.append((forward - shift * sp * cr, right + shift * sr, up, p, q))
+    return found
+
+
+def _fit(seen: list[Seen], side: float) -> Level | None:
+    """Return the least squares pose."""
+    count = len(seen)
     if count < 2:
         return None
+    mx = my = px = py = real = imaginary = 0.0
+    for forward, right, _, p, q in seen:
+        mx += forward
+        my += right
+        px += p
+        py += q
+        real += p * forward + q * right
+        imaginary += p * right - q * forward
     spread = 0.5 * count - (px * px + py * py) / count
     a = (real - (px * mx + py * my) / count) / spread
     b = (imaginary - (px * my - py * mx) / count) / spread

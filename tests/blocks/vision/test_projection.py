@@ -5,13 +5,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from quadvis_vision.camera.calibration import CameraCalibration
 from quadvis_vision.camera.projection import (
+    CAMERA_FROM_BODY,
     attitude_of,
+    camera_attitude,
     camera_pose,
+    camera_rotation,
     circle_outline,
     ellipse_centres,
     plane_homography,
@@ -98,6 +101,15 @@ def test_rotation_is_the_product_of_yaw_pitch_and_roll(attitude: tuple[float, ..
 
     assert np.allclose(rotation(attitude), about(2, psi) @ about(1, theta) @ about(0, phi), atol=1e-14)
     assert np.allclose(attitude_of(rotation(attitude)), attitude, atol=1e-12)
+
+
+@given(attitudes)
+@example((0.0, 0.0, 0.0))
+@example((-0.0, -0.0, math.pi))
+def test_the_rotation_of_the_camera_is_the_product_to_the_bit(attitude: tuple[float, ...]) -> None:
+    turn = camera_rotation(*attitude)
+    assert turn.tobytes() == (CAMERA_FROM_BODY @ rotation(attitude).T).tobytes()
+    assert np.array(camera_attitude(turn)).tobytes() == attitude_of(turn.T @ CAMERA_FROM_BODY).tobytes()
 
 
 @given(positions, attitudes)
