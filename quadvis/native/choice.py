@@ -6,15 +6,19 @@ the same command always does the same.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib.util import find_spec
+from typing import TYPE_CHECKING
 
 from quadvis.block import Block
 from quadvis.engine.engine import Engine
 from quadvis.engine.program import COPY, Program
 from quadvis.engine.solver import TABLEAUS
 from quadvis.errors import QuadvisError, counted, quoted, suggestion
+
+if TYPE_CHECKING:
+    from quadvis.native.block_type import BlockType
 
 AUTO, PYTHON, NATIVE = ENGINES = ("auto", "python", "native")
 Announce = Callable[[str], None]
@@ -31,10 +35,14 @@ COMPILE = 1.3  # to compile a block type
 
 @dataclass(frozen=True)
 class Choice:
-    """How a program is run: ``python`` or ``native``, and why if that was not asked for."""
+    """How a program is run: ``python`` or ``native``, and why if that was not asked for.
+
+    ``types`` are the types of the blocks that can be compiled, by the number of the block.
+    """
 
     engine: str
     reason: str = ""
+    types: Mapping[int, BlockType] = field(default_factory=dict, repr=False)
 
     def __str__(self) -> str:
         return f"{self.engine}, {self.reason}" if self.reason else self.engine
@@ -60,7 +68,8 @@ def choose(engine: Engine, ticks: int, wanted: str = AUTO, announce: Announce | 
         return Choice(PYTHON, SHORT)
     from quadvis.native.library import block_types, library
 
-    kinds = list(dict.fromkeys(block_types(program, blocks).values()))
+    types = block_types(program, blocks)
+    kinds = list(dict.fromkeys(types.values()))
     missing = library().missing(kinds)
     cost = START + LOAD * len(kinds) + (COMPILER + COMPILE * len(missing) if missing else 0.0)
     if wanted == AUTO and saved < cost:
@@ -72,7 +81,7 @@ def choose(engine: Engine, ticks: int, wanted: str = AUTO, announce: Announce | 
     library().prepare(kinds, announce)
     refused = {kind.block.__name__: library().refusals[kind] for kind in kinds if kind in library().refusals}
     names = ", ".join(f"{name} ({why})" for name, why in refused.items())
-    return Choice(NATIVE, f"but interpreted: {names}" if names else "")
+    return Choice(NATIVE, f"but interpreted: {names}" if names else "", types)
 
 
 def _saved(program: Program, blocks: Sequence[Block], ticks: int) -> float:
@@ -97,14 +106,13 @@ def use(engine: Engine, choice: Choice) -> None:
     if choice.engine != NATIVE:
         return
     from quadvis.native.executor import NativeExecutor
-    from quadvis.native.library import block_types, library
+    from quadvis.native.library import library
 
-    compiled = library()
-    kinds = block_types(engine.program, [node.block for node in engine.graph.nodes])
+    compiled, types = library(), choice.types
     engine.run_with(
         lambda interpreter: NativeExecutor(
             interpreter,
             compiled.loop(),
-            lambda op: compiled.function(kinds[op.block], op.method) if op.block in kinds else None,
+            lambda op: compiled.function(types[op.block], op.method) if op.block in types else None,
         )
     )

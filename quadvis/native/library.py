@@ -11,7 +11,7 @@ import hashlib
 import platform
 import sys
 from collections.abc import Callable, Iterable, Sequence
-from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -41,11 +41,11 @@ class Library:
     def loop(self) -> int:
         """Return the address of the compiled loop."""
         if LOOP not in self._functions:
-            from quadvis.native.compiler import compile_loop_code
-
             key = _key(LOOP)
             code = cache.load(key)
             if code is None or not self._add(LOOP, code):
+                from quadvis.native.compiler import compile_loop_code
+
                 self._add(LOOP, _kept(key, compile_loop_code(_prefix(key))))
         return self._functions[LOOP][LOOP].address
 
@@ -144,6 +144,15 @@ def _surroundings() -> str:
 
 
 def _version(name: str) -> str:
+    """Return the version of a package, which may not be installed; as a rule the name of a folder has it."""
+    spec = find_spec(name)
+    if spec is None or spec.origin is None:
+        return ""
+    found = sorted(path.name for path in Path(spec.origin).parents[1].glob(f"{name}-*-info"))
+    if found:
+        return ", ".join(found)
+    from importlib.metadata import PackageNotFoundError, version  # takes longer than all of LLVM
+
     try:
         return version(name)
     except PackageNotFoundError:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import builtins
+import functools
 import hashlib
 import inspect
 import types
@@ -132,7 +133,7 @@ def _describe(value: Any, names: Collection[str], parts: list[str], seen: dict[i
         parts.append(f"again {seen[id(value)]}")
     elif isinstance(value, types.FunctionType):
         seen[id(value)] = len(seen)
-        used = sorted(set(names_in(value.__code__)))
+        used = _used(value.__code__)
         parts.append(_text(value.__code__))
         cells = [cell.cell_contents for cell in value.__closure__ or ()]
         for constant in (value.__defaults__, value.__kwdefaults__, *cells):
@@ -151,6 +152,12 @@ def _describe_all(
         _describe(value, names, parts, seen)
 
 
+@functools.cache
+def _used(code: types.CodeType) -> tuple[str, ...]:
+    return tuple(sorted(set(names_in(code))))
+
+
+@functools.cache
 def _text(code: types.CodeType) -> str:
     """Return all that a code object does, without lines and files."""
     constants = list(map(_constant, code.co_consts))
