@@ -15,11 +15,11 @@ from benchmarks.flights import HOVER
 from benchmarks.programs._quadvis import text
 from benchmarks.rows import ROOT, Row, medians
 from benchmarks.tasks import Task
+from quadvis.errors import QuadvisError
 
 QUADVIS = (sys.executable, "-m", "quadvis")
 FIRST_STEP = ("--stop-time", "0 s", "--log", "")
 LOADING = "import sys; from pathlib import Path; from quadvis.api import load; load(Path(sys.argv[1]))"
-# The machine code of every numeric block, of the shapes that its conformance test takes.
 LIBRARY = "from benchmarks.whole_library import compile_all; compile_all()"
 
 
@@ -120,9 +120,14 @@ def _kept() -> Iterator[dict[str, str]]:
 
 
 def seconds(command: Sequence[str], environment: dict[str, str]) -> tuple[float, float]:
-    """Return the CPU seconds of a process and of its ended children, and its wall time."""
+    """Return the CPU seconds of a process and of its ended children, and its wall time.
+
+    QuadvisError if it ends in an error. A run to its first step meets no expectations: that is none.
+    """
     begin = time.perf_counter()
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment)
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode not in ((0, 1) if FIRST_STEP[1] in command else (0,)):
+        raise QuadvisError(f"'{' '.join(command)}' ended with exit code {process.returncode}")
     return usage.ru_utime + usage.ru_stime, time.perf_counter() - begin
