@@ -430,6 +430,33 @@ def test_a_time_that_no_float_has_exactly_is_left_to_the_interpreter() -> None:
     assert engine.read(ALONE, "y") == 2**54 / 3
 
 
+class Kept(Block):
+    """Copies its input to a state and the state to its output, as a delay does; the state may be wider."""
+
+    u = In("float64[*]")
+    y = Out("float64[n]")
+    last = State("float64[n]")
+    size = Param((0.0,), type="float64[n]")
+
+    def output(self):
+        return self.last
+
+    def update(self, u):
+        self.last = u
+
+
+@pytest.mark.parametrize(
+    ("u", "length", "called"),
+    [(np.arange(3.0), 3, 0), (np.arange(40.0), 40, 0), (1.5, 3, 1)],
+    ids=["a few slots", "many slots", "a number for all elements"],
+)
+def test_what_only_copies_needs_no_call_and_gives_the_same_bits(u: Any, length: int, called: int) -> None:
+    sizes = {"*": np.shape(u), "n": length}
+    interpreted, engine = (alone(Kept(size=np.zeros(length)), {"u": u}, sizes, Fraction(1)) for _ in range(2))
+    assert outcome(natively(engine), 3) == outcome(interpreted, 3)
+    assert len(engine._executor._made()._calls) == called
+
+
 # The cache
 
 
