@@ -223,7 +223,7 @@ def test_a_block_that_fails_ends_the_run_with_1_and_tells_where_the_log_is(
     project: Path, capsys: Captured
 ) -> None:
     own(project, "raise ValueError('no good')")
-    assert done("run", "own.yaml") == 1
+    assert done("run", "own.yaml", "--engine", "python") == 1
     assert capsys.readouterr().err.splitlines() == [
         "own blocks from 'blocks'",
         "log up to there: runs/a-loop.mcap",

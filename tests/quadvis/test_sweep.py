@@ -597,7 +597,9 @@ def test_what_is_finished_when_a_sweep_is_ended_stays_and_resuming_gives_the_byt
 @linux
 def test_a_worker_that_is_killed_is_told_in_one_sentence() -> None:
     long_runs(100_000)
-    process = quadvis_sweep("long.yaml", "--over", "seed=0..9", "--workers", "2", "-o", "x.csv")
+    process = quadvis_sweep(
+        "long.yaml", "--over", "seed=0..9", "--workers", "2", "-o", "x.csv", "--engine", "python"
+    )
     workers = wait_for(lambda: len(children(process)) == 2 and children(process))
     os.kill(workers[0], signal.SIGKILL)
     _, told = process.communicate(timeout=60)
