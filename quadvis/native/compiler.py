@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from quadvis.engine.memory import packed
+from quadvis.machine.garbage import uncollected
 from quadvis.native.block_type import BlockType, Kind, MethodType
 from quadvis.native.cache import MachineCode
 from quadvis.native.checked import power, replacements
 from quadvis.native.machine_code import Compiled, Unlinkable, emit
-from quadvis.native.source import POWER, Unreadable, names_in, prepared
+from quadvis.native.source import POWER, Unreadable, fingerprint, names_in, prepared
 
 # A division by zero and a wrong index are noticed. Nobody calls the functions from Python.
 OPTIONS = {"error_model": "python", "boundscheck": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
@@ -68,36 +70,75 @@ def compile_function(
     import numba
 
     jit: Any = numba.njit
-    made = jit(numba.void(*pointers), **options)(function)
+    with uncollected(), _quickly():
+        made = jit(numba.void(*pointers), **options)(function)
     result = made.overloads[made.signatures[0]]
     return Compiled(result.library.get_llvm_str(), result.fndesc.llvm_func_name, len(pointers))
 
 
+@contextmanager
+def _quickly() -> Iterator[None]:
+    """Have numba optimise at its second level, a quarter sooner than at its third; `emit` optimises the whole."""
+    from numba.core import config as settings
+    from numba.core import registry
+
+    config: Any = settings
+    _ = registry.cpu_target.target_context  # what numba makes for the whole process stays as it was
+    level = config.OPT
+    config.OPT = type(level)(2)
+    try:
+        yield
+    finally:
+        config.OPT = level
+
+
+Known = dict[tuple[types.FunctionType, str], Any]  # numba's dispatchers, by function and fingerprint
+_shared: Known = {}
+
+
 class _Scope:
-    """Functions compiled with their helpers; each helper once. ``arrays`` are the array fields of `self`."""
+    """Functions compiled with their helpers; each helper once. ``arrays`` are the array fields of `self`.
+
+    Helpers that never get `self` are the same for all block types.
+    """
 
     def __init__(self, arrays: set[str]) -> None:
         self._arrays = arrays
-        self._known: dict[Any, Any] = {}
+        self._known: Known = {}
 
     def jit(self, function: types.FunctionType) -> Any:
         """Return numba's dispatcher for a plain function and the plain functions that it calls."""
-        import numba
+        known, key = self._known, (function, "")
+        if not _meets_self(function, set()):
+            known, key = _shared, (function, fingerprint(function))
+        if key not in known:
+            import numba
 
-        if function not in self._known:
             checked = replacements()
             scope = dict(function.__globals__)
             scope |= {"int": checked[int], "round": checked[round], "pow": checked[pow], POWER: power()}
             copy = prepared(function, self._arrays, scope)
             jit: Any = numba.njit
-            self._known[function] = jit(copy, **OPTIONS)
+            known[key] = jit(copy, **OPTIONS)
             for name in names_in(function.__code__):
                 value = function.__globals__.get(name)
                 if isinstance(value, types.FunctionType):
                     scope[name] = self.jit(value)
                 elif _hashable(value) and value in checked:
                     scope[name] = checked[value]
-        return self._known[function]
+        return known[key]
+
+
+def _meets_self(function: types.FunctionType, seen: set[types.FunctionType]) -> bool:
+    """Return whether a function, or one that it calls, has a `self`."""
+    if function in seen:
+        return False
+    seen.add(function)
+    code = function.__code__
+    called = (function.__globals__.get(name) for name in names_in(code))
+    return "self" in (*code.co_varnames, *code.co_freevars) or any(
+        _meets_self(each, seen) for each in called if isinstance(each, types.FunctionType)
+    )
 
 
 def _hashable(value: Any) -> bool:
