@@ -15,7 +15,6 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from importlib import import_module
-from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 from benchmarks.rows import ROOT
@@ -36,9 +35,10 @@ PROGRAMS = {
     "bdsim": "bdsim",
     "pathsim": "PathSim",
 }
+KEPT = "quadvis_native"  # its machine code is kept from process to process
 GOALS = {"a": "<= 2.5 x C", "b": "<= 6 ns", "c": "<= 6 ns"}
 GROWTH = 16  # of the steps of a run, until it is long enough
-MOST_STEPS = 10_000_000
+RUNS = 50  # at most, for one time
 OVERHEADS = 3
 
 
@@ -134,17 +134,19 @@ class Timed:
         if not self.error <= worker.task.tolerance:
             raise WorkerError(f"its values are wrong by {self.error:.1e}")
         self._overhead = statistics.median(worker.run(1)[0] for _ in range(OVERHEADS))
-        while seconds < budget / 2 and steps < MOST_STEPS:
+        while seconds < budget / 2 and steps < worker.task.most:
             wanted = int(steps * budget / max(seconds, budget / GROWTH))
-            steps = min(max(wanted, steps + 1), MOST_STEPS)
+            steps = min(max(wanted, steps + 1), worker.task.most)
             seconds, _ = worker.run(steps)
-        self._steps = steps
+        self._steps, self._budget = steps, budget
         self.times: list[float] = []  # of a step (s)
 
     def measure(self) -> None:
-        """Add the time of a step in one run, without what the run costs before its first step."""
-        seconds, _ = self.worker.run(self._steps)
-        self.times.append(max(seconds - self._overhead, 0.0) / (self._steps - 1))
+        """Add the time of a step, without what a run costs before its first step."""
+        seconds: list[float] = []
+        while len(seconds) < RUNS and sum(seconds) < self._budget / 2:
+            seconds.append(max(self.worker.run(self._steps)[0] - self._overhead, 0.0))
+        self.times.append(sum(seconds) / len(seconds) / (self._steps - 1))
 
 
 def peers(
@@ -157,15 +159,20 @@ def peers(
 
 def _task(rounds: int, task: Task, programs: Sequence[str], python: str, budget: float) -> Iterator[PeerRow]:
     expected = task.expected(task.check)
-    cold = {name: _cold(name, task) for name in programs if name == "quadvis_native"}
+    cold: dict[str, float] = {}
     timed: dict[str, Timed] = {}
     with ExitStack() as stack:
+        cache = stack.enter_context(tempfile.TemporaryDirectory())
         for name in programs:
             most = getattr(import_module(f"benchmarks.programs.{name}"), "MOST", None)
             if most is not None and task.blocks > most:
                 yield PeerRow(task.name, PROGRAMS[name], note=f"not tried with more than {most} blocks")
                 continue
-            worker = stack.enter_context(Worker(name, task, sys.executable if name in OURS else python))
+            interpreter = sys.executable if name in OURS else python
+            if name == KEPT:  # its first process fills the cache
+                with Worker(name, task, interpreter, QUADVIS_CACHE=cache) as worker:
+                    cold[name] = worker.answer()["build"]
+            worker = stack.enter_context(Worker(name, task, interpreter, QUADVIS_CACHE=cache))
             try:
                 facts = worker.answer()
                 if "missing" in facts:
@@ -187,15 +194,5 @@ def _task(rounds: int, task: Task, programs: Sequence[str], python: str, budget:
             task.name, PROGRAMS[name], each.facts["version"], step * 1e9,
             step * 1e9 / task.blocks if task.blocks else None, ratio,
             each.facts["load"], each.facts["build"], cold.get(name), each.error,
-            goal=GOALS[task.letter] if name == "quadvis_native" else "",
+            goal=GOALS[task.letter] if name == KEPT else "",
         )  # fmt: skip
-
-
-def _cold(name: str, task: Task) -> float:
-    """Return how long a program takes to its first step with an empty cache of machine code (s of CPU)."""
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        Worker(name, task, sys.executable, QUADVIS_CACHE=str(Path(folder, "cache"))) as worker,
-    ):
-        found: float = worker.answer()["build"]
-        return found

@@ -184,6 +184,11 @@ class Task:
         """After how many steps the values are compared: in a and b the loop is in full motion then."""
         return 5000 if self.letter != "c" else min(20, self.count // 2 - 1)
 
+    @property
+    def most(self) -> int:
+        """The largest number of steps: after 100 s the states of a and b become denormal, which is slow."""
+        return 10_000_000 if self.letter == "c" else 100_000
+
     def expected(self, steps: int) -> list[float]:
         """Return what comes out: the 12 states in a and b, the outputs at the `front` in c.
 
