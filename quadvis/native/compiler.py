@@ -78,7 +78,7 @@ def compile_function(
 
 @contextmanager
 def _quickly() -> Iterator[None]:
-    """Have numba optimise at its second level, a quarter sooner than at its third; `emit` optimises the whole."""
+    """Have numba optimise at its second level, a quarter sooner than at its third; `emit` comes after it."""
     from numba.core import config as settings
     from numba.core import registry
 
