@@ -41,8 +41,9 @@ def _keeps_too(self: Any, value: Any) -> None:
     self.field = value
 
 
-# The code of a method that copies a field of its block to its only output, or its only input to a field.
-PLAIN = frozenset(function.__code__.co_code for function in (_gives, _keeps, _keeps_too))
+# The code of a method that copies a field of its block to its only output, or its first input to a field.
+GIVES = _gives.__code__.co_code
+KEEPS = frozenset(function.__code__.co_code for function in (_keeps, _keeps_too))
 
 
 @dataclass(frozen=True)
@@ -185,10 +186,13 @@ class Tables:
         """Return the slots from which and to which a method copies, if it does nothing else."""
         code = getattr(self._interpreter.selves[op.block], op.method).__code__
         block = self._interpreter.program.blocks[op.block]
-        if code.co_code not in PLAIN or code.co_names[0] not in {field.name for field in block.record.fields}:
+        gives, keeps = code.co_code == GIVES, code.co_code in KEEPS
+        if not (gives or keeps) or code.co_names[0] not in {field.name for field in block.record.fields}:
             return None
         field = block.field(code.co_names[0])
-        source, target = (op.sources[0], field) if op.sources else (field, op.targets[0])
+        if len(op.targets) != (1 if gives else 0):
+            return None
+        source, target = (field, op.targets[0]) if gives else (op.sources[0], field)
         return (source, target) if source[:2] == target[:2] else None
 
     def _call(self, function: Function, op: Op) -> tuple[int, int]:

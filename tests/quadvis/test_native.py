@@ -457,6 +457,27 @@ def test_what_only_copies_needs_no_call_and_gives_the_same_bits(u: Any, length: 
     assert len(engine._executor._made()._calls) == called
 
 
+class Gives(Block):
+    """Asks for an input that it does not use, and gives a parameter."""
+
+    u = In()
+    y = Out()
+    factor = Param(2.0)
+    last = State()
+
+    def output(self, u):
+        return self.factor
+
+    def update(self, u, time):
+        self.last = u
+
+
+def test_a_method_that_gives_a_field_never_takes_its_input_for_it() -> None:
+    interpreted, engine = (alone(Gives(), {"u": 7.0}, {}, Fraction(1)) for _ in range(2))
+    assert outcome(natively(engine), 3) == outcome(interpreted, 3)
+    assert [engine.read(ALONE, name) for name in ("y", "factor", "last")] == [2.0, 2.0, 7.0]
+
+
 # The cache
 
 
