@@ -10,8 +10,9 @@ from quadvis.engine.memory import Memory
 from quadvis.engine.program import Op
 from quadvis.engine.taps import Observer, Tap
 from quadvis.native import loop
-from quadvis.native.tables import EXACT, Function, PythonCall, Tables
+from quadvis.native.tables import Function, PythonCall, Tables
 
+EXACT = 1 << 53  # whole numbers below are exact as floats
 INSTRUCTIONS = 1 << 25  # after so many, some tenths of a second, Python has its turn: Ctrl-C
 
 
@@ -39,11 +40,6 @@ class NativeExecutor:
     @tick.setter
     def tick(self, tick: int) -> None:
         self.interpreter.tick = tick
-
-    @property
-    def native(self) -> int:
-        """The number of calls that are compiled."""
-        return self._made().native
 
     def attach(self, observer: Tap | Observer) -> None:
         """Have rows taken from now on, or something done at the ticks of a task."""

@@ -10,7 +10,7 @@ import functools
 import hashlib
 import platform
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
@@ -22,10 +22,10 @@ from quadvis.engine.program import Op, Program
 from quadvis.native import cache
 from quadvis.native.block_type import BlockType, MethodType
 from quadvis.native.cache import MachineCode
+from quadvis.native.choice import Announce
 from quadvis.native.machine_code import Loaded, processor
 from quadvis.native.tables import Function
 
-Announce = Callable[[str], None]
 LOOP = "loop"
 COMPILER = ("block_type", "checked", "compiler", "loop", "machine_code", "runtime", "source")  # of this room
 

@@ -11,7 +11,6 @@ due, the loop leaves the segment out.
 
 from __future__ import annotations
 
-import math
 import types
 from typing import Any
 
@@ -35,8 +34,6 @@ DONE, FAILED, NOT_FINITE, FULL, ASKED = range(5)
 TICK, UNTIL, SEGMENT, PLACE, RESULT, RHYTHMS, SEGMENTS, NUMERATOR, DENOMINATOR = range(9)
 STATES, HELD, STAGES, MINOR, DERIVATIVES, CALLS = range(9, 15)
 CONTROLS = 15
-
-SYMBOL = "quadvis_loop"
 
 
 def loop(
@@ -194,7 +191,7 @@ def compile_loop() -> Compiled:
     import numba
 
     kinds: Any = numba.types
-    scope = {**globals(), "math": math, "invoke": _invoke()}
+    scope = {**globals(), "invoke": _invoke()}
     for function in (_begin, _call, _copy, _move, _finite, _row, _integrate, loop):
         made = types.FunctionType(function.__code__, scope, function.__name__)
         scope[function.__name__] = numba.njit(made, error_model="numpy")

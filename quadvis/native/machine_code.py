@@ -41,7 +41,7 @@ def emit(functions: Mapping[str, Compiled]) -> tuple[bytes, frozenset[str]]:
     import llvmlite.binding as llvm
 
     machine = target_machine()
-    modules = [_module(llvm, function.text) for function in functions.values()]
+    modules = [llvm.parse_assembly(function.text) for function in functions.values()]
     whole = modules[0]
     for module in modules[1:]:
         whole.link_in(module)
@@ -61,15 +61,6 @@ def emit(functions: Mapping[str, Compiled]) -> tuple[bytes, frozenset[str]]:
         if function.name in functions and set(STATUS.findall(str(function))) != {"0"}
     )
     return machine.emit_object(whole), fallible
-
-
-def _module(llvm: Any, text: str) -> Any:
-    """Return a module without what numba adds for calls from Python."""
-    module = llvm.parse_assembly(text)
-    for function in module.functions:
-        if function.name.startswith(("cfunc.", "_ZN7cpython")) and not function.is_declaration:
-            function.linkage = "internal"
-    return module
 
 
 def _entry(name: str, function: Compiled) -> str:

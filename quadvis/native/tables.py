@@ -25,7 +25,6 @@ Whole = NDArray[np.int64]
 ALWAYS: Rhythm = (1, 0)
 ROOM = 1 << 16  # bytes of the rows of one tap
 FEW = 16  # slots, which are copied one by one
-EXACT = 1 << 53  # whole numbers below are exact as floats
 
 
 def _gives(self: Any) -> Any:
@@ -98,7 +97,6 @@ class Tables:
         self._pairs: dict[int, list[tuple[int, int]]] = {}  # what an instruction copies
         self._places: list[int] = []  # addresses for calls
         self._calls: list[tuple[int, int]] = []  # instruction, and the index of its first place
-        self.native = 0  # calls that are compiled
         self.python: list[PythonCall] = []
         self.redo: dict[int, Redo] = {}  # by instruction
         self.rings: list[Ring] = []
@@ -168,7 +166,6 @@ class Tables:
             self._ask(rhythm, python)
             return
         block = self._interpreter.program.blocks[op.block]
-        self.native += 1
         copy = self._as_copy(op)
         if copy is not None:
             self._copy(rhythm, copy[0].position, copy[1].position, copy[0].size)
@@ -234,7 +231,6 @@ class Tables:
         for function, op in zip(functions, ops, strict=True):
             assert function is not None
             self._code.append(self._call(function, op))
-            self.native += 1
 
     def _finish(self) -> None:
         program, memory = self._interpreter.program, self._interpreter.memory
