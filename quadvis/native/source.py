@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import builtins
+import enum
 import functools
 import hashlib
 import inspect
@@ -14,7 +15,7 @@ from typing import Any
 import numpy as np
 
 POWER = "__power__"
-PLAIN = (int, float, complex, str, bytes, bool, type(None), type(...), tuple, frozenset, range, np.generic)
+PLAIN = (int, float, complex, str, bytes, bool, type(None), type(...), frozenset, range, np.generic)
 
 
 class Unreadable(Exception):
@@ -121,6 +122,13 @@ def _describe(value: Any, names: Collection[str], parts: list[str], seen: dict[i
     """Add what a value is; ``names`` are those of a module's members that are used."""
     if isinstance(value, PLAIN):
         parts.append(_constant(value))
+    elif isinstance(value, tuple):
+        parts.append(f"{type(value).__name__} of {len(value)}")
+        for item in value:
+            _describe(item, names, parts, seen)
+    elif isinstance(value, enum.EnumMeta):
+        members: dict[str, Any] = dict(value.__members__)
+        parts.append(repr([(name, member.value) for name, member in members.items()]))
     elif isinstance(value, np.ndarray):
         parts.append(f"{value.dtype}{value.shape}{value.tobytes().hex()}")
     elif isinstance(value, types.ModuleType):
@@ -140,6 +148,8 @@ def _describe(value: Any, names: Collection[str], parts: list[str], seen: dict[i
             _describe(constant, used, parts, seen)
         known = value.__globals__
         _describe_all({name: known[name] for name in used if name in known}, used, parts, seen)
+    elif isinstance(plain := getattr(value, "py_func", None), types.FunctionType):  # compiled by its author
+        _describe(plain, names, parts, seen)
     else:
         parts.append(f"{type(value).__name__} {getattr(value, '__qualname__', '') or repr(value)}")
 

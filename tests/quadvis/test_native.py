@@ -1,10 +1,12 @@
 """Programs as machine code: the same bits as interpreted, the same faults, a cache that is never stale."""
 
+import enum
 import math
 import os
 import random
 import subprocess
 import sys
+import types
 from collections.abc import Callable
 from fractions import Fraction
 from itertools import product
@@ -628,6 +630,12 @@ def test_what_a_function_reaches_decides_over_its_fingerprint() -> None:
     assert same == fingerprint(made(1.0))
     others = [made(2.0), made(1), made((1.0,)), made(np.array([1.0])), made(1.0, "return helper(2 * u)")]
     assert len({same, *map(fingerprint, others)}) == 6
+    long = np.zeros((2, 5000))
+    long[1, 2500] = 1.0  # where a printed array has dots
+    kinds = [enum.IntEnum("Kind", {"A": number}) for number in (1, 2)]
+    compiled = [types.SimpleNamespace(py_func=made(number), __qualname__="method") for number in (1.0, 2.0)]
+    for one, other in ((tuple([long[0]]), tuple([long[1]])), kinds, compiled):
+        assert fingerprint(made(one)) != fingerprint(made(other))
 
 
 # The choice
