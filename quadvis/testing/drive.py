@@ -10,6 +10,7 @@ import numpy as np
 from quadvis.block import Block
 from quadvis.engine.engine import Engine
 from quadvis.engine.memory import Slot
+from quadvis.native.choice import PYTHON, choose, use
 from quadvis.testing.alone import ALONE, alone, parameter_sizes
 from quadvis.units import parse_period
 
@@ -40,13 +41,16 @@ def drive(
     steps: int | None = None,
     solver: str = "ode4",
     seed: int = 0,
+    engine: str = PYTHON,
     **inputs: Any,
 ) -> Driven:
     """Feed a block step by step and return its outputs.
 
     Each input is one constant value or an array (a list for frames) with a leading time axis. ``rate`` is a
     rate such as "10 Hz", a period such as "5 ms", or a number in Hz. ``steps`` is needed if no input has a
-    time axis. TypeError if an input is unknown or missing, or if its shape does not fit.
+    time axis. ``engine`` is that of a run; "native" runs the block's machine code, as a flight does.
+    TypeError if an input is unknown or missing, or if its shape does not fit. QuadvisError if the engine
+    cannot be had.
     """
     interface = block.interface
     for name in inputs:
@@ -68,7 +72,9 @@ def drive(
     count = steps if steps is not None else counts.pop()
     period = parse_period(rate) if isinstance(rate, str) else 1 / Fraction(str(rate))
     first = {name: values[0] for name, (values, _) in series.items()}
-    return _drive(alone(block, first, sizes, period, solver, seed), series, count)
+    made = alone(block, first, sizes, period, solver, seed)
+    use(made, choose(made, count, engine))
+    return _drive(made, series, count)
 
 
 def _series(name: str, signal: Any, value: Any, sizes: dict[str, Any], steps: int | None) -> tuple[Any, bool]:

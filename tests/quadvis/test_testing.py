@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from quadvis.block import Block, Frame, In, Out, Param, Random, State, uniform
+from quadvis.errors import QuadvisError
+from quadvis.native.executor import NativeExecutor
 from quadvis.testing import drive
 
 
@@ -95,6 +97,27 @@ def test_frames_are_given_and_come_back_as_lists() -> None:
     assert drive(Numbered(), frame=frames[0], steps=2).number.tolist() == [1, 1]
 
 
+@pytest.mark.parametrize(
+    ("block", "inputs"), [(Sum, {"u": [1.0, 2.0, 4.0]}), (Integral, {"u": [1.0, 0.5, 0.25]})]
+)
+def test_machine_code_gives_the_same_bits(
+    block: type[Block], inputs: dict[str, list[float]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    until: list[int] = []
+    run = NativeExecutor.run
+    monkeypatch.setattr(NativeExecutor, "run", lambda self, tick: until.append(tick) or run(self, tick))
+    interpreted = drive(block(), rate="10 Hz", **inputs)
+    compiled = drive(block(), rate="10 Hz", engine="native", **inputs)
+    assert until == [1, 2, 3]
+    for name, values in interpreted.signals.items():
+        assert compiled.signals[name].tobytes() == values.tobytes()
+
+
+def test_an_unknown_engine_is_refused() -> None:
+    with pytest.raises(QuadvisError, match="there is no engine 'nativ'; did you mean 'native'"):
+        drive(Sum(), u=[1.0], engine="nativ")
+
+
 def test_the_last_states_can_be_read() -> None:
     assert drive(Sum(), u=[1.0] * 5).state("steps") == 5
 
@@ -137,6 +160,6 @@ def test_inputs_that_do_not_fit_are_refused(inputs: dict, sentence: str) -> None
         drive(Sum(), **inputs)
 
 
-def test_an_output_that_is_not_there_is_told() -> None:
+def test_an_output_that_is_not_there_is_reported() -> None:
     with pytest.raises(AttributeError, match="the block has no output 'sum'"):
         _ = drive(Sum(), u=1.0, steps=1).sum
