@@ -16,13 +16,14 @@ import pytest
 import quadvis
 from quadvis.errors import QuadvisError
 from quadvis.library.catalogue import Catalogue
+from tests.diagrams import golden
 
 from .script import loaded, run_script
 
 TOOL = Path(__file__).parents[2] / "tools" / "bench"
 bench = loaded(TOOL)  # now its package is found
 
-from benchmarks import commands, flights, peers, tasks, whole_library  # noqa: E402
+from benchmarks import choices, commands, flights, peers, tasks, whole_library  # noqa: E402
 from benchmarks.programs import python_by_hand  # noqa: E402
 from benchmarks.tasks import Task  # noqa: E402
 
@@ -164,6 +165,21 @@ def test_loading_is_measured_beyond_an_empty_diagram(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(commands, "seconds", loaded_in)
     (row,) = commands.load(1, counts=(200,))
     assert (row.what, row.value) == ("loading 200 blocks", pytest.approx(1.98))
+
+
+def test_the_chosen_engine_is_compared_with_the_faster_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    taken = {"python": 3.0, "native": 2.0, "auto": 2.25}
+    commands_seen: list[Sequence[str]] = []
+
+    def measured_in(command: Sequence[str], environment: dict[str, str]) -> tuple[float, float]:
+        commands_seen.append(command)
+        return taken[command[-1]], 0.0
+
+    monkeypatch.setattr(choices, "seconds", measured_in)
+    found = list(choices.choices(1))
+    assert [row.value for row in found] == [0.25] * len(golden.cases())
+    assert found[0].what == "blackout.yaml: interpreted 3.00 s, machine code 2.00 s"
+    assert {Path(command[4]).name for command in commands_seen} == {name for name, _ in golden.cases()}
 
 
 def test_a_command_that_ends_in_an_error_has_no_time() -> None:

@@ -41,7 +41,7 @@ def start(rounds: int) -> Iterator[Row]:
         commands[f"quadvis run {of}, to the first step, rendered camera"] = (
             (*rendered, "--engine", engine), "<= 0.45" if engine == "python" else "",
         )  # fmt: skip
-    with _kept() as environment:
+    with kept() as environment:
         works = {
             name: (lambda c=command: seconds(c, environment)[0]) for name, (command, _) in commands.items()
         }
@@ -55,7 +55,7 @@ def start(rounds: int) -> Iterator[Row]:
 def load(rounds: int, counts: Sequence[int] = (1000, 10_000)) -> Iterator[Row]:
     """Measure how long diagrams of many blocks take to be loaded and checked, beyond an empty one."""
     goals = {1000: "<= 0.25", 10_000: "<= 1.5"}
-    with _kept() as environment:
+    with kept() as environment:
         folder = Path(environment["PYTHONPYCACHEPREFIX"])
         files = {count: folder / f"chain{count}.yaml" for count in (2, *counts)}
         for count, file in files.items():
@@ -82,7 +82,7 @@ def cold(_: int) -> Iterator[Row]:
         "compiling hover.yaml, rendered camera": ((*QUADVIS, "run", str(HOVER), *native), "<= 20"),
         "compiling the whole library": ((sys.executable, "-c", LIBRARY), "<= 90"),
     }
-    with _kept() as environment:
+    with kept() as environment:
         seconds(commands["compiling hover.yaml, geometric"][0], environment)
         for number, (name, (command, goal)) in enumerate(commands.items()):
             empty = str(Path(environment["PYTHONPYCACHEPREFIX"], f"cold{number}"))
@@ -93,7 +93,7 @@ def cold(_: int) -> Iterator[Row]:
 
 def sweep(rounds: int, seeds: int = 30, stop_time: str = "140 s") -> Iterator[Row]:
     """Measure a sweep over seeds with two workers, in wall time: it is what both cores give together."""
-    with _kept() as environment:
+    with kept() as environment:
         table = Path(environment["PYTHONPYCACHEPREFIX"], "table.csv")
         command = (
             *QUADVIS, "sweep", str(HOVER), "--variant", "geometric", "--over", f"seed=0..{seeds - 1}",
@@ -110,7 +110,7 @@ def sweep(rounds: int, seeds: int = 30, stop_time: str = "140 s") -> Iterator[Ro
 
 
 @contextmanager
-def _kept() -> Iterator[dict[str, str]]:
+def kept() -> Iterator[dict[str, str]]:
     """Give an environment in which bytecode is kept, as on a machine where the program has run before."""
     with tempfile.TemporaryDirectory() as folder:
         paths = os.pathsep.join(str(ROOT / part) for part in ("", "blocks", "tools"))

@@ -1,0 +1,38 @@
+"""Whether the engine that a run chooses by itself is the faster one: all shipped diagrams and variants."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import yaml
+
+from benchmarks.commands import QUADVIS, kept, seconds
+from benchmarks.rows import ROOT, Row, medians
+
+ENGINES = ("python", "native", "auto")
+
+
+def choices(rounds: int, options: Sequence[str] = ("--log", "")) -> Iterator[Row]:
+    """Measure whole runs with each engine; machine code is in the cache.
+
+    A row gives how much longer the chosen engine took than the faster one.
+    """
+    with kept() as environment:
+        folder = Path(environment["PYTHONPYCACHEPREFIX"], "diagrams")
+        shutil.copytree(ROOT / "diagrams", folder)  # some diagrams write files beside themselves
+        for path in sorted(folder.glob("*.yaml")):
+            for variant in ("", *yaml.safe_load(path.read_text()).get("variants", {})):
+                of = ("--variant", variant) if variant else ()
+                command = (*QUADVIS, "run", str(path), *of, *options, "--engine")
+                works: dict[str, Callable[[], float]] = {
+                    engine: (lambda e=engine, c=command: seconds((*c, e), environment)[0])
+                    for engine in ENGINES
+                }
+                works["native"]()  # compiles
+                found = medians(rounds, works)
+                python, native, auto = (found[engine] for engine in ENGINES)
+                name = f"{path.name}, {variant}" if variant else path.name
+                what = f"{name}: interpreted {python:.2f} s, machine code {native:.2f} s"
+                yield Row(what, auto - min(python, native), "s of CPU", None, "<= 0.3")
