@@ -21,7 +21,7 @@ from quadvis.cli.options import parser
 from quadvis.diagram.keys import SECTIONS, keys
 from quadvis.diagram.schema import diagram_schema
 from quadvis.diagram.sections.context import RunSection
-from quadvis.diagram.sections.section import DIAGRAM, PART, FileSection
+from quadvis.diagram.sections.section import DIAGRAM, GROUP, PART, FileSection
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("README.md", "quadvis/README.md", "blocks/README.md", "diagrams/README.md")
@@ -196,9 +196,12 @@ def test_the_table_of_keys_has_the_row_of_every_section_and_no_other() -> None:
     assert rows == [f"| `{section.key}` | {section.words} |" for section in SECTIONS]
 
 
-@pytest.mark.parametrize("kind", [DIAGRAM, PART])
+@pytest.mark.parametrize("kind", [DIAGRAM, PART, GROUP])
 def test_the_schema_has_every_key_and_no_other(kind: str) -> None:
-    form = diagram_schema({})["else"]["then" if kind == PART else "else"]
+    form = diagram_schema({})["else"]
+    if kind != GROUP:
+        form = form["else"]
+    form = form["else" if kind == DIAGRAM else "then"]
     known = {*keys(kind, required=True), *keys(kind, required=False)}
     assert form["properties"].keys() == known == {each.key for each in SECTIONS if kind in each.kinds}
 

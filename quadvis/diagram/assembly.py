@@ -12,8 +12,9 @@ from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.doubts import warn_parameters, warn_rates
 from quadvis.diagram.expand import Expansion, Kept
 from quadvis.diagram.flow import Cases
+from quadvis.diagram.group_files import GroupFiles
 from quadvis.diagram.keys import RUN_SECTIONS
-from quadvis.diagram.loader import read_part
+from quadvis.diagram.loader import read_group, read_part
 from quadvis.diagram.outputs import check_writers
 from quadvis.diagram.parts import Parts
 from quadvis.diagram.sections.blocks import BLOCKS
@@ -53,6 +54,7 @@ class Assembly:
         self.spec, self.faults = spec, faults
         self.catalogue = Catalogue(spec.path.parent, own_blocks)
         self.parts = Parts(read_part, faults)
+        self.groups = GroupFiles(read_group, faults)
         self.kept: dict[str, Kept] = {}
         self.made: dict[str, Made] = {}
         self.cases: Cases = {}
@@ -70,7 +72,7 @@ class Assembly:
         """Return the diagram; it may run if there are no faults."""
         spec, faults = self.spec, self.faults
         filled = fill_slots(spec, variant, faults)
-        expansion = Expansion(filled, self.catalogue, settings, self.parts, faults, self.kept)
+        expansion = Expansion(filled, self.catalogue, settings, self.parts, self.groups, faults, self.kept)
         wiring = Wiring(expansion, faults)
         promised = self._promised(filled)
         given = {slot: wiring.outputs(slot) for slot in promised if expansion.knows(slot)}
@@ -90,7 +92,7 @@ class Assembly:
             warn_parameters(file, faults)
         self._warned = len(files)
         if not self.variants:
-            self.warn_rates()
+            self.warn_unused()
         written = spec[STOP_TIME]
         context = Context(
             wiring, graph, stop, written is not None and known(written) and stop < written, faults
@@ -101,7 +103,7 @@ class Assembly:
         check_files(spec[FILES], spec.path.parent, faults)
         seed = spec[SEED] if seed is None else _seed(seed, faults)
         listing = tuple(draft.path for draft in drafts)
-        sources = (spec.path, *self.parts.files, *self._params)
+        sources = (spec.path, *self.parts.files, *self.groups.files, *self._params)
         check_writers(drafts, sources, faults)
         ports = {name: wire_text(source) for name, source in wiring.ports()}
         return Diagram(
@@ -114,9 +116,14 @@ class Assembly:
         """The names of the diagram's variants."""
         return tuple(self.spec[VARIANTS])
 
-    def warn_rates(self) -> None:
-        """Warn of rates that nothing uses; each variant must have been made before, as it may use some."""
+    def warn_unused(self) -> None:
+        """Warn of rates and of parameters of groups that nothing uses.
+
+        Each variant must have been made before, as it may use some.
+        """
         warn_rates(self.spec, self.parts, self.faults)
+        if not self.faults:
+            self.groups.warn_unused()
 
     def _promised(self, filled: FileSpec) -> Outputs:
         """Return the outputs of the blocks in the slots that a variant fills."""
@@ -124,7 +131,7 @@ class Assembly:
         changed = [name for name, block in spec[BLOCKS].items() if filled[BLOCKS][name] is not block]
         if changed and self._base is None:
             self._base = Wiring(
-                Expansion(spec, self.catalogue, {}, self.parts, Faults(), self.kept), Faults()
+                Expansion(spec, self.catalogue, {}, self.parts, self.groups, Faults(), self.kept), Faults()
             )
         return {slot: self._base.outputs(slot) for slot in changed if self._base is not None}
 

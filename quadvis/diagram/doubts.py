@@ -27,7 +27,8 @@ def warn_parameters(spec: FileSpec, faults: Faults) -> None:
     for block in _blocks(spec):
         inputs = block.inputs if block.inputs is not None and known(block.inputs) else {}
         parameters = block.parameters if known(block.parameters) else {}
-        for node in (*parameters.values(), *(given.source for given in inputs.values())):
+        sources = (given.source for given in inputs.values())
+        for node in (*parameters.values(), *block.groups, *sources):
             if isinstance(node, YamlNode):
                 used |= named_parameters(node)
     for name, value in spec[PARAMS].items():

@@ -7,7 +7,10 @@ from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
 from quadvis.block import Block, ParameterError
+from quadvis.diagram.group import Group
+from quadvis.diagram.group_files import GroupFiles
 from quadvis.diagram.names import remedy_for
+from quadvis.diagram.overrides import Overrides
 from quadvis.diagram.parts import Parts
 from quadvis.diagram.scope import FlatBlock, Scope
 from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec, InputSpec
@@ -16,7 +19,7 @@ from quadvis.diagram.sections.ports import PORTS
 from quadvis.diagram.settings import Settings
 from quadvis.diagram.spec import FileSpec
 from quadvis.diagram.values import read_parameter, substitute
-from quadvis.document import YamlNode, YamlScalar
+from quadvis.document import YamlNode
 from quadvis.errors import (
     UNKNOWN,
     DiagramError,
@@ -25,21 +28,12 @@ from quadvis.errors import (
     QuadvisError,
     Unknown,
     known,
-    quoted,
     suggestion,
 )
 from quadvis.library.catalogue import Catalogue, CatalogueError
-from quadvis.units import Unit, UnitError, split_quantity
 
 MAX_BLOCKS = 50_000  # in parts, since parts in parts multiply; a file by itself is as long as it is
 MAX_DEPTH = 30
-
-
-def _is_unit(text: str) -> bool:
-    try:
-        return bool(Unit.parse(text).dimension) if text else False
-    except UnitError:
-        return False
 
 
 class Kept(NamedTuple):
@@ -63,19 +57,20 @@ class Expansion:
         catalogue: Catalogue,
         settings: Settings,
         parts: Parts,
+        groups: GroupFiles,
         faults: Faults,
         kept: dict[str, Kept],
     ) -> None:
-        self.catalogue, self.settings, self.parts, self.faults = catalogue, settings, parts, faults
-        self.kept = kept
+        self.catalogue, self.parts, self.faults = catalogue, parts, faults
+        self.groups, self.kept, self.overrides = groups, kept, Overrides(settings, faults)
         self.blocks: dict[str, FlatBlock] = {}
         self._unknown: set[str] = set()  # paths of blocks and parts that exist, and are `UNKNOWN`
         self._count = 0
-        self._used: set[tuple[str, str]] = set()
-        params = {name: self._chosen("", name, node) for name, node in spec[PARAMS].items()}
+        params = {name: self._parameter(name, node) for name, node in spec[PARAMS].items()}
         self.root = Scope("", spec, params)
         self._expand(self.root, (os.path.realpath(spec.path),))
-        self._report_unused()
+        self.overrides.report_unused(lambda path: not self.knows(path), self.blocks, spec[PARAMS])
+        self._report_doubled()
 
     @property
     def is_whole(self) -> bool:
@@ -86,39 +81,30 @@ class Expansion:
         """Say whether a block or part, and every part around it, is known as far as it exists."""
         return not any(path == other or path.startswith(f"{other}/") for other in self._unknown)
 
-    def _chosen(self, path: str, name: str, own: YamlNode | Unknown) -> YamlNode | Unknown:
-        """Return the value of a parameter: the setting if there is one.
+    def _parameter(self, name: str, own: YamlNode | Unknown) -> YamlNode | Unknown:
+        """Return the value of a parameter of the diagram; settings may replace those inside a group."""
+        value = self.overrides.chosen("", name, own)
+        with self.faults.about(f"parameter '{name}'"):
+            found = self.groups.resolved(own, value)
+        given = self.overrides.of(name)
+        if not isinstance(found, Group) or not given:
+            return found
+        entries = {}
+        for entry, setting in given.items():
+            own = found.entries.get(entry, UNKNOWN)
+            entries[entry] = self.overrides.chosen(name, entry, own)
+            if entry not in found.entries:
+                remedy = suggestion(entry, found.entries)
+                problem = f"group '{name}' has no parameter '{entry}'"
+                self.faults.add(setting.place, problem, remedy)
+        return found.replaced(entries)
 
-        A setting without a unit for a value with one is refused here, before others are blamed for it.
-        """
-        self._used.add((path, name))
-        setting = self.settings.get(path, {}).get(name)
-        value = setting.value if setting is not None else UNKNOWN
-        if setting is None or value is UNKNOWN:
-            return own
-        if not isinstance(value, YamlScalar) or not isinstance(own, YamlScalar):
-            return value
-        number, unit = split_quantity(value.value)
-        wanted = split_quantity(own.value)[1]
-        if not number or unit or not number.strip("+-0.") or not _is_unit(wanted):
-            return value
-        remedy = f"did you mean {quoted(f'{number} {wanted}')}?"
-        self.faults.add(setting.place, f"{quoted(name)}: {quoted(number)} has no unit", remedy)
-        return UNKNOWN
-
-    def _report_unused(self) -> None:
-        for path, values in self.settings.items():
-            for name, setting in values.items():
-                if (path, name) in self._used or not self.knows(path) or setting.value is UNKNOWN:
-                    continue
-                if path:
-                    inner = [other for other in self.blocks if other.endswith(f"/{path}")]
-                    remedy = f"did you mean '{inner[0]}'?" if inner else suggestion(path, self.blocks)
-                    self.faults.add(setting.place, f"there is no block '{path}'", remedy)
-                else:
-                    remedy = suggestion(name, self.root.spec[PARAMS])
-                    remedy = remedy or "a parameter of a block is set by 'block.parameter=value'"
-                    self.faults.add(setting.place, f"the diagram has no parameter '{name}'", remedy)
+    def _report_doubled(self) -> None:
+        """Report groups with the name of a block: a setting would not say which of them it means."""
+        for name, node in self.root.params.items():
+            if isinstance(node, Group) and name in self.root.spec[BLOCKS]:
+                problem = f"both a group and a block are called '{name}', so a setting could mean either"
+                self.faults.add(node.place, problem, "choose another name for one of them")
 
     def _expand(self, scope: Scope, files: tuple[str, ...]) -> None:
         for name, block in scope.spec[BLOCKS].items():
@@ -145,6 +131,8 @@ class Expansion:
                     self._expand_part(scope, block, values, files)
                 else:
                     places = self._places(block, path)
+                    if block.groups:
+                        places = {**dict.fromkeys(values, block.groups[0].place), **places}
                     self.blocks[path] = FlatBlock(path, block, scope, kind, values, places)
 
     def _read(self, scope: Scope, block: BlockSpec, path: str) -> Kept:
@@ -154,9 +142,17 @@ class Expansion:
             return kept
         before = len(self.faults)
         values = self._values(scope, block, path)
-        kind = UNKNOWN if block.is_part else self._find_kind(block, path, values)
+        kind: type[Block] | Unknown = UNKNOWN
+        if not block.is_part:
+            self._refuse_groups(block, values)
+            kind = self._class(block)
+            if known(kind):
+                values = self._taken(scope, block, kind.interface.params) | values
+                kind = self._with_ports(kind, block, values)
+            if kind is UNKNOWN:
+                self._unknown.add(path)
         found = Kept(block, scope.params, values, kind)
-        if len(self.faults) == before and path not in self.settings:
+        if len(self.faults) == before and not self.overrides.of(path):
             self.kept[path] = found
         return found
 
@@ -164,28 +160,56 @@ class Expansion:
         """Return the parameters of a block or part."""
         given = block.parameters if known(block.parameters) else {}
         values = {name: substitute(node, scope.params, self.faults) for name, node in given.items()}
-        for name in self.settings.get(path, {}):
-            values[name] = self._chosen(path, name, values.get(name, UNKNOWN))
+        for name in self.overrides.of(path):
+            values[name] = self.overrides.chosen(path, name, values.get(name, UNKNOWN))
         return values
 
     def _places(self, block: BlockSpec, path: str) -> Mapping[str, Place]:
         """Return where the parameters of a block or part are given their values."""
-        settings = self.settings.get(path, {})
+        settings = self.overrides.of(path)
         if not settings:
             return block.parameter_places
         return block.parameter_places | {name: setting.place for name, setting in settings.items()}
 
-    def _find_kind(
-        self, block: BlockSpec, path: str, values: Mapping[str, YamlNode | Unknown]
-    ) -> type[Block] | Unknown:
+    def _taken(
+        self, scope: Scope, block: BlockSpec, declared: Mapping[str, Any]
+    ) -> dict[str, YamlNode | Unknown]:
+        """Return the parameters that a block or part takes from groups."""
+        found: dict[str, YamlNode | Unknown] = {}
+        for node in block.groups:
+            group = substitute(node, scope.params, self.faults)
+            if not known(group):
+                continue
+            taken = group.take_all(declared) if isinstance(group, Group) else {}
+            twice = [name for name in taken if name in found]
+            if not isinstance(group, Group):
+                self.faults.add(node.place, "this is not a group", "write '$name' of a group under 'params'")
+            elif not taken:
+                problem = f"'{block.kind}' has no parameter of the group '{node.text()[1:]}'"
+                self.faults.add(node.place, problem, "leave it out")
+            elif twice:
+                problem = f"more than one of these groups has '{twice[0]}'"
+                self.faults.add(node.place, problem, f"give '{twice[0]}' under 'with'")
+            found |= taken
+        return found
+
+    def _refuse_groups(self, block: BlockSpec, values: dict[str, YamlNode | Unknown]) -> None:
+        """Report groups in place of values of a block; they become `UNKNOWN`."""
+        for name, node in values.items():
+            if isinstance(node, Group):
+                place = block.parameters[name].place if known(block.parameters) else node.place
+                remedy = (
+                    "name one of its parameters, as in '$group.name', or write 'group: $group' beside 'with'"
+                )
+                self.faults.add(place, f"'{name}' takes a value, not a group of parameters", remedy)
+                values[name] = UNKNOWN
+
+    def _class(self, block: BlockSpec) -> type[Block] | Unknown:
         try:
-            kind: type[Block] | Unknown = self._with_ports(self.catalogue.find(block.kind), block, values)
+            return self.catalogue.find(block.kind)
         except CatalogueError as error:
             self.faults.add(block.kind_place, error.problem, error.remedy)
-            kind = UNKNOWN
-        if kind is UNKNOWN:
-            self._unknown.add(path)
-        return kind
+            return UNKNOWN
 
     def _with_ports(
         self, kind: type[Block], block: BlockSpec, values: Mapping[str, YamlNode | Unknown]
@@ -228,7 +252,11 @@ class Expansion:
                 self.faults.add(places[name], problem, remedy)
         if block.inputs is not UNKNOWN:
             self._check_inputs(block, block.inputs or {}, spec[PORTS].inputs)
-        child = Scope(f"{scope.prefix}{block.name}/", spec, spec[PARAMS] | values, scope, block)
+        values = self._taken(scope, block, spec[PARAMS]) | values
+        params = {
+            name: self.groups.resolved(own, values.get(name, own)) for name, own in spec[PARAMS].items()
+        }
+        child = Scope(f"{scope.prefix}{block.name}/", spec, params, scope, block)
         scope.children[block.name] = child
         self._expand(child, (*files, self.parts.locate(block)[1]))
 

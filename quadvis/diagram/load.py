@@ -76,7 +76,7 @@ def check(
         diagram = assembly.diagram(settings=given)
         for variant in assembly.variants:
             assembly.diagram(variant)
-        assembly.warn_rates()
+        assembly.warn_unused()
         return replace(diagram, warnings=tuple(sorted(set(faults.warnings))), files=digests)
 
 

@@ -6,11 +6,13 @@ from pathlib import Path
 
 from quadvis.diagram.keys import FILE_SECTIONS, RUN_SECTIONS, keys
 from quadvis.diagram.sections.header import is_version
-from quadvis.diagram.sections.section import DIAGRAM, PART, Values
+from quadvis.diagram.sections.section import DIAGRAM, GROUP, PART, Values
 from quadvis.diagram.spec import FileSpec
 from quadvis.document import YamlMap, YamlNode, parse_yaml, read_yaml
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown
 from quadvis.errors.caller import as_given
+
+GROUP_SECTIONS = [section for section in FILE_SECTIONS if GROUP in section.kinds]
 
 
 def read_file(path: Path, faults: Faults) -> FileSpec | Unknown:
@@ -21,6 +23,11 @@ def read_file(path: Path, faults: Faults) -> FileSpec | Unknown:
 def read_part(path: Path, faults: Faults) -> FileSpec | Unknown:
     """Read a part likewise."""
     return _read(path, faults.collect(read_yaml, path, faults), faults, PART)
+
+
+def read_group(path: Path, faults: Faults) -> FileSpec | Unknown:
+    """Read a group of parameters likewise."""
+    return _read(path, faults.collect(read_yaml, path, faults), faults, GROUP)
 
 
 def read_text(text: str, path: Path, faults: Faults) -> FileSpec | Unknown:
@@ -46,6 +53,13 @@ def _is_kind(root: YamlMap, faults: Faults, kind: str) -> bool:
     if "set" in root and "blocks" not in root:
         key, problem = "set", "this is a parameter file, since it has 'set'"
         remedy = f"give the diagram, and this file with {as_given('--params', 'params')}"
+    elif kind == GROUP and ("blocks" in root or "ports" in root):
+        key = "blocks" if "blocks" in root else "ports"
+        problem = f"this is a diagram or a part of one, not a group of parameters, since it has '{key}'"
+        remedy = "give a file with 'params' and no blocks"
+    elif kind != GROUP and "params" in root and {*root} <= {section.key for section in GROUP_SECTIONS}:
+        key, problem = "params", "this is a group of parameters, since it has 'params' and no blocks"
+        remedy = "give a diagram or a part that names it as 'params: {name: {group: file.yaml}}'"
     elif kind == DIAGRAM and "ports" in root:
         key, problem = "ports", "this is a part of a diagram, since it has 'ports'"
         remedy = "give a diagram that names it as 'part: file.yaml'"

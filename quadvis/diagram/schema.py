@@ -1,4 +1,4 @@
-"""The JSON schema of diagrams, parts and parameter files: completion, hover and checks in editors.
+"""The JSON schema of diagrams, parts, groups and parameter files: completion, hover and checks in editors.
 
 It is made from the declarations. An editor checks the form as one types; `quadvis check` knows more: units,
 shapes, rates, loops.
@@ -11,7 +11,8 @@ from collections.abc import Mapping
 from quadvis.block import Block
 from quadvis.diagram.keys import SECTIONS, keys
 from quadvis.diagram.sections.forms import COMMON, Schema, closed
-from quadvis.diagram.sections.section import DIAGRAM, PART
+from quadvis.diagram.sections.params import PARAMS
+from quadvis.diagram.sections.section import DIAGRAM, GROUP, PART
 from quadvis.diagram.settings import PARAMETERS_KEYS, PARAMETERS_REQUIRED, parameters_schema
 
 
@@ -30,13 +31,24 @@ def diagram_schema(blocks: Mapping[str, type[Block]]) -> Schema:
             (*PARAMETERS_REQUIRED, *PARAMETERS_KEYS), top | parameters_schema(), PARAMETERS_REQUIRED
         ),
         "else": {
-            "required": list(keys(DIAGRAM, required=True)),
-            "if": {"required": ["ports"]},
-            "then": _file(PART, top),
-            "else": _file(DIAGRAM, top),
+            "if": _is_group(top),
+            "then": _file(GROUP, top),
+            "else": {
+                "required": list(keys(DIAGRAM, required=True)),
+                "if": {"required": ["ports"]},
+                "then": _file(PART, top),
+                "else": _file(DIAGRAM, top),
+            },
         },
         "$defs": definitions,
     }
+
+
+def _is_group(top: Mapping[str, Schema]) -> Schema:
+    """Return what only groups fulfil: they have parameters, and none of the keys of other files."""
+    own = {*keys(GROUP, required=True), *keys(GROUP, required=False)}
+    others = [{"required": [key]} for key in top if key not in own]
+    return {"required": [PARAMS.key], "not": {"anyOf": others}}
 
 
 def _file(kind: str, top: Mapping[str, Schema]) -> Schema:

@@ -10,13 +10,16 @@ from pathlib import Path
 from typing import Any
 
 from quadvis.block import Param, SignalType
+from quadvis.diagram.group import Group
 from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar
 from quadvis.document.number_lists import Numbers
 from quadvis.errors import UNKNOWN, Faults, Unknown, known, quoted, suggestion
 from quadvis.units import Unit, parse_quantity, split_quantity
 
 QUANTITY_KEYS = ("value", "unit")
-_PARAMETER = re.compile(r"\$(?P<name>[A-Za-z_]\w*)(?:\[(?P<element>\d{1,6})\])?", re.ASCII)
+_PARAMETER = re.compile(
+    r"\$(?P<name>[A-Za-z_]\w*)(?:\.(?P<entry>[A-Za-z_]\w*))?(?:\[(?P<element>\d{1,6})\])?", re.ASCII
+)
 
 
 class Bare:
@@ -70,13 +73,29 @@ def _parameter(
         faults.add(node.place, f"there is no parameter {quoted(name)} here", remedy)
         return UNKNOWN
     found = params[match["name"]]
+    if known(found) and match["entry"] is not None:
+        found = _entry(node, match, found, faults)
     if found is UNKNOWN or match["element"] is None:
         return found
     element = int(match["element"])
     if isinstance(found, YamlList) and element < len(found):
         return found[element]
     count = f"has {len(found)} elements" if isinstance(found, YamlList) else "is one value"
-    faults.add(node.place, f"parameter '{match['name']}' {count}, there is no [{element}]", "count from 0")
+    name = match.group().partition("[")[0][1:]
+    faults.add(node.place, f"parameter '{name}' {count}, there is no [{element}]", "count from 0")
+    return UNKNOWN
+
+
+def _entry(node: YamlScalar, match: re.Match[str], group: YamlNode, faults: Faults) -> YamlNode | Unknown:
+    """Return the parameter of a group that ``$group.name`` means."""
+    name, entry = match["name"], match["entry"]
+    if not isinstance(group, Group):
+        faults.add(node.place, f"parameter '{name}' is not a group", f"write '${name}'")
+    elif entry not in group.entries:
+        remedy = suggestion(entry, group.entries)
+        faults.add(node.place, f"group '{name}' has no parameter '{entry}'", remedy)
+    else:
+        return group.take(entry)
     return UNKNOWN
 
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from quadvis.diagram.group import Group
 from quadvis.diagram.scope import Scope
 from quadvis.diagram.values import si
 from quadvis.diagram.wiring import Wiring
@@ -62,6 +63,11 @@ def _values(
 ) -> tuple[list[Unit], tuple[str, ...]]:
     """Return the units and the texts of a parameter's elements."""
     scope: Scope | Unknown = wiring.expansion.root
+    group = wiring.expansion.root.params.get(path)
+    if isinstance(group, Group):
+        if name not in group.entries:
+            raise node.fault(f"group '{path}' has no parameter '{name}'", suggestion(name, group.entries))
+        return _written(wiring, node, name, group.entries[name])
     for part in path.split("/") if path else ():
         scope = scope.children.get(part, UNKNOWN) if known(scope) else UNKNOWN
     if known(scope):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cProfile
+import math
 import os
 import pstats
 import re
@@ -466,3 +467,14 @@ def test_loading_a_diagram_imports_nothing_heavy() -> None:
         [sys.executable, "-c", code], cwd=DIAGRAMS, capture_output=True, text=True, check=True
     )
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("solver", ["{step: 10 ms}", "{step: 10 ms, method: ode4}"])
+def test_a_solver_without_a_method_is_ode4(tmp_path: Path, solver: str) -> None:
+    path = tmp_path / "decay.yaml"
+    path.write_text(
+        f"{{quadvis: 1, name: decay, solver: {solver}, stop_time: 1 s, blocks: {{"
+        "x: {block: signal.integrator, with: {initial: 1}, in: {u: u.y}},"
+        "u: {block: signal.gain, rate: continuous, with: {factor: -1 1/s}, in: {u: x.y}}}}"
+    )
+    assert quadvis.load(path).run(log=None)["x.y"][-1] == pytest.approx(math.exp(-1), rel=1e-9)

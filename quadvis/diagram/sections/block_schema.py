@@ -6,12 +6,14 @@ import inspect
 from collections.abc import Mapping
 
 from quadvis.block import Block, Declared, Param
+from quadvis.diagram.group import GROUP_KEY
 from quadvis.diagram.sections.forms import CONSTANT, SIGNAL, TEXT, VALUES, Schema, closed, map_of, ref
 from quadvis.graph.graph import CONTINUOUS, CROSSINGS
 from quadvis.library.describe import default_text, first_line
 
-BLOCK_KEYS = ("block", "part", "rate", "slot", "with", "in")
+BLOCK_KEYS = ("block", "part", "rate", "slot", GROUP_KEY, "with", "in")
 WIRE_KEYS = ("from", "across")
+GROUP_NAME: Schema = {"type": "string", "pattern": r"^\$[A-Za-z_][A-Za-z0-9_]*$"}
 LIBRARY_BLOCK: Schema = {
     "type": "string",
     "pattern": "^[a-z][a-z0-9_]*:",
@@ -41,6 +43,10 @@ def _any_block(blocks: Mapping[str, type[Block]]) -> Schema:
         "part": {**TEXT, "description": "file of a subsystem, relative to this one"},
         "rate": {**TEXT, "description": f"one of the diagram's rates, or '{CONTINUOUS}'"},
         "slot": {"type": "boolean", "description": "variants may put another block here"},
+        GROUP_KEY: {
+            "anyOf": [GROUP_NAME, {"type": "array", "items": GROUP_NAME}],
+            "description": "groups whose values it takes for its parameters of the same names",
+        },
         "with": map_of(ref("value"), "parameters"),
         "in": map_of(ref("input"), "inputs: block.port, a constant, or {from: block.port, across: hold}"),
     }
@@ -64,7 +70,6 @@ def _one_block(block: type[Block]) -> Schema:
     parameters: Schema = {
         "additionalProperties": False,
         "properties": {name: _parameter(param) for name, param in interface.params.items()},
-        "required": required,
     }
     inputs: Schema = {
         "additionalProperties": ref("input") if block.ports_from() else False,
@@ -73,12 +78,15 @@ def _one_block(block: type[Block]) -> Schema:
         },
         "required": [name for name, port in interface.inputs.items() if port.default is None],
     }
-    return {
+    found: Schema = {
         "description": inspect.getdoc(block) or "",
         "properties": {"with": parameters, "in": inputs},
-        # A block in a slot may have the slot's wires, but has its own parameters.
-        "required": ["with"] if required else [],
     }
+    if required:
+        # A block in a slot may have the slot's wires, but has its own parameters; a group may have them all.
+        given = {"required": ["with"], "properties": {"with": {"required": required}}}
+        found["anyOf"] = [{"required": [GROUP_KEY]}, given]
+    return found
 
 
 def _parameter(param: Param) -> Schema:

@@ -7,13 +7,14 @@ from typing import Any, NamedTuple
 
 from quadvis.block import Block
 from quadvis.diagram.entries import PATH, refuse_name, with_clean_names
+from quadvis.diagram.group import GROUP_KEY
 from quadvis.diagram.reference import Reference, read_reference
 from quadvis.diagram.sections.block_schema import BLOCK_KEYS, WIRE_KEYS, block_definitions
 from quadvis.diagram.sections.block_text import resolved_block
 from quadvis.diagram.sections.forms import Schema, map_of, ref
 from quadvis.diagram.sections.section import DIAGRAM, PART, Checked, FileSection
 from quadvis.diagram.values import QUANTITY_KEYS
-from quadvis.document import YamlMap, YamlNode, YamlScalar
+from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown, closest, known
 from quadvis.graph.graph import CROSSINGS
 
@@ -39,6 +40,7 @@ class BlockSpec(NamedTuple):
     is_part: bool
     parameters: dict[str, YamlNode] | Unknown
     parameter_places: dict[str, Place]
+    groups: tuple[YamlNode, ...] = ()  # from which it takes parameters: `$name`
     rate: tuple[str, Place] | Unknown | None = None
     slot: Place | Unknown | None = None
     inputs: dict[str, InputSpec] | Unknown | None = None  # None: no 'in' was written
@@ -73,11 +75,17 @@ def read_block(name: str, place: Place, node: YamlNode, faults: Faults) -> Block
         parameters=UNKNOWN if given is UNKNOWN or "with" in doubled else given.values if given else {},
         parameter_places=_places(given) if given is not None and known(given) else {},
         inputs=UNKNOWN if "in" in doubled else inputs,
+        groups=_read_groups(fields[GROUP_KEY]) if GROUP_KEY in fields else (),
     )
 
 
 def _read_rate(node: YamlNode) -> tuple[str, Place]:
     return node.text(), node.place
+
+
+def _read_groups(node: YamlNode) -> tuple[YamlNode, ...]:
+    """Return the names of one group, or of a list of them."""
+    return tuple(node.items()) if isinstance(node, YamlList) else (node,)
 
 
 def _read_slot(node: YamlNode, faults: Faults) -> Place | Unknown | None:

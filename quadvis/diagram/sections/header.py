@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from quadvis.diagram.sections.forms import TEXT, Schema
-from quadvis.diagram.sections.section import DIAGRAM, PART, Checked, FileSection
+from quadvis.diagram.sections.section import DIAGRAM, GROUP, PART, Checked, FileSection
 from quadvis.document import YamlMap, YamlNode
 from quadvis.errors import Faults
 
@@ -26,7 +26,7 @@ class Format(FileSection[int]):
     key = "quadvis"
     words = "version of the format, 1; must be there"
     required = True
-    kinds = (DIAGRAM, PART)
+    kinds = (DIAGRAM, PART, GROUP)
 
     def read(self, node: YamlNode | None, faults: Faults) -> int:
         """Return the version that this quadvis reads."""
@@ -47,7 +47,7 @@ class Name(FileSection[str]):
     key = "name"
     words = "the diagram's name, and its log's"
     required = True
-    kinds = (DIAGRAM, PART)
+    kinds = (DIAGRAM, PART, GROUP)
 
     def read(self, node: YamlNode | None, faults: Faults) -> str:
         """Return the name."""
@@ -67,7 +67,7 @@ class Doc(FileSection[str]):
 
     key = "doc"
     words = "what it is for"
-    kinds = (DIAGRAM, PART)
+    kinds = (DIAGRAM, PART, GROUP)
 
     def read(self, node: YamlNode | None, faults: Faults) -> str:
         """Return the text."""

@@ -1,10 +1,11 @@
-"""`params`: named values, which blocks and parts take as `$name`."""
+"""`params`: named values, which blocks and parts take as `$name`, and groups of them from other files."""
 
 from __future__ import annotations
 
 from quadvis.diagram.entries import named_entries
-from quadvis.diagram.sections.forms import Schema, map_of, ref
-from quadvis.diagram.sections.section import DIAGRAM, PART, FileSection
+from quadvis.diagram.group import GROUP_KEY
+from quadvis.diagram.sections.forms import TEXT, Schema, closed, map_of, ref
+from quadvis.diagram.sections.section import DIAGRAM, GROUP, PART, FileSection
 from quadvis.diagram.values import read_constant
 from quadvis.document import YamlNode
 from quadvis.errors import Faults, Unknown
@@ -13,11 +14,14 @@ Params = dict[str, YamlNode | Unknown]
 
 
 class ParamsSection(FileSection[Params]):
-    """The parameters of a diagram or part, by name."""
+    """The parameters of a diagram, part or group, by name."""
 
     key = "params"
-    words = "named values, used as `$name` or `$name[2]`; `quadvis run --set name=value` replaces them"
-    kinds = (DIAGRAM, PART)
+    words = (
+        "named values, used as `$name` or `$name[2]`; `quadvis run --set name=value` replaces them; "
+        "`name: {group: file.yaml}` takes the values of a file, see below"
+    )
+    kinds = (DIAGRAM, PART, GROUP)
 
     def read(self, node: YamlNode | None, faults: Faults) -> Params:
         """Return the values with their units."""
@@ -29,7 +33,9 @@ class ParamsSection(FileSection[Params]):
 
     def schema(self) -> Schema:
         """Return the schema: values by name."""
-        return map_of(ref("value"), "named values, used as $name or $name[2]")
+        file = {**TEXT, "description": "file of a group of parameters, relative to this one"}
+        value = {"anyOf": [ref("value"), closed((GROUP_KEY,), {GROUP_KEY: file}, (GROUP_KEY,))]}
+        return map_of(value, "named values, used as $name, $name[2], or $group.name")
 
 
 PARAMS = ParamsSection()

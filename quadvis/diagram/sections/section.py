@@ -20,7 +20,7 @@ from quadvis.graph.graph import Graph
 
 Value = TypeVar("Value")
 Said = TypeVar("Said", covariant=True)
-DIAGRAM, PART = "diagram", "part"  # the kinds of files that have sections
+DIAGRAM, PART, GROUP = "diagram", "part", "group"  # the kinds of files that have sections
 
 
 class Checked(Protocol):

@@ -13,12 +13,13 @@ from quadvis.errors import UNKNOWN, Faults, Place, Unknown
 from quadvis.graph.graph import SOLVERS
 
 SOLVER_KEYS = ("method", "step")
+METHOD = "ode4"  # where none is written
 
 
 class SolverSpec(NamedTuple):
     """The method and the step (s) of the solver, and where the step is written."""
 
-    method: str = "ode4"
+    method: str = METHOD
     step: Fraction | Unknown | None = None
     place: Place | None = None
 
@@ -36,9 +37,9 @@ class SolverSection(FileSection[SolverSpec]):
             return SolverSpec(step=UNKNOWN if node is not None else None)
         method = faults.collect(fields["method"].choice, SOLVERS) if "method" in fields else None
         if "step" not in fields:
-            return SolverSpec(method or SolverSpec.method)
+            return SolverSpec(method or METHOD)
         step = faults.read(read_step, fields["step"])
-        return SolverSpec(method or SolverSpec.method, step, fields["step"].place)
+        return SolverSpec(method or METHOD, step, fields["step"].place)
 
     def schema(self) -> Schema:
         """Return the schema: method and step."""
