@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from typing import Any, NamedTuple
 
-from quadvis.block import Block, In, Param, ParameterError
+from quadvis.block import Block, In, Param, ParameterError, Random
 from quadvis.diagram.draft import Connection, Draft, unconnected
 from quadvis.diagram.expand import Expansion
 from quadvis.diagram.names import absent, remedy_for
@@ -70,7 +70,22 @@ class Builder:
                 draft = self._draft(flat)
             if known(draft):
                 found.append(draft)
+        self._refuse_common_streams(found)
         return found
+
+    def _refuse_common_streams(self, drafts: list[Draft]) -> None:
+        """Report blocks whose noise has one name: it would be the same noise."""
+        first: dict[str, str] = {}
+        for draft in drafts:
+            if not any(isinstance(state, Random) for state in draft.interface.states.values()):
+                continue
+            other = first.setdefault(draft.stream, draft.path)
+            if other != draft.path:
+                flat = self.expansion.blocks[draft.path]
+                place = next((spec.stream[1] for spec in flat.around if spec.stream is not None), draft.place)
+                problem = f"'{other}' has the stream '{draft.stream}', too: their noise would be the same"
+                with self.faults.about(f"block '{draft.path}'"):
+                    self.faults.add(place, problem, "give each a name of its own")
 
     def _draft(self, flat: FlatBlock) -> Draft | Unknown:
         if flat.kind is UNKNOWN:
@@ -81,7 +96,7 @@ class Builder:
         connections = dict(self._connections(flat, flat.kind))
         return Draft(
             flat.path, flat.spec.place, flat.spec.kind, flat.kind, block, task, connections, flat.places,
-            units, flat.parameters,
+            units, flat.parameters, flat.stream,
         )  # fmt: skip
 
     def _choose_step(self) -> Fraction | Unknown | None:

@@ -46,7 +46,7 @@ class WireCheck:
         task = draft.task if known(draft.task) else _ANY_TASK
         # Of a block whose parameters are unknown only the declarations are looked at, which its class has.
         block = draft.block if known(draft.block) else cast(Block, draft.type)
-        node = Node(draft.path, draft.kind, block, task, inputs)
+        node = Node(draft.path, draft.kind, block, task, inputs, stream=draft.stream)
         for name, param in interface.params.items() if known(draft.block) else ():
             shape = getattr(getattr(draft.block, name), "shape", ())
             if param.signal.scalar != "str" and not param.signal.unify(shape, node.sizes):

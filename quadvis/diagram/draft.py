@@ -40,6 +40,7 @@ class Draft:
     places: Mapping[str, Place] = field(default_factory=dict)  # of the parameters that are given
     units: Mapping[str, OpenUnits] = field(default_factory=dict)  # of the parameters where they are open
     given: Mapping[str, YamlNode | Unknown] = field(default_factory=dict)  # their values as written
+    stream: str = ""  # the name of its noise
 
     def origin(self, name: str) -> Place:
         """Return where the value of a parameter or constant is written."""

@@ -57,6 +57,16 @@ class FlatBlock:
         """The block's rate, or that of the nearest part around it that has one."""
         return next((spec.rate for spec in self.around if spec.rate is not None), None)
 
+    @cached_property
+    def stream(self) -> str:
+        """The name of the block's noise: its path, unless it or a part around it has a stream of its own."""
+        inside = ""
+        for spec in self.around:
+            if spec.stream is not None:
+                return spec.stream[0] + inside
+            inside = f"/{spec.name}{inside}"
+        return self.path
+
     @property
     def around(self) -> Iterator[BlockSpec]:
         """The block's entry, then those of the parts around it."""

@@ -242,7 +242,7 @@ def _image(graph: Graph, layout: Layout, seed: int) -> bytes:
                 memory.write(block.inputs[port], source.value)
         for name, state in node.block.interface.states.items():
             if isinstance(state, Random):
-                memory.write(block.field(name), stream_start(seed, f"{node.path}.{name}"))
+                memory.write(block.field(name), stream_start(seed, f"{node.stream or node.path}.{name}"))
     return bytes(memory.raw)
 
 

@@ -83,6 +83,7 @@ class Node:
     inputs: dict[str, Wire | Constant]
     sizes: Sizes = field(default_factory=dict)
     units: dict[str, tuple[Unit, ...]] = field(default_factory=dict)  # of the outputs, element by element
+    stream: str = ""  # the name of its noise; its path if empty
 
     def shape(self, port: str) -> Shape:
         """Return the shape of an input, output or state."""

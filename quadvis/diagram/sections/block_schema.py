@@ -7,11 +7,11 @@ from collections.abc import Mapping
 
 from quadvis.block import Block, Declared, Param
 from quadvis.diagram.group import GROUP_KEY
-from quadvis.diagram.sections.forms import CONSTANT, SIGNAL, TEXT, VALUES, Schema, closed, map_of, ref
+from quadvis.diagram.sections.forms import CONSTANT, NAME, SIGNAL, TEXT, VALUES, Schema, closed, map_of, ref
 from quadvis.graph.graph import CONTINUOUS, CROSSINGS
 from quadvis.library.describe import default_text, first_line
 
-BLOCK_KEYS = ("block", "part", "rate", "slot", GROUP_KEY, "with", "in")
+BLOCK_KEYS = ("block", "part", "rate", "slot", "stream", GROUP_KEY, "with", "in")
 WIRE_KEYS = ("from", "across")
 GROUP_NAME: Schema = {"type": "string", "pattern": r"^\$[A-Za-z_][A-Za-z0-9_]*$"}
 LIBRARY_BLOCK: Schema = {
@@ -43,6 +43,7 @@ def _any_block(blocks: Mapping[str, type[Block]]) -> Schema:
         "part": {**TEXT, "description": "file of a subsystem, relative to this one"},
         "rate": {**TEXT, "description": f"one of the diagram's rates, or '{CONTINUOUS}'"},
         "slot": {"type": "boolean", "description": "variants may put another block here"},
+        "stream": {**NAME, **TEXT, "description": "name of its noise in place of its path"},
         GROUP_KEY: {
             "anyOf": [GROUP_NAME, {"type": "array", "items": GROUP_NAME}],
             "description": "groups whose values it takes for its parameters of the same names",

@@ -27,6 +27,8 @@ def resolved_block(node: Node, folder: Path) -> dict[str, Any]:
         "block": node.kind,
         "rate": CONTINUOUS if node.task.continuous else node.task.name,
     }
+    if node.stream not in ("", node.path):
+        found["stream"] = node.stream
     values = {
         name: _parameter(node, param, folder)
         for name, param in node.block.interface.params.items()

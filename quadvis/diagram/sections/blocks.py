@@ -44,6 +44,7 @@ class BlockSpec(NamedTuple):
     rate: tuple[str, Place] | Unknown | None = None
     slot: Place | Unknown | None = None
     inputs: dict[str, InputSpec] | Unknown | None = None  # None: no 'in' was written
+    stream: tuple[str, Place] | None = None  # the name of its noise, or of that of its inner blocks
 
 
 Blocks = dict[str, BlockSpec | Unknown]
@@ -75,11 +76,18 @@ def read_block(name: str, place: Place, node: YamlNode, faults: Faults) -> Block
         parameters=UNKNOWN if given is UNKNOWN or "with" in doubled else given.values if given else {},
         parameter_places=_places(given) if given is not None and known(given) else {},
         inputs=UNKNOWN if "in" in doubled else inputs,
+        stream=faults.collect(_read_stream, fields["stream"]) if "stream" in fields else None,
         groups=_read_groups(fields[GROUP_KEY]) if GROUP_KEY in fields else (),
     )
 
 
 def _read_rate(node: YamlNode) -> tuple[str, Place]:
+    return node.text(), node.place
+
+
+def _read_stream(node: YamlNode) -> tuple[str, Place]:
+    if PATH.fullmatch(node.text()) is None:
+        raise node.wrong("a name, or names joined by '/'")
     return node.text(), node.place
 
 
