@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -48,6 +49,7 @@ class SignalType:
     shape: tuple[int | str, ...]
 
     @staticmethod
+    @cache
     def parse(text: str) -> SignalType:
         """Read ``float64``, ``int64[3]``, ``float64[n]``, ``float64[*]`` (any shape) or ``frame``."""
         if text == "frame":

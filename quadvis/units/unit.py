@@ -267,6 +267,7 @@ def advised(error: UnitError, text: str, wanted: Sequence[Unit] = ()) -> UnitErr
     return UnitError(error.problem, f"write it in {' or '.join(map(str, wanted))}")
 
 
+@lru_cache(maxsize=1024)
 def parse_units(text: str) -> tuple[Unit, ...]:
     """Return the units of a port's elements: one for all elements ("m/s"), or one each ("m m m rad")."""
     plain = plain_spelling(text).split()
