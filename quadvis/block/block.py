@@ -17,7 +17,7 @@ from typing import Any, ClassVar, TypeVar
 
 from quadvis.block.declare import Declared, In, Out, Param, ParameterError, Safe, State, Work
 from quadvis.errors import QuadvisError, sentence, suggestion
-from quadvis.machine.inputs import file_digest
+from quadvis.machine.inputs import file_digest, read_once
 from quadvis.machine.source_line import file_of, source_line
 from quadvis.units import Unit
 
@@ -181,11 +181,12 @@ class Block:
         """Return ``read(path)`` of the file that a parameter names; ParameterError reports a fault in it.
 
         The file is read at the first call, and the result is kept. So ``open`` gets the same result as
-        ``check``, even if the file has changed in between. Do not modify the result.
+        ``check``, even if the file has changed in between. Blocks of one diagram that give the same ``read``
+        and path share the result: do not modify it.
         """
         if name not in self._kept:
             try:
-                self._kept[name] = read(getattr(self, name))
+                self._kept[name] = read_once(read, getattr(self, name))
             except ParameterError:
                 raise
             except QuadvisError as error:

@@ -55,8 +55,8 @@ class Assembly:
         self.catalogue = Catalogue(spec.path.parent, own_blocks)
         self.parts = Parts(read_part, faults)
         self.groups = GroupFiles(read_group, faults)
-        self.kept: dict[str, Kept] = {}
-        self.made: dict[str, Made] = {}
+        self.kept: dict[str, list[Kept]] = {}
+        self.made: dict[str, list[Made]] = {}
         self.cases: Cases = {}
         self._warned = 0  # files whose unused parameters are reported
         self._params = [path for file in params for path in (file.path, *file.bases)]

@@ -51,7 +51,12 @@ class Builder:
     """Makes the blocks and reports their faults. ``step`` is the solver's step, if a solver is needed."""
 
     def __init__(
-        self, spec: FileSpec, expansion: Expansion, wiring: Wiring, made: dict[str, Made], faults: Faults
+        self,
+        spec: FileSpec,
+        expansion: Expansion,
+        wiring: Wiring,
+        made: dict[str, list[Made]],
+        faults: Faults,
     ) -> None:
         self.spec, self.expansion, self.wiring, self.made, self.faults = spec, expansion, wiring, made, faults
         self.tasks = {
@@ -155,9 +160,9 @@ class Builder:
         self, flat: FlatBlock, kind: type[Block], task: Task | Unknown
     ) -> tuple[Block | Unknown, dict[str, OpenUnits]]:
         period = task.period if known(task) and known(self.step) else None
-        made = self.made.get(flat.path)
-        if made is not None and made[:3] == (kind, flat.parameters, period):
-            return made.block, made.units
+        for made in self.made.get(flat.path, ()):
+            if made[:3] == (kind, flat.parameters, period):
+                return made.block, made.units
         declared = kind.interface.params
         values: dict[str, Any] = {}
         units: dict[str, OpenUnits] = {}
@@ -183,7 +188,7 @@ class Builder:
             self.faults.add(flat.spec.place, f"parameter '{name}' is missing", f"give {wanted} under 'with'")
         block = self._construct(flat, kind, values, period) if whole else UNKNOWN
         if known(block):
-            self.made[flat.path] = Made(kind, flat.parameters, period, block, units)
+            self.made.setdefault(flat.path, []).append(Made(kind, flat.parameters, period, block, units))
             for doubt in block.doubts() if period is not None else ():
                 self.faults.warn(self._place(flat, doubt), str(doubt))
         return block, units

@@ -59,7 +59,7 @@ class Expansion:
         parts: Parts,
         groups: GroupFiles,
         faults: Faults,
-        kept: dict[str, Kept],
+        kept: dict[str, list[Kept]],
     ) -> None:
         self.catalogue, self.parts, self.faults = catalogue, parts, faults
         self.groups, self.kept, self.overrides = groups, kept, Overrides(settings, faults)
@@ -137,9 +137,9 @@ class Expansion:
 
     def _read(self, scope: Scope, block: BlockSpec, path: str) -> Kept:
         """Return the parameters of a block or part, and the class of a block."""
-        kept = self.kept.get(path)
-        if kept is not None and kept.entry is block and kept.params == scope.params:
-            return kept
+        for kept in self.kept.get(path, ()):
+            if kept.entry is block and kept.params == scope.params:
+                return kept
         before = len(self.faults)
         values = self._values(scope, block, path)
         kind: type[Block] | Unknown = UNKNOWN
@@ -153,7 +153,7 @@ class Expansion:
                 self._unknown.add(path)
         found = Kept(block, scope.params, values, kind)
         if len(self.faults) == before and not self.overrides.of(path):
-            self.kept[path] = found
+            self.kept.setdefault(path, []).append(found)
         return found
 
     def _values(self, scope: Scope, block: BlockSpec, path: str) -> dict[str, YamlNode | Unknown]:

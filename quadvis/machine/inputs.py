@@ -9,15 +9,18 @@ from __future__ import annotations
 import hashlib
 import os
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from io import BufferedReader
+from typing import Any, NamedTuple, TypeVar
 
 from quadvis.errors import QuadvisError
 from quadvis.machine.files import PathLike, reason
 
 MOST_BYTES = 256_000_000
+
+_Read = TypeVar("_Read")
 
 
 class InputError(QuadvisError):
@@ -33,7 +36,12 @@ class TooLongError(InputError):
     """A file that has more bytes than are read."""
 
 
-_noted: ContextVar[dict[str, str] | None] = ContextVar("noted", default=None)
+class _Noted(NamedTuple):
+    digests: dict[str, str]  # by path
+    results: dict[tuple[Callable[[str], Any], str], Any]  # of `read_once`
+
+
+_noted: ContextVar[_Noted | None] = ContextVar("noted", default=None)
 
 
 def read_input(path: PathLike, most: int | None = MOST_BYTES, what: str = "") -> bytes:
@@ -67,10 +75,21 @@ def open_input(path: PathLike, what: str = "") -> BufferedReader:
     return os.fdopen(descriptor, "rb")
 
 
+def read_once(read: Callable[[str], _Read], path: str) -> _Read:
+    """Return ``read(path)``; inside `noted_inputs` one result serves all who ask for it. Do not modify it."""
+    noted = _noted.get()
+    if noted is None:
+        return read(path)
+    if (read, path) not in noted.results:
+        noted.results[read, path] = read(path)
+    found: _Read = noted.results[read, path]
+    return found
+
+
 def note_digest(path: PathLike, digest: str) -> None:
     """Note the SHA-256 of a file's contents; QuadvisError if an earlier reading gave another one."""
     noted = _noted.get()
-    if noted is not None and noted.setdefault(os.fspath(path), digest) != digest:
+    if noted is not None and noted.digests.setdefault(os.fspath(path), digest) != digest:
         raise QuadvisError(f"'{os.fspath(path)}' was changed while it was being read; try again")
 
 
@@ -88,9 +107,9 @@ def file_digest(path: PathLike) -> str:
 @contextmanager
 def noted_inputs() -> Iterator[Mapping[str, str]]:
     """Collect the SHA-256 of all files that are read inside, by path."""
-    found: dict[str, str] = {}
-    token = _noted.set(found)
+    noted = _Noted({}, {})
+    token = _noted.set(noted)
     try:
-        yield found
+        yield noted.digests
     finally:
         _noted.reset(token)
