@@ -27,8 +27,11 @@ def with_clean_names(node: YamlNode, faults: Faults) -> YamlMap:
     """Return a map of which the keys are names; those with odd characters are refused, and read as meant."""
     mapping = node.mapping()
     for key in list(mapping.keys.values()):
-        char, name = first_odd(key.value), cleaned(key.value)
-        if char is not None and PATH.fullmatch(name) and name not in mapping:
+        char = first_odd(key.value)
+        if char is None:
+            continue
+        name = cleaned(key.value)
+        if PATH.fullmatch(name) and name not in mapping:
             problem = f"{quoted(key.value)} holds {with_article(char)}"
             faults.add(key.place, problem, replacement(char))
             mapping = mapping.renamed(key.value, name)

@@ -97,6 +97,8 @@ class Composer:
         for event in events:
             kind = type(event)
             if kind is yaml.ScalarEvent:
+                if event.style == '"':
+                    self._check_escapes(event)
                 self._add(self._scalar(event), event)
             elif kind is yaml.MappingStartEvent:
                 self._open(YamlMap({}, {}, *self._position(event)), event)
@@ -185,7 +187,8 @@ class Composer:
         self.nodes += 1
         if self.nodes > self.most:
             raise self._fatal(event, f"the file holds more than {self.most} values", "split it")
-        self._check_properties(event)
+        if event.anchor is not None or event.tag is not None:
+            self._refuse_properties(event)
         if not self.stack:
             self.root = node
             return
@@ -213,17 +216,20 @@ class Composer:
         else:
             parent.keys[key.value], parent.values[key.value] = key, node
 
-    def _check_properties(self, event: Any) -> None:
-        if getattr(event, "style", "") == '"':
-            escaped = FORBIDDEN.search(event.value)
-            if escaped is not None:
-                problem, remedy = forbidden(escaped)
-                if ord(escaped.group()) < 0x20:
-                    remedy = "write '/' between folders, and '\\\\' for '\\' in double quotes"
-                self._refuse(event, problem, remedy)
-        if event.anchor is not None and type(event) is not yaml.AliasEvent:
+    def _check_escapes(self, event: Any) -> None:
+        escaped = FORBIDDEN.search(event.value)
+        if escaped is not None:
+            problem, remedy = forbidden(escaped)
+            if ord(escaped.group()) < 0x20:
+                remedy = "write '/' between folders, and '\\\\' for '\\' in double quotes"
+            self._refuse(event, problem, remedy)
+
+    def _refuse_properties(self, event: Any) -> None:
+        if type(event) is yaml.AliasEvent:  # it has been refused
+            return
+        if event.anchor is not None:
             self._refuse(event, f"the anchor {quoted('&' + event.anchor)} is not allowed", "leave it out")
-        if getattr(event, "tag", None) is not None:
+        if event.tag is not None:
             remedy = "leave it out, or put a text that begins with '!' in quotes"
             tag = event.tag.replace("tag:yaml.org,2002:", "!!")
             self._refuse(event, f"the tag {quoted(tag)} is not allowed", remedy)

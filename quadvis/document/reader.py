@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Iterator
 from typing import Any
 
 import yaml
@@ -139,13 +140,18 @@ def _compose(text: str, position: Position, faults: Faults) -> YamlNode:
         apart += faults
         try:
             composer = Composer(position, apart, text, lists, repaired=repaired)
-            root = composer.compose(yaml.parse(hide_lists(text, lists), Loader=_Loader))
+            root = composer.compose(_events(hide_lists(text, lists)))
         except (yaml.YAMLError, MisreadError):
             pass
         else:
             faults[:] = apart
             return root
-    return Composer(position, faults, text, repaired=repaired).compose(yaml.parse(text, Loader=_Loader))
+    return Composer(position, faults, text, repaired=repaired).compose(_events(text))
+
+
+def _events(text: str) -> Iterator[Any]:
+    """Return the parser's events; the call behind the last event returns None."""
+    return iter(_Loader(text).get_event, None)
 
 
 def _line_column(text: str, at: int) -> tuple[int, int]:

@@ -59,11 +59,15 @@ def meant(character: str) -> str | None:
 
 def odd_characters(text: str, start: int = 0, end: int | None = None) -> Iterator[tuple[int, str]]:
     """Yield the offset of each character of a text that looks like ASCII, and the character."""
-    if text.isascii() and "\t" not in text:
+    if _is_plain(text):
         return
     for match in _CANDIDATE.finditer(text, start, len(text) if end is None else end):
         if meant(match.group()) is not None:
             yield match.start(), match.group()
+
+
+def _is_plain(text: str) -> bool:
+    return text.isascii() and "\t" not in text
 
 
 def cleaned(text: str) -> str:
@@ -75,6 +79,8 @@ def cleaned(text: str) -> str:
 
 def first_odd(text: str) -> str | None:
     """Return the first odd character of a text, or None."""
+    if _is_plain(text):
+        return None
     return next((char for _, char in odd_characters(text)), None)
 
 

@@ -6,8 +6,7 @@ as a traceback. A check reports all faults together: it collects them in `Faults
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, NamedTuple, ParamSpec, TypeVar
 
@@ -180,16 +179,26 @@ class Faults(list[Fault]):
         """Say whether a fault at a place is kept."""
         return any(fault.place == place for fault in self)
 
-    @contextmanager
-    def about(self, subject: str) -> Iterator[None]:
+    def about(self, subject: str) -> _About:
         """Name the subject of every fault added inside: `with faults.about("block 'velocity'"): ...`."""
-        before, self.subject = self.subject, subject
-        try:
-            yield
-        finally:
-            self.subject = before
+        return _About(self, subject)
 
     def check(self) -> None:
         """Raise `DiagramError` if there is any fault."""
         if self:
             raise DiagramError(self)
+
+
+class _About:
+    """The subject of faults inside a `with` statement."""
+
+    __slots__ = ("before", "faults", "subject")
+
+    def __init__(self, faults: Faults, subject: str) -> None:
+        self.faults, self.subject = faults, subject
+
+    def __enter__(self) -> None:
+        self.before, self.faults.subject = self.faults.subject, self.subject
+
+    def __exit__(self, *_: object) -> None:
+        self.faults.subject = self.before

@@ -113,7 +113,7 @@ def test_an_error_without_a_place_is_a_fault_too(monkeypatch: pytest.MonkeyPatch
     def broken(*args: Any, **kwargs: Any) -> Iterator[Any]:
         raise yaml.YAMLError("no words of ours")
 
-    monkeypatch.setattr(yaml, "parse", broken)
+    monkeypatch.setattr(reader, "_events", broken)
     assert said("a: 1") == [
         "1:1: this cannot be read; check quotes, brackets and indentation here and in the line above"
     ]

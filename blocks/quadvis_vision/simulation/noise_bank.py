@@ -28,9 +28,10 @@ class NoiseBank(NamedTuple):
 def noise_bank(sigma: float, size: int) -> NoiseBank:
     """Return the noise of a camera; all cameras of one size and noise share it, so nobody can write to it."""
     # numpy promises never to change the numbers of RandomState, so a run repeats on other versions too.
-    noise = np.rint(sigma * np.random.RandomState(0).standard_normal(size + NOISE_STARTS))
-    more, less = np.clip(noise, 0, 255).astype(np.uint8), np.clip(-noise, 0, 255).astype(np.uint8)
-    both = more - less
+    noise = sigma * np.random.RandomState(0).standard_normal(size + NOISE_STARTS)
+    levels = np.rint(noise, out=noise).clip(-255, 255, out=noise).astype(np.int16)
+    more, less = levels.clip(min=0).astype(np.uint8), (-levels).clip(min=0).astype(np.uint8)
+    both = levels.astype(np.uint8)
     for bank in (more, less, both):
         bank.flags.writeable = False
     return NoiseBank(more, less, both, max(int(more.max()), int(less.max())))
