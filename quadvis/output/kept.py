@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.errors import QuadvisError, quoted
-from quadvis.output.log_reader import read_log
 from quadvis.output.recording import RecordedBlock, Recording, Slots
 
 ALL = "*"
@@ -125,6 +124,8 @@ class RunSignals(Recording):
                 raise QuadvisError(
                     f"{problem}; keep the rows of {quoted(path)} in memory, or the log as it is"
                 )
+            from quadvis.output.log_reader import read_log  # most runs have no need of it
+
             self._read = read_log(self._log)
         return self._read.arrays(self.blocks[block].path)
 

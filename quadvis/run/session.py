@@ -22,7 +22,6 @@ from quadvis.engine.taps import Tap
 from quadvis.graph.graph import Node
 from quadvis.native.choice import AUTO, PYTHON, Announce, Choice, choose, use
 from quadvis.output.kept import ALL, RowJudge, RunSignals
-from quadvis.output.log import PORTS, LogWriter
 from quadvis.output.recording import RecordedBlock, RecordedPort, Recording
 from quadvis.output.statistics import finite
 from quadvis.output.stretch import NANOSECONDS
@@ -31,6 +30,7 @@ from quadvis.version import __version__
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
+    from quadvis.output.log import LogWriter
 
 Progress = Callable[[float, float], None]  # simulated time reached, wall time spent (s)
 PYTHON_ONLY = Choice(PYTHON)
@@ -168,7 +168,7 @@ def run(
     wall, cpu = time.perf_counter(), time.process_time()
     with ExitStack() as stack:
         stack.enter_context(diagram.guarded(log))
-        writer = stack.enter_context(LogWriter(log, recorded, metadata(diagram))) if log is not None else None
+        writer = stack.enter_context(_writer(log, recorded, diagram)) if log is not None else None
         judges = []
         for index, node in enumerate(logged):
             judge = RowJudge(recorded[index], judging)
@@ -187,6 +187,12 @@ def run(
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
     lost = writer.loss if writer else ""
     return Result(diagram, signals, outcome, diagram.duration, wall, cpu, lost, choice)
+
+
+def _writer(log: str | Path, recorded: Sequence[RecordedBlock], diagram: Diagram) -> LogWriter:
+    from quadvis.output.log import LogWriter  # only a run with a log waits for this import
+
+    return LogWriter(log, recorded, metadata(diagram))
 
 
 def _takers(index: int, signals: RunSignals, writer: LogWriter | None, judge: RowJudge) -> list[Taker]:
@@ -252,6 +258,8 @@ def _fields(node: Node) -> tuple[RecordedPort, ...]:
 
 def metadata(diagram: Diagram) -> dict[str, str]:
     """Return the facts of a run for its log as texts; see ``quadvis.output.log``."""
+    from quadvis.output.log import PORTS
+
     return {
         "quadvis": __version__,
         "name": diagram.name,
