@@ -2,20 +2,19 @@
 
 # Ctrl-C may come while the modules below are still being imported.
 try:
-    import atexit
     import gc
     import os
 
     # The objects made at the start are no garbage; collecting garbage would take a twentieth of the start.
     gc.disable()
-    # At its end Python would look for garbage among all objects twice; the system takes the memory anyway.
-    atexit.register(gc.freeze)
     # One BLAS thread: matrices are small here, and a pool of threads costs more than importing numpy.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
     from quadvis.machine.exits import listen
+    from quadvis.machine.garbage import uncollected_at_exit
 
     listen()
+    uncollected_at_exit()
 
     from quadvis.cli import main
 except KeyboardInterrupt:

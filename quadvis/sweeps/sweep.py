@@ -23,7 +23,6 @@ from quadvis.machine.files import PLOT, Claim, check_output
 from quadvis.native.choice import AUTO, Announce, choose
 from quadvis.sweeps.axes import PARAMS, SEED, VARIANT, Axis, Over, points, read_axes
 from quadvis.sweeps.grid import Grid
-from quadvis.sweeps.picture import draw
 from quadvis.sweeps.pool import perform_all, processors
 from quadvis.sweeps.table import FAILURE, HASH, PASSED, WALL, Table, read_rows, table_kind
 from quadvis.sweeps.worker import Configuration, Job, Quantity, Row, diagram_of, quantities
@@ -100,6 +99,8 @@ def sweep(
             raise
     table = collection.table()
     if plot is not None:
+        from quadvis.sweeps.picture import draw  # a sweep without a plot does not wait for this import
+
         draw(table, Path(plot), grid.inputs)
     return table
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from quadvis.errors import QuadvisError
 from quadvis.errors.caller import IS_COMMAND
+from quadvis.machine.garbage import uncollected_at_exit
 from quadvis.machine.interrupts import leave_to_parent
 from quadvis.output.statistics import COUNT, FINAL
 
@@ -164,6 +165,7 @@ def begin(is_command: bool) -> None:
     """Prepare a worker process, for a sweep that a command or Python has asked for."""
     IS_COMMAND.set(is_command)
     leave_to_parent()
+    uncollected_at_exit()
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
