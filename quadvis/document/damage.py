@@ -10,7 +10,7 @@ The file is long because it holds one look for each way in which a text is no YA
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from quadvis.document.scan import Scan
 from quadvis.errors import counted
@@ -35,8 +35,7 @@ STAND_INS = {":": "\ue001", "[": "\ue002", "]": "\ue003", ",": "\ue004", "@": "\
 ORIGINALS = str.maketrans({stand_in: sign for sign, stand_in in STAND_INS.items()})
 
 
-@dataclass(frozen=True)
-class Trouble:
+class Trouble(NamedTuple):
     """A fault at an offset of the text; ``repaired`` is the text for reading on, None if no repair exists."""
 
     at: int

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isnan
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,7 @@ NOT_FINITE_OUTPUT = "output"
 NOT_FINITE_STATE = "state"
 
 
-@dataclass(frozen=True)
-class Stop:
+class Stop(NamedTuple):
     """Why an executor stopped at a tick: the exception of a block's method, or numbers that are not finite.
 
     ``blocks`` are the numbers of the blocks that ran, or that alone which failed.

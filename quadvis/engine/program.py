@@ -38,8 +38,7 @@ class Op(NamedTuple):
     targets: tuple[Slot, ...]
 
 
-@dataclass(frozen=True)
-class TaskProgram:
+class TaskProgram(NamedTuple):
     """The calls of the blocks of one rate at each of their ticks, phase by phase.
 
     The task is due at tick ``offset`` and then at every ``every`` ticks. ``delays``: copies of outputs of one
@@ -68,8 +67,7 @@ class TaskProgram:
         return {"read": self.reads, "output": self.outputs, "write": self.writes, "update": self.updates}
 
 
-@dataclass(frozen=True)
-class Tunable:
+class Tunable(NamedTuple):
     """A parameter that may change between two ticks of a run."""
 
     block: int

@@ -8,7 +8,7 @@ third-order formula of Bogacki and Shampine, ode2 Heun's, ode4 the classical one
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,7 @@ Vector = NDArray[np.float64]
 Rates = Callable[[float, Vector], Vector]  # the derivative of a state at a time; a fresh array each time
 
 
-@dataclass(frozen=True)
-class Tableau:
+class Tableau(NamedTuple):
     """An explicit Runge-Kutta formula."""
 
     nodes: tuple[float, ...]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +30,7 @@ class Tap(ABC):
             self.take(tick, memoryview(row).cast("B"))
 
 
-@dataclass(frozen=True)
-class Observer:
+class Observer(NamedTuple):
     """Something to do at the ticks of a task, with the memory as it is between outputs and updates."""
 
     task: str

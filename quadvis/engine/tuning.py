@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from quadvis.block import Block, ParameterError
 from quadvis.engine.memory import Memory
@@ -12,8 +11,7 @@ from quadvis.engine.program import Program
 from quadvis.errors import sentence, suggestion
 
 
-@dataclass(frozen=True)
-class Change:
+class Change(NamedTuple):
     """A parameter that took a new value before a tick."""
 
     tick: int

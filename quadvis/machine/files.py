@@ -16,11 +16,10 @@ import stat
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 from quadvis.errors import QuadvisError
 
@@ -32,8 +31,7 @@ Content = bytes | str | Callable[[BinaryIO], object]  # or a function that write
 Identity = tuple[int, int]  # device and number of a file
 
 
-@dataclass(frozen=True)
-class Kind:
+class Kind(NamedTuple):
     """A kind of file: a phrase such as "the log", and the marks of such files.
 
     Files of the kind begin with one of `heads`, and contain `pattern` (a regular expression, ^ at each line)

@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +37,7 @@ PYTHON_ONLY = Choice(PYTHON)
 SLICE = 0.1  # s of wall time between two calls of the progress; Ctrl-C and rows for the log wait no longer
 
 
-@dataclass(frozen=True)
-class Taker:
+class Taker(NamedTuple):
     """A consumer of a block's rows: ``one`` takes a stamp (ns) and a row, ``many`` those of N rows."""
 
     one: Callable[[int, bytes], object]

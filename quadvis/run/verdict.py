@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,8 +51,7 @@ class Measured:
         return self.selection.stretch.lack(self.found)
 
 
-@dataclass(frozen=True)
-class Verdict:
+class Verdict(NamedTuple):
     """An expectation and the value found, in the unit of the elements; NaN if no value was found.
 
     ``lack`` says why the run cannot be judged: samples of the stretch are missing.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,8 +55,7 @@ class Limit(NamedTuple):
     shown: Unit
 
 
-@dataclass(frozen=True)
-class Questions:
+class Questions(NamedTuple):
     """All that is asked: time (s) of the operating point, cuts, limits; ``context`` is for more of them."""
 
     context: Context

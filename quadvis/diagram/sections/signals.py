@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from quadvis.diagram.draft import misfit
 from quadvis.diagram.requirements import Selection
@@ -33,8 +33,7 @@ class Asked(Generic[Item]):
     written: Any = None
 
 
-@dataclass(frozen=True)
-class Signal:
+class Signal(NamedTuple):
     """A signal that is logged, over the whole run, with its scalar kind."""
 
     selection: Selection
@@ -100,4 +99,4 @@ def read_stretch(fields: YamlMap, context: Context) -> Signal | Unknown:
     selection = found.selection
     of = context.faults.collect(fields["of"].quantity, selection.unit, bare=False) if "of" in fields else None
     stretch = replace(selection.stretch, after=after or Fraction(0), before=before)
-    return replace(found, selection=replace(selection, of=of or 0.0, stretch=stretch))
+    return found._replace(selection=replace(selection, of=of or 0.0, stretch=stretch))
