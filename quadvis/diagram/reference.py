@@ -10,7 +10,7 @@ from quadvis.graph.graph import Index
 from quadvis.graph.names import read_name
 
 
-@dataclass(frozen=True)
+@dataclass
 class Reference:
     """A signal as a file names it, with an index if there is one."""
 

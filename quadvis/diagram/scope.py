@@ -41,7 +41,7 @@ class Scope:
         return f"block '{self.prefix[:-1]}'"
 
 
-@dataclass(frozen=True)
+@dataclass
 class FlatBlock:
     """One block of the catalogue under its full path."""
 
