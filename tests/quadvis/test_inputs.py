@@ -17,7 +17,7 @@ import quadvis
 from quadvis.api import Diagram, load_text
 from quadvis.block import Block, Frame, Out, Param, ParameterError
 from quadvis.errors import QuadvisError
-from quadvis.machine.inputs import file_digest, note_digest, noted_inputs, open_input, read_input
+from quadvis.machine.inputs import file_digest, note_digest, noted_inputs, open_input, read_input, read_once
 from quadvis.output.log_reader import read_log
 from quadvis.sweeps import sweep as sweeping
 from quadvis.sweeps import worker
@@ -370,6 +370,25 @@ def test_files_that_are_read_are_noted_once(tmp_path: Path) -> None:
             read_input(path)
     assert outer == {str(path): digest, "c": "xyz"} and list(inner) == ["b"]
     assert read_input(path) == b"other"
+
+
+def test_what_a_function_reads_from_a_file_is_shared_while_inputs_are_noted(tmp_path: Path) -> None:
+    read: list[str] = []
+
+    def contents(path: str) -> list[bytes]:
+        read.append(path)
+        return [read_input(path)]
+
+    path = str(tmp_path / "a")
+    with noted_inputs() as found:
+        with pytest.raises(QuadvisError):
+            read_once(contents, path)
+        Path(path).write_bytes(b"x")
+        first = read_once(contents, path)
+        assert read_once(contents, path) is first and first == [b"x"]
+        assert read_once(lambda path: contents(path) * 2, path) == [b"x", b"x"]  # another function
+    assert list(found) == [path] and read == [path] * 3
+    assert read_once(contents, path) is not read_once(contents, path)
 
 
 def test_every_thread_notes_for_itself(tmp_path: Path) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gc
+import subprocess
+import sys
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
@@ -139,6 +141,24 @@ def test_variants_share_the_blocks_that_they_have_in_common(
     assert made["ShapeFlow.settle"] == 2  # a source, and a gain
 
 
+def test_a_variant_takes_a_block_that_an_earlier_one_had(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "stage.yaml").write_text(PART)
+    rows = "  slot: {block: sources.constant, slot: true, rate: fast, with: {value: 1}}\n"
+    part = "{part: stage.yaml, rate: fast, with: {factor: 3}, in: {u: slot.y}}"
+    rows += f"  stage: {part.replace('{', '{slot: true, ', 1)}\n"
+    other = "{part: stage.yaml, with: {factor: 4}}"
+    variants = (
+        f"variants:\n  a: {{slots: {{stage: {other}}}}}\n  b: {{slots: {{slot: {{block: sources.sine}}}}}}\n"
+    )
+    path = tmp_path / "d.yaml"
+    path.write_text(HEAD + rows + variants)
+    made = calls(monkeypatch, (Block, "check"))
+    check(path)
+    assert made["Block.check"] == 3 + 1 + 1  # the gain of "a", the sine of "b"
+
+
 def test_a_fault_in_one_of_many_equal_blocks_is_that_block_s() -> None:
     text = chain(200).replace("in: {u: b120.y}", "in: {u: 2 s}")
     end = "  end: {block: signal.sum, rate: fast, in: {a: b199.y, b: b119.y}}\n"
@@ -155,6 +175,16 @@ def test_loading_leaves_the_garbage_collector_as_it_was(text: str) -> None:
         with suppress(DiagramError):
             Engine(load_text(text).graph)
         assert gc.isenabled() == before
+
+
+def test_the_end_of_a_process_collects_no_garbage() -> None:
+    code = (
+        "import atexit, gc; from quadvis.machine.garbage import uncollected_at_exit\n"
+        "atexit.register(lambda: print(gc.get_freeze_count() > 1000, end=''))\n"  # the last to be called
+        "uncollected_at_exit()"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout == "True"
 
 
 @pytest.mark.slow
