@@ -65,17 +65,17 @@ class Catalogue:
             raise CatalogueError(f"'{name}' is not a block name", remedy)
         if match["library"]:
             return self._in_library(match["library"], match["path"], name)
-        own = self._own_file(match["path"])
-        standard = _exists(f"{STANDARD}.{match['path']}")
-        if own and standard:
+        own, standard = self._own_file(match["path"]), f"{STANDARD}.{match['path']}"
+        if own and _exists(standard):
             raise CatalogueError(f"'{name}' is in the standard library and in {own}", "rename the file")
         if own:
             self._permit(own, name)
             return _block_class(_load_file(own, name), name)
-        if not standard:
+        module = _import(standard, name)
+        if module is None:
             remedy = suggestion(name, self.names()) or "quadvis list shows all"
             raise CatalogueError(f"there is no block '{name}'", remedy)
-        return _block_class(_import(f"{STANDARD}.{match['path']}", name), name)
+        return _block_class(module, name)
 
     def load_all(self) -> tuple[dict[str, type[Block]], list[str]]:
         """Return the classes of all blocks by name, and a sentence for each that cannot be loaded."""
@@ -118,11 +118,11 @@ class Catalogue:
         packages = _libraries()
         if library not in packages:
             raise CatalogueError(f"there is no library '{library}'", suggestion(library, packages))
-        module = f"{packages[library]}.{path}"
-        if not _exists(module):
+        module = _import(f"{packages[library]}.{path}", name)
+        if module is None:
             names = [f"{library}:{known}" for known in _walk(packages[library])]
             raise CatalogueError(f"there is no block '{name}'", suggestion(name, names))
-        return _block_class(_import(module, name), name)
+        return _block_class(module, name)
 
 
 def _libraries() -> dict[str, str]:
@@ -161,11 +161,15 @@ def _walk(package: str, prefix: str = "") -> Iterator[str]:
             yield f"{prefix}{module.name}"
 
 
-def _import(module: str, name: str) -> ModuleType:
+def _import(module: str, name: str) -> ModuleType | None:
+    """Return the module of a block; None if there is none, or if it is a package."""
     try:
-        return importlib.import_module(module)
+        found = importlib.import_module(module)
     except Exception as error:
+        if not _exists(module):
+            return None
         raise CatalogueError(f"block '{name}' cannot be loaded: {type(error).__name__}: {error}") from error
+    return None if hasattr(found, "__path__") else found
 
 
 def _load_file(file: Path, name: str) -> ModuleType:
