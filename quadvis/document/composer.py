@@ -8,7 +8,15 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-import yaml
+from yaml import (
+    AliasEvent,
+    DocumentStartEvent,
+    MappingEndEvent,
+    MappingStartEvent,
+    ScalarEvent,
+    SequenceEndEvent,
+    SequenceStartEvent,
+)
 
 from quadvis.document.damage import ORIGINALS
 from quadvis.document.keys import mend_fraction, refuse_repeated, split_pair, wrong_key
@@ -57,8 +65,15 @@ class Position:
 
     def of(self, line: int, column: int) -> tuple[str, int, int]:
         """Return file, line and column."""
-        moved = sum(line == other and column > start for other, start in self.blanks) if self.blanks else 0
+        moved = sum(line == other and column > start for other, start in self.blanks)
         return self.name, line + 1, column + 1 - moved
+
+    def of_event(self, event: Any) -> tuple[str, int, int]:
+        """Return where an event of the parser begins."""
+        mark = event.start_mark
+        if self.blanks:
+            return self.of(mark.line, mark.column)
+        return self.name, mark.line + 1, mark.column + 1
 
 
 @dataclass
@@ -96,20 +111,20 @@ class Composer:
         """Return the root; raise an error for an empty file."""
         for event in events:
             kind = type(event)
-            if kind is yaml.ScalarEvent:
+            if kind is ScalarEvent:
                 if event.style == '"':
                     self._check_escapes(event)
                 self._add(self._scalar(event), event)
-            elif kind is yaml.MappingStartEvent:
-                self._open(YamlMap({}, {}, *self._position(event)), event)
-            elif kind is yaml.SequenceStartEvent:
-                self._open(YamlList([], *self._position(event)), event)
-            elif kind is yaml.MappingEndEvent or kind is yaml.SequenceEndEvent:
+            elif kind is MappingStartEvent:
+                self._open(YamlMap({}, {}, *self.position.of_event(event)), event)
+            elif kind is SequenceStartEvent:
+                self._open(YamlList([], *self.position.of_event(event)), event)
+            elif kind is MappingEndEvent or kind is SequenceEndEvent:
                 self._close()
-            elif kind is yaml.AliasEvent:
+            elif kind is AliasEvent:
                 self._refuse(event, f"the alias {quoted('*' + event.anchor)} is not allowed", "write it out")
-                self._add(YamlScalar("", True, *self._position(event)), event)
-            elif kind is yaml.DocumentStartEvent:
+                self._add(YamlScalar("", True, *self.position.of_event(event)), event)
+            elif kind is DocumentStartEvent:
                 self.documents += 1
                 if self.documents > 1:
                     raise self._fatal(event, "a second document begins here", "keep one document in a file")
@@ -121,14 +136,10 @@ class Composer:
             )
         return self.root
 
-    def _position(self, event: Any) -> tuple[str, int, int]:
-        mark = event.start_mark
-        return self.position.of(mark.line, mark.column)
-
     def _scalar(self, event: Any) -> YamlScalar | Numbers:
         value, plain = event.value, not event.style
         if self.is_ascii:
-            return YamlScalar(value, plain, *self._position(event))
+            return YamlScalar(value, plain, *self.position.of_event(event))
         if self.lists and MARK in value:
             mark = event.start_mark
             if value != MARK or not plain or (mark.line, mark.column) not in self.lists:
@@ -137,12 +148,12 @@ class Composer:
             self.nodes += found.count
             if self.nodes >= self.most:
                 raise MisreadError  # read it again element by element, to find where it exceeds the limit
-            return Numbers(found, source, *self._position(event))
+            return Numbers(found, source, *self.position.of_event(event))
         if value.isascii() and "\t" not in value:
-            return YamlScalar(value, plain, *self._position(event))
+            return YamlScalar(value, plain, *self.position.of_event(event))
         if self.repaired:
             value = value.translate(ORIGINALS)
-        return YamlScalar(value, plain, *self._position(event), odd=self._odd(event))
+        return YamlScalar(value, plain, *self.position.of_event(event), odd=self._odd(event))
 
     def _odd(self, event: Any) -> Odd | None:
         """Return the first character of a text that looks like an ASCII one, with its place."""
@@ -163,10 +174,10 @@ class Composer:
         return LINE_END.split(self.text)
 
     def _refuse(self, event: Any, problem: str, remedy: str) -> None:
-        self.faults.add(Place(*self._position(event)), problem, remedy)
+        self.faults.add(Place(*self.position.of_event(event)), problem, remedy)
 
     def _fatal(self, event: Any, problem: str, remedy: str) -> DiagramError:
-        return DiagramError([*self.faults, Fault(Place(*self._position(event)), "", problem, remedy)])
+        return DiagramError([*self.faults, Fault(Place(*self.position.of_event(event)), "", problem, remedy)])
 
     def _open(self, node: YamlList | YamlMap, event: Any) -> None:
         self._add(node, event)
@@ -225,7 +236,7 @@ class Composer:
             self._refuse(event, problem, remedy)
 
     def _refuse_properties(self, event: Any) -> None:
-        if type(event) is yaml.AliasEvent:  # it has been refused
+        if type(event) is AliasEvent:  # it has been refused
             return
         if event.anchor is not None:
             self._refuse(event, f"the anchor {quoted('&' + event.anchor)} is not allowed", "leave it out")
@@ -236,7 +247,7 @@ class Composer:
 
     def _key(self, node: YamlNode, event: Any) -> YamlScalar:
         """Return the key for the next value, or `_NO_KEY` if the key is refused."""
-        if type(event) is yaml.AliasEvent:
+        if type(event) is AliasEvent:
             return _NO_KEY
         problem, remedy = wrong_key(node)
         if isinstance(node, YamlScalar) and not problem:
