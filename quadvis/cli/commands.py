@@ -6,7 +6,6 @@ The file is long because it has all commands, each of a few lines.
 from __future__ import annotations
 
 import argparse
-import gc
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from quadvis.cli.default_places import default_name, log_path, runs_folder
 from quadvis.errors import Fault, QuadvisError, RunError, counted
 from quadvis.machine.files import SVG, Kind, write_output
+from quadvis.machine.garbage import collected_from_now_on
 
 if TYPE_CHECKING:
     from quadvis.library.catalogue import Catalogue, OwnBlocks
@@ -53,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
     diagram = _load(options, stop_time=options.stop_time, seed=options.seed)
     log = log_path(options.log, diagram)
     _print_warnings(diagram, options)
-    gc.enable()
+    collected_from_now_on()
     try:
         with ProgressLine(diagram.duration) as progress:
             result = run_diagram(
@@ -88,7 +88,7 @@ def sweep(options: argparse.Namespace) -> int:
     plot = table_path.parent / f"{table_path.stem}.png" if options.plot is None else Path(options.plot)
     if options.plot and plot.suffix != ".png":
         raise QuadvisError(f"cannot write the plot '{plot}': give a name that ends in .png")
-    gc.enable()
+    collected_from_now_on()
     with SweepLine() as progress:
         table = run_sweep(
             options.file, over, variant=one,

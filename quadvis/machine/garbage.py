@@ -20,6 +20,13 @@ def uncollected() -> Iterator[None]:
             gc.enable()
 
 
+def collected_from_now_on() -> None:
+    """Collect garbage again if the collector has been at rest, but never among the objects made by now."""
+    if not gc.isenabled():
+        gc.freeze()
+        gc.enable()
+
+
 def uncollected_at_exit() -> None:
     """Collect no garbage when the process ends: Python would look at all objects twice, for some 40 ms."""
     atexit.register(gc.freeze)

@@ -177,6 +177,16 @@ def test_loading_leaves_the_garbage_collector_as_it_was(text: str) -> None:
         assert gc.isenabled() == before
 
 
+def test_garbage_is_collected_again_but_not_among_what_was_made_at_rest() -> None:
+    code = (
+        "import gc; from quadvis.machine.garbage import collected_from_now_on as again\n"
+        "again(); enabled = gc.get_freeze_count(); gc.disable(); again()\n"
+        "print(enabled, gc.get_freeze_count() > 1000, gc.isenabled())"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.split() == ["0", "True", "True"]
+
+
 def test_the_end_of_a_process_collects_no_garbage() -> None:
     code = (
         "import atexit, gc; from quadvis.machine.garbage import uncollected_at_exit\n"
