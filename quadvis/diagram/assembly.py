@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from types import MappingProxyType
 
+from quadvis.block import Out
 from quadvis.diagram.build import Builder, Made
 from quadvis.diagram.check import WireCheck
 from quadvis.diagram.diagram import Diagram
@@ -17,7 +18,6 @@ from quadvis.diagram.keys import RUN_SECTIONS
 from quadvis.diagram.loader import read_group, read_part
 from quadvis.diagram.outputs import check_writers
 from quadvis.diagram.parts import Parts
-from quadvis.diagram.sections.blocks import BLOCKS
 from quadvis.diagram.sections.context import Context
 from quadvis.diagram.sections.files import FILES, check_files
 from quadvis.diagram.sections.seed import SEED
@@ -26,7 +26,7 @@ from quadvis.diagram.sections.stop_time import STOP_TIME
 from quadvis.diagram.sections.tasking import TASKING
 from quadvis.diagram.sections.variants import VARIANTS
 from quadvis.diagram.settings import ParameterFile, Settings
-from quadvis.diagram.slots import Outputs, check_slots, fill_slots
+from quadvis.diagram.slots import fill_slots, stand_ins
 from quadvis.diagram.spec import FileSpec
 from quadvis.diagram.ticks import check_ticks
 from quadvis.diagram.times import read_duration
@@ -60,7 +60,7 @@ class Assembly:
         self.cases: Cases = {}
         self._warned = 0  # files whose unused parameters are reported
         self._params = [path for file in params for path in (file.path, *file.bases)]
-        self._base: Wiring | None = None  # of the diagram without a variant
+        self._bases: dict[int, Wiring] = {}  # of the diagrams on which others stand, by identity
 
     def diagram(
         self,
@@ -74,9 +74,7 @@ class Assembly:
         filled = fill_slots(spec, variant, faults)
         expansion = Expansion(filled, self.catalogue, settings, self.parts, self.groups, faults, self.kept)
         wiring = Wiring(expansion, faults)
-        promised = self._promised(filled)
-        given = {slot: wiring.outputs(slot) for slot in promised if expansion.knows(slot)}
-        wiring.unknown = check_slots(spec, filled, promised, given, faults)
+        wiring.stand_ins = stand_ins(filled, self._outputs)
         wiring.check_ports(expansion.root)
         builder = Builder(spec, expansion, wiring, self.made, faults)
         drafts = builder.drafts()
@@ -100,10 +98,10 @@ class Assembly:
         for section in RUN_SECTIONS:
             with faults.about(section.key):
                 context.values[section] = section.read(spec.nodes.get(section.key), context)
-        check_files(spec[FILES], spec.path.parent, faults)
+        check_files(spec[FILES], faults)
         seed = spec[SEED] if seed is None else _seed(seed, faults)
         listing = tuple(draft.path for draft in drafts)
-        sources = (spec.path, *self.parts.files, *self.groups.files, *self._params)
+        sources = (*spec.paths, *self.parts.files, *self.groups.files, *self._params)
         check_writers(drafts, sources, faults)
         ports = {name: wire_text(source) for name, source in wiring.ports()}
         return Diagram(
@@ -125,15 +123,12 @@ class Assembly:
         if not self.faults:
             self.groups.warn_unused()
 
-    def _promised(self, filled: FileSpec) -> Outputs:
-        """Return the outputs of the blocks in the slots that a variant fills."""
-        spec = self.spec
-        changed = [name for name, block in spec[BLOCKS].items() if filled[BLOCKS][name] is not block]
-        if changed and self._base is None:
-            self._base = Wiring(
-                Expansion(spec, self.catalogue, {}, self.parts, self.groups, Faults(), self.kept), Faults()
-            )
-        return {slot: self._base.outputs(slot) for slot in changed if self._base is not None}
+    def _outputs(self, spec: FileSpec, name: str) -> Mapping[str, Out]:
+        """Return the outputs of a block of a diagram on which others stand, as far as they are right."""
+        if id(spec) not in self._bases:
+            expansion = Expansion(spec, self.catalogue, {}, self.parts, self.groups, Faults(), self.kept)
+            self._bases[id(spec)] = Wiring(expansion, Faults())
+        return self._bases[id(spec)].outputs(name)
 
 
 def _stop_time(spec: FileSpec, given: str | float | None, faults: Faults) -> Fraction:

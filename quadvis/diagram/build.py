@@ -198,7 +198,7 @@ class Builder:
         text = node.value if isinstance(node, YamlScalar) and not param.is_text else None
         if text is not None and (param, text) in self._right:
             return self._right[param, text]
-        read = self.faults.read(read_parameter, param, node)
+        read = self.faults.read(read_parameter, param, node, self.spec.path)
         if known(read):
             try:
                 param.accept(read[0])

@@ -22,7 +22,7 @@ def _blocks(spec: FileSpec) -> Iterator[BlockSpec]:
 
 
 def warn_parameters(spec: FileSpec, faults: Faults) -> None:
-    """Warn of parameters that no block of their file uses."""
+    """Warn of parameters of a file that no block there uses; those of its base are not its own."""
     used: set[str] = set()
     for block in _blocks(spec):
         inputs = block.inputs if block.inputs is not None and known(block.inputs) else {}
@@ -32,7 +32,7 @@ def warn_parameters(spec: FileSpec, faults: Faults) -> None:
             if isinstance(node, YamlNode):
                 used |= named_parameters(node)
     for name, value in spec[PARAMS].items():
-        if name not in used and known(value):
+        if name not in used and known(value) and value.file == spec.place.file:
             faults.warn(value.place, f"parameter '{name}' is not used", f"write '${name}' where it belongs")
 
 
@@ -43,7 +43,7 @@ def warn_rates(spec: FileSpec, parts: Parts, faults: Faults) -> None:
     rates = (block.rate for file in (spec, *parts.specs()) for block in _blocks(file))
     used = {rate[0] for rate in rates if rate is not None and known(rate)}
     for name, rate in spec[RATES].items():
-        if known(rate) and name not in used:
+        if known(rate) and name not in used and rate.place.file == spec.place.file:
             faults.warn(
                 rate.place, f"no block runs at the rate '{name}'", "leave it out, or give it to a block"
             )

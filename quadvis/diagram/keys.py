@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from quadvis.diagram.sections.analyse import ANALYSE
+from quadvis.diagram.sections.base import BASE, WITHOUT
 from quadvis.diagram.sections.blocks import BLOCKS
 from quadvis.diagram.sections.context import RunSection
 from quadvis.diagram.sections.expect import EXPECT
@@ -24,7 +25,8 @@ from quadvis.diagram.sections.tasking import TASKING
 from quadvis.diagram.sections.variants import VARIANTS
 
 FILE_SECTIONS: tuple[FileSection[Any], ...] = (
-    FORMAT, NAME, DOC, PARAMS, RATES, SOLVER, TASKING, STOP_TIME, SEED, FILES, BLOCKS, VARIANTS, PORTS,
+    FORMAT, NAME, DOC, BASE, WITHOUT, PARAMS, RATES, SOLVER, TASKING, STOP_TIME, SEED, FILES, BLOCKS,
+    VARIANTS, PORTS,
 )  # fmt: skip
 RUN_SECTIONS: tuple[RunSection[Any], ...] = (LOG, EXPECT, SUMMARY, FIGURES, ANALYSE)
 SECTIONS: tuple[Section[Any], ...] = (*FILE_SECTIONS, *RUN_SECTIONS)

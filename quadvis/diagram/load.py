@@ -9,14 +9,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from quadvis.diagram.assembly import Assembly
+from quadvis.diagram.bases import read_diagram, standing
 from quadvis.diagram.diagram import Diagram
-from quadvis.diagram.loader import read_file, read_text
+from quadvis.diagram.loader import read_text
 from quadvis.diagram.settings import Files, Given, read_settings, setting_texts
 from quadvis.errors import DiagramError, Fault, Faults, Place
 from quadvis.errors.discretion import quoting_only
 from quadvis.library.catalogue import OwnBlocks
 from quadvis.machine.garbage import uncollected
 from quadvis.machine.inputs import noted_inputs
+from quadvis.machine.shipped import shipped_folder
 
 
 def load(
@@ -43,7 +45,7 @@ def load(
     texts = setting_texts(settings)
     with quoting_only(_quotable(path, params, texts)), _reported_once(faults) as digests:
         given, files = read_settings(settings, params, faults)
-        spec = read_file(Path(path), faults)
+        spec = read_diagram(Path(path), faults)
         diagram = Assembly(spec, faults, files, own_blocks).diagram(variant, given, stop_time, seed)
         found = tuple(sorted(set(faults.warnings)))
         return replace(
@@ -58,7 +60,7 @@ def load_text(
     """Load a diagram from a text, such as the resolved one in a log, as if it stood in a file of a folder."""
     faults = Faults()
     with quoting_only([folder]), _reported_once(faults) as digests:
-        spec = read_text(text, Path(folder) / name, faults)
+        spec = standing(read_text(text, Path(folder) / name, faults), faults)
         diagram = Assembly(spec, faults, own_blocks=own_blocks).diagram()
         return replace(diagram, files=digests)
 
@@ -71,7 +73,7 @@ def check(
     quotable = _quotable(path, params, setting_texts(settings))
     with quoting_only(quotable), _reported_once(faults) as digests:
         given, files = read_settings(settings, params, faults)
-        spec = read_file(Path(path), faults)
+        spec = read_diagram(Path(path), faults)
         assembly = Assembly(spec, faults, files, own_blocks)
         diagram = assembly.diagram(settings=given)
         for variant in assembly.variants:
@@ -81,7 +83,8 @@ def check(
 
 
 def _quotable(path: str | Path, params: Files, settings: Sequence[str]) -> Iterator[str | Path]:
-    """Yield the files and folders that faults may quote: the diagram's, and what its user named."""
+    """Yield what faults may quote: the folders of the diagram and of quadvis's own, what the user named."""
+    yield shipped_folder()
     for file in (path, *([params] if isinstance(params, str | os.PathLike) else params)):
         yield Path(file).parent
         yield Path(os.path.realpath(file)).parent

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from quadvis.diagram.keys import FILE_SECTIONS, RUN_SECTIONS, keys
-from quadvis.diagram.sections.header import is_version
+from quadvis.diagram.sections.base import BASE
+from quadvis.diagram.sections.header import FORMAT, NAME, is_version
 from quadvis.diagram.sections.section import DIAGRAM, GROUP, PART, Values
 from quadvis.diagram.spec import FileSpec
 from quadvis.document import YamlMap, YamlNode, parse_yaml, read_yaml
@@ -39,12 +40,20 @@ def _read(path: Path, node: YamlNode | None, faults: Faults, kind: str) -> FileS
     root = faults.collect(node.mapping) if node is not None else None
     if root is None or not is_version(root, faults) or not _is_kind(root, faults, kind):
         return UNKNOWN
-    fields = root.fields(keys(kind, required=True), keys(kind, required=False), faults)
+    fields = _fields(root, kind, faults)
     values = Values()
     for section in FILE_SECTIONS:
         values[section] = section.read(fields.get(section.key) if kind in section.kinds else None, faults)
     nodes = {section.key: fields[section.key] for section in RUN_SECTIONS if section.key in fields}
-    return FileSpec(path, Place(str(path)), root.place, values, nodes)
+    return FileSpec(path, Place(str(path)), root.place, values, nodes, frozenset(fields))
+
+
+def _fields(root: YamlMap, kind: str, faults: Faults) -> YamlMap:
+    """Return the keys of a file; what a diagram must have may come from its base, except format and name."""
+    required, optional = keys(kind, required=True), keys(kind, required=False)
+    fields = root.fields((), (*required, *optional), faults)
+    needed = (FORMAT.key, NAME.key) if BASE.key in fields else required
+    return fields.fields(needed, tuple(fields), faults)
 
 
 def _is_kind(root: YamlMap, faults: Faults, kind: str) -> bool:

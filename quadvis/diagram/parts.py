@@ -10,6 +10,7 @@ from quadvis.diagram.sections.blocks import BlockSpec
 from quadvis.diagram.spec import FileSpec
 from quadvis.errors import UNKNOWN, Faults, Unknown, known
 from quadvis.machine.missing_file import file_trouble
+from quadvis.machine.shipped import named_file
 
 
 class Parts:
@@ -25,7 +26,7 @@ class Parts:
         """Return the file of a part, and its real path."""
         key = block.kind_place.file, block.kind
         if key not in self._located:
-            file = Path(block.kind_place.file).parent / block.kind
+            file = named_file(block.kind, block.kind_place.file)
             self._located[key] = file, os.path.realpath(file)
         return self._located[key]
 

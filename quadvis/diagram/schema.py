@@ -10,8 +10,11 @@ from collections.abc import Mapping
 
 from quadvis.block import Block
 from quadvis.diagram.keys import SECTIONS, keys
+from quadvis.diagram.sections.base import BASE, WITHOUT
 from quadvis.diagram.sections.forms import COMMON, Schema, closed
+from quadvis.diagram.sections.header import FORMAT, NAME
 from quadvis.diagram.sections.params import PARAMS
+from quadvis.diagram.sections.ports import PORTS
 from quadvis.diagram.sections.section import DIAGRAM, GROUP, PART
 from quadvis.diagram.settings import PARAMETERS_KEYS, PARAMETERS_REQUIRED, parameters_schema
 
@@ -34,8 +37,11 @@ def diagram_schema(blocks: Mapping[str, type[Block]]) -> Schema:
             "if": _is_group(top),
             "then": _file(GROUP, top),
             "else": {
-                "required": list(keys(DIAGRAM, required=True)),
-                "if": {"required": ["ports"]},
+                "required": [FORMAT.key, NAME.key],
+                # What a diagram must have may come from its base.
+                "anyOf": [{"required": [BASE.key]}, {"required": list(keys(DIAGRAM, required=True))}],
+                "dependentRequired": {WITHOUT.key: [BASE.key]},
+                "if": {"required": [PORTS.key]},
                 "then": _file(PART, top),
                 "else": _file(DIAGRAM, top),
             },

@@ -26,11 +26,11 @@ from quadvis.document import YamlList, YamlMap, YamlNode, parse_yaml, read_yaml
 from quadvis.errors import UNKNOWN, DiagramError, Faults, Odd, Place, Unknown, known
 from quadvis.errors.caller import as_given
 from quadvis.errors.characters import first_odd
-from quadvis.machine.missing_file import file_trouble
+from quadvis.machine.missing_file import base_trouble
+from quadvis.machine.shipped import named_file
 
 PARAMETERS_REQUIRED = ("quadvis", "name", "set")
 PARAMETERS_KEYS = ("doc", "base")
-MAX_DEPTH = 30  # of files that build on files
 SETTING: Schema = {"pattern": r"^([A-Za-z_][A-Za-z0-9_/]*\.)?[A-Za-z_][A-Za-z0-9_]*$"}
 
 
@@ -108,8 +108,8 @@ def _read_file(
     texts = {key: faults.collect(root[key].text) for key in ("name", "doc", "base") if key in root}
     base = texts.get("base")
     if base is not None:
-        inner = path.parent / base
-        problem, remedy = _wrong_base(inner, base, (*users, os.path.realpath(path)))
+        inner = named_file(base, path)
+        problem, remedy = base_trouble(inner, base, (*users, os.path.realpath(path)))
         if problem:
             faults.add(root["base"].place, problem, remedy)
         else:
@@ -133,15 +133,6 @@ def _is_parameters(root: YamlMap, faults: Faults) -> bool:
     problem = "this is a diagram or a part of one, since it has 'blocks'"
     faults.add(root.keys["blocks"].place, problem, "give a file with 'set: {block.parameter: value}'")
     return False
-
-
-def _wrong_base(path: Path, text: str, users: tuple[str, ...]) -> tuple[str, str]:
-    """Return the problem and the remedy for the base of a parameter file."""
-    if os.path.realpath(path) in users:
-        return f"'{text}' builds on itself", "name another file, or leave 'base' out"
-    if len(users) > MAX_DEPTH:
-        return f"files build on files more than {MAX_DEPTH} deep", "write their values into one"
-    return file_trouble(str(path), text, users)
 
 
 def settings_origin() -> str:

@@ -1,33 +1,37 @@
-"""Variants: other blocks in the slots of a diagram, with the same outputs."""
+"""Blocks in the place of others: in the slots of a variant, and in a diagram that stands on another one.
+
+Such a block must give the outputs that are read, of the same kind.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 from quadvis.block import Out
 from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec
 from quadvis.diagram.sections.variants import VARIANTS, Variants
 from quadvis.diagram.spec import FileSpec
-from quadvis.errors import UNKNOWN, Faults, known, suggestion
-
-Outputs = Mapping[str, Mapping[str, Out]]  # by slot and port
-Pair = tuple[BlockSpec, BlockSpec]  # the block in a slot, and the variant's block for it
+from quadvis.errors import UNKNOWN, Faults, Place, known, suggestion
 
 
-def fill_slots(spec: FileSpec, variant: str | None, faults: Faults) -> FileSpec:
-    """Return the diagram with a variant's blocks in their slots; faults of all variants are reported."""
+def fill_slots(spec: FileSpec, variant: str | None, faults: Faults, place: Place | None = None) -> FileSpec:
+    """Return the diagram with a variant's blocks in their slots; faults of all variants are reported.
+
+    ``place`` is where the variant is named, if a file names it.
+    """
     variants = spec[VARIANTS]
     if variant is not None and variant not in variants:
         remedy = suggestion(variant, variants) or "the diagram has no variants"
-        faults.add(spec.place, f"there is no variant '{variant}'", remedy)
+        faults.add(place or spec.place, f"there is no variant '{variant}'", remedy)
     lineages = {name: _lineage(variants, name, faults) for name in variants}
     blocks = dict(spec[BLOCKS])
     fitting = {name: dict(_fitting(spec, name, faults)) for name in variants}
     for name in reversed(lineages.get(variant or "", [])):
         for slot, (base, block) in fitting[name].items():
-            blocks[slot] = _in_slot(base, block)
-    return replace(spec, values=spec.values.replaced(BLOCKS, blocks))
+            blocks[slot] = in_slot(base, block)
+    return replace(spec, values=spec.values.replaced(BLOCKS, blocks), base=spec)
 
 
 def _lineage(variants: Variants, variant: str, faults: Faults) -> list[str]:
@@ -70,32 +74,43 @@ def _fitting(
             yield slot, (base, block)
 
 
-def _in_slot(base: BlockSpec, block: BlockSpec) -> BlockSpec:
+def in_slot(base: BlockSpec, block: BlockSpec) -> BlockSpec:
     """Return the block for a slot: it has the slot's wires and rate unless it has its own."""
     inputs = base.inputs if block.inputs is None else block.inputs
     return block._replace(slot=base.slot, inputs=inputs, rate=block.rate or base.rate)
 
 
-def check_slots(
-    spec: FileSpec, filled: FileSpec, promised: Outputs, given: Outputs, faults: Faults
-) -> set[tuple[str, str]]:
-    """Report the outputs that a block in a slot lacks, or has of another kind; return slots and ports."""
-    found = set()
-    for slot, outputs in given.items():
-        before, now = spec[BLOCKS][slot], filled[BLOCKS][slot]
-        assert known(before) and known(now)
-        for port, wanted in promised[slot].items():
-            offered = outputs.get(port)
-            problem = ""
-            if offered is None:
-                problem = f"'{now.kind}' has no output '{port}', which '{before.kind}' gives in this slot"
-            elif _differ(offered, wanted):
-                this, that = _words(offered), _words(wanted)
-                problem = f"output '{port}' of '{now.kind}' is {this}, that of '{before.kind}' is {that}"
-            if problem:
-                found.add((slot, port))
-                remedy = "choose one with the same outputs"
-                faults.add(now.kind_place, problem, remedy, subject=f"block '{slot}'")
+class StandIn(NamedTuple):
+    """A block in the place of another one, and the outputs of that one."""
+
+    block: BlockSpec
+    before: BlockSpec
+    promised: Mapping[str, Out]
+
+    def misfit(self, port: str, offered: Out | None, reader: Place) -> str:
+        """Return what is wrong with an output of the block that something reads; "" if nothing is."""
+        now, before, wanted = self.block.kind, self.before.kind, self.promised.get(port)
+        if wanted is None:
+            return ""
+        if offered is None:
+            return f"'{now}' has no output '{port}', which '{before}' gives here and {reader} reads"
+        if _differ(offered, wanted):
+            this, that = _words(offered), _words(wanted)
+            return f"output '{port}' of '{now}' is {this}, that of '{before}' is {that}"
+        return ""
+
+
+def stand_ins(spec: FileSpec, outputs: Callable[[FileSpec, str], Mapping[str, Out]]) -> dict[str, StandIn]:
+    """Return the blocks in the place of others, by name; ``outputs`` gives those of a block of a diagram."""
+    found: dict[str, StandIn] = {}
+    base = spec.base
+    while base is not None:
+        for name, before in base[BLOCKS].items():
+            block = spec[BLOCKS].get(name)
+            if name in found or block is before or block is None or not known(block) or not known(before):
+                continue
+            found[name] = StandIn(block, before, outputs(base, name))
+        base = base.base
     return found
 
 

@@ -12,6 +12,7 @@ from quadvis.diagram.reference import Reference
 from quadvis.diagram.scope import FlatBlock, Scope
 from quadvis.diagram.sections.blocks import BLOCKS, INSIDE, InputSpec
 from quadvis.diagram.sections.ports import PORTS
+from quadvis.diagram.slots import StandIn
 from quadvis.diagram.values import substitute
 from quadvis.document import YamlList, YamlNode
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known, suggestion
@@ -36,11 +37,12 @@ class Source(NamedTuple):
 
 
 class Wiring:
-    """Finds the source of a name. ``unknown`` are blocks and outputs of slots that do not fit."""
+    """Finds the source of a name. ``stand_ins`` are the blocks in the place of others, by name."""
 
     def __init__(self, expansion: Expansion, faults: Faults) -> None:
         self.expansion, self.faults = expansion, faults
-        self.unknown: set[tuple[str, str]] = set()
+        self.stand_ins: Mapping[str, StandIn] = {}
+        self._unfit: set[tuple[str, str]] = set()  # stand-ins and their outputs that are wrong
         # The ports of parts are resolved once, so that a fault in them is reported once.
         self._found: dict[tuple[str, str], Source] = {}
         self._sought: set[tuple[str, str]] = set()
@@ -110,13 +112,25 @@ class Wiring:
         return self._indexed(self._export(child, reference.port)._replace(place=reference.place), reference)
 
     def _offers(self, path: str, reference: Reference, outputs: Mapping[str, object]) -> bool:
-        if (path, reference.port) in self.unknown:
+        if path in self.stand_ins and not self._stands_in(path, reference):
             return False
         if reference.port not in outputs:
             remedy = suggestion(reference.port, outputs) if outputs else "it has none"
             problem = f"block '{reference.block}' has no output '{reference.port}'"
             self.faults.add(reference.place, problem, remedy)
         return reference.port in outputs
+
+    def _stands_in(self, name: str, reference: Reference) -> bool:
+        """Say whether a block in the place of another one gives an output that is read; report it once."""
+        stand_in, port = self.stand_ins[name], reference.port
+        if (name, port) in self._unfit:
+            return False
+        problem = stand_in.misfit(port, self.outputs(name).get(port), reference.place)
+        if problem:
+            remedy = "choose one that gives the outputs that are read"
+            self._unfit.add((name, port))
+            self.faults.add(stand_in.block.kind_place, problem, remedy, subject=f"block '{name}'")
+        return not problem
 
     def _source(self, scope: Scope, given: InputSpec) -> Source:
         if given.source is UNKNOWN:

@@ -14,6 +14,8 @@ _MEANT = {
     "quadvis": "version formatversion schemaversion",
     "name": "title model modelname",
     "doc": "description comment comments help about note notes summary",
+    "base": "extends inherits inherit parent template derivedfrom",
+    "without": "remove removes delete drop exclude disable",
     "params": "parameters parameter constants variables workspace vars with",
     "rates": "sampletimes clocks tasks periods frequencies rate",
     "solver": "integrator solvers",

@@ -6,10 +6,12 @@ import errno
 import os
 import stat
 from collections.abc import Container
+from pathlib import Path
 
 from quadvis.errors import closest, quoted
 from quadvis.machine.files import reason
 
+MAX_BASES = 30  # of a file, its base, the base of that, and so on
 RELATIVE = "a path is relative to the file in which it stands"
 
 
@@ -33,6 +35,15 @@ def file_trouble(name: str, shown: str = "", but: Container[str] = ()) -> tuple[
     if not stat.S_ISDIR(mode):
         return "this is not a file but a pipe or a device", "name a YAML file"
     return (missing, RELATIVE) if shown else ("this is not a file", "name a YAML file")
+
+
+def base_trouble(path: Path, text: str, users: tuple[str, ...]) -> tuple[str, str]:
+    """Return the problem and the remedy for the base of a file; ``users`` are the real paths on top of it."""
+    if os.path.realpath(path) in users:
+        return f"'{text}' builds on itself", "name another file, or leave 'base' out"
+    if len(users) > MAX_BASES:
+        return f"files build on files more than {MAX_BASES} deep", "write their values into one"
+    return file_trouble(str(path), text, users)
 
 
 def _near_file(name: str, shown: str, but: Container[str]) -> str:

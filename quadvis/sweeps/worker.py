@@ -158,7 +158,7 @@ def _limit(diagram: Diagram, selection: Selection, statistic: str) -> float | No
     return None
 
 
-_loaded: tuple[Configuration, Diagram] | None = None
+_loaded: tuple[tuple[Configuration, Mapping[str, str]], Diagram] | None = None
 
 
 def begin(is_command: bool) -> None:
@@ -195,16 +195,17 @@ def perform(job: Job) -> Row:
 
 
 def diagram_of(job: Job) -> Diagram:
-    """Return the diagram of a run; successive runs of one configuration share it.
+    """Return the diagram of a run; successive runs of one configuration and the same files share it.
 
     QuadvisError if a file has changed since the sweep began, because one table is about one diagram.
     """
     global _loaded
-    if _loaded is None or _loaded[0] != job.configuration:
+    asked = job.configuration, job.files
+    if _loaded is None or _loaded[0] != asked:
         loaded = job.configuration.load()
         for path, digest in loaded.files.items():
             if job.files.get(path, digest) != digest:
                 raise QuadvisError(f"'{path}' is not what it was when the sweep began; sweep again")
-        _loaded = job.configuration, loaded
+        _loaded = asked, loaded
     diagram = _loaded[1]
     return diagram if job.seed is None else replace(diagram, seed=job.seed)

@@ -1,11 +1,10 @@
 """Blocks as a resolved diagram has them: every parameter is written out, with the unit that was found.
 
-Nothing depends on the machine: paths are relative to the diagram's folder.
+Nothing depends on the machine: paths are relative to the diagram's folder, or name files of quadvis's own.
 """
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +13,7 @@ import numpy as np
 from quadvis.block import Param
 from quadvis.graph.graph import CONTINUOUS, Node, Wire
 from quadvis.graph.names import wire_text
-
-
-def relative(path: str, folder: Path) -> str:
-    """Return a path as a diagram in a folder writes it, wherever that folder is."""
-    return Path(os.path.relpath(path, folder)).as_posix()
+from quadvis.machine.shipped import portable_name
 
 
 def resolved_block(node: Node, folder: Path) -> dict[str, Any]:
@@ -51,7 +46,7 @@ def _parameter(node: Node, param: Param, folder: Path) -> Any:
     if param.choices:
         return param.choices[value]
     if param.is_text:
-        return relative(value, folder) if param.is_file and value else value
+        return portable_name(value, folder) if param.is_file and value else value
     return _quantity(node, param.name, value)
 
 

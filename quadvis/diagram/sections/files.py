@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Any
 
-from quadvis.diagram.sections.block_text import relative
 from quadvis.diagram.sections.forms import Schema
 from quadvis.diagram.sections.section import Checked, FileSection
 from quadvis.document import YamlNode
 from quadvis.errors import Faults
 from quadvis.graph.graph import Graph
 from quadvis.machine.inputs import file_digest
+from quadvis.machine.shipped import named_file, portable_name
 
 Files = dict[str, YamlNode]  # SHA-256 by path
 
@@ -38,7 +37,7 @@ class FilesSection(FileSection[Files]):
         """Return the sums of the files that parameters name to be read."""
         sums = {path: diagram.files[path] for path in _named(diagram.graph) if path in diagram.files}
         folder = diagram.path.parent
-        return {relative(path, folder): digest for path, digest in sorted(sums.items())} or None
+        return {portable_name(path, folder): digest for path, digest in sorted(sums.items())} or None
 
 
 def _named(graph: Graph) -> list[str]:
@@ -51,11 +50,11 @@ def _named(graph: Graph) -> list[str]:
     ]
 
 
-def check_files(files: Files, folder: Path, faults: Faults) -> None:
+def check_files(files: Files, faults: Faults) -> None:
     """Report the files that have changed since the diagram was written out."""
     for name, node in files.items():
         wanted = faults.collect(node.text)
-        path = folder / name
+        path = named_file(name, node.file)
         if not os.path.isfile(path):
             faults.add(node.place, f"there is no file '{name}'", "paths are relative to the diagram")
         elif wanted is not None and file_digest(path) != wanted:

@@ -30,8 +30,8 @@ class VariantsSection(FileSection[Variants]):
 
     key = "variants"
     words = (
-        "`name: {slots: {block: {...}}}`: other blocks for those marked `slot: true`, with the same outputs; "
-        "`base: other` takes those of another variant first"
+        "`name: {slots: {block: {...}}}`: other blocks for those marked `slot: true`, which give the outputs "
+        "that are read; `base: other` takes those of another variant first"
     )
 
     def read(self, node: YamlNode | None, faults: Faults) -> Variants:
