@@ -11,6 +11,7 @@ from typing import NamedTuple
 from quadvis.block import Block
 from quadvis.diagram.draft import Draft
 from quadvis.errors import Faults, Place, QuadvisError, quoted
+from quadvis.library.own_package import own_files
 from quadvis.machine.files import same_file
 
 
@@ -32,7 +33,7 @@ def files_read(blocks: Iterable[Block], sources: Iterable[Path]) -> list[Path]:
         if kind not in kinds:
             kinds.add(kind)
             module = getattr(sys.modules.get(kind.__module__), "__file__", None)
-            found |= {Path(module): None} if module else {}
+            found |= dict.fromkeys(([Path(module)] if module else []) + own_files(kind.__module__))
         found |= dict.fromkeys(map(Path, block.reads()))
     return list(found)
 

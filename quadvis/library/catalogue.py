@@ -3,8 +3,9 @@
 ``signal.derivative`` is class ``Derivative`` in module ``quadvis_blocks.signal.derivative``. ``acme:slope``
 is block ``slope`` of the library that another distribution registered as ``acme`` in the entry point group
 ``quadvis.libraries``. A folder ``blocks`` beside a diagram adds the user's own: ``blocks/wind/fan.py`` is
-``wind.fan``. The user's own blocks are Python code that comes with the diagram, so the caller may be notified
-before they run, or refuse them: see `OwnBlocks`.
+``wind.fan``. Of a diagram in a folder ``diagrams`` it may also stand beside that folder. The user's own
+blocks are Python code that comes with the diagram, so the caller may be notified before they run, or refuse
+them: see `OwnBlocks`.
 """
 
 from __future__ import annotations
@@ -14,15 +15,14 @@ import importlib.util
 import os
 import pkgutil
 import re
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 
-from quadvis.block import OWN_MODULES, Block
+from quadvis.block import Block
 from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.errors.caller import as_given
-from quadvis.machine.source_line import source_line
+from quadvis.library.own_package import OwnPackage
 
 STANDARD = "quadvis_blocks"
 GROUP = "quadvis.libraries"
@@ -46,11 +46,12 @@ class Catalogue:
     """Finds blocks by name; ``folder`` is the folder of the diagram, whose own blocks may be refused."""
 
     def __init__(self, folder: Path | None = None, own_blocks: OwnBlocks = True) -> None:
-        own = None if folder is None else folder / "blocks"
+        own = None if folder is None else _own_folder(folder)
         # In the repository of quadvis the folder of this name holds the standard library.
         self.own = None if own is None or (own / STANDARD).is_dir() else own
         self.own_blocks = own_blocks
         self._found: dict[str, type[Block]] = {}
+        self._package: OwnPackage | None = None  # made when the first own block is loaded
 
     def find(self, name: str) -> type[Block]:
         """Return the class of a block; CatalogueError says what is wrong with the name or with its module."""
@@ -69,8 +70,7 @@ class Catalogue:
         if own and _exists(standard):
             raise CatalogueError(f"'{name}' is in the standard library and in {own}", "rename the file")
         if own:
-            self._permit(own, name)
-            return _block_class(_load_file(own, name), name)
+            return _block_class(self._load_own(own, name), name)
         module = _import(standard, name)
         if module is None:
             remedy = suggestion(name, self.names()) or "quadvis list shows all"
@@ -99,6 +99,20 @@ class Catalogue:
             found += [f"{library}:{path}" for path in sorted(_walk(package))]
         return found
 
+    def _load_own(self, file: Path, name: str) -> ModuleType:
+        """Run the module of an own block, if that is permitted, and return it."""
+        self._permit(file, name)
+        assert self.own is not None
+        if self._package is None:
+            self._package = OwnPackage(self.own)
+        try:
+            return self._package.module(file, name)
+        except Exception as error:
+            place = self._package.place(error) or file
+            reason = error.msg if isinstance(error, SyntaxError) else error
+            problem = f"block '{name}' cannot be loaded from {place}: {type(error).__name__}: {reason}"
+            raise CatalogueError(problem) from error
+
     def _permit(self, file: Path, name: str) -> None:
         """Refuse to run the code of an own block, or announce that it will run."""
         if not self.own_blocks:
@@ -123,6 +137,14 @@ class Catalogue:
             names = [f"{library}:{known}" for known in _walk(packages[library])]
             raise CatalogueError(f"there is no block '{name}'", suggestion(name, names))
         return _block_class(module, name)
+
+
+def _own_folder(folder: Path) -> Path:
+    """Return the folder of own blocks: beside the diagram, or beside a folder ``diagrams`` around it."""
+    beside = folder / "blocks"
+    if os.path.basename(os.path.abspath(folder)) != "diagrams" or beside.is_dir():
+        return beside
+    return Path(os.path.normpath(folder / os.pardir / "blocks"))
 
 
 def _libraries() -> dict[str, str]:
@@ -170,23 +192,6 @@ def _import(module: str, name: str) -> ModuleType | None:
             return None
         raise CatalogueError(f"block '{name}' cannot be loaded: {type(error).__name__}: {error}") from error
     return None if hasattr(found, "__path__") else found
-
-
-def _load_file(file: Path, name: str) -> ModuleType:
-    module_name = OWN_MODULES + name
-    spec = importlib.util.spec_from_file_location(module_name, file)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[module_name] = module
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        del sys.modules[module_name]
-        place = source_line(error, str(file)) or file
-        reason = error.msg if isinstance(error, SyntaxError) else error
-        problem = f"block '{name}' cannot be loaded from {place}: {type(error).__name__}: {reason}"
-        raise CatalogueError(problem) from error
-    return module
 
 
 def _block_class(module: ModuleType, name: str) -> type[Block]:

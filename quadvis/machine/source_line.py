@@ -7,14 +7,19 @@ import sys
 import traceback
 
 
-def source_line(error: BaseException, file: str) -> str:
-    """Return ``file:line`` of the innermost step of an error in a source file; "" if it never was there."""
-    whole = os.path.abspath(file)
-    steps = traceback.extract_tb(error.__traceback__)
-    lines = [step.lineno for step in steps if os.path.abspath(step.filename) == whole]
-    if isinstance(error, SyntaxError) and os.path.abspath(error.filename or "") == whole:
-        lines.append(error.lineno)
-    return f"{shown(file)}:{lines[-1]}" if lines else ""
+def source_line(error: BaseException, source: str) -> str:
+    """Return ``file:line`` of the innermost step of an error in a file, or in the files of a folder.
+
+    "" if the error never was there.
+    """
+    whole = os.path.abspath(source)
+    steps = [(step.filename, step.lineno) for step in traceback.extract_tb(error.__traceback__)]
+    if isinstance(error, SyntaxError):
+        steps.append((error.filename or "", error.lineno))
+    found = [
+        (file, line) for file, line in steps if f"{os.path.abspath(file)}{os.sep}".startswith(whole + os.sep)
+    ]
+    return f"{shown(found[-1][0])}:{found[-1][1]}" if found else ""
 
 
 def file_of(kind: type) -> str:

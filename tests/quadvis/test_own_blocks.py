@@ -192,3 +192,126 @@ def test_only_a_run_writes_where_the_writers_of_a_foreign_diagram_say(
     more = {"check": (), "draw": ("-o", "drawn.svg"), "run": ("--log", "")}[command]
     assert main([command, "mine/writes.yaml", *more]) == 0
     assert (project / "out").exists() == (command == "run")
+
+
+# code that own blocks share, and a project with its blocks beside its diagrams
+
+SHARES = '''"""A fan."""
+from quadvis.block import Block, Out
+
+from .._curves import LIFT
+from .._motors.speeds import fast
+
+
+class {name}(Block):
+    """Turns."""
+    y = Out(doc="speed")
+    def output(self):
+        return fast(LIFT)
+'''
+ONE = """\
+quadvis: 1
+name: one
+rates: {fast: 10 Hz}
+stop_time: 0.1 s
+blocks:
+  fan: {block: wind.fan, rate: fast}
+"""
+
+
+def sharing(folder: Path, lift: float = 2.0) -> Path:
+    """Write a diagram whose blocks share modules, in their folder and in a package there; return its path."""
+    blocks = folder / "blocks"
+    for name in ("wind", "_motors"):
+        (blocks / name).mkdir(parents=True, exist_ok=True)
+    for name in ("Fan", "Big"):
+        (blocks / "wind" / f"{name.lower()}.py").write_text(SHARES.replace("{name}", name))
+    (blocks / "_curves.py").write_text(f"LIFT = {lift!r}\n")
+    (blocks / "_motors" / "__init__.py").write_text("")
+    (blocks / "_motors" / "speeds.py").write_text("def fast(lift):\n    return 10.0 * lift\n")
+    (folder / "one.yaml").write_text(ONE + "  big: {block: wind.big, rate: fast}\n")
+    return folder / "one.yaml"
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_own_blocks_share_modules_of_their_folder_and_of_packages_there(project: Path, engine: str) -> None:
+    result = quadvis.load(sharing(project)).run(engine=engine)
+    assert result["fan.y"].tolist() == result["big.y"].tolist() == [20.0, 20.0]
+
+
+def test_a_shared_module_that_was_edited_is_read_anew(project: Path) -> None:
+    assert quadvis.load(sharing(project)).run()["fan.y"][0] == 20.0
+    assert quadvis.load(sharing(project, lift=123.0)).run()["fan.y"][0] == 1230.0
+
+
+def test_shared_modules_of_two_folders_do_not_meet(project: Path) -> None:
+    ours, theirs = (quadvis.load(sharing(project / name, lift)) for name, lift in (("a", 2.0), ("b", 3.0)))
+    assert (ours.run()["fan.y"][0], theirs.run()["fan.y"][0]) == (20.0, 30.0)
+    assert quadvis.load(project / "a" / "one.yaml").run()["fan.y"][0] == 20.0
+
+
+def test_shared_modules_are_inputs_and_no_blocks(project: Path, capsys: Captured) -> None:
+    found = {path.name for path in quadvis.load(sharing(project)).inputs}
+    assert {"one.yaml", "fan.py", "big.py", "_curves.py", "speeds.py"} <= found
+    assert main(["list"]) == 0
+    shown = capsys.readouterr().out
+    assert "wind.big" in shown and "speeds" not in shown and "_curves" not in shown
+
+
+@pytest.mark.parametrize("text", ["LIFT = 1 / 0\n", "LIFT = (\n"], ids=["error", "syntax"])
+def test_an_error_in_a_shared_module_is_reported_at_its_line(project: Path, text: str) -> None:
+    path = sharing(project)
+    (project / "blocks" / "_curves.py").write_text(f"FIRST = 1\n{text}")
+    with pytest.raises(DiagramError, match=r"block 'wind\.fan' cannot be loaded from blocks/_curves\.py:2: "):
+        quadvis.load(path)
+
+
+@pytest.fixture
+def layout(project: Path) -> Path:
+    """A project with folders `blocks` and `diagrams` side by side."""
+    sharing(project / "lab")
+    (project / "lab" / "diagrams").mkdir()
+    (project / "lab" / "one.yaml").rename(project / "lab" / "diagrams" / "one.yaml")
+    return project / "lab"
+
+
+@pytest.mark.parametrize(
+    ("here", "file", "said"),
+    [
+        ("", "lab/diagrams/one.yaml", "lab/blocks"),
+        ("lab", "diagrams/one.yaml", "blocks"),
+        ("lab/diagrams", "one.yaml", "../blocks"),
+    ],
+)
+def test_blocks_beside_the_folder_of_the_diagrams_are_found_announced_and_refused(
+    here: str, file: str, said: str, layout: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(layout.parent / here)
+    assert main(["check", file]) == 0
+    assert capsys.readouterr().err == f"own blocks from '{said}'\n"
+    assert main(["check", file, "--no-own-blocks"]) == 2
+    told = capsys.readouterr().err
+    assert f"block 'wind.fan' is code of this diagram's own, in '{said}/wind/fan.py'" in told
+    assert "own blocks from" not in told
+
+
+def test_blocks_beside_the_diagram_itself_come_first_and_other_folders_count_for_nothing(
+    layout: Path,
+) -> None:
+    other = layout / "flights"
+    other.mkdir()
+    (other / "one.yaml").write_text(ONE)
+    with pytest.raises(DiagramError, match=r"there is no block 'wind\.fan'"):
+        quadvis.load(other / "one.yaml")
+    (layout / "diagrams" / "blocks").mkdir()
+    with pytest.raises(DiagramError, match=r"there is no block 'wind\.fan'"):
+        quadvis.load(layout / "diagrams" / "one.yaml")
+
+
+def test_a_base_brings_no_code(project: Path) -> None:
+    (project / "ours.yaml").write_text("{quadvis: 1, name: ours, base: mine/loop.yaml}")
+    with pytest.raises(
+        DiagramError, match=r"mine/loop\.yaml:7:\d+: block 'fan': there is no block 'wind\.fan'"
+    ):
+        quadvis.load(project / "ours.yaml")
+    assert not Path("ran").exists()
