@@ -15,6 +15,7 @@ from quadvis.cli.default_places import default_name, log_path, runs_folder
 from quadvis.errors import Fault, QuadvisError, RunError, counted
 from quadvis.machine.files import SVG, Kind, write_output
 from quadvis.machine.garbage import collected_from_now_on
+from quadvis.machine.shipped import PREFIX, named_file
 
 if TYPE_CHECKING:
     from quadvis.library.catalogue import Catalogue, OwnBlocks
@@ -148,8 +149,9 @@ def _plain_faults(faults: Iterable[Fault]) -> list[dict[str, Any]]:
 
 
 def list_blocks(options: argparse.Namespace) -> int:
-    """Print all blocks; 2 if a library cannot be loaded."""
+    """Print all blocks, and the files that come with quadvis; 2 if a library cannot be loaded."""
     from quadvis.library.describe import catalogue_lines, facts
+    from quadvis.library.shipped_files import shipped_lines
 
     catalogue = _catalogue(options)
     if options.json:
@@ -157,7 +159,7 @@ def list_blocks(options: argparse.Namespace) -> int:
         _print_json([facts(name, block) for name, block in blocks.items()])
     else:
         lines, failures = catalogue_lines(catalogue, _width())
-        print("\n".join(lines))
+        print("\n".join((*lines, "", *shipped_lines(_width()))))
     return _all_loaded(failures)
 
 
@@ -176,9 +178,17 @@ def _all_loaded(failures: list[str]) -> int:
 
 
 def describe(options: argparse.Namespace) -> int:
-    """Print the declarations of a block."""
+    """Print the declarations of a block, or a file that comes with quadvis."""
     from quadvis.library.describe import description, facts
+    from quadvis.library.shipped_files import shipped_text
 
+    if options.block.startswith(PREFIX):
+        text = shipped_text(options.block)
+        if options.json:
+            _print_json({"file": options.block, "path": str(named_file(options.block)), "text": text})
+        else:
+            print(text, end="")
+        return 0
     block = _catalogue(options).find(options.block)
     if options.json:
         _print_json(facts(options.block, block))

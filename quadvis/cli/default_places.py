@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from quadvis.errors import QuadvisError
 from quadvis.machine.files import file_name, reason
+from quadvis.machine.shipped import named_file
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
@@ -26,9 +27,9 @@ def log_path(given: str | None, diagram: Diagram) -> Path | None:
 
 def default_name(options: argparse.Namespace, variant: str | None) -> str:
     """Return a name for the outputs of a diagram; it differs for other variants and parameter files."""
-    stem = Path(options.file).stem
+    stem = named_file(options.file).stem
     name = [file_name(stem) if set(stem) & set("+,") else stem, *([file_name(variant)] if variant else [])]
-    return ",".join(("+".join(name), *(file_name(Path(file).stem) for file in options.params)))
+    return ",".join(("+".join(name), *(file_name(named_file(file).stem) for file in options.params)))
 
 
 def runs_folder(what: str, option: str) -> Path:

@@ -68,11 +68,17 @@ def parser() -> Parser:
     check = add("check", commands.check, "check a diagram and report all its faults")
     _diagram_options(check)
     check.add_argument("--json", action="store_true", help="print the faults and warnings as JSON")
-    blocks = add("list", commands.list_blocks, "list all blocks")
+    blocks = add("list", commands.list_blocks, "list all blocks, and the files that come with quadvis")
     blocks.add_argument("--json", action="store_true", help="print all declarations as JSON")
     _own_block_option(blocks)
-    describe = add("describe", commands.describe, "describe a block: ports, parameters, source")
-    describe.add_argument("block", metavar="BLOCK", help="such as signal.derivative")
+    describe = add(
+        "describe",
+        commands.describe,
+        "describe a block: ports, parameters, source; or show a file that comes with quadvis",
+    )
+    describe.add_argument(
+        "block", metavar="BLOCK", help="such as signal.derivative, or quadvis:parts/craft.yaml"
+    )
     describe.add_argument("--json", action="store_true", help="print its declarations as JSON")
     _own_block_option(describe)
     analyse = add(

@@ -12,6 +12,7 @@ from quadvis.diagram.spec import FileSpec
 from quadvis.document import YamlMap, YamlNode
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known, suggestion
 from quadvis.machine.missing_file import RELATIVE, file_trouble
+from quadvis.machine.shipped import named_file
 
 
 class GroupFiles:
@@ -43,7 +44,7 @@ class GroupFiles:
         text = self.faults.read(named.text)
         if not known(text):
             return UNKNOWN
-        path = Path(named.file).parent / text
+        path = named_file(text, named.file)
         real = os.path.realpath(path)
         if real not in self._specs:
             problem, remedy = file_trouble(str(path), text)

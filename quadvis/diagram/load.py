@@ -18,7 +18,7 @@ from quadvis.errors.discretion import quoting_only
 from quadvis.library.catalogue import OwnBlocks
 from quadvis.machine.garbage import uncollected
 from quadvis.machine.inputs import noted_inputs
-from quadvis.machine.shipped import shipped_folder
+from quadvis.machine.shipped import named_file, shipped_folder
 
 
 def load(
@@ -45,7 +45,7 @@ def load(
     texts = setting_texts(settings)
     with quoting_only(_quotable(path, params, texts)), _reported_once(faults) as digests:
         given, files = read_settings(settings, params, faults)
-        spec = read_diagram(Path(path), faults)
+        spec = read_diagram(named_file(path), faults)
         diagram = Assembly(spec, faults, files, own_blocks).diagram(variant, given, stop_time, seed)
         found = tuple(sorted(set(faults.warnings)))
         return replace(
@@ -73,7 +73,7 @@ def check(
     quotable = _quotable(path, params, setting_texts(settings))
     with quoting_only(quotable), _reported_once(faults) as digests:
         given, files = read_settings(settings, params, faults)
-        spec = read_diagram(Path(path), faults)
+        spec = read_diagram(named_file(path), faults)
         assembly = Assembly(spec, faults, files, own_blocks)
         diagram = assembly.diagram(settings=given)
         for variant in assembly.variants:

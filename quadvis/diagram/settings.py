@@ -62,7 +62,7 @@ def read_settings(given: Given, params: Files, faults: Faults) -> tuple[Settings
     paths = [params] if isinstance(params, str | os.PathLike) else params
     found: dict[str, dict[str, Setting]] = {}
     files = []
-    for path in map(Path, paths):
+    for path in map(named_file, paths):
         bases: list[Path] = []
         name = _read_file(path, (), found, bases, faults)
         files.append(ParameterFile(name or path.stem, path, tuple(bases)))

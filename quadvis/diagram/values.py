@@ -14,7 +14,7 @@ from quadvis.diagram.group import Group
 from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar
 from quadvis.document.number_lists import Numbers
 from quadvis.errors import UNKNOWN, Faults, Unknown, known, quoted, suggestion
-from quadvis.machine.shipped import is_shipped, named_file
+from quadvis.machine.shipped import named_file, named_output
 from quadvis.units import Unit, parse_quantity, split_quantity
 
 QUANTITY_KEYS = ("value", "unit")
@@ -138,16 +138,14 @@ def _with_units(node: YamlNode, units: Iterator[Unit], key: str) -> YamlNode:
 def read_parameter(param: Param, node: YamlNode, diagram: Path | None = None) -> tuple[Any, OpenUnits]:
     """Return a parameter's value as the block takes it, and its units where the declaration leaves them open.
 
-    A path is relative to the file in which it stands. But a shipped file does not make blocks write into an
-    installation: there it is relative to the ``diagram``. DiagramError if the value is of another kind, shape
-    or unit.
+    ``diagram`` is the file that is loaded. DiagramError if the value is of another kind, shape or unit.
     """
     if param.is_file:
         # Relative to the file in which it stands, wherever the diagram is run from; none stays none.
-        text, file = node.text(), node.file
-        if param.writes and diagram is not None and is_shipped(file) and not is_shipped(diagram):
-            file = str(diagram)
-        return (str(named_file(text, file)) if text else ""), ()
+        text = node.text()
+        if param.writes and diagram is not None and text:
+            return str(named_output(text, node.file, diagram)), ()
+        return (str(named_file(text, node.file)) if text else ""), ()
     if param.is_text:
         return node.text(), ()
     if param.choices:

@@ -82,7 +82,7 @@ from {module} import {name}
 """
 
 DIAGRAM = """# A signal through a lag: change it into your own.
-# `quadvis list` shows all blocks, `quadvis describe BLOCK` one of them.
+# `quadvis list` shows all blocks, and the parts that come with quadvis; `quadvis describe NAME` one of them.
 quadvis: 1
 name: {name}
 doc: What this diagram is for.

@@ -7,21 +7,35 @@ from functools import cache
 from pathlib import Path
 
 PREFIX = "quadvis:"
+INSTALLED = Path(__file__).resolve().parents[1] / "diagrams"  # not there in a checkout
 
 
 @cache
 def shipped_folder() -> Path:
     """Return the folder of the diagrams of quadvis: in its package, or in a checkout beside it."""
-    package = Path(__file__).resolve().parents[1]
-    installed = package / "diagrams"
-    return installed if installed.is_dir() else package.parent / "diagrams"
+    return INSTALLED if INSTALLED.is_dir() else INSTALLED.parents[1] / "diagrams"
 
 
-def named_file(text: str, file: str | os.PathLike[str] = "") -> Path:
+def named_file(text: str | os.PathLike[str], file: str | os.PathLike[str] = "") -> Path:
     """Return the file that a text in a file names: a shipped one, or one relative to the file's folder."""
-    if text.startswith(PREFIX):
-        return shipped_folder() / text.removeprefix(PREFIX)
-    return Path(file).parent / text
+    name = os.fspath(text)
+    if name.startswith(PREFIX):
+        return shipped_folder() / name.removeprefix(PREFIX)
+    return Path(file).parent / name
+
+
+def named_output(text: str, file: str, diagram: Path) -> Path:
+    """Return the file or folder to be written that a text in a file names.
+
+    Nothing is written into an installation: a shipped file counts as if it stood in a folder ``diagrams``
+    beside the diagram, or in the working directory if the diagram is a shipped one, too.
+    """
+    is_ours = is_shipped(diagram)
+    if not is_shipped(file) or (is_ours and not INSTALLED.is_dir()):
+        return named_file(text, file)
+    inner = os.path.relpath(os.path.dirname(os.path.realpath(file)), os.path.realpath(shipped_folder()))
+    beside = Path() if is_ours else diagram.parent
+    return Path(os.path.normpath(beside / "diagrams" / inner / text))
 
 
 def is_shipped(path: str | os.PathLike[str]) -> bool:
