@@ -3,8 +3,10 @@
 import gc
 import os
 import signal
+from importlib.util import find_spec
 from pathlib import Path
 
+import pytest
 from hypothesis import settings
 
 # Whoever starts the tests in the background of a script leaves Ctrl-C ignored, and programs inherit that.
@@ -19,6 +21,18 @@ os.environ.setdefault("QUADVIS_CACHE", str(Path(__file__).parents[1] / ".pytest_
 settings.register_profile("thorough", derandomize=True, deadline=None)
 settings.register_profile("quick", settings.get_profile("thorough"), max_examples=20)
 settings.load_profile("quick")
+
+
+# Packages that a user may leave out; what needs one of them has its name in the name of the test.
+OPTIONAL = [name for name in ("mujoco",) if find_spec(name) is None]
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Skip what needs a package that is not installed."""
+    for item in items:
+        for name in OPTIONAL:
+            if name in item.nodeid:
+                item.add_marker(pytest.mark.skip(reason=f"the package {name} is not installed"))
 
 
 def pytest_collection_finish() -> None:

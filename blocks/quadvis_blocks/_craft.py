@@ -13,4 +13,5 @@ TORQUE_RATIO = 0.016  # m, c: drag torque of a rotor divided by its thrust
 MOTOR_LAG = 0.08  # s
 THRUST_MAX = 2.0  # N, of a rotor
 RADIO_DELAY = 0.022  # s, of a radio frame
+DRAG = 0.1  # N s/m, force of the air divided by the speed against it
 GRAVITY = 9.81  # m/s^2

@@ -1,20 +1,20 @@
-"""The diagrams, parts, calibrations and parameter files that come with quadvis, for `list` and `describe`."""
+"""The diagrams and all that they name, as they come with quadvis, for `list` and `describe`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
 
 from quadvis.errors import QuadvisError, suggestion
 from quadvis.machine.columns import table
 from quadvis.machine.shipped import PREFIX, named_file, shipped_folder
 
-FOLDERS = ("", "parts", "calib", "sets")
+KINDS = ("*.yaml", "parts/*.yaml", "calib/*.yaml", "sets/*.yaml", "models/*.xml")
 
 
 def shipped_names() -> list[str]:
     """Return the names of all files, as a diagram writes them: ``quadvis:parts/craft.yaml``."""
     folder = shipped_folder()
-    files = [file for inner in FOLDERS for file in sorted((folder / inner).glob("*.yaml"))]
+    files = [file for kind in KINDS for file in sorted(folder.glob(kind))]
     return [PREFIX + file.relative_to(folder).as_posix() for file in files]
 
 
@@ -33,13 +33,10 @@ def shipped_text(name: str) -> str:
 
 
 def _first_sentence(text: str) -> str:
-    comment = " ".join(_comment(text))
+    """Return the beginning of the comment at the top of a YAML or XML file."""
+    if text.startswith("<!--"):
+        lines = text.removeprefix("<!--").partition("-->")[0].splitlines()
+    else:
+        lines = [line[1:] for line in itertools.takewhile(lambda line: line[:1] == "#", text.splitlines())]
+    comment = " ".join(" ".join(lines).split())
     return comment.split(". ")[0].split(": ")[0].removesuffix(".")
-
-
-def _comment(text: str) -> Iterator[str]:
-    """Yield the lines of the comment at the top of a file."""
-    for line in text.splitlines():
-        if not line.startswith("#"):
-            return
-        yield line.removeprefix("#").strip()

@@ -60,6 +60,7 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
         "times": [0.0, 0.35, 1.0],
         "values": [[1.0, 2.0], [3.0, -1.0], [0.0, 0.0]],
         "during": [[0.3, 0.6]],
+        "model": str(ROOT / "diagrams" / "models" / "rotorcraft.xml"),
     }
     required = [key for key, param in block.interface.params.items() if param.required]
     if {"file", "folder"} & {*required}:  # few blocks read or write files, and all tests come by here

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, In, Out, Param, State
-from quadvis_blocks._craft import GRAVITY, MASS, MOTOR_LAG
+from quadvis_blocks._craft import DRAG, GRAVITY, MASS, MOTOR_LAG
 from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, note
 
 
@@ -29,7 +29,7 @@ class ReckonedHeight(Block):
         0.1, unit="rad/s", min=0.0, tune=True, doc="how fast the trim follows; slower than gusts"
     )
     mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass of the craft; default: Draganfly IV")
-    drag = Param(0.1, unit="N*s/m", min=0.0, tune=True, doc="drag force over the speed through the air")
+    drag = Param(DRAG, unit="N*s/m", min=0.0, tune=True, doc="drag force over the speed through the air")
     lag = Param(MOTOR_LAG, unit="s", above=0.0, tune=True, doc="time constant of a motor")
     gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
     lowest = Param(

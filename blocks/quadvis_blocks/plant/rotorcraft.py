@@ -9,7 +9,7 @@ import numpy as np
 
 from quadvis.block import Block, In, Out, Param, ParameterError, Random, State, clip, random_signs
 from quadvis_blocks._angles import wrapped
-from quadvis_blocks._craft import ARM, GRAVITY, INERTIA, MASS, MOTOR_LAG, THRUST_MAX, TORQUE_RATIO
+from quadvis_blocks._craft import ARM, DRAG, GRAVITY, INERTIA, MASS, MOTOR_LAG, THRUST_MAX, TORQUE_RATIO
 
 PAPER, RIGID_BODY = range(2)
 GIVEN, RANDOM = range(2)
@@ -49,7 +49,9 @@ class Rotorcraft(Block):
     lag = Param(MOTOR_LAG, unit="s", above=0.0, tune=True, doc="time constant of a motor")
     thrust_min = Param(0.0, unit="N", min=0.0, doc="least thrust of a rotor")
     thrust_max = Param(THRUST_MAX, unit="N", above=0.0, doc="greatest thrust of a rotor")
-    drag = Param(0.1, unit="N*s/m", min=0.0, tune=True, doc="drag force divided by the speed through the air")
+    drag = Param(
+        DRAG, unit="N*s/m", min=0.0, tune=True, doc="drag force divided by the speed through the air"
+    )
     torque_bias = Param(
         (0.0, 0.0, 0.0),
         type="float64[3]",
