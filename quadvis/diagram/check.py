@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import cast
 
 from quadvis.block import Block
-from quadvis.diagram.draft import Draft, Key, Link, unconnected
+from quadvis.diagram.draft import Draft, Key, Link, not_taken, unconnected
 from quadvis.diagram.flow import Cases
 from quadvis.diagram.names import absent, remedy_for
 from quadvis.diagram.shape_flow import ShapeFlow
@@ -88,7 +88,9 @@ class WireCheck:
             inputs = draft.interface.inputs
             for port, connection in draft.connections.items():
                 wire = connection.source
-                if port not in inputs:
+                if port not in inputs and draft.inherits:
+                    self._fault(draft, draft.place, *not_taken(port, draft.kind))
+                elif port not in inputs:
                     remedy = remedy_for(port, draft.connections, inputs)
                     self._fault(draft, connection.place, f"{draft.kind} has no input '{port}'", remedy)
                 elif isinstance(wire, Wire) and wire.block in self.drafts:

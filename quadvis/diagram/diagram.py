@@ -41,7 +41,7 @@ class Diagram:
     settings: tuple[str, ...] = ()  # the parameters that were replaced, block.parameter=value
     warnings: tuple[Doubt, ...] = ()  # faults that do not prevent a run
     ports: Mapping[str, str] = field(default_factory=dict)  # of parts: the signals of blocks that they are
-    sources: tuple[Path, ...] = ()  # the YAML files of the diagram, its parts and its parameter files
+    sources: tuple[Path, ...] = ()  # the YAML files: its own, of bases, parts and parameter files
     files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of every file that was read, by path
     own_blocks: bool = True  # whether code beside the diagram may be run
 

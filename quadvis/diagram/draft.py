@@ -41,6 +41,7 @@ class Draft:
     units: Mapping[str, OpenUnits] = field(default_factory=dict)  # of the parameters where they are open
     given: Mapping[str, YamlNode | Unknown] = field(default_factory=dict)  # their values as written
     stream: str = ""  # the name of its noise
+    inherits: bool = False  # whether the inputs are those of the block that it replaces
 
     def origin(self, name: str) -> Place:
         """Return where the value of a parameter or constant is written."""
@@ -73,6 +74,11 @@ class Link(NamedTuple):
 def misfit(wire: Wire, shape: Sequence[int]) -> str:
     """Say that an index goes beyond a signal."""
     return f"index {index_text(wire.index)} does not fit '{wire.source}', which has {shape_text(shape)}"
+
+
+def not_taken(port: str, kind: str) -> tuple[str, str]:
+    """Return the problem and the remedy of an input that a block has from the block that it replaces."""
+    return f"'{kind}' has no input '{port}' of the block that it replaces", "give it an 'in' of its own"
 
 
 def unconnected(port: str, declared: In) -> tuple[str, str]:

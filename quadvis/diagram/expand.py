@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
 from quadvis.block import Block, ParameterError
+from quadvis.diagram.draft import not_taken
 from quadvis.diagram.group import Group
 from quadvis.diagram.group_files import GroupFiles
 from quadvis.diagram.names import remedy_for
@@ -264,7 +265,9 @@ class Expansion:
         self, block: BlockSpec, inputs: Mapping[str, InputSpec], declared: Collection[str]
     ) -> None:
         for name, given in inputs.items():
-            if name not in declared:
+            if name not in declared and block.inherits:
+                self.faults.add(block.place, *not_taken(name, block.kind))
+            elif name not in declared:
                 problem = f"part '{block.kind}' has no input '{name}'"
                 self.faults.add(given.place, problem, remedy_for(name, inputs, declared))
 

@@ -76,8 +76,10 @@ def _fitting(
 
 def in_slot(base: BlockSpec, block: BlockSpec) -> BlockSpec:
     """Return the block for a slot: it has the slot's wires and rate unless it has its own."""
-    inputs = base.inputs if block.inputs is None else block.inputs
-    return block._replace(slot=base.slot, inputs=inputs, rate=block.rate or base.rate)
+    if block.inputs is None:
+        block = block._replace(inputs=base.inputs, inherits=True)
+    slot = base.slot if block.slot is None else block.slot
+    return block._replace(slot=slot, rate=block.rate or base.rate)
 
 
 class StandIn(NamedTuple):

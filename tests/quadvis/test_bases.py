@@ -104,6 +104,14 @@ def test_variants_of_the_base_fill_its_slots_also_where_the_diagram_has_another_
     assert factor(quadvis.load("mine.yaml", variant="third")) == 3.0
 
 
+def test_a_diagram_may_make_a_slot_of_a_block_of_its_base() -> None:
+    Path("slots.yaml").write_text(
+        "{quadvis: 1, name: slots, base: shared/base.yaml, blocks: {wave: {slot: true, block: sources.sine}},"
+        " variants: {steady: {slots: {wave: {block: sources.constant, with: {value: 2}}}}}}"
+    )
+    assert quadvis.load("slots.yaml", variant="steady").graph["wave"].kind == "sources.constant"
+
+
 def test_a_base_may_have_a_base_and_a_variant_and_then_its_variants_stay_behind() -> None:
     diagram = quadvis.load("top.yaml")
     assert (factor(diagram), diagram.graph["wave"].kind, diagram.variants) == (0.5, "sources.constant", ())

@@ -45,6 +45,7 @@ class BlockSpec(NamedTuple):
     slot: Place | Unknown | None = None
     inputs: dict[str, InputSpec] | Unknown | None = None  # None: no 'in' was written
     stream: tuple[str, Place] | None = None  # the name of its noise, or of that of its inner blocks
+    inherits: bool = False  # whether the inputs are those of the block that it replaces
 
 
 Blocks = dict[str, BlockSpec | Unknown]
