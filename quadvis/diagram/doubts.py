@@ -22,8 +22,11 @@ def _blocks(spec: FileSpec) -> Iterator[BlockSpec]:
 
 
 def warn_parameters(spec: FileSpec, faults: Faults) -> None:
-    """Warn of parameters of a file that no block there uses; those of its base are not its own."""
-    used: set[str] = set()
+    """Warn of parameters of a file that neither a block there uses nor what it says of a run.
+
+    Those of its base are not its own.
+    """
+    used: set[str] = {name for node in spec.nodes.values() for name in named_parameters(node)}
     for block in _blocks(spec):
         inputs = block.inputs if block.inputs is not None and known(block.inputs) else {}
         parameters = block.parameters if known(block.parameters) else {}

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from quadvis.api import Diagram, load, load_text
+from quadvis.diagram.sections.figures import read_figures
 from quadvis.document import parse_yaml
 from quadvis.errors import DiagramError
 from quadvis.output.log_reader import read_log
@@ -197,3 +198,32 @@ def test_an_open_input_of_a_part_leaves_its_readers_open(tmp_path: Path) -> None
     np.testing.assert_array_equal(result["full/far.y"], np.full(11, 3.0))
     assert np.abs(result["bare.rate"][1:]).min() > 0.1
     np.testing.assert_array_equal(result["full.rate"], np.zeros(11))
+
+
+ASKED = """\
+quadvis: 1
+name: asked
+params: {target: {value: [0, 1.5], unit: m m}, late: 0.5 s, most: 20 cm}
+rates: {fast: 10 Hz}
+stop_time: 1 s
+blocks:
+  height: {block: sources.constant, rate: fast, with: {value: 1.6 m}}
+expect: [{signal: height.y, of: "$target[1]", after: $late, within: $most}]
+summary: {height: {signal: height.y, of: "$target[1]", show: [max]}}
+figures: [{title: height, from: $late, signals: height.y, unit: cm, reference: "$target[1]"}]
+"""
+
+
+def test_a_run_is_judged_against_the_parameters_of_its_diagram(tmp_path: Path) -> None:
+    (tmp_path / "asked.yaml").write_text(ASKED)
+    diagram = load(tmp_path / "asked.yaml")
+    assert diagram.warnings == ()  # each parameter is used
+    assert str(diagram.expectations[0]) == "height.y within 20 cm of 150 cm after 0.5 s"
+    assert diagram.run().passed
+    other = load(tmp_path / "asked.yaml", settings=["target=[0 m, 1.3 m]"])
+    result = other.run()
+    assert not result.passed and result.outcome.summary["height"]["max"] == pytest.approx(0.3)
+    assert other.hash != diagram.hash
+    same(other, load_text(other.resolved, tmp_path))
+    (figure,) = read_figures(other.resolved, "log")
+    assert (figure.start, figure.panels[0].reference) == (0.5, pytest.approx(130.0))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -12,8 +12,9 @@ from typing import Any
 from quadvis.diagram.reference import Reference, read_reference
 from quadvis.diagram.sections.section import Said, Section, Values
 from quadvis.diagram.times import time_text
+from quadvis.diagram.values import substitute
 from quadvis.diagram.wiring import OpenInput, Wiring
-from quadvis.document import YamlList, YamlMap, YamlNode
+from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known
 from quadvis.graph.graph import Graph, Node, Wire
 from quadvis.graph.names import wire_text
@@ -33,7 +34,8 @@ class Context:
     shortened: bool
     faults: Faults
     values: Values = field(default_factory=Values)
-    names: dict[Place, str] = field(default_factory=dict)  # the full name of each signal, by where it stands
+    # What stands for each name by its place: the full name of a signal, the value of a parameter.
+    meant: dict[Place, Any] = field(default_factory=dict)
 
     @cached_property
     def nodes(self) -> Mapping[str, Node]:
@@ -60,8 +62,25 @@ class Context:
             self.faults.add(reference.place, problem, "name an output of a block")
         if not isinstance(source, Wire) or source.block not in self.nodes:
             return UNKNOWN
-        self.names[reference.place] = wire_text(source)
+        self.meant[reference.place] = wire_text(source)
         return source
+
+    def filled(self, fields: YamlMap, keys: Collection[str]) -> YamlMap:
+        """Return a map with ``$name`` and ``$name[2]`` under these keys replaced by what they name.
+
+        A key whose value has a fault is left out.
+        """
+        values = dict(fields.values)
+        for key in keys:
+            node = fields.get(key)
+            if not isinstance(node, YamlScalar) or not node.value.startswith("$"):
+                continue
+            found = substitute(node, self.wiring.expansion.root.params, self.faults)
+            if known(found):
+                values[key], self.meant[node.place] = found, found.to_python()
+            else:
+                del values[key]
+        return YamlMap(fields.keys, values, fields.file, fields.line, fields.column, fields.key)
 
     def warn_window(
         self, fields: YamlMap, keys: tuple[str, str], begin: Fraction | None, end: Fraction | None
@@ -76,12 +95,14 @@ class Context:
             self.faults.warn(fields[keys[1]].place, problem, f"end later than '{keys[0]}'")
 
     def written(self, node: YamlNode | None) -> Any:
-        """Return a section as plain data, with every signal that was read by its full name."""
+        """Return a section as plain data: signals that were read by their full names, parameters by value."""
         if isinstance(node, YamlList):
             return [self.written(child) for child in node]
         if isinstance(node, YamlMap):
             return {key: self.written(child) for key, child in node.values.items()}
-        return (self.names.get(node.place) or node.to_python()) if node is not None else None
+        if node is None:
+            return None
+        return self.meant[node.place] if node.place in self.meant else node.to_python()
 
 
 class RunSection(Section[Said]):

@@ -65,7 +65,8 @@ def _read(node: YamlNode, context: Context) -> Iterator[Expectation]:
         faults.add(node.place, problem, f"add one of {', '.join(EXPECTATIONS)}")
     if found is UNKNOWN:
         return
-    for kind in kinds:
+    fields = context.filled(fields, kinds)
+    for kind in filter(fields.__contains__, kinds):
         is_count = EXPECTATIONS[kind].statistic == COUNT
         unit = ONE if is_count else found.selection.unit
         limit = faults.collect(fields[kind].quantity, unit, bare=False)

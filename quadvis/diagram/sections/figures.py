@@ -15,8 +15,9 @@
         signals: plant.attitude[2]
         unit: deg
 
-A reference is in the unit of the axis, or brings its own ("4 cm"). In YAML's flow style a signal with an
-index needs quotes. Only a title and signals are required.
+A reference is in the unit of the axis, or brings its own ("4 cm"). It may be a parameter of the diagram,
+"$target[2]", and so may times. In YAML's flow style a signal with an index needs quotes. Only a title and
+signals are required.
 """
 
 from __future__ import annotations
@@ -116,6 +117,8 @@ class FigureReader:
         name = self.faults.collect(title.text) if title else None
         panels = [entry] if single else self.faults.collect(_some, entry["panels"]) or []
         read = [self.faults.collect(self._panel, panel, single) for panel in panels]
+        if self.context is not None:
+            entry = self.context.filled(entry, STRETCH_KEYS)
         begin, end = (self._time(entry.get(key)) for key in STRETCH_KEYS)
         start = stamp(begin) / NANOSECONDS if begin is not None else -math.inf
         stop = stamp(end) / NANOSECONDS if end is not None else math.inf
@@ -133,6 +136,8 @@ class FigureReader:
     def _panel(self, node: YamlNode, single: bool) -> Panel:
         """Read a panel; in a figure of one panel the keys and the title are the figure's."""
         entry = node.mapping() if single else node.fields(PANEL_KEYS[:1], PANEL_KEYS[1:], self.faults)
+        if self.context is not None:
+            entry = self.context.filled(entry, ("reference",))
         title, signals, unit, reference = map(entry.get, ("title", "signals", "unit", "reference"))
         shown = self.faults.collect(_unit, unit) if unit else None
         entries = _some(signals) if isinstance(signals, YamlList) else [signals] if signals else []

@@ -88,6 +88,7 @@ def _sampling(node: Node, context: Context) -> Sampling:
 
 def read_stretch(fields: YamlMap, context: Context) -> Signal | Unknown:
     """Return the signal of an expectation or of a line of the summary, over its stretch of the run."""
+    fields = context.filled(fields, STRETCH_KEYS)
     found = read_signal(fields["signal"], context) if "signal" in fields else UNKNOWN
     after, before = (
         context.faults.collect(read_duration, fields[name]) if name in fields else None
