@@ -17,6 +17,8 @@ from quadvis.analysis.loops import AnalysisError
 from quadvis.analysis.margins import Loop, rates
 from quadvis.analysis.systems import closed_loop
 from quadvis.analysis.vary import STABLE, Limits
+from quadvis.analysis.verdict import LoopVerdict, judge_limit, judge_margin
+from quadvis.diagram.loop_requirements import RequiredMargin
 from quadvis.diagram.sections.analyse import Cut
 from quadvis.errors import DiagramError
 from quadvis.errors.caller import as_given
@@ -33,7 +35,7 @@ class Analysis:
     """The closed loop of a diagram around its operating point.
 
     ``linear`` holds its matrices, ``loops`` the loops opened at the cut points, by name; ``limits`` holds the
-    tolerances of parameters.
+    tolerances of parameters, each of which is sought when it is first read.
     """
 
     diagram: Diagram
@@ -55,6 +57,21 @@ class Analysis:
     def stable(self) -> bool:
         """True if all poles decay."""
         return bool((self.poles.real < STABLE).all())
+
+    @cached_property
+    def verdicts(self) -> tuple[LoopVerdict, ...]:
+        """What is to be said on each margin and limit that the diagram expects, in the order of the file."""
+        return tuple(
+            judge_margin(requirement, self.loops[requirement.label])
+            if isinstance(requirement, RequiredMargin)
+            else judge_limit(requirement, self.stable, self.limits.answer(requirement.limit))
+            for requirement in self.diagram.loop_requirements
+        )
+
+    @property
+    def passed(self) -> bool:
+        """True if the loop is stable and has every margin that the diagram expects."""
+        return self.stable and all(verdict.met for verdict in self.verdicts)
 
     @cached_property
     def system(self) -> Any:
@@ -86,9 +103,11 @@ class Analysis:
             "hyperperiod_s": self.period,
             "states": list(self.linear.states),
             "stable": self.stable,
+            "passed": self.passed,
             "poles": [[float(pole.real), float(pole.imag)] for pole in self.poles],
             "cuts": loops,
             "limits": limits,
+            "expect": [verdict.facts() for verdict in self.verdicts],
         }
 
 

@@ -76,6 +76,23 @@ class Loop:
         return _margins([*self._crossings(), *self._ends()])
 
     @cached_property
+    def idle(self) -> tuple[str, ...]:
+        """The signals of the cut through which no loop passes: of a change of one, nothing comes back to it.
+
+        They are judged one by one with all others as they are. Of a signal that is read at some of its
+        instants only, these are enough.
+        """
+        places = {channel.read: channel for channel in self.closed.channels}
+        found = {place: 0.0 for place in places}
+        for omega in self._grid().tolist():
+            response = self._response(omega)
+            for place in found:
+                mine = np.flatnonzero([channel.read == place for channel in self.closed.channels])
+                opened = _opened(response[np.ix_(mine, mine)])
+                found[place] = max(found[place], float(np.nanmax(np.abs(opened))))
+        return tuple(dict.fromkeys(places[place].text for place, gain in found.items() if gain < FAINT))
+
+    @cached_property
     def loci(self) -> tuple[NDArray[np.float64], Complexes]:
         """Frequencies (N,) and eigenvalues (N, loci) of the loop, each locus in a column; rad/s."""
         grid = self._grid()
@@ -113,10 +130,8 @@ class Loop:
         return np.asarray(closed.c @ np.linalg.solve(inner, closed.b.astype(complex)) + closed.d)
 
     def _values(self, omega: float) -> Complexes:
-        """Return the open loop's eigenvalues, computed from those of the closed loop, which stay finite."""
-        values = np.linalg.eigvals(self._response(omega))
-        with np.errstate(all="ignore"):  # at a pole the gain is infinite
-            return np.asarray(-values / (1.0 + values))
+        """Return the open loop's eigenvalues."""
+        return _opened(self._response(omega))
 
     def _unfolded(self, omega: float) -> list[tuple[complex, float]]:
         """Return the eigenvalues with their true frequencies; lifting folds these into the lowest band.
@@ -186,6 +201,13 @@ class Loop:
             else:
                 right, after = middle, value
         return 0.5 * (left + right), 0.5 * (before + after)
+
+
+def _opened(response: Complexes) -> Complexes:
+    """Return the open loop's eigenvalues, computed from those of the closed loop, which stay finite."""
+    values = np.linalg.eigvals(response)
+    with np.errstate(all="ignore"):  # at a pole the gain is infinite
+        return np.asarray(-values / (1.0 + values))
 
 
 def _log_gain(value: complex) -> float:

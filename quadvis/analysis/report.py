@@ -11,7 +11,8 @@ import numpy as np
 
 from quadvis.analysis.analyse import Analysis
 from quadvis.analysis.margins import Loop
-from quadvis.errors import QuadvisError
+from quadvis.analysis.verdict import LoopVerdict
+from quadvis.errors import QuadvisError, counted
 from quadvis.machine.columns import table
 from quadvis.machine.files import PNG, file_name, write_output
 from quadvis.output.canvas import blank_sheet
@@ -46,11 +47,17 @@ def analysis_lines(analysis: Analysis) -> Iterator[str]:
     width = max(map(len, analysis.limits), default=0)
     for label, found in analysis.limits.items():
         yield f"  {label.ljust(width)}  {found.text}"
+    yield from _indented([_verdict_row(verdict) for verdict in analysis.verdicts])
     if analysis.stable:
         yield "STABLE"
     else:
         worst = float(analysis.poles.real.max())
         yield f"NOT STABLE: a disturbance grows by {worst:.3g} 1/s, in {_growing_states(analysis)}"
+    count, missed = len(analysis.verdicts), sum(not verdict.met for verdict in analysis.verdicts)
+    if missed:
+        yield f"FAILED: {missed} of {counted(count, 'margin')} not met"
+    elif count:
+        yield f"PASSED: {count} of {counted(count, 'margin')} met"
 
 
 def _indented(rows: list[tuple[str, ...]]) -> Iterator[str]:
@@ -96,6 +103,10 @@ def _row(loop: Loop) -> tuple[str, ...]:
         f"{margins.delay:.4g} s",
         f"{down}, {up}",
     )
+
+
+def _verdict_row(verdict: LoopVerdict) -> tuple[str, ...]:
+    return "met" if verdict.met else "NOT MET", str(verdict.requirement), verdict.shown
 
 
 def _degrees(angle: float) -> str:

@@ -50,9 +50,9 @@ class Tolerance:
     def text(self) -> str:
         """The answer in words."""
         if math.isnan(self.value):
-            return f"unstable from {shown(self.limit, self.limit.start)} on"
+            return f"unstable from {self.limit.shows(self.limit.start)} on"
         words = "up to" if self.limit.end > self.limit.start else "down to"
-        found = f"stable {words} {shown(self.limit, self.value)}"
+        found = f"stable {words} {self.limit.shows(self.value)}"
         if self.reason:
             return f"{found}; beyond: {self.reason}"
         return found if self.reached else f"{found} and perhaps further"
@@ -89,16 +89,10 @@ def tolerance(diagram: Diagram, limit: Limit, at: float, engine: str = AUTO) -> 
 
 
 def _growth_at(diagram: Diagram, limit: Limit, at: float, engine: str, value: float) -> float:
-    words = f"at {shown(limit, value)}, from {shown(limit, limit.start)} to {shown(limit, limit.end)}"
+    words = f"at {limit.shows(value)}, from {limit.shows(limit.start)} to {limit.shows(limit.end)}"
     with task(words):
         graph = varied(diagram, limit.variable.setting(value)).graph
         return growth(linearised(graph, (), at, engine))
-
-
-def shown(limit: Limit, value: float) -> str:
-    """Return a value of the parameter as text."""
-    number = f"{value / limit.shown.scale:.4g}"
-    return f"{number} {limit.shown}" if limit.shown.symbols else number
 
 
 class Limits(Mapping[str, Tolerance]):
@@ -107,13 +101,17 @@ class Limits(Mapping[str, Tolerance]):
     def __init__(self, diagram: Diagram, limits: Sequence[Limit], at: float, engine: str) -> None:
         self._diagram, self._at, self._engine = diagram, at, engine
         self._limits = {limit.label: limit for limit in limits}
-        self._found: dict[str, Tolerance] = {}
+        self._found: dict[Limit, Tolerance] = {}
 
     def __getitem__(self, label: str) -> Tolerance:
-        if label not in self._found:
-            with task(f"limit '{label}'"):
-                self._found[label] = tolerance(self._diagram, self._limits[label], self._at, self._engine)
-        return self._found[label]
+        return self.answer(self._limits[label])
+
+    def answer(self, limit: Limit) -> Tolerance:
+        """Return the answer to a question, also to one whose name another one took."""
+        if limit not in self._found:
+            with task(f"limit '{limit.label}'"):
+                self._found[limit] = tolerance(self._diagram, limit, self._at, self._engine)
+        return self._found[limit]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._limits)

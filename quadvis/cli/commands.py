@@ -198,7 +198,7 @@ def describe(options: argparse.Namespace) -> int:
 
 
 def analyse(options: argparse.Namespace) -> int:
-    """Print poles, margins and limits of a diagram's loop; 1 if the loop is not stable."""
+    """Print poles, margins and limits of a diagram's loop; 1 if it is not stable or misses a margin."""
     from quadvis.analysis.analyse import analyse as analyse_loop
     from quadvis.analysis.progress import watched
     from quadvis.analysis.questions import read_cuts, read_limits, read_time
@@ -222,7 +222,7 @@ def analyse(options: argparse.Namespace) -> int:
         _print_json(facts | {"plots": paths})
     elif paths:
         print("\n".join(paths))
-    return 0 if analysis.stable else FAILED
+    return 0 if analysis.passed else FAILED
 
 
 def draw(options: argparse.Namespace) -> int:

@@ -14,6 +14,7 @@ JSON_HELP = """\
 engine, real_time_factor, log, lost (what the log lacks, and why);
 summary: {label: {signal, unit, and the statistics by name, final of a vector as a list}};
 expect: [{expectation, signal, kind, unit, limit, found, met, lack (why the run cannot be judged)}];
+margins: the number of expectations that only 'quadvis analyse' judges;
 warnings: [{file, line, column, subject, problem, remedy}], about what runs but is surely a mistake.
 Numbers are in the unit beside them, null for a number that is unknown or infinite.
 Exit code: 0 all expectations met, 1 an expectation is not met, the run stopped or its log lacks something,
@@ -31,11 +32,13 @@ Exit code: 0 all runs passed, 1 a run did not, 2 bad input; 130, 129 or 143 inte
 ANALYSE_HELP = """\
 Noise is removed, Newton's method finds a steady state nearby, and the loop is linearised there;
 a sampled loop is lifted over one hyperperiod. All signals of a cut are opened together.
---json prints one object: diagram, variant, hash, hyperperiod_s (0 for a continuous loop), states, stable;
-poles: [[real, imaginary]] in 1/s; cuts: {name: {signals, gain_up, gain_down, phase_lag, phase_lead,
+--json prints one object: diagram, variant, hash, hyperperiod_s (0 for a continuous loop), states, stable,
+passed; poles: [[real, imaginary]] in 1/s; cuts: {name: {signals, gain_up, gain_down, phase_lag, phase_lead,
 delay, crossover}} in factors, rad, s and rad/s, null for no limit;
-limits: {name: {vary, unit, stable_to, reached, reason}}.
-Exit code: 0 stable, 1 not stable, 2 bad input, or a loop that cannot be linearised."""
+limits: {name: {vary, unit, stable_to, reached, reason}};
+expect: [{expectation, label, kind, unit, limit, found, met, lack (why nothing is found)}].
+Exit code: 0 stable, with all margins that the diagram expects; 1 not stable, or a margin is not met;
+2 bad input, or a loop that cannot be linearised."""
 
 
 def parser() -> Parser:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from quadvis.block import Block
 from quadvis.diagram.keys import SECTIONS
+from quadvis.diagram.loop_requirements import LoopRequirement
 from quadvis.diagram.requirements import Entry, Expectation
 from quadvis.diagram.sections.analyse import ANALYSE, Questions
 from quadvis.diagram.sections.expect import EXPECT
@@ -100,6 +101,11 @@ class Diagram:
     def expectations(self) -> Sequence[Expectation]:
         """The requirements on a run."""
         return self.values[EXPECT].items
+
+    @property
+    def loop_requirements(self) -> Sequence[LoopRequirement]:
+        """The requirements on the loop, which an analysis judges and a run does not."""
+        return self.values[EXPECT].loop
 
     @property
     def summary(self) -> Sequence[Entry]:

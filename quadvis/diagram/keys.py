@@ -28,7 +28,7 @@ FILE_SECTIONS: tuple[FileSection[Any], ...] = (
     FORMAT, NAME, DOC, BASE, WITHOUT, PARAMS, RATES, SOLVER, TASKING, STOP_TIME, SEED, FILES, BLOCKS,
     VARIANTS, PORTS,
 )  # fmt: skip
-RUN_SECTIONS: tuple[RunSection[Any], ...] = (LOG, EXPECT, SUMMARY, FIGURES, ANALYSE)
+RUN_SECTIONS: tuple[RunSection[Any], ...] = (LOG, ANALYSE, EXPECT, SUMMARY, FIGURES)  # `expect` names cuts
 SECTIONS: tuple[Section[Any], ...] = (*FILE_SECTIONS, *RUN_SECTIONS)
 
 

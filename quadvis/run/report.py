@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from quadvis.diagram.requirements import Entry
+from quadvis.errors import counted
 from quadvis.machine.columns import table
 from quadvis.run.session import Result
 from quadvis.run.verdict import Outcome, Verdict
@@ -19,11 +20,17 @@ def summary_lines(result: Result) -> list[str]:
     lines += [f"  {line}" for line in table([_verdict_row(verdict) for verdict in outcome.verdicts])]
     speed = f", {result.real_time_factor:.0f} x real time" if result.duration and result.wall else ""
     lines.append(f"  {result.wall:.1f} s of wall time{speed}; engine: {result.engine}")
+    lines += not_judged(len(diagram.loop_requirements))
     met = sum(verdict.met for verdict in outcome.verdicts)
     if outcome.verdicts:
         count = len(outcome.verdicts)
         lines.append(f"{'PASSED' if result.passed else 'FAILED'}: {met} of {count} expectations met")
     return lines
+
+
+def not_judged(count: int) -> list[str]:
+    """Return a line on the expectations that no run judges, if there are any."""
+    return [f"  not judged by a run: {counted(count, 'margin')}; 'quadvis analyse' does it"] if count else []
 
 
 def _entry_row(entry: Entry, outcome: Outcome) -> tuple[str, ...]:

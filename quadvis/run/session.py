@@ -93,7 +93,7 @@ class Result:
 
     @property
     def passed(self) -> bool:
-        """True if every expectation of the diagram is met."""
+        """True if every expectation of the diagram on a run is met; those on its loop `analyse` judges."""
         return self.outcome.passed
 
     @property
@@ -110,7 +110,8 @@ class Result:
         ``real_time_factor`` is simulated time divided by wall time. ``summary``
         holds ``{signal, unit, rms, max, ...}`` by label; ``final`` of several elements is a list. ``expect``
         is a list of ``{expectation, signal, kind, unit, limit, found, met, lack}``; ``lack`` says why the run
-        cannot be judged. Numbers are in the unit beside them; None stands for a number that is unknown or
+        cannot be judged. ``margins`` is the number of expectations on the loop, which only an analysis
+        judges. Numbers are in the unit beside them; None stands for a number that is unknown or
         infinite.
         """
         summary = {
@@ -135,6 +136,7 @@ class Result:
             "real_time_factor": finite(self.real_time_factor),
             "summary": summary,
             "expect": [verdict.facts() for verdict in self.outcome.verdicts],
+            "margins": len(self.diagram.loop_requirements),
         }
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from quadvis.errors import counted
 from quadvis.machine.columns import table as aligned
 from quadvis.machine.status_line import StatusLine
+from quadvis.run.report import not_judged
 from quadvis.sweeps.axes import SEED
 from quadvis.sweeps.table import FAILURE, PASSED, Table
 from quadvis.sweeps.worker import Quantity
@@ -67,7 +68,7 @@ def sweep_lines(table: Table, width: int | None = None) -> list[str]:
         lines.append(f"  and {len(groups) - MOST_LINES} points more")
     if any(len(rows) > 1 for _, rows in groups):
         lines += ["", f"  mean ({LOW} to {HIGH} %) over the runs of a point"]
-    return [*lines, *_failures(table), _verdict(table)]
+    return [*lines, *_failures(table), *not_judged(table.margins), _verdict(table)]
 
 
 def extent(table: Table, points: int) -> str:

@@ -82,7 +82,7 @@ def sweep(
     chosen = choose(Engine(diagram.graph), diagram.ticks * len(places), engine, announce).engine
     several = any(axis.name in (VARIANT, PARAMS) for axis in axes)  # block types may differ from run to run
     jobs = list(grid.jobs(_folder(logs), engine if several else chosen))
-    collection = _Collection(diagram.name, axes, places, found)
+    collection = _Collection(diagram.name, axes, places, found, len(diagram.loop_requirements))
     with _Saving(collection, target, timings, grid.inputs) as save:
         if resume and target is not None and target.stat().st_size:
             jobs = _not_known(jobs, _earlier(target, found), collection)
@@ -233,8 +233,10 @@ class _Collection:
         axes: Sequence[Axis],
         grid: Sequence[tuple[int, ...]],
         quantities: Sequence[Quantity],
+        margins: int,
     ) -> None:
         self.name, self.axes, self.grid, self.quantities = name, axes, grid, quantities
+        self.margins = margins
         self.units = tuple(quantity.unit for quantity in quantities)
         self.rows: dict[int, Row] = {}
         self.failed = 0
@@ -260,4 +262,4 @@ class _Collection:
         columns[FAILURE] = np.array([row.failure for row in rows], np.str_)
         columns[HASH] = np.array([row.hash for row in rows], np.str_)
         wall = np.array([row.wall for row in rows], np.float64)
-        return Table(self.name, self.axes, self.quantities, indices, columns, wall)
+        return Table(self.name, self.axes, self.quantities, indices, columns, wall, self.margins)

@@ -29,7 +29,8 @@ class Table(Mapping[str, NDArray[Any]]):
 
     The columns are the axes, the quantities (NaN for a run without results), ``passed``, ``failure`` (why a
     run stopped, or "") and ``hash`` (of the resolved diagram, seed included). ``wall`` (s) is the wall time
-    of each run. It is not a column, because it alone differs between two sweeps of the same runs.
+    of each run. It is not a column, because it alone differs between two sweeps of the same runs. ``margins``
+    is the number of the diagram's expectations on its loop, which no run judges.
     """
 
     def __init__(
@@ -40,10 +41,11 @@ class Table(Mapping[str, NDArray[Any]]):
         indices: NDArray[np.int64],
         columns: Mapping[str, NDArray[Any]],
         wall: NDArray[np.float64],
+        margins: int = 0,
     ) -> None:
         """Keep the columns; ``indices`` (N, axes) are each run's indices of values on the axes."""
         self.name, self.axes, self.quantities = name, tuple(axes), tuple(quantities)
-        self.indices, self.columns, self.wall = indices, dict(columns), wall
+        self.indices, self.columns, self.wall, self.margins = indices, dict(columns), wall, margins
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.columns[name]

@@ -3,17 +3,20 @@
 from quadvis.units.grammar import UnitError
 from quadvis.units.quantity import (
     format_quantity,
+    format_ratio,
     parse_number,
     parse_period,
     parse_quantity,
     parse_rational,
     read_quantity,
+    read_ratio,
     require_unit,
     split_quantity,
 )
 from quadvis.units.unit import Unit, advised, parse_units, unify
 
 __all__ = [
-    "Unit", "UnitError", "advised", "format_quantity", "parse_number", "parse_period", "parse_quantity",
-    "parse_rational", "parse_units", "read_quantity", "require_unit", "split_quantity", "unify",
+    "Unit", "UnitError", "advised", "format_quantity", "format_ratio", "parse_number",
+    "parse_period", "parse_quantity", "parse_rational", "parse_units", "read_quantity", "read_ratio",
+    "require_unit", "split_quantity", "unify",
 ]  # fmt: skip

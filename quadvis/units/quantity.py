@@ -11,6 +11,7 @@ from quadvis.errors import quoted
 from quadvis.units.grammar import LONGEST, UnitError
 from quadvis.units.unit import Unit, advised
 
+DECIBEL = "dB"  # of ratios alone: a logarithm is no unit, since products of it mean nothing
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _OTHER_BASE = re.compile(r"[+-]?0(?:[xX][0-9a-fA-F]|[oO][0-7]|[bB][01])")  # 0x10, but not 0 ohm
 _RATIO = re.compile(r"([0-9]+) */ *([0-9]+)(?![0-9.])")
@@ -112,6 +113,24 @@ def read_quantity(text: str, unit: Unit, *, bare: bool = True) -> float:
         return _to_si(number, written, text)
     _require_dimension(text, written, unit)
     return _to_si(number, _quotient(written, unit), text)
+
+
+def read_ratio(text: str) -> float:
+    """Return a ratio of amplitudes: "2", "200 %", or its logarithm, "6 dB"."""
+    number, unit = split_quantity(text)
+    if unit != DECIBEL or not number:
+        return read_quantity(text, Unit())
+    try:
+        return float(10.0 ** float(_exact(number, text) / 20))
+    except OverflowError:
+        raise UnitError(f"{quoted(text)} is outside the range of numbers") from None
+
+
+def format_ratio(value: float, unit: str = "") -> str:
+    """Return a ratio as text: "x 1.995", or "6 dB" if this is the unit."""
+    if unit != DECIBEL:
+        return f"x {value:.4g}"
+    return f"{20.0 * math.log10(value):.4g} dB" if value else "-inf dB"
 
 
 @lru_cache(maxsize=1024)

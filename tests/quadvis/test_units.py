@@ -16,12 +16,14 @@ from quadvis.units import (
     Unit,
     UnitError,
     format_quantity,
+    format_ratio,
     parse_number,
     parse_period,
     parse_quantity,
     parse_rational,
     parse_units,
     read_quantity,
+    read_ratio,
     require_unit,
     split_quantity,
     unify,
@@ -518,3 +520,25 @@ def test_any_text_is_read_or_refused(text):
             read_quantity(text, Unit.parse(unit), bare=False)
         except QuadvisError as error:
             assert str(error).isprintable()
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("2", 2.0), ("200 %", 2.0), ("20 dB", 10.0), ("40dB", 100.0), ("0 dB", 1.0), ("-20 dB", 0.1)],
+)
+def test_a_ratio_of_amplitudes_is_a_number_or_its_decibels(text: str, value: float) -> None:
+    assert read_ratio(text) == value  # exactly: these powers of ten are
+
+
+@pytest.mark.parametrize("text", ["2 m", "dB", "6 db", "1e5 dB", "x dB", "6 dB/s"])
+def test_what_is_no_ratio_is_refused(text: str) -> None:
+    with pytest.raises(UnitError):
+        read_ratio(text)
+
+
+@given(st.floats(1e-9, 1e9))
+def test_a_ratio_is_shown_as_it_is_read(value: float) -> None:
+    assert float(format_ratio(value).removeprefix("x ")) == pytest.approx(value, rel=1e-3)
+    shown = format_ratio(value, "dB")
+    assert read_ratio(shown) == pytest.approx(value, rel=0.02)
+    assert format_ratio(0.0, "dB") == "-inf dB"

@@ -16,7 +16,7 @@ from quadvis.diagram.times import read_duration
 from quadvis.diagram.variable import Variable, find_variable
 from quadvis.diagram.wiring import Wiring
 from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar
-from quadvis.errors import UNKNOWN, Faults, Unknown, known
+from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known
 from quadvis.errors.caller import as_given
 from quadvis.graph.names import wire_text
 from quadvis.units import Unit, split_quantity
@@ -54,14 +54,23 @@ class Limit(NamedTuple):
     end: float
     shown: Unit
 
+    def shows(self, value: float) -> str:
+        """Return a value of the parameter as text."""
+        number = f"{value / self.shown.scale:.4g}"
+        return f"{number} {self.shown}" if self.shown.symbols else number
+
 
 class Questions(NamedTuple):
-    """All that is asked: time (s) of the operating point, cuts, limits; ``context`` is for more of them."""
+    """All that is asked: time (s) of the operating point, cuts, limits; ``context`` is for more of them.
+
+    ``named`` are the names that are written under `cuts` and under `limits`, also of those with a fault.
+    """
 
     context: Context
     at: float = AT
     cuts: tuple[Cut, ...] = ()
     limits: tuple[Limit, ...] = ()
+    named: tuple[tuple[str, ...] | Unknown, tuple[str, ...] | Unknown] = ((), ())
 
     def more(
         self, cuts: Mapping[str, Any], limits: Mapping[str, tuple[str, str, str]]
@@ -70,6 +79,10 @@ class Questions(NamedTuple):
         faults = Faults()
         wiring = Wiring(self.context.wiring.expansion, faults)
         context = replace(self.context, wiring=wiring, faults=faults)
+        for label in cuts:
+            if any(label == cut.label for cut in self.cuts):
+                problem = f"the diagram has a cut '{label}' already"
+                faults.add(Place(as_given("--cut", "cuts")), problem, "choose another name")
         found = [_cut(label, _list(signals), context) for label, signals in cuts.items()]
         sought = [_limit(label, _map(limit), context) for label, limit in limits.items()]
         faults.check()
@@ -86,9 +99,11 @@ class Analyse(RunSection[Questions]):
     def read(self, node: YamlNode | None, context: Context) -> Questions:
         """Return the questions."""
         faults = context.faults
-        fields = faults.collect(node.fields, (), ANALYSE_KEYS, faults) if node is not None else None
-        if fields is None:
+        if node is None:
             return Questions(context)
+        fields = faults.collect(node.fields, (), ANALYSE_KEYS, faults)
+        if fields is None:
+            return Questions(context, named=(UNKNOWN, UNKNOWN))
         at = faults.collect(read_duration, fields["at"]) if "at" in fields else None
         cuts = faults.collect(fields["cuts"].mapping) if "cuts" in fields else None
         limits = faults.collect(fields["limits"].mapping) if "limits" in fields else None
@@ -99,6 +114,7 @@ class Analyse(RunSection[Questions]):
             AT if at is None else float(at),
             tuple(cut for cut in found if known(cut)),
             tuple(limit for limit in sought if known(limit)),
+            (_labels(fields.get("cuts")), _labels(fields.get("limits"))),
         )
 
     def schema(self) -> Schema:
@@ -120,6 +136,12 @@ class Analyse(RunSection[Questions]):
             "to": {**QUANTITY, "description": "where it ends"},
         }
         return {"limit": closed(LIMIT_KEYS, limit, LIMIT_KEYS)}
+
+
+def _labels(node: YamlNode | None) -> tuple[str, ...] | Unknown:
+    if isinstance(node, YamlMap):
+        return tuple(node.values)
+    return UNKNOWN if node is not None else ()
 
 
 def _text(text: str, place: str, key: str = "") -> YamlScalar:

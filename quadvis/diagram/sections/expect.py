@@ -1,38 +1,64 @@
-"""`expect`: the requirements on a run."""
+"""`expect`: the requirements on a run, and on the linearised loop."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
+from quadvis.diagram.loop_requirements import MARGINS, LoopRequirement
 from quadvis.diagram.requirements import EXPECTATIONS, Expectation
 from quadvis.diagram.sections.context import Context, RunSection
-from quadvis.diagram.sections.forms import QUANTITY, SIGNAL, Schema, closed, list_of, ref
+from quadvis.diagram.sections.expect_loop import DIRECTIONS, read_limit, read_margin
+from quadvis.diagram.sections.forms import QUANTITY, SIGNAL, TEXT, Schema, closed, list_of, ref
 from quadvis.diagram.sections.section import Checked
 from quadvis.diagram.sections.signals import STRETCH_KEYS, Asked, read_stretch
-from quadvis.document import YamlNode
-from quadvis.errors import UNKNOWN
+from quadvis.document import YamlMap, YamlNode
+from quadvis.errors import UNKNOWN, closest
 from quadvis.output.statistics import COUNT
 from quadvis.units import Unit, split_quantity
 
 ONE = Unit()
+# What an expectation judges, by the key that names it, and the other keys.
+FORMS: Mapping[str, tuple[str, ...]] = {
+    "signal": (*STRETCH_KEYS, *EXPECTATIONS),
+    "margin": tuple(MARGINS),
+    "limit": DIRECTIONS,
+}
 
 
-class Expect(RunSection[Asked[Expectation]]):
-    """The requirements that a run must meet."""
+@dataclass(frozen=True)
+class Expected(Asked[Expectation]):
+    """The requirements on a run as ``items``; those on the loop, which an analysis must meet, as ``loop``."""
+
+    loop: tuple[LoopRequirement, ...] = ()
+
+
+class Expect(RunSection[Expected]):
+    """The requirements that a run and its loop must meet."""
 
     key = "expect"
     words = (
         "requirements: `{signal, after, before, of}` with one of `within`, `rms`, `below`, `above`, `count`, "
-        "`at_least`, see below"
+        "`at_least`; `{margin: cut}` with `gain`, `phase`, `delay`; `{limit, above}`, see below"
     )
 
-    def read(self, node: YamlNode | None, context: Context) -> Asked[Expectation]:
+    def read(self, node: YamlNode | None, context: Context) -> Expected:
         """Return the expectations in the order of the file."""
-        entries = context.faults.collect(node.items) if node is not None else None
-        found = tuple(expectation for entry in entries or [] for expectation in _read(entry, context))
-        return Asked(found, context.written(node))
+        entries = (context.faults.collect(node.items) if node is not None else None) or []
+        found: list[Expectation] = []
+        loop: list[LoopRequirement] = []
+        of_run: list[YamlNode] = []
+        for entry in entries:
+            form = _form(entry)
+            fields = context.faults.collect(entry.fields, (form,), FORMS[form], context.faults)
+            if form == "signal":
+                of_run.append(entry)
+                found += _read(fields, context) if fields is not None else ()
+            elif fields is not None and form in fields:
+                loop += (read_margin if form == "margin" else read_limit)(fields, context)
+        written = [context.written(entry) for entry in of_run]
+        return Expected(tuple(found), written or None, tuple(loop))
 
     def schema(self) -> Schema:
         """Return the schema: a list of requirements."""
@@ -40,29 +66,51 @@ class Expect(RunSection[Asked[Expectation]]):
 
     def definitions(self, blocks: object) -> dict[str, Schema]:
         """Return the form of one requirement."""
-        keys = ("signal", *STRETCH_KEYS, *EXPECTATIONS)
         stretch: dict[str, Schema] = {key: QUANTITY for key in STRETCH_KEYS}
         kinds: dict[str, Schema] = {
             key: {**QUANTITY, "description": kind.words} for key, kind in EXPECTATIONS.items()
         }
-        return {"expectation": closed(keys, {"signal": SIGNAL, **stretch, **kinds}, ["signal"])}
+        margins: dict[str, Schema] = {
+            key: {**QUANTITY, "description": words} for key, words in MARGINS.items()
+        }
+        of = {
+            "signal": {"signal": SIGNAL, **stretch, **kinds},
+            "margin": {"margin": {**TEXT, "description": "a cut under `analyse`"}, **margins},
+            "limit": {
+                "limit": {**TEXT, "description": "a limit under `analyse`"},
+                "above": {**QUANTITY, "description": "the value up to which the loop must be stable"},
+                "below": {**QUANTITY, "description": "that down to which it must"},
+            },
+        }
+        return {
+            "expectation": {
+                "anyOf": [closed((form, *keys), of[form], [form]) for form, keys in FORMS.items()]
+            }
+        }
 
     def resolved(self, diagram: Checked) -> Any:
-        """Return the requirements as they are written, with the full names of signals."""
+        """Return the requirements on a run as they are written, with the full names of signals.
+
+        Like `analyse`, those on the loop say nothing of a run, so they are not in its hash.
+        """
         return diagram.values[self].written
 
 
-def _read(node: YamlNode, context: Context) -> Iterator[Expectation]:
+def _form(node: YamlNode) -> str:
+    """Return the key that says what is judged; a misspelt one counts."""
+    keys = tuple(node.values) if isinstance(node, YamlMap) else ()
+    near = (form for key in keys for form in [closest(key, FORMS)] if form is not None)
+    return next((form for form in FORMS if form in keys), None) or next(near, "signal")
+
+
+def _read(fields: YamlMap, context: Context) -> Iterator[Expectation]:
     """Read ``{signal: plant.position[0], after: 20 s, within: 0.15 m}``."""
     faults = context.faults
-    fields = faults.collect(node.fields, ("signal",), (*STRETCH_KEYS, *EXPECTATIONS), faults)
-    if fields is None:
-        return
     found = read_stretch(fields, context)
     kinds = [kind for kind in EXPECTATIONS if kind in fields]
     if not kinds and all(key in ("signal", *STRETCH_KEYS) for key in fields):
         problem = "nothing is expected of the signal"
-        faults.add(node.place, problem, f"add one of {', '.join(EXPECTATIONS)}")
+        faults.add(fields.place, problem, f"add one of {', '.join(EXPECTATIONS)}")
     if found is UNKNOWN:
         return
     fields = context.filled(fields, kinds)
