@@ -79,18 +79,20 @@ class Loop:
     def idle(self) -> tuple[str, ...]:
         """The signals of the cut through which no loop passes: of a change of one, nothing comes back to it.
 
-        They are judged one by one with all others as they are. Of a signal that is read at some of its
-        instants only, these are enough.
+        Each is judged with all others as they are; a signal that is read at some of its instants only is on
+        the loop.
         """
-        places = {channel.read: channel for channel in self.closed.channels}
-        found = {place: 0.0 for place in places}
-        for omega in self._grid().tolist():
-            response = self._response(omega)
-            for place in found:
-                mine = np.flatnonzero([channel.read == place for channel in self.closed.channels])
-                opened = _opened(response[np.ix_(mine, mine)])
-                found[place] = max(found[place], float(np.nanmax(np.abs(opened))))
-        return tuple(dict.fromkeys(places[place].text for place, gain in found.items() if gain < FAINT))
+        channels = self.closed.channels
+        instants: dict[int, list[int]] = {}
+        for index, channel in enumerate(channels):
+            instants.setdefault(channel.read, []).append(index)
+        responses = [self._response(omega) for omega in self._grid().tolist()]
+        idle = [
+            channels[mine[0]].text
+            for mine in instants.values()
+            if all(np.abs(_opened(each[np.ix_(mine, mine)])).max() < FAINT for each in responses)
+        ]
+        return tuple(dict.fromkeys(idle))
 
     @cached_property
     def loci(self) -> tuple[NDArray[np.float64], Complexes]:

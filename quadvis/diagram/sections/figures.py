@@ -33,12 +33,12 @@ from quadvis.diagram.sections.section import Checked
 from quadvis.diagram.sections.signals import Asked, check_signal
 from quadvis.diagram.times import SECOND
 from quadvis.diagram.unit_flow import words
-from quadvis.document import YamlList, YamlMap, YamlNode, parse_yaml
-from quadvis.errors import UNKNOWN, Faults, Unknown, known
+from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar, parse_yaml
+from quadvis.errors import UNKNOWN, DiagramError, Fault, Faults, Place, Unknown, known, quoted
 from quadvis.graph.graph import Wire
 from quadvis.output.figures import Figure, Panel, Trace
 from quadvis.output.stretch import NANOSECONDS, stamp
-from quadvis.units import Unit, UnitError
+from quadvis.units import Unit, UnitError, split_quantity
 
 STRETCH_KEYS = ("from", "to")
 PANEL_KEYS = ("signals", "title", "unit", "reference")
@@ -136,13 +136,14 @@ class FigureReader:
     def _panel(self, node: YamlNode, single: bool) -> Panel:
         """Read a panel; in a figure of one panel the keys and the title are the figure's."""
         entry = node.mapping() if single else node.fields(PANEL_KEYS[:1], PANEL_KEYS[1:], self.faults)
+        place = entry["reference"].place if "reference" in entry else entry.place
         if self.context is not None:
             entry = self.context.filled(entry, ("reference",))
         title, signals, unit, reference = map(entry.get, ("title", "signals", "unit", "reference"))
         shown = self.faults.collect(_unit, unit) if unit else None
         entries = _some(signals) if isinstance(signals, YamlList) else [signals] if signals else []
         traces = [self.faults.read(self._trace, trace, shown) for trace in entries]
-        level = self.faults.collect(reference.quantity, shown or Unit()) if reference else None
+        level = self.faults.collect(_level, reference, unit, shown, place) if reference else None
         name = self.faults.collect(title.text) if title and not single else None
         return Panel(tuple(trace for trace in traces if known(trace)), name or "", shown, level)
 
@@ -176,6 +177,14 @@ def _some(node: YamlNode) -> list[YamlNode]:
     if not node.items():
         raise node.fault("the list is empty", "write its entries, or leave the key out")
     return node.items()
+
+
+def _level(node: YamlNode, unit: YamlNode | None, shown: Unit | None, place: Place) -> float:
+    """Return a reference in the unit of the axis; ``place`` is where the panel names it."""
+    if unit is None and isinstance(node, YamlScalar) and all(split_quantity(node.value)):
+        problem = f"the reference is {quoted(node.value)}, and its panel has no unit"
+        raise DiagramError([Fault(place, "", problem, "add the 'unit' of the axis")])
+    return node.quantity(shown or Unit())
 
 
 def _unit(node: YamlNode) -> Unit:
