@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, TypeVar
 
-from quadvis.block.declare import Declared, In, Out, Param, ParameterError, Safe, State, Work
+from quadvis.block.declare import Declared, Derived, In, Out, Param, ParameterError, Safe, State, Work
 from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.machine.inputs import file_digest, read_once
 from quadvis.machine.source_line import file_of, source_line
@@ -44,6 +44,7 @@ class Interface:
     inputs: Mapping[str, In]
     outputs: Mapping[str, Out]
     params: Mapping[str, Param]
+    derived: Mapping[str, Derived]
     states: Mapping[str, State]
     work: Mapping[str, Work]
     safe: Mapping[str, Safe]  # by the input that each value replaces
@@ -265,7 +266,7 @@ def _interface(cls: type[Block]) -> Interface:
     if outputs and "output" not in arguments:
         raise TypeError(f"{cls.__name__} declares outputs but has no output method")
     safe = _safe(cls, of(Safe).values(), inputs, arguments.get("write", ()))
-    return Interface(inputs, outputs, of(Param), states, of(Work), safe, arguments)
+    return Interface(inputs, outputs, of(Param), of(Derived), states, of(Work), safe, arguments)
 
 
 def _asked(function: Callable[..., Any], inputs: tuple[str, ...] | None) -> tuple[str, ...]:

@@ -70,6 +70,16 @@ class Out(Declared):
 
 
 @dataclass(eq=False)
+class Derived(Declared):
+    """Numbers that ``check`` computes from files and from parameters that cannot be tuned, and assigns.
+
+    They are constant during a run, and in memory, so that compiled methods can read them.
+    """
+
+    type: str = "float64"
+
+
+@dataclass(eq=False)
 class State(Declared):
     """A state. Only ``start`` and ``update`` change it, and the solver by ``deriv`` if ``continuous``."""
 

@@ -61,7 +61,7 @@ class Field(NamedTuple):
 
 @dataclass(frozen=True)
 class Record:
-    """The layout of a block's ``self``: the period first, then parameters, then states, then Work.
+    """The layout of a block's ``self``: the period, parameters, what is derived from them, states, Work.
 
     ``kept`` slots come before the Work, which is scratch of one tick and no part of a snapshot.
     """
@@ -75,7 +75,7 @@ class Record:
         """Lay out a block whose symbolic sizes are known; texts and frames stay outside."""
         interface = block.interface
         fields, offset, kept = [Field("period", "float64", (), 0)], 1, 1
-        for group in (interface.params, interface.states, interface.work):
+        for group in (interface.params, interface.derived, interface.states, interface.work):
             kept = offset
             for name, declared in group.items():
                 if declared.signal.scalar in ("str", "frame"):
@@ -182,7 +182,7 @@ class Memory:
         """Write a block's period, parameters and the initial values of its states from ``position`` on."""
         interface = block.interface
         for item in record.fields:
-            if item.name in interface.params:
+            if item.name in interface.params or item.name in interface.derived:
                 value = getattr(block, item.name)
             elif item.name in interface.states:
                 value = interface.states[item.name].init

@@ -129,6 +129,9 @@ def _describe(value: Any, names: Collection[str], parts: list[str], seen: dict[i
     elif isinstance(value, enum.EnumMeta):
         members: dict[str, Any] = dict(value.__members__)
         parts.append(repr([(name, member.value) for name, member in members.items()]))
+    elif isinstance(value, type) and issubclass(value, tuple):  # fields of a named tuple have places
+        fields = getattr(value, "_fields", ())
+        parts.append(f"{value.__qualname__} {fields} {getattr(value, '_field_defaults', {})}")
     elif isinstance(value, np.ndarray):
         parts.append(f"{value.dtype}{value.shape}{value.tobytes().hex()}")
     elif isinstance(value, types.ModuleType):

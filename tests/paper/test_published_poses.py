@@ -6,9 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from quadvis_vision.camera.projection import attitude_of
+from quadvis_vision.camera.projection import camera_attitude
 from quadvis_vision.pose.level import level_pose
 from quadvis_vision.pose.pose import pose_from_n_points, pose_from_plane
+from tests.blocks.vision.plain import circles_at, pose_by
 
 # x, y, z and three angles in degrees. One heading misprints the method, and one number: "-0-2" is -0.2.
 FIRST = np.array([
@@ -72,9 +73,9 @@ def test_exact_points_give_the_published_poses_back(method, published, order):
     # The columns' names cannot be read, so every way to take them as roll, pitch and yaw must do.
     for row in published:
         angles = np.radians(row[3:])[list(order)]
-        pose = method(to_rays(to_pixels(camera_points(row[:3], angles))), SIDE)
+        pose = pose_by(method, to_rays(to_pixels(camera_points(row[:3], angles))), SIDE)
         assert pose.position == pytest.approx(row[:3], abs=1e-7)
-        found = attitude_of(pose.rotation.T @ np.diag([1.0, -1.0, -1.0]))
+        found = camera_attitude(pose.rotation.tolist())
         assert found == pytest.approx(angles, abs=1e-7)
 
 
@@ -87,7 +88,8 @@ def test_two_circles_and_the_tilt_give_the_published_poses_back_too(published):
         for rows in itertools.combinations(range(4), 2):
             seen = np.full((4, 2), np.nan)
             seen[list(rows)] = points[list(rows)]
-            assert level_pose(seen, roll, pitch, SIDE) == pytest.approx((*row[:3], yaw), abs=1e-7)
+            found = level_pose(circles_at(seen, CORNERS), roll, pitch)
+            assert found == pytest.approx((*row[:3], yaw, roll, pitch), abs=1e-7)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -109,7 +111,8 @@ def test_the_distance_of_the_first_method_is_the_longer_focal_lengths_in_part():
         pixels = to_pixels(camera_points(row[:3], np.radians(row[[5, 4, 3]])))
         for method in METHODS:
             ratio = (
-                method(to_rays(pixels, longer), SIDE).position[2] / method(to_rays(pixels), SIDE).position[2]
+                pose_by(method, to_rays(pixels, longer), SIDE).position[2]
+                / pose_by(method, to_rays(pixels), SIDE).position[2]
             )
             assert ratio == pytest.approx(1.052, abs=0.02)  # of the published 1.137
 

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from quadvis.block import Block, Param, ParameterError, Random, State, fill_uniform, passed, reached
+from quadvis.block import Block, Param, ParameterError, Random, State, Work, fill_uniform, passed, reached
 
 QUEUE = 16  # frames that can be on their way at once
 SEQUENCE, STAMP, ARRIVAL = range(3)  # the first columns of a row; the rest is the content of the frame
 CONTENT = 3
 
-Row = NDArray[np.float64]
+if TYPE_CHECKING:
+    _Base = Block
+else:  # `DeliveringCamera` alone is not a block: it declares Work, but has no output method
+    _Base = object
 
 
-class DeliveringCamera(Block, numeric=False):
+class DeliveringCamera(_Base):
     """A camera whose frames are late, may get lost, and may overtake each other.
 
     A frame is captured at every ``every``-th tick, from the first tick on. Frames are numbered from 1, lost
@@ -58,10 +59,11 @@ class DeliveringCamera(Block, numeric=False):
     ticks = State("int64")
     captured = State("int64")
     dropped = State("bool")  # whether the last frame was lost by chance
-    pending = State(f"float64[{QUEUE},{CONTENT}]")  # rows on their way, oldest first; cameras widen it
+    pending = State(f"float64[{QUEUE},{CONTENT}]")  # rows on their way, oldest first; cameras widen all rows
     waiting = State("int64")  # number of rows on their way
     shown = State(f"float64[{CONTENT}]")  # the row on the wire; sequence 0 before the first
-    _arrivals: tuple[Row, list[Row]]  # the rows on the wire and on their way, from output to update
+    taken = Work(f"float64[{CONTENT}]")  # the row of the frame captured at this tick; sequence 0 if none is
+    wire = Work(f"float64[{CONTENT}]")  # the row on the wire now
 
     def check(self) -> None:
         """Refuse a latency that the queue cannot hold; ParameterError."""
@@ -72,70 +74,77 @@ class DeliveringCamera(Block, numeric=False):
             problem = f"latency{together} must be {bound}, got {self.latency + self.jitter:g} s"
             raise ParameterError("latency", problem)
 
-    def start(self) -> None:
-        """Draw the chances of the first frame."""
-        self._draw()
 
-    def _draw(self) -> None:
-        fill_uniform(self.delivery, self.chances)
+# Functions, since compiled methods can call functions only; each takes the camera.
 
-    def _is_captured(self) -> bool:
-        """Return whether this tick has a frame, lost or not."""
-        return bool(self.ticks % self.every == 0)
 
-    def _is_dropped(self) -> bool:
-        """Return whether the frame of this tick gets lost by chance."""
-        rate, burst = self.drop_rate, self.drop_burst
-        if self.captured == 0:
-            return bool(self.chances[0] < rate)
-        return bool(self.chances[0] < (1 - (1 - rate) / burst if self.dropped else rate / burst))
+def draw(camera: Any) -> None:
+    """Draw the chances of the coming frame; for ``start``."""
+    fill_uniform(camera.delivery, camera.chances)
 
-    def _is_lost(self, time: float) -> bool:
-        if self._is_dropped():
-            return True
-        begin, length = self.blackout.tolist()
-        return bool(length > 0.0 and reached(time, begin) and not reached(time, begin + length))
 
-    def _arrival(self, stamp: float) -> float:
-        """Return when the frame of this tick arrives."""
-        return float(stamp + self.latency + self.jitter * self.chances[1])
+def is_captured(camera: Any) -> bool:
+    """Return whether this tick has a frame, lost or not."""
+    return bool(camera.ticks % camera.every == 0)
 
-    def _row(self, stamp: float, content: Any) -> Row:
-        """Return the frame of this tick as a row of the queue."""
-        row = np.empty(CONTENT + len(content))
-        row[SEQUENCE], row[STAMP], row[ARRIVAL] = self.captured + 1, stamp, self._arrival(stamp)
-        row[CONTENT:] = content
-        return row
 
-    def _arrived(self, fresh: Row | None, time: float) -> tuple[Row, list[Row]]:
-        """Return the row on the wire at this time, and the rows that are still on their way.
+def take(camera: Any, time: float, stamp: float) -> bool:
+    """Begin the row of this tick's frame in ``taken``; return whether there is a frame that is not lost."""
+    if not is_captured(camera) or _is_lost(camera, time):
+        camera.taken[SEQUENCE] = 0.0
+        return False
+    camera.taken[SEQUENCE] = camera.captured + 1
+    camera.taken[STAMP] = stamp
+    camera.taken[ARRIVAL] = stamp + camera.latency + camera.jitter * camera.chances[1]
+    return True
 
-        ``fresh`` is the row of the frame that is captured now; None if there is none or if it is lost.
-        """
-        queue = [*self.pending[: self.waiting].copy()] + ([] if fresh is None else [fresh])
-        shown, newest, rest = None, (0.0, 0.0), []
-        for row in queue:
-            sequence, _, arrival = row[:CONTENT].tolist()
-            if not reached(time, arrival):
-                rest.append(row)
-            elif shown is None or (arrival, sequence) > newest:
-                shown, newest = row, (arrival, sequence)
-        return self.shown.copy() if shown is None else shown, rest
 
-    def _deliver(self, fresh: Row | None, time: float) -> Row:
-        """Return the row on the wire at this time, and keep all rows for `_advance`; for ``output``."""
-        self._arrivals = self._arrived(fresh, time)
-        return self._arrivals[0]
+def deliver(camera: Any, time: float) -> None:
+    """Put the row on the wire at this time into ``wire``; for ``output``, after `take`."""
+    camera.wire[:] = camera.shown
+    last = (-math.inf, 0.0)
+    for index in range(camera.waiting):
+        last = _show(camera.wire, camera.pending[index], time, last)
+    _show(camera.wire, camera.taken, time, last)
 
-    def _advance(self) -> None:
-        """Keep the rows on the wire and on their way, and go to the next tick; for ``update``."""
-        shown, rest = self._arrivals
-        self.shown[:] = shown
-        for place, row in enumerate(rest):
-            self.pending[place] = row
-        self.waiting = len(rest)
-        if self._is_captured():
-            self.dropped = self._is_dropped()
-            self.captured += 1
-            self._draw()
-        self.ticks += 1
+
+def advance(camera: Any, time: float) -> None:
+    """Keep the rows on the wire and on their way, and go to the next tick; for ``update``."""
+    camera.shown[:] = camera.wire
+    left = 0
+    for index in range(camera.waiting):
+        if not reached(time, camera.pending[index, ARRIVAL]):
+            camera.pending[left] = camera.pending[index]
+            left += 1
+    if camera.taken[SEQUENCE] > 0 and not reached(time, camera.taken[ARRIVAL]):
+        camera.pending[left] = camera.taken
+        left += 1
+    camera.waiting = left
+    if is_captured(camera):
+        camera.dropped = _is_dropped(camera)
+        camera.captured += 1
+        draw(camera)
+    camera.ticks += 1
+
+
+def _show(wire: Any, row: Any, time: float, last: tuple[float, float]) -> tuple[float, float]:
+    """Put a row on the wire if it has arrived, after the last one; return arrival and number of the later."""
+    arrival, sequence = float(row[ARRIVAL]), float(row[SEQUENCE])
+    if sequence == 0 or not reached(time, arrival) or (arrival, sequence) < last:
+        return last
+    wire[:] = row
+    return arrival, sequence
+
+
+def _is_dropped(camera: Any) -> bool:
+    """Return whether the frame of this tick gets lost by chance."""
+    rate, burst = camera.drop_rate, camera.drop_burst
+    if camera.captured > 0:
+        rate = 1 - (1 - rate) / burst if camera.dropped else rate / burst
+    return bool(camera.chances[0] < rate)
+
+
+def _is_lost(camera: Any, time: float) -> bool:
+    begin, length = float(camera.blackout[0]), float(camera.blackout[1])
+    blind = length > 0.0 and reached(time, begin) and not reached(time, begin + length)
+    return blind or _is_dropped(camera)

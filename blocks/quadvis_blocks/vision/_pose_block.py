@@ -1,84 +1,40 @@
-"""The common part of the pose blocks: ports, parameters, and the way from pixels to rays and back."""
+"""The common part of the pose blocks: ports, parameters, the camera, and the outputs for a pose."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from quadvis.block import Block, In, Out, Param
+from quadvis.block import Block, Derived, In, Out, Param
 from quadvis_vision.camera.calibration import CameraCalibration
-from quadvis_vision.camera.lens import by_point
-from quadvis_vision.camera.projection import SIDE, camera_attitude, target_corners
+from quadvis_vision.camera.pinhole import NUMBERS, Pinhole, pinhole
+from quadvis_vision.camera.projection import SIDE, camera_attitude
 from quadvis_vision.camera.two_planes import TwoPlanesCalibration
-from quadvis_vision.pose.pose import Pose, camera_points, seen_centres
-from quadvis_vision.pose.refine import View, pose_of, refine, unknowns_of
+from quadvis_vision.camera.vectors import Vector
+from quadvis_vision.pose.circles import Circle, image, residual, seen_circles
+from quadvis_vision.pose.pose import Pose
+from quadvis_vision.pose.refine import pose_of, refine, unknowns_of
 
 if TYPE_CHECKING:
     _Base = Block
 else:  # `PoseFromCircles` alone is not a block: it declares outputs, but has no output method
     _Base = object
 
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool]
+Method = Callable[[Sequence[Vector], float], Pose | None]  # from rays to the circles and the side
 
 PINHOLE, TWO_PLANES = range(2)
 NONE, GAUSS_NEWTON = range(2)
-NOTHING = (np.full(3, math.nan), math.nan, np.full((3, 3), math.nan), math.nan, math.nan, math.nan, False)
 
 
-class PinholeRays:
-    """Rays of a pinhole camera with a lens."""
-
-    def __init__(self, path: str) -> None:
-        self.camera = CameraCalibration.load(path)
-
-    def rays(self, pixels: Array) -> Array:
-        """Return the vectors (n, 3) in camera axes along which pixels (n, 2) look."""
-        if self.camera.bends:
-            return np.column_stack((self.camera.normalise(pixels), np.ones(len(pixels))))
-        # The same in plain numbers, which on four pixels are faster than arrays.
-        fx, skew, cx, fy, cy = self.camera.intrinsics
-        heights = [(v - cy) / fy for v in pixels[:, 1].tolist()]
-        return np.array(
-            [((u - cx - skew * y) / fx, y, 1.0) for u, y in zip(pixels[:, 0].tolist(), heights, strict=True)]
-        )
-
-    def pixels(self, points: Array) -> Array:
-        """Return the pixels (n, 2) of normalised points (n, 2)."""
-        return self.camera.to_pixels(points)
-
-    def slopes(self, points: Array) -> Array:
-        """Return the derivatives (n, 2, 2) of pixels by normalised points (n, 2), the lens included."""
-        matrix, lens = self.camera.matrix[:2, :2], self.camera.distortion
-        return matrix @ by_point(points, lens) if self.camera.bends else _alike(matrix, points)
+def _numbers(path: str) -> tuple[float, ...]:
+    return CameraCalibration.load(path).numbers
 
 
-class TwoPlanesRays:
-    """Rays of a camera that was calibrated on two planes."""
-
-    def __init__(self, path: str) -> None:
-        self.planes = TwoPlanesCalibration.load(path)
-        self.matrix = self.planes.pinhole[0]
-
-    def rays(self, pixels: Array) -> Array:
-        """Return the unit vectors (n, 3) in camera axes along which pixels (n, 2) look, eq. (4)."""
-        return self.planes.rays(pixels)
-
-    def pixels(self, points: Array) -> Array:
-        """Return the pixels (n, 2) of normalised points (n, 2)."""
-        return np.asarray(points @ self.matrix[:2, :2].T + self.matrix[:2, 2])
-
-    def slopes(self, points: Array) -> Array:
-        """Return the derivatives (n, 2, 2) of pixels by normalised points (n, 2)."""
-        return _alike(self.matrix[:2, :2], points)
-
-
-def _alike(matrix: Array, points: Array) -> Array:
-    """Return the matrix (2, 2) once for each point."""
-    return np.broadcast_to(matrix, (len(points), 2, 2))
+def _numbers_of_planes(path: str) -> tuple[float, ...]:
+    return TwoPlanesCalibration.load(path).numbers
 
 
 class PoseFromCircles(_Base):
@@ -102,35 +58,16 @@ class PoseFromCircles(_Base):
         0.0, unit="m", min=0.0, doc="of the circles, to correct for perspective; 0: circles are points"
     )
 
+    optics = Derived(f"float64[{NUMBERS}]", doc="the camera as `pinhole` takes it")
+
     def check(self) -> None:
         """Read the calibration."""
-        self._load()
-
-    def _load(self) -> PinholeRays | TwoPlanesRays:
-        if self.rays == TWO_PLANES:
-            return self.read_file("calibration", TwoPlanesRays)
-        return self.read_file("calibration", PinholeRays)
-
-    def open(self) -> None:
-        """Read the calibration."""
-        self._camera = self._load()
-        self._corners = target_corners(self.side)
-
-    def _seen(self, pose: Pose, radius: float) -> Array:
-        """Return the normalised points (4, 2) at which circles of a radius (m) are seen from a pose."""
-        return seen_centres(pose, camera_points(pose, self._corners), radius)
-
-    def _described(self, pose: Pose, seen: Array, centres: Array) -> tuple[Any, ...]:
-        """Return the outputs for a pose; `seen` (n, 2) are the normalised points of its circles."""
-        roll, pitch, yaw = camera_attitude(pose.rotation)
-        errors = self._camera.pixels(seen) - centres
-        residual = math.sqrt(np.vdot(errors, errors) / len(errors))
-        yaw = math.pi if yaw <= -math.pi else yaw
-        return pose.position, yaw, pose.rotation, roll, pitch, residual, True
+        planes = self.rays == TWO_PLANES
+        self.optics = self.read_file("calibration", _numbers_of_planes if planes else _numbers)
 
 
-class PoseFromFour(PoseFromCircles, Block, numeric=False):
-    """A block for a method of the paper, which uses all four circles and nothing else: `solve`."""
+class PoseFromFour(PoseFromCircles):
+    """A block for a method of the paper, which uses all four circles and nothing else."""
 
     refine = Param(
         "none",
@@ -138,29 +75,44 @@ class PoseFromFour(PoseFromCircles, Block, numeric=False):
         doc="how the residual in the picture is minimised, if at all",
     )
 
-    def solve(self, rays: Array) -> Pose | None:
-        """Return the pose from rays (4, 3) to the circles; None if they meet no square in front."""
-        raise NotImplementedError
 
-    def output(self, centres: Any) -> tuple[Any, ...]:
-        """Return the pose; NaN and false if a circle is missing or the four are no square seen from below."""
-        with np.errstate(all="ignore"):  # pixels may have any values
-            rays = self._camera.rays(centres)
-            pose = self.solve(rays) if np.isfinite(rays).all() else None
-            if pose is not None and (self.radius or self.refine == GAUSS_NEWTON):
-                pose = self._improved(pose, rays[:, :2] / rays[:, 2:])
-            return NOTHING if pose is None else self._described(pose, self._seen(pose, self.radius), centres)
+def from_four(
+    method: Method, centres: Any, optics: Any, side: float, radius: float, refinement: int
+) -> tuple[Any, ...]:
+    """Return the outputs of a block with such a method: no pose if a circle is missing or they are no square.
 
-    def _improved(self, start: Pose, points: Array) -> Pose | None:
-        """Return the pose from normalised points (4, 2), corrected for the radius and refined as chosen."""
-        pose: Pose | None = start
-        for _ in range(2 if self.radius else 0):
-            if pose is None:
-                return None
-            shift = self._seen(pose, self.radius) - self._seen(pose, 0.0)
-            pose = self.solve(np.column_stack((points - shift, np.ones(4))))
-        if pose is None or self.refine == NONE:
-            return pose
-        view = View(self._corners, points, self._camera.slopes(points), self.radius)
-        estimate = refine(view, unknowns_of(pose))
-        return None if estimate is None else pose_of(estimate.unknowns)
+    The method's pose is corrected for the radius of the circles, if this is not 0, and refined as chosen.
+    """
+    camera = pinhole(optics)
+    circles = seen_circles(centres, camera, side, 1.0)
+    if len(circles) < 4:
+        return no_pose()
+    pose = method([(circle.x, circle.y, 1.0) for circle in circles], side)
+    for _ in range(2 if radius > 0 else 0):
+        if pose is not None:
+            pose = method([_ray(pose, circle, radius) for circle in circles], side)
+    if pose is not None and refinement == GAUSS_NEWTON:
+        estimate = refine(circles, radius, unknowns_of(pose))
+        pose = None if estimate is None else pose_of(estimate.unknowns)
+    return no_pose() if pose is None else described(pose, circles, radius, camera)
+
+
+def _ray(pose: Pose, circle: Circle, radius: float) -> Vector:
+    """Return the ray to the middle of a circle, which its ellipse's centre misses by as much as at a pose."""
+    seen_x, seen_y = image(pose, circle, radius)
+    x, y = image(pose, circle, 0.0)
+    return circle.x - (seen_x - x), circle.y - (seen_y - y), 1.0
+
+
+def described(pose: Pose, circles: list[Circle], radius: float, camera: Pinhole) -> tuple[Any, ...]:
+    """Return the outputs for a pose."""
+    roll, pitch, yaw = camera_attitude(pose.rotation)
+    yaw = math.pi if yaw <= -math.pi else yaw
+    off = residual(pose, circles, radius, camera)
+    return np.array(pose.position), yaw, np.array(pose.rotation), roll, pitch, off, True
+
+
+def no_pose() -> tuple[Any, ...]:
+    """Return the outputs if there is no pose."""
+    missing = math.nan
+    return np.full(3, missing), missing, np.full((3, 3), missing), missing, missing, missing, False

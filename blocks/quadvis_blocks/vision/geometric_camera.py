@@ -7,16 +7,28 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import In, Out, Param, Random, State, fill_normal
-from quadvis_blocks.vision._delayed_camera import CONTENT, QUEUE, SEQUENCE, STAMP, DeliveringCamera, Row
+from quadvis.block import Block, Derived, In, Out, Param, Random, State, Work, fill_normal
+from quadvis_blocks.vision._delayed_camera import (
+    CONTENT,
+    QUEUE,
+    SEQUENCE,
+    STAMP,
+    DeliveringCamera,
+    advance,
+    deliver,
+    draw,
+    is_captured,
+    take,
+)
 from quadvis_vision.camera.calibration import CameraCalibration
+from quadvis_vision.camera.pinhole import NUMBERS, pinhole, pixel
 from quadvis_vision.camera.projection import (
+    CORNERS,
     RADIUS,
     SIDE,
-    camera_pose,
-    ellipse_centres,
-    plane_homography,
-    target_corners,
+    camera_point,
+    camera_rotation,
+    ellipse_centre,
 )
 from quadvis_vision.detection.detect import NOT_FOUND, STALE, TWO_CIRCLES
 
@@ -24,7 +36,7 @@ WIDTH = CONTENT + 8  # of a row: u, v of four circles
 PICTURE, UNBOUNDED = range(2)
 
 
-class GeometricCamera(DeliveringCamera, numeric=False):
+class GeometricCamera(DeliveringCamera, Block):
     """The results of `vision.rendered_camera` with `vision.circle_detector`, without rendering.
 
     The block projects the centres of the four ellipses and adds white noise; a circle whose outline leaves
@@ -59,74 +71,74 @@ class GeometricCamera(DeliveringCamera, numeric=False):
         doc="unbounded: circles are also seen beyond the edges of the picture",
     )
 
+    optics = Derived(f"float64[{NUMBERS}]", doc="the camera as `pinhole` takes it")
+    size = Derived("float64[2]", unit="px", doc="width and height of the picture")
+
     stream = Random()
     drawn = State("float64[8]")  # noise of the coming measurement
     pending = State(f"float64[{QUEUE},{WIDTH}]")
     shown = State(f"float64[{WIDTH}]")
+    taken = Work(f"float64[{WIDTH}]")
+    wire = Work(f"float64[{WIDTH}]")
     last_sequence = State("int64")
 
     def check(self) -> None:
         """Read the calibration, and refuse a latency that is too long for the period."""
         super().check()
-        self._load()
-
-    def _load(self) -> CameraCalibration:
-        return self.read_file("calibration", CameraCalibration.load)
-
-    def open(self) -> None:
-        """Read the calibration."""
-        self._camera = self._load()
-        self._corners = target_corners(self.side)
+        calibration = self.read_file("calibration", CameraCalibration.load)
+        self.optics, self.size = calibration.numbers, calibration.size
 
     def start(self) -> None:
         """Draw the chances and the noise of the first measurement."""
-        super().start()
+        draw(self)
         fill_normal(self.stream, self.drawn)
 
     def output(self, position: Any, attitude: Any, time: float) -> tuple[Any, ...]:
         """Return the measurement that arrived last."""
-        row = self._deliver(self._taken(position, attitude, time), time)
-        sequence = int(row[SEQUENCE])
+        if take(self, time, time):
+            _measure(self, position, attitude)
+        deliver(self, time)
+        sequence = int(self.wire[SEQUENCE])
         fresh = sequence != self.last_sequence
+        centres, quality = np.full((4, 2), math.nan), np.full(4, math.nan)
         if sequence == 0:
-            nothing = np.full((4, 2), math.nan), np.full(4, math.nan)
-            return *nothing, STALE, False, False, math.nan, 0, False, False
-        centres = row[CONTENT:].reshape(4, 2)
-        quality = [1.0 if math.isfinite(u) else math.nan for u in row[CONTENT::2].tolist()]
-        count = quality.count(1.0)
+            return centres, quality, STALE, False, False, math.nan, 0, False, False
+        count = 0
+        for corner in range(4):
+            u, v = float(self.wire[CONTENT + 2 * corner]), float(self.wire[CONTENT + 2 * corner + 1])
+            if math.isfinite(u):
+                centres[corner, 0], centres[corner, 1] = u, v
+                quality[corner] = 1.0
+                count += 1
         status = 4 - count if count >= 2 else NOT_FOUND
         lost = fresh and status > TWO_CIRCLES
-        return centres, quality, status, status == 0, lost, row[STAMP], sequence, fresh, False
+        return centres, quality, status, status == 0, lost, float(self.wire[STAMP]), sequence, fresh, False
 
-    def update(self) -> None:
+    def update(self, time: float) -> None:
         """Keep the measurement of this tick, and the measurements that have arrived."""
-        if self._is_captured():
+        if is_captured(self):
             fill_normal(self.stream, self.drawn)
-        self._advance()
+        advance(self, time)
         self.last_sequence = int(self.shown[SEQUENCE])
 
-    def _taken(self, position: Any, attitude: Any, time: float) -> Row | None:
-        """Return the measurement of this tick; None if there is none, or if it is lost."""
-        if not self._is_captured() or self._is_lost(time):
-            return None
-        return self._row(time, self._measure(position, attitude))
 
-    def _measure(self, position: Any, attitude: Any) -> Any:
-        """Return u, v of the four centres (8,) in px; NaN where a circle is not wholly in the picture."""
-        turn, shift = camera_pose(position, attitude, self.ceiling)
-        depth = self._corners @ turn[2] + shift[2]
-        depths, radius = depth.tolist(), self.radius
-        behind = min(depths) <= radius
-        corners = self._corners[depth > radius] if behind else self._corners
-        pixels = self._camera.to_pixels(ellipse_centres(plane_homography(turn, shift), corners, radius))
-        if behind:
-            seen, pixels = pixels, np.full((4, 2), math.nan)
-            pixels[depth > radius] = seen
-        if self.field_of_view == PICTURE:
-            width, height = self._camera.size
-            size = float(self._camera.matrix[1, 1]) * radius
-            for corner, ((u, v), away) in enumerate(zip(pixels.tolist(), depths, strict=True)):
-                reach = size / max(away, radius)
-                if not (reach <= u <= width - 1 - reach and reach <= v <= height - 1 - reach):
-                    pixels[corner] = math.nan
-        return pixels.ravel() + self.noise * self.drawn
+def _measure(camera: Any, position: Any, attitude: Any) -> None:
+    """Write u, v of the four centres (px) into ``taken``; NaN where a circle is not wholly in the picture."""
+    turn = camera_rotation(float(attitude[0]), float(attitude[1]), float(attitude[2]))
+    place = (float(position[0]), float(position[1]), camera.ceiling - float(position[2]))
+    normal = (turn[0][2], turn[1][2], turn[2][2])
+    optics = pinhole(camera.optics)
+    across, down = float(camera.size[0]), float(camera.size[1])
+    for corner in range(4):
+        forward, right = CORNERS[corner]
+        point = camera_point(turn, place, camera.side * forward, camera.side * right)
+        u, v = math.nan, math.nan
+        if point[2] > camera.radius:
+            x, y = ellipse_centre(point, normal, camera.radius)
+            u, v = pixel(optics, x, y)
+            reach = optics.fy * camera.radius / point[2]
+            inside = reach <= u <= across - 1 - reach and reach <= v <= down - 1 - reach
+            if camera.field_of_view == PICTURE and not inside:
+                u, v = math.nan, math.nan
+        camera.taken[CONTENT + 2 * corner] = u + camera.noise * camera.drawn[2 * corner]
+        camera.taken[CONTENT + 2 * corner + 1] = v + camera.noise * camera.drawn[2 * corner + 1]

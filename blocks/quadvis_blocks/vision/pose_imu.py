@@ -8,19 +8,21 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, In, Out, Param
-from quadvis_blocks.vision._pose_block import NOTHING, Array, Bools, PoseFromCircles
+from quadvis_blocks.vision._pose_block import PoseFromCircles, described, no_pose
+from quadvis_vision.camera.pinhole import pinhole
 from quadvis_vision.camera.projection import RADIUS
 from quadvis_vision.detection.detect import INCONSISTENT, NOT_FOUND
+from quadvis_vision.pose.circles import Circle, misfit, seen_circles
+from quadvis_vision.pose.least_squares import Triangle
 from quadvis_vision.pose.level import level_covariance, level_pose
-from quadvis_vision.pose.refine import Estimate, Tilt, View, pose_of, refine
+from quadvis_vision.pose.refine import Estimate, Tilt, pose_of, refine
 
 LEVEL, MAP = range(2)
 NO_TILT = 8  # a status; smaller numbers are those of the detector
 MISFIT_MAX = 0.1  # sides; greatest rms error of the levelled pose: 10 deg of tilt give 0.05 at 1.6 sides
-UNCERTAIN = np.full((4, 4), math.nan)
 
 
-class PoseImu(PoseFromCircles, Block, numeric=False):
+class PoseImu(PoseFromCircles, Block):
     """Position and heading of the craft from two circles or more, with roll and pitch from the inertial unit.
 
     - Mode `level` takes roll and pitch as they are. The problem for the other unknowns is linear, has one
@@ -65,39 +67,41 @@ class PoseImu(PoseFromCircles, Block, numeric=False):
 
     def output(self, centres: Any, imu_roll: float, imu_pitch: float) -> tuple[Any, ...]:
         """Return the pose, its covariance and the status."""
-        with np.errstate(all="ignore"):  # pixels may have any values
-            rays = self._camera.rays(centres).tolist()
-            flags = [z > 0 and all(map(math.isfinite, (x, y, z))) for x, y, z in rays]
-            count = flags.count(True)
-            if count < 2:
-                return *NOTHING, UNCERTAIN, NOT_FOUND
-            if not (math.isfinite(imu_roll) and math.isfinite(imu_pitch)):
-                return *NOTHING, UNCERTAIN, NO_TILT
-            seen = np.array(flags)
-            points = np.array([
-                (x / z, y / z) if flag else (math.nan, math.nan)
-                for (x, y, z), flag in zip(rays, flags, strict=True)
-            ])  # fmt: skip
-            estimate = self._estimate(points, seen, Tilt(imu_roll, imu_pitch, self.tilt_sigma))
-            if estimate is None or not np.isfinite(estimate.covariance).all():
-                return *NOTHING, UNCERTAIN, INCONSISTENT
-            pose = pose_of(estimate.unknowns)
-            described = self._described(pose, self._seen(pose, self.radius)[seen], centres[seen])
-            return *described, estimate.covariance[:4, :4], 4 - count
+        camera = pinhole(self.optics)
+        circles = seen_circles(centres, camera, self.side, self.pixel_sigma)
+        covariance = np.full((4, 4), math.nan)
+        if len(circles) < 2:
+            return *no_pose(), covariance, NOT_FOUND
+        if not (math.isfinite(imu_roll) and math.isfinite(imu_pitch)):
+            return *no_pose(), covariance, NO_TILT
+        tilt = Tilt(imu_roll, imu_pitch, self.tilt_sigma)
+        estimate = _estimate(circles, tilt, self.side, self.radius, self.mode)
+        if estimate is None or not _is_written(estimate.covariance, covariance):
+            return *no_pose(), covariance, INCONSISTENT
+        pose = pose_of(estimate.unknowns)
+        return *described(pose, circles, self.radius, camera), covariance, 4 - len(circles)
 
-    def _estimate(self, points: Array, seen: Bools, tilt: Tilt) -> Estimate | None:
-        """Return the unknowns and their covariance from normalised points (4, 2), NaN where not seen."""
-        level = level_pose(points, tilt.roll, tilt.pitch, self.side, self.radius)
-        if level is None:
-            return None
-        start = np.array([*level, tilt.roll, tilt.pitch])
-        misfit = (self._seen(pose_of(start), self.radius) - points)[seen]
-        allowed = MISFIT_MAX * self.side / level[2]  # the size of the side from straight below
-        if not np.vdot(misfit, misfit) < len(misfit) * allowed * allowed:
-            return None
-        weights = self._camera.slopes(points[seen]) / self.pixel_sigma
-        view = View(self._corners[seen], points[seen], weights, self.radius)
-        if self.mode == MAP:
-            return refine(view, start, tilt)
-        covariance = level_covariance(view, start, tilt.sigma)
-        return None if covariance is None else Estimate(start, covariance)
+
+def _estimate(circles: list[Circle], tilt: Tilt, side: float, radius: float, mode: int) -> Estimate | None:
+    """Return the unknowns and their covariance."""
+    level = level_pose(circles, tilt.roll, tilt.pitch, radius)
+    if level is None:
+        return None
+    allowed = MISFIT_MAX * side / level.z  # the size of the side from straight below
+    if not misfit(pose_of(level), circles, radius) < allowed:
+        return None
+    if mode == MAP:
+        return refine(circles, radius, level, tilt)
+    return Estimate(level, level_covariance(circles, level, tilt.sigma))
+
+
+def _is_written(triangle: Triangle, covariance: Any) -> bool:
+    """Write the covariance of x, y, z, yaw from the triangle of it; return whether it is there and finite."""
+    if not triangle:
+        return False
+    place = 0
+    for row in range(4):
+        for column in range(row + 1):
+            covariance[row, column] = covariance[column, row] = triangle[place]
+            place += 1
+    return bool(np.isfinite(covariance).all())

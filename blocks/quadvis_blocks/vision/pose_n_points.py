@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from quadvis_blocks.vision._pose_block import PoseFromFour
-from quadvis_vision.pose.pose import Array, Pose, pose_from_n_points
+from typing import Any
+
+from quadvis.block import Block
+from quadvis_blocks.vision._pose_block import PoseFromFour, from_four
+from quadvis_vision.pose.pose import pose_from_n_points
 
 
-class PoseNPoints(PoseFromFour, numeric=False):
+class PoseNPoints(PoseFromFour, Block):
     """Position and attitude of the craft from the four circles by the perspective of n points.
 
     The distances of the circles along their rays follow from two facts: opposite sides of a square are equal,
@@ -19,6 +22,6 @@ class PoseNPoints(PoseFromFour, numeric=False):
     rotation equals that of `vision.pose_plane`; the two poses differ only in distance.
     """
 
-    def solve(self, rays: Array) -> Pose | None:
-        """Return the pose from rays (4, 3) to the circles."""
-        return pose_from_n_points(rays, self.side)
+    def output(self, centres: Any) -> tuple[Any, ...]:
+        """Return the pose; NaN and false if a circle is missing or the four are no square seen from below."""
+        return from_four(pose_from_n_points, centres, self.optics, self.side, self.radius, self.refine)

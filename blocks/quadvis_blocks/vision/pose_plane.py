@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from quadvis_blocks.vision._pose_block import PoseFromFour
-from quadvis_vision.pose.pose import Array, Pose, pose_from_plane
+from typing import Any
+
+from quadvis.block import Block
+from quadvis_blocks.vision._pose_block import PoseFromFour, from_four
+from quadvis_vision.pose.pose import pose_from_plane
 
 
-class PosePlane(PoseFromFour, numeric=False):
+class PosePlane(PoseFromFour, Block):
     """Position and attitude of the craft from the four circles by the homography of the target's plane.
 
     The homography from the plane to normalised image points consists of the first two columns of the rotation
@@ -19,6 +22,6 @@ class PosePlane(PoseFromFour, numeric=False):
     `vision.pose_n_points`; the two poses differ only in distance.
     """
 
-    def solve(self, rays: Array) -> Pose | None:
-        """Return the pose from rays (4, 3) to the circles."""
-        return pose_from_plane(rays, self.side)
+    def output(self, centres: Any) -> tuple[Any, ...]:
+        """Return the pose; NaN and false if a circle is missing or the four are no square seen from below."""
+        return from_four(pose_from_plane, centres, self.optics, self.side, self.radius, self.refine)

@@ -7,8 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Frame, In, Out, Param, ParameterError, Random, State, uniform
-from quadvis_blocks.vision._delayed_camera import CONTENT, QUEUE, SEQUENCE, STAMP, DeliveringCamera, Row
+from quadvis.block import Block, Frame, In, Out, Param, ParameterError, Random, State, Work, uniform
+from quadvis_blocks.vision._delayed_camera import (
+    CONTENT,
+    QUEUE,
+    SEQUENCE,
+    STAMP,
+    DeliveringCamera,
+    advance,
+    deliver,
+    draw,
+    is_captured,
+    take,
+)
 from quadvis_vision.camera.calibration import CameraCalibration
 from quadvis_vision.camera.projection import RADIUS, SIDE
 from quadvis_vision.simulation.renderer import Renderer, Scene
@@ -20,7 +31,7 @@ END = slice(CONTENT + 8, CONTENT + 14)
 WIDTH = CONTENT + 14
 
 
-class RenderedCamera(DeliveringCamera, numeric=False):
+class RenderedCamera(DeliveringCamera, Block, numeric=False):
     """The pictures of a camera on the craft, of four coloured discs on a light ceiling.
 
     The camera looks straight up from the craft: picture right is the craft's front, picture top its right
@@ -77,6 +88,8 @@ class RenderedCamera(DeliveringCamera, numeric=False):
     previous = State("float64[6]")  # pose one tick ago
     pending = State(f"float64[{QUEUE},{WIDTH}]")
     shown = State(f"float64[{WIDTH}]")
+    taken = Work(f"float64[{WIDTH}]")
+    wire = Work(f"float64[{WIDTH}]")
 
     def check(self) -> None:
         """Read the calibration; refuse discs that overlap, and times that are too long for the period."""
@@ -112,33 +125,33 @@ class RenderedCamera(DeliveringCamera, numeric=False):
 
     def start(self) -> None:
         """Draw the chances and the noise of the first frame."""
-        super().start()
+        draw(self)
         self.grain = uniform(self.stream)
 
     def output(self, position: Any, attitude: Any, time: float) -> Frame:
         """Return the frame that arrived last."""
-        return self._picture(self._deliver(self._capture(position, attitude, time), time))
+        if take(self, time, time - self.exposure_time / 2):
+            self.taken[CONTENT:] = self._content(np.concatenate((position, attitude)))
+        deliver(self, time)
+        return self._picture(self.wire)
 
-    def update(self, position: Any, attitude: Any) -> None:
+    def update(self, position: Any, attitude: Any, time: float) -> None:
         """Keep the frame captured at this tick, and the frame on the wire."""
-        if self._is_captured():
+        if is_captured(self):
             self.grain = uniform(self.stream)
-        self._advance()
+        advance(self, time)
         self.previous[:3], self.previous[3:] = position, attitude
 
-    def _capture(self, position: Any, attitude: Any, time: float) -> Row | None:
-        """Return the frame whose exposure ends at this tick; None if there is none, or if it is lost."""
-        if not self._is_captured() or self._is_lost(time):
-            return None
-        pose = begin = np.concatenate((position, attitude))
+    def _content(self, pose: Any) -> Any:
+        """Return the numbers of the frame whose exposure ends at this tick with the craft at a pose (6,)."""
+        begin = pose
         if self.ticks and self.exposure_time:
             way = pose - self.previous
             way[3:] -= 2 * math.pi * np.round(way[3:] / (2 * math.pi))  # the short way round
             begin = pose - way * (self.exposure_time / self.period)
-        content = np.concatenate(([self.exposure, self.grain], begin, pose))
-        return self._row(time - self.exposure_time / 2, content)
+        return np.concatenate(([self.exposure, self.grain], begin, pose))
 
-    def _picture(self, row: Row) -> Frame:
+    def _picture(self, row: Any) -> Frame:
         """Return the frame of a row; the last one is kept, since it may stay on the wire."""
         if not row[SEQUENCE]:
             return Frame.none()

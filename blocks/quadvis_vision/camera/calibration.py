@@ -93,6 +93,11 @@ class CameraCalibration:
         return fx, skew, cx, fy, cy
 
     @cached_property
+    def numbers(self) -> tuple[float, ...]:
+        """The camera as `quadvis_vision.camera.pinhole.pinhole` takes it."""
+        return (*self.intrinsics, *self.distortion.tolist())
+
+    @cached_property
     def _affine(self) -> tuple[Array, Array]:
         return self.matrix[:2, :2].T, self.matrix[:2, 2]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,6 +10,28 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
+
+Lens = tuple[float, float, float, float, float]  # k1, k2, p1, p2, k3
+
+
+def distorted(x: Any, y: Any, lens: Lens) -> tuple[Any, Any, Any, Any, Any]:
+    """Return x and y after the lens, and the derivatives: x by x, x by y (which is y by x), and y by y.
+
+    Coordinates are numbers, or arrays of one shape.
+    """
+    k1, k2, p1, p2, k3 = lens
+    xx, xy, yy = x * x, x * y, y * y
+    r2 = xx + yy
+    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    slope = 2 * (k1 + r2 * (2 * k2 + 3 * k3 * r2))  # d radial / dx = slope x
+    along, across = 2 * (p1 * y + p2 * x), 2 * (p1 * x + p2 * y)
+    return (
+        x * radial + 2 * p1 * xy + p2 * (r2 + 2 * xx),
+        y * radial + p1 * (r2 + 2 * yy) + 2 * p2 * xy,
+        radial + slope * xx + along + 4 * p2 * x,
+        slope * xy + across,
+        radial + slope * yy + along + 4 * p1 * y,
+    )
 
 
 def distort(normalised: Floats, lens: Floats) -> Floats:
@@ -25,20 +47,9 @@ def by_point(normalised: Floats, lens: Floats) -> Floats:
 def linearise(normalised: Floats, lens: Floats) -> tuple[Floats, Floats]:
     """Return normalised coordinates (..., 2) after the lens (5,), and their derivatives (..., 2, 2)."""
     k1, k2, p1, p2, k3 = lens.tolist()
-    x, y = normalised[..., 0], normalised[..., 1]
-    xx, xy, yy = x * x, x * y, y * y
-    r2 = xx + yy
-    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    slope = 2 * (k1 + r2 * (2 * k2 + 3 * k3 * r2))  # d radial / dx = slope x
-    along, across = 2 * (p1 * y + p2 * x), 2 * (p1 * x + p2 * y)
-    bent = np.empty_like(normalised)
-    bent[..., 0] = x * radial + 2 * p1 * xy + p2 * (r2 + 2 * xx)
-    bent[..., 1] = y * radial + p1 * (r2 + 2 * yy) + 2 * p2 * xy
-    jacobian = np.empty((*normalised.shape, 2))
-    jacobian[..., 0, 0] = radial + slope * xx + along + 4 * p2 * x
-    jacobian[..., 1, 1] = radial + slope * yy + along + 4 * p1 * y
-    jacobian[..., 0, 1] = jacobian[..., 1, 0] = slope * xy + across
-    return bent, jacobian
+    x, y, x_by_x, x_by_y, y_by_y = distorted(normalised[..., 0], normalised[..., 1], (k1, k2, p1, p2, k3))
+    jacobian = np.stack((x_by_x, x_by_y, x_by_y, y_by_y), axis=-1)
+    return np.stack((x, y), axis=-1), jacobian.reshape(*normalised.shape, 2)
 
 
 def by_lens(normalised: Floats) -> Floats:

@@ -14,84 +14,61 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from quadvis_vision.camera.vectors import Matrix, Vector, scaled, turned
 
-# Body axes (forward, right, down) to camera axes: right in the picture is forward, down in the picture is
-# left, and the optical axis points up.
-CAMERA_FROM_BODY: Array = np.diag([1.0, -1.0, -1.0])
-CAMERA_FROM_BODY.flags.writeable = False
+Array = NDArray[np.float64]
 
 SIDE = 1.0  # m, between the centres of neighbouring circles
 RADIUS = 0.12  # m
+CORNERS = ((-0.5, 0.5), (0.5, 0.5), (0.5, -0.5), (-0.5, -0.5))  # forward and right, of a square of side 1
 
 
 def target_corners(side: float) -> Array:
     """Return the circle centres (4, 3) in target axes (m): clockwise from upper left in the picture."""
-    half = side / 2
-    return np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
+    return np.array([[side * forward, side * right, 0.0] for forward, right in CORNERS])
 
 
-def rotation(attitude: ArrayLike) -> Array:
-    """Return the rotation (3, 3) from body (forward, right, down) to level axes, Rz(psi) Ry(theta) Rx(phi).
+def camera_rotation(roll: float, pitch: float, yaw: float) -> Matrix:
+    """Return the rotation from target to camera axes of a craft with an attitude in rad.
 
-    `attitude` is (phi, theta, psi) in rad: right side down, nose up and clockwise from above are positive.
-    """
-    phi, theta, psi = np.asarray(attitude, dtype=np.float64).tolist()
-    cr, sr = math.cos(phi), math.sin(phi)
-    cp, sp = math.cos(theta), math.sin(theta)
-    cy, sy = math.cos(psi), math.sin(psi)
-    return np.array([
-        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-        [-sp, cp * sr, cp * cr],
-    ])  # fmt: skip
-
-
-def attitude_of(body_rotation: ArrayLike) -> Array:
-    """Return (phi, theta, psi) in rad of a rotation (3, 3) from body to level axes; inverts `rotation`."""
-    (forward, _, _), (right, _, _), (x, y, z) = np.asarray(body_rotation, dtype=np.float64).tolist()
-    return np.array([math.atan2(y, z), math.atan2(-x, math.hypot(y, z)), math.atan2(right, forward)])
-
-
-def camera_rotation(roll: float, pitch: float, yaw: float) -> Array:
-    """Return the rotation (3, 3) from target to camera axes of a craft with an attitude in rad.
-
-    It is CAMERA_FROM_BODY times the transpose of `rotation`, written out in plain numbers for speed.
+    Right side down, nose up and clockwise from above are positive. The rotation from body axes (forward,
+    right, down) to target axes is Rz(yaw) Ry(pitch) Rx(roll). Right in the picture is forward, down in the
+    picture is left, and the optical axis points up: so this is diag(1, -1, -1) times its transpose.
     """
     cr, sr = math.cos(roll), math.sin(roll)
     cp, sp = math.cos(pitch), math.sin(pitch)
     cy, sy = math.cos(yaw), math.sin(yaw)
-    # 0.0 in front, since a product of matrices has no -0.0.
-    rows = (
-        0.0 + cy * cp, 0.0 + sy * cp, 0.0 - sp,
-        0.0 - (cy * sp * sr - sy * cr), 0.0 - (sy * sp * sr + cy * cr), 0.0 - cp * sr,
-        0.0 - (cy * sp * cr + sy * sr), 0.0 - (sy * sp * cr - cy * sr), 0.0 - cp * cr,
-    )  # fmt: skip
-    return np.array(rows).reshape(3, 3)
+    return (
+        (cy * cp, sy * cp, -sp),
+        (sy * cr - cy * sp * sr, -sy * sp * sr - cy * cr, -cp * sr),
+        (-cy * sp * cr - sy * sr, cy * sr - sy * sp * cr, -cp * cr),
+    )
 
 
-def camera_attitude(turn: Array) -> tuple[float, float, float]:
-    """Return (phi, theta, psi) in rad from the rotation (3, 3) of the camera; inverts `camera_rotation`."""
-    (forward, right, x), (_, _, y), (_, _, z) = turn.tolist()
-    y, z = 0.0 - y, 0.0 - z
-    return math.atan2(y, z), math.atan2(-(0.0 + x), math.hypot(y, z)), math.atan2(0.0 + right, 0.0 + forward)
+def camera_attitude(turn: Matrix) -> Vector:
+    """Return roll, pitch and yaw in rad from the rotation of the camera; inverts `camera_rotation`."""
+    (forward, right, x), (_, _, y), (_, _, z) = turn
+    level = math.sqrt(y * y + z * z)  # `math.hypot` has other bits interpreted than compiled
+    return math.atan2(-y, -z), math.atan2(-x, level), math.atan2(right, forward)
+
+
+def camera_point(turn: Matrix, position: Vector, forward: float, right: float) -> Vector:
+    """Return the point of the target that is `forward` and `right` of its middle (m), in camera axes (m).
+
+    `turn` is the rotation from target to camera axes, `position` that of the camera in target axes (m).
+    """
+    x, y, z = position
+    return turned(turn, (forward - x, right - y, -z))
 
 
 def camera_pose(position: ArrayLike, attitude: ArrayLike, ceiling: float) -> tuple[Array, Array]:
-    """Return (R, t) with X_c = R X_t + t for a vehicle at (x, y, h) in m with (phi, theta, psi) in rad.
+    """Return (R, t) with X_c = R X_t + t for a vehicle at (x, y, h) in m with (roll, pitch, yaw) in rad.
 
     `ceiling` is the height of the target in m. R is (3, 3), t is (3,) in m.
     """
     x, y, height = np.asarray(position, dtype=np.float64).tolist()
     turn = camera_rotation(*np.asarray(attitude, dtype=np.float64).tolist())
-    return turn, -turn @ np.array([x, y, ceiling - height])
-
-
-def vehicle_pose(turn: ArrayLike, shift: ArrayLike, ceiling: float) -> tuple[Array, Array]:
-    """Return position (x, y, h) in m and attitude (phi, theta, psi) in rad: the inverse of `camera_pose`."""
-    r = np.asarray(turn, dtype=np.float64)
-    x, y, z = -r.T @ np.asarray(shift, dtype=np.float64)
-    return np.array([x, y, ceiling - z]), attitude_of(r.T @ CAMERA_FROM_BODY)
+    return np.array(turn), np.array(scaled(turned(turn, (x, y, ceiling - height)), -1.0))
 
 
 def plane_homography(turn: Array, shift: Array) -> Array:
@@ -110,15 +87,17 @@ def circle_outline(centre: Sequence[float], radius: float, count: int = 64) -> A
     )
 
 
-def ellipse_centres(homography: Array, centres: Array, radius: float) -> Array:
-    """Return the centres (n, 2) of the ellipses that circles (n, >= 2) in m on the target become, normalised.
+def ellipse_centre(point: Vector, normal: Vector, radius: float) -> tuple[float, float]:
+    """Return the normalised centre of the ellipse that a circle on the target becomes; NaN if at infinity.
 
-    The centre of an ellipse is not the image of the circle's centre: the conic's centre is w H p - r^2 H
-    (h31, h32, 0)' with p = (x, y, 1) and w the depth of p.
+    `point` is the circle's centre in camera axes (m), `normal` the target's normal there. The centre of an
+    ellipse is not the image of the circle's centre; it is the pole of the picture's line at infinity, whose
+    plane through the camera is z = 0. For a circle around X it is the image of z X + r^2 (n_z n - e_z): with
+    a radius (m) of 0, that of X.
     """
-    points = np.ones((len(centres), 3))
-    points[:, :2] = centres[:, :2]
-    depth = points @ homography[2]
-    bent = homography @ np.array((*homography[2, :2].tolist(), 0.0))
-    middle = depth[:, None] * (points @ homography.T) - radius * radius * bent
-    return np.asarray(middle[:, :2] / middle[:, 2:])
+    x, y, z = point
+    bend = radius * radius * normal[2]
+    away = z * z + bend * normal[2] - radius * radius
+    if away == 0:
+        return math.nan, math.nan
+    return (z * x + bend * normal[0]) / away, (z * y + bend * normal[1]) / away

@@ -179,6 +179,12 @@ class TwoPlanesCalibration:
         k, rotation = rq(np.linalg.inv(directions))
         return k / k[2, 2], rotation
 
+    @cached_property
+    def numbers(self) -> tuple[float, ...]:
+        """The exact pinhole as `quadvis_vision.camera.pinhole.pinhole` takes it: it has no lens."""
+        (fx, skew, cx), (_, fy, cy), _ = self.pinhole[0].tolist()
+        return (fx, skew, cx, fy, cy, 0.0, 0.0, 0.0, 0.0, 0.0)
+
     def project(self, points: ArrayLike, *, exact: bool = False) -> Floats:
         """Return the pixels (n, 2) of points (n, 3) of the calibration frame by eq. (4)-(5).
 

@@ -14,116 +14,130 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
+from quadvis_vision.camera.pinhole import Slopes
+from quadvis_vision.camera.projection import camera_point, camera_rotation
+from quadvis_vision.camera.vectors import Matrix, Vector, transposed, turned
+from quadvis_vision.pose.circles import Circle
+from quadvis_vision.pose.least_squares import Triangle, factored, solved, squares, undetermined
+from quadvis_vision.pose.refine import Row, Unknowns, pose_of, slopes, weighed
 
-from quadvis_vision.camera.projection import CAMERA_FROM_BODY, rotation
-from quadvis_vision.pose.pose import camera_points
-from quadvis_vision.pose.refine import View, pose_of, slopes
-
-Array = NDArray[np.float64]
-Level = tuple[float, float, float, float]  # x, y, z (m) of the camera in the target frame, yaw (rad)
 Sines = tuple[float, float, float, float]  # sine and cosine of roll, sine and cosine of pitch
-Seen = tuple[float, float, float, float, float]  # of a circle: forward, right, the ray's height; its corner
-
-# Corners 1..4 of the square of side 1 in target axes: forward and right of its middle.
-_CORNERS = ((-0.5, 0.5), (0.5, 0.5), (0.5, -0.5), (-0.5, -0.5))
 
 
-def level_pose(points: Array, roll: float, pitch: float, side: float, radius: float = 0.0) -> Level | None:
-    """Return the pose from normalised points (4, 2) and a finite tilt (rad); None if the points give none.
+def level_pose(circles: list[Circle], roll: float, pitch: float, radius: float = 0.0) -> Unknowns | None:
+    """Return the pose from circles and a finite tilt (rad); None if they give none.
 
-    Rows with NaN are missing circles. The points are the centres of the ellipses that the circles become;
-    with a `radius` (m) above zero they are corrected to the images of the circles' centres.
+    What is seen are the centres of the ellipses that the circles become; with a `radius` (m) above zero they
+    are corrected to the images of the circles' centres.
     """
-    tilt = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
-    seen = _levelled(points, tilt)
-    if seen is None:
-        return None
-    pose = _fit(seen, side)
-    for _ in range(2 if radius else 0):  # the correction needs the distance, and changes it a little
-        if pose is None:
-            return None
-        pose = _fit(_corrected(seen, tilt, (radius / pose[2]) ** 2), side)
+    pose = _fit(circles, roll, pitch, 0.0)
+    for _ in range(2 if radius > 0 else 0):  # the correction needs the distance, and changes it a little
+        if pose is not None:
+            pose = _fit(circles, roll, pitch, radius / pose.z)
     return pose
 
 
-@np.errstate(all="ignore")
-def level_covariance(view: View, unknowns: Array, sigma: float) -> Array | None:
-    """Return the covariance (4, 4) of x, y, z, yaw from `level_pose`; None if the view is not enough.
-
-    `view` holds the points that are not missing and their weights, `unknowns` (6,) are the pose's x, y, z,
-    yaw, roll and pitch, and `sigma` (rad) is the standard deviation of roll and of pitch.
-    """
-    pose = pose_of(unknowns)
-    points = camera_points(pose, view.corners)
-    if not (points[:, 2] > 0).all():
+def _fit(circles: list[Circle], roll: float, pitch: float, size: float) -> Unknowns | None:
+    """Return the least squares pose; `size` is the radius of the circles in a level camera's picture."""
+    tilt = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
+    mx = my = px = py = real = imaginary = spread = 0.0
+    for circle in circles:
+        x, y = _levelled(circle.x, circle.y, tilt, size)
+        p, q = circle.forward, circle.right
+        mx, my = mx + x, my + y
+        px, py = px + p, py + q
+        real += p * x + q * y
+        imaginary += p * y - q * x
+        spread += p * p + q * q
+    count = len(circles)
+    spread -= (px * px + py * py) / max(count, 1)
+    if count < 2 or not spread > 0:
         return None
-    level = rotation((unknowns[4], unknowns[5], 0.0)) @ CAMERA_FROM_BODY.T
-    away = points @ level.T
-    down = away[:, 2:, None] / points[:, 2:, None]
-    turned = (level[:2, :2] - away[:, :2, None] / away[:, 2:, None] * level[2, :2]) / -down  # m by points
-    fitted = (turned @ slopes(pose, points, float(unknowns[4]))).reshape(-1, 6)
-    try:
-        gains = np.linalg.solve(fitted[:, :4].T @ fitted[:, :4], fitted[:, :4].T)
-        by_picture = gains.reshape(4, -1, 1, 2) @ turned @ np.linalg.inv(view.weights)
-    except np.linalg.LinAlgError:
-        return None
-    by_picture, by_tilt = by_picture.reshape(4, -1), sigma * gains @ fitted[:, 4:]
-    return np.asarray(by_picture @ by_picture.T + by_tilt @ by_tilt.T)
-
-
-# Plain numbers, as here, are on four points several times faster than arrays or complex numbers.
-
-
-def _levelled(points: Array, tilt: Sines) -> list[Seen] | None:
-    """Return what is seen of each circle that is not missing; None if one is below the camera."""
-    sr, cr, sp, cp = tilt
-    found: list[Seen] = []
-    for (x, y), corner in zip(points.tolist(), _CORNERS):  # noqa: B905  # strict takes a tenth of the time
-        w = sr * y + cr
-        up = sp * x + cp * w
-        if up > 0:
-            found.append(((cp * x - sp * w) / up, (sr - cr * y) / up, up, *corner))
-        elif up <= 0:
-            return None
-    return found
-
-
-def _corrected(seen: list[Seen], tilt: Sines, size: float) -> list[Seen]:
-    """Return the images of the circles' centres; `size` is their squared radius in a level camera's picture.
-
-    The centre of an ellipse is the pole of the picture's horizon. In level directions the horizon is the line
-    sp cr forward - sr right = cp cr, and 1 / up is the centre's distance from it.
-    """
-    sr, cr, sp, _ = tilt
-    rise = 4 * size * (sp * sp * cr * cr + sr * sr)
-    found: list[Seen] = []
-    for forward, right, up, p, q in seen:
-        shift = 2 * size / (1 / up + math.sqrt(1 / (up * up) + rise))
-        found.append((forward - shift * sp * cr, right + shift * sr, up, p, q))
-    return found
-
-
-def _fit(seen: list[Seen], side: float) -> Level | None:
-    """Return the least squares pose."""
-    count = len(seen)
-    if count < 2:
-        return None
-    mx = my = px = py = real = imaginary = 0.0
-    for forward, right, _, p, q in seen:
-        mx += forward
-        my += right
-        px += p
-        py += q
-        real += p * forward + q * right
-        imaginary += p * right - q * forward
-    spread = 0.5 * count - (px * px + py * py) / count
     a = (real - (px * mx + py * my) / count) / spread
     b = (imaginary - (px * my - py * mx) / count) / spread
     scale = a * a + b * b
     if not 0 < scale < math.inf:
         return None
     x, y = px - (a * mx + b * my) / scale, py - (a * my - b * mx) / scale
-    each = side / count
-    return each * x, each * y, side / math.sqrt(scale), math.atan2(-b, a)
+    return Unknowns(x / count, y / count, 1 / math.sqrt(scale), math.atan2(-b, a), roll, pitch)
+
+
+def _levelled(x: float, y: float, tilt: Sines, size: float) -> tuple[float, float]:
+    """Return m of a circle from the normalised centre of its ellipse; NaN if it is not above the camera.
+
+    The centre of an ellipse is the pole of the picture's horizon. In level directions the horizon is the line
+    sp cr forward - sr right = cp cr, and 1 / up is the centre's distance from it.
+    """
+    sr, cr, sp, cp = tilt
+    w = sr * y + cr
+    up = sp * x + cp * w
+    if not 0 < up < math.inf:
+        return math.nan, math.nan
+    forward, right = (cp * x - sp * w) / up, (sr - cr * y) / up
+    if size > 0:
+        away, square = 1 / up, size * size
+        rise = 4 * square * (sp * sp * cr * cr + sr * sr)
+        shift = 2 * square / (away + math.sqrt(away * away + rise))
+        forward, right = forward - shift * sp * cr, right + shift * sr
+    return forward, right
+
+
+def level_covariance(circles: list[Circle], unknowns: Unknowns, sigma: float) -> Triangle:
+    """Return the covariance of x, y, z, yaw from `level_pose`; [] if the circles determine none.
+
+    It is the triangle of 4 x 4, as in `quadvis_vision.pose.least_squares`. `sigma` (rad) is the standard
+    deviation of roll and of pitch. The pose is linear in small errors of what is measured; each measured
+    number contributes the square of what one standard deviation of it does to the pose.
+    """
+    pose = pose_of(unknowns)
+    level = transposed(camera_rotation(unknowns.roll, unknowns.pitch, 0.0))
+    fitted: list[Row] = []  # the derivatives of m by the unknowns
+    by_pixels: list[Slopes] = []  # m by standard deviations of u and v
+    for circle in circles:
+        point = camera_point(pose.rotation, pose.position, circle.forward, circle.right)
+        a, b, c, d = circle.weights
+        area = a * d - b * c
+        if not (point[2] > 0 and turned(level, point)[2] < 0 and abs(area) > 0):
+            return undetermined()
+        by_x, by_y = slopes(pose, point, unknowns.roll, 0.0, 0.0)
+        p, q, r, s = _by_ray(level, point)
+        fitted.append(weighed(by_x, p, by_y, q))
+        fitted.append(weighed(by_x, r, by_y, s))
+        by_pixels.append(
+            ((p * d - q * c) / area, (q * a - p * b) / area, (r * d - s * c) / area, (s * a - r * b) / area)
+        )
+    factor = factored(squares(fitted, 4), 4)
+    if not factor:
+        return undetermined()
+    # The right sides of the normal equations by one standard deviation of each measured number.
+    sides: list[Row] = []
+    by_roll = by_pitch = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for index in range(len(circles)):
+        forward, right = fitted[2 * index], fitted[2 * index + 1]
+        p, q, r, s = by_pixels[index]
+        sides.append(weighed(forward, p, right, r))
+        sides.append(weighed(forward, q, right, s))
+        by_roll = weighed(by_roll, 1.0, weighed(forward, forward[4], right, right[4]), sigma)
+        by_pitch = weighed(by_pitch, 1.0, weighed(forward, forward[5], right, right[5]), sigma)
+    sides.append(by_roll)
+    sides.append(by_pitch)
+    found = [0.0] * len(factor)
+    for side in sides:
+        effect = solved(factor, side, 4)
+        place = 0
+        for i in range(4):
+            for j in range(i + 1):
+                found[place] += effect[i] * effect[j]
+                place += 1
+    return found
+
+
+def _by_ray(level: Matrix, point: Vector) -> Slopes:
+    """Return the derivatives of m of a point in camera axes by its normalised x and y, row by row."""
+    (l11, l12, _), (l21, l22, _), (l31, l32, _) = level
+    away = turned(level, point)
+    forward, right, down = away[0] / away[2], away[1] / away[2], away[2] / point[2]
+    return (
+        (forward * l31 - l11) / down, (forward * l32 - l12) / down,
+        (right * l31 - l21) / down, (right * l32 - l22) / down,
+    )  # fmt: skip

@@ -11,32 +11,31 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+from quadvis_vision.camera.projection import camera_attitude, camera_point, camera_rotation, ellipse_centre
+from quadvis_vision.camera.vectors import Vector
+from quadvis_vision.pose.circles import Circle
+from quadvis_vision.pose.least_squares import Triangle, factored, inverted, solved, squares, undetermined
+from quadvis_vision.pose.pose import Pose
 
-from quadvis_vision.camera.projection import camera_attitude, camera_rotation
-from quadvis_vision.pose.pose import Pose, camera_points, seen_centres
+# The derivatives of a number by the unknowns, then its difference from what it should be.
+Row = tuple[float, float, float, float, float, float, float]
 
-Array = NDArray[np.float64]
-
+_UNKNOWNS = 6
+_CURVATURE = 21  # numbers of the triangle of 6 x 6; then six of the gradient, then the sum of squares
 _STEPS = 30
 _NEAR = 1e-6  # gain in the sum of squares (a thousandth of a deviation) below which a step is the last one
 _DAMPING = 1e-3  # of the diagonal, used once a step has not helped; before that, steps are pure Gauss-Newton
-_ROLL, _PITCH = 4, 5  # where they are among the unknowns
 
 
-class View(NamedTuple):
-    """The view of a target: its `corners` (n, 3) (m) were seen at the normalised `points` (n, 2).
+class Unknowns(NamedTuple):
+    """The place of the camera in the target frame (m), and the attitude of the craft (rad)."""
 
-    `weights` (n, 2, 2) convert differences of normalised points to multiples of the picture's standard
-    deviation. With a `radius` (m) the points are the centres of the ellipses that circles on the corners
-    become.
-    """
-
-    corners: Array
-    points: Array
-    weights: Array
-    radius: float = 0.0
+    x: float
+    y: float
+    z: float
+    yaw: float
+    roll: float
+    pitch: float
 
 
 class Tilt(NamedTuple):
@@ -48,108 +47,142 @@ class Tilt(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """The `unknowns` (6,) and their `covariance` (6, 6)."""
+    """The `unknowns` and their `covariance` (6, 6), a triangle of `quadvis_vision.pose.least_squares`."""
 
-    unknowns: Array
-    covariance: Array
-
-
-class _Place(NamedTuple):
-    """The sum of squares at `unknowns` (6,), half its gradient (6,) and half its curvature (6, 6)."""
-
-    unknowns: Array
-    cost: float
-    gradient: Array
-    curvature: Array
+    unknowns: Unknowns
+    covariance: Triangle
 
 
-def unknowns_of(pose: Pose) -> Array:
-    """Return x, y, z, yaw, roll, pitch (6,) of a pose."""
+def unknowns_of(pose: Pose) -> Unknowns:
+    """Return the unknowns of a pose."""
     roll, pitch, yaw = camera_attitude(pose.rotation)
-    return np.array([*pose.position.tolist(), yaw, roll, pitch])
+    x, y, z = pose.position
+    return Unknowns(x, y, z, yaw, roll, pitch)
 
 
-def pose_of(unknowns: Array) -> Pose:
-    """Return the pose with x, y, z, yaw, roll, pitch (6,)."""
-    yaw, roll, pitch = unknowns[3:].tolist()
-    return Pose(camera_rotation(roll, pitch, yaw), unknowns[:3])
+def pose_of(unknowns: Unknowns) -> Pose:
+    """Return the pose with these unknowns."""
+    turn = camera_rotation(unknowns.roll, unknowns.pitch, unknowns.yaw)
+    return Pose(turn, (unknowns.x, unknowns.y, unknowns.z))
 
 
-@np.errstate(all="ignore")
-def refine(view: View, start: Array, tilt: Tilt | None = None) -> Estimate | None:
-    """Return the most probable pose near the unknowns `start` (6,); None if the view determines none.
+def refine(
+    circles: list[Circle], radius: float, start: Unknowns, tilt: Tilt | None = None
+) -> Estimate | None:
+    """Return the most probable pose near some unknowns; None if the circles determine none.
 
-    Without a tilt four points are needed. With a tilt two are enough; they do not change the tilt.
+    With a `radius` (m) above 0, what is seen are the centres of the ellipses that circles become. Without a
+    tilt four circles are needed. With a tilt two are enough; they do not change the tilt.
     """
-    try:
-        return _descend(view, start, tilt)
-    except np.linalg.LinAlgError:
-        return None
-
-
-def _descend(view: View, start: Array, tilt: Tilt | None) -> Estimate | None:
-    place, damping = _look(view, start, tilt), 0.0
-    if place is None:
+    place, damping = start, 0.0
+    found = _look(circles, radius, place, tilt)
+    if not found:
         return None
     for _ in range(_STEPS):
-        curvature = place.curvature
-        if damping:
-            curvature = curvature + np.diag(damping * curvature.diagonal())
-        step = np.linalg.solve(curvature, place.gradient)
-        unknowns = place.unknowns - step
-        if not step.dot(place.gradient) > _NEAR:
-            if not damping:
-                place = place._replace(unknowns=unknowns)
+        gradient = found[_CURVATURE:-1]
+        factor = factored(_damped(found, damping), _UNKNOWNS)
+        if not factor:
+            return None
+        step = solved(factor, gradient, _UNKNOWNS)
+        beside = _moved(place, step)
+        if not _gain(step, gradient) > _NEAR:
+            place = place if damping else beside
             break
-        there = _look(view, unknowns, tilt)
-        if there is not None and there.cost < place.cost:
-            place, damping = there, damping / 10
+        there = _look(circles, radius, beside, tilt)
+        if there and there[-1] < found[-1]:
+            place, found, damping = beside, there, damping / 10
         else:
             damping = max(10 * damping, _DAMPING)
-    if not (math.isfinite(place.cost) and all(map(math.isfinite, place.unknowns.tolist()))):
+    factor = factored(found, _UNKNOWNS)
+    if not (factor and math.isfinite(found[-1]) and _is_finite(place)):
         return None
-    return Estimate(place.unknowns, np.asarray(np.linalg.inv(place.curvature), np.float64))
+    return Estimate(place, inverted(factor, _UNKNOWNS))
 
 
-def _look(view: View, unknowns: Array, tilt: Tilt | None) -> _Place | None:
-    """Return the sum of squares and its derivatives; None if a corner is not in front of the camera."""
-    pose = pose_of(unknowns)
-    points = camera_points(pose, view.corners)
-    if not all(depth > 0 for depth in points[:, 2].tolist()):
-        return None
-    residual = (view.weights @ (seen_centres(pose, points, view.radius) - view.points)[:, :, None]).ravel()
-    jacobian = (view.weights @ slopes(pose, points, float(unknowns[4]))).reshape(-1, 6)
-    # `dot` is `@`, with the same bits and half the overhead.
-    cost, gradient, curvature = residual.dot(residual), jacobian.T.dot(residual), jacobian.T.dot(jacobian)
+def _damped(found: Triangle, damping: float) -> Triangle:
+    """Return the curvature with a multiple of its diagonal added."""
+    curvature = found[:_CURVATURE]
+    if damping:
+        for index in range(_UNKNOWNS):
+            curvature[index * (index + 3) // 2] *= 1 + damping
+    return curvature
+
+
+def _moved(place: Unknowns, step: list[float]) -> Unknowns:
+    x, y, z, yaw, roll, pitch = place
+    return Unknowns(
+        x - step[0], y - step[1], z - step[2], yaw - step[3], roll - step[4], pitch - step[5]
+    )  # fmt: skip
+
+
+def _gain(step: list[float], gradient: list[float]) -> float:
+    """Return by how much a step lowers the sum of squares where it is a parabola."""
+    gain = 0.0
+    for index in range(_UNKNOWNS):
+        gain += step[index] * gradient[index]
+    return gain
+
+
+def _is_finite(place: Unknowns) -> bool:
+    x, y, z, yaw, roll, pitch = place
+    return math.isfinite(x + y + z) and math.isfinite(yaw + roll + pitch)
+
+
+def _look(circles: list[Circle], radius: float, place: Unknowns, tilt: Tilt | None) -> Triangle:
+    """Return half the curvature of the sum of squares, half its gradient, and the sum; [] if it has none.
+
+    They are the triangle of the squares of [J r], the derivatives of all numbers and their differences. There
+    are none if a circle is not in front of the camera.
+    """
+    rows: list[Row] = []
+    if not _is_finite(place):
+        return undetermined()
+    pose = pose_of(place)
+    (_, _, right), (_, _, down), (_, _, ahead) = pose.rotation
+    for circle in circles:
+        point = camera_point(pose.rotation, pose.position, circle.forward, circle.right)
+        if not point[2] > 0:
+            return undetermined()
+        x, y = ellipse_centre(point, (right, down, ahead), radius)
+        by_x, by_y = slopes(pose, point, place.roll, x - circle.x, y - circle.y)
+        u_by_x, u_by_y, v_by_x, v_by_y = circle.weights
+        rows.append(weighed(by_x, u_by_x, by_y, u_by_y))
+        rows.append(weighed(by_x, v_by_x, by_y, v_by_y))
     if tilt is not None:
-        off = (unknowns[_ROLL:] - np.array((tilt.roll, tilt.pitch))) / tilt.sigma
-        cost += off.dot(off)
-        gradient[_ROLL:] += off / tilt.sigma
-        curvature[_ROLL, _ROLL] += 1 / tilt.sigma**2
-        curvature[_PITCH, _PITCH] += 1 / tilt.sigma**2
-    return _Place(unknowns, float(cost), gradient, curvature)
+        weight = 1 / tilt.sigma
+        rows.append((0.0, 0.0, 0.0, 0.0, weight, 0.0, (place.roll - tilt.roll) * weight))
+        rows.append((0.0, 0.0, 0.0, 0.0, 0.0, weight, (place.pitch - tilt.pitch) * weight))
+    return squares(rows, _UNKNOWNS + 1)
 
 
-def slopes(pose: Pose, points: Array, roll: float) -> Array:
-    """Return the derivatives (n, 2, 6) of normalised points by the unknowns; `points` are in camera axes.
+def slopes(pose: Pose, point: Vector, roll: float, off_x: float, off_y: float) -> tuple[Row, Row]:
+    """Return the derivatives of a normalised point (x, y) by the unknowns, and its differences behind them.
 
-    The effect of the circles' radius is neglected: it moves their centres too little to spoil a step.
+    `point` is in camera axes. Each row is the interaction matrix of the point (Chaumette and Hutchinson,
+    Visual servo control, part I, 2006), by which it moves in the picture with the camera, times the motion
+    of the camera with the unknowns: its place along the target's axes, its yaw around the target's normal,
+    roll around its own first axis, pitch around (0, -cos roll, sin roll). The effect of the circles' radius
+    is neglected: it moves their centres too little to spoil a step.
     """
-    moved: list[float] = []
-    for x, y, z in points.tolist():
-        moved += _interaction(x / z, y / z, z)
-    turn = pose.rotation
-    velocities = np.zeros((6, 6))  # of the camera in its own axes by the rates of the unknowns
-    velocities[:3, :3] = turn
-    velocities[3:, 3] = turn[:, 2]
-    velocities[3, 4] = 1.0
-    velocities[4, 5], velocities[5, 5] = -math.cos(roll), math.sin(roll)
-    return np.asarray(np.array(moved).reshape(-1, 2, 6) @ velocities)
+    (r11, r12, r13), (r21, r22, r23), (r31, r32, r33) = pose.rotation
+    z = point[2]
+    x, y = point[0] / z, point[1] / z
+    xy, xx, yy = x * y, 1 + x * x, 1 + y * y
+    cr, sr = math.cos(roll), math.sin(roll)
+    by_x = (
+        (x * r31 - r11) / z, (x * r32 - r12) / z, (x * r33 - r13) / z,
+        xy * r13 - xx * r23 + y * r33, xy, xx * cr + y * sr, off_x,
+    )  # fmt: skip
+    by_y = (
+        (y * r31 - r21) / z, (y * r32 - r22) / z, (y * r33 - r23) / z,
+        yy * r13 - xy * r23 - x * r33, yy, xy * cr - x * sr, off_y,
+    )  # fmt: skip
+    return by_x, by_y
 
 
-def _interaction(x: float, y: float, z: float) -> tuple[float, ...]:
-    """Return the interaction matrix (2, 6), row by row, of a point at depth z: its velocity by the camera's.
-
-    Source: Chaumette and Hutchinson, Visual servo control, part I: basic approaches (2006).
-    """
-    return (-1 / z, 0.0, x / z, x * y, -1 - x * x, y, 0.0, -1 / z, y / z, 1 + y * y, -x * y, -x)
+def weighed(a: Row, p: float, b: Row, q: float) -> Row:
+    """Return p a + q b."""
+    return (
+        p * a[0] + q * b[0], p * a[1] + q * b[1], p * a[2] + q * b[2], p * a[3] + q * b[3],
+        p * a[4] + q * b[4], p * a[5] + q * b[5], p * a[6] + q * b[6],
+    )  # fmt: skip

@@ -5,8 +5,9 @@ from __future__ import annotations
 import inspect
 import sys
 import types
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 from quadvis.block import Block
 from quadvis.native.source import names_in
@@ -42,17 +43,38 @@ def tested(subject: Subject) -> None:
 
 
 def all_declarations_used(subject: Subject) -> None:
-    """Check that some method asks for every input, and some method names every parameter, state and Work."""
+    """Check that some method asks for every input, and that every other declaration is named somewhere.
+
+    It may be named in a method, or in a function of the block's own library that a method calls.
+    """
     interface = subject.block.interface
     asked = {name for names in interface.arguments.values() for name in names}
     idle = [name for name in interface.inputs if name not in asked]
     assert not idle, f"no method asks for {', '.join(idle)}; take it away"
     classes = [kind for kind in subject.block.__mro__ if kind not in Block.__mro__]
     functions = [value for kind in classes for value in vars(kind).values() if inspect.isfunction(value)]
-    names = {name for function in functions for name in _named(inspect.unwrap(function).__code__)}
+    names = {name for function in _reached(functions) for name in _named(function.__code__)}
     names |= {item.name for item in interface.safe.values()}  # `Block.write_safe` uses them
-    idle = [name for name in (*interface.params, *interface.states, *interface.work) if name not in names]
+    groups = (interface.params, interface.derived, interface.states, interface.work)
+    idle = [name for group in groups for name in group if name not in names]
     assert not idle, f"no method uses {', '.join(idle)}; take it away"
+
+
+def _reached(functions: Iterable[Any]) -> set[types.FunctionType]:
+    """Return plain functions and those that they call, as far as these are of the same library."""
+    found: set[types.FunctionType] = set()
+    waiting = [inspect.unwrap(function) for function in functions]
+    while waiting:
+        function = waiting.pop()
+        if function not in found:
+            found.add(function)
+            library = function.__module__.partition(".")[0]
+            called = (function.__globals__.get(name) for name in names_in(function.__code__))
+            waiting += [
+                each for each in called
+                if isinstance(each, types.FunctionType) and each.__module__.partition(".")[0] == library
+            ]  # fmt: skip
+    return found
 
 
 def _named(code: types.CodeType) -> Iterator[str]:

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from quadvis_vision.camera.calibration import CameraCalibration
-from quadvis_vision.camera.projection import camera_pose, ellipse_centres, target_corners
+from quadvis_vision.camera.projection import (
+    camera_point,
+    camera_pose,
+    camera_rotation,
+    ellipse_centre,
+    target_corners,
+)
 from quadvis_vision.detection.circles import Target
 from quadvis_vision.detection.colours import ColourCalibration
 from quadvis_vision.detection.detect import follow, search
@@ -24,6 +30,7 @@ from tests.stages import mostly_slow
 
 COLOURS = Path(__file__).parents[3] / "diagrams" / "calib" / "colours.yaml"
 TARGET = Target(ColourCalibration.load(COLOURS), 0.12, 2.0, 80.0)
+CAMERA = CameraCalibration((452, 322), np.array([[430.0, 2, 225.5], [0, 438, 160.5], [0, 0, 1]]), np.zeros(5))
 CLEAN, COMBINED = 0.07, 0.10  # px rms, what is asked of centres
 
 
@@ -82,16 +89,19 @@ def test_discs_lie_where_the_closed_form_puts_the_centres_of_their_ellipses():
     rng = np.random.default_rng(4)
     for _ in range(5):
         pose = draw_pose(rng, (452, 322), Condition(tilt=25.0))
-        expected = ellipse_centres(homography((452, 322), pose), CORNERS, RADIUS)
+        x, y, z, roll, pitch, yaw = pose
+        turn = camera_rotation(roll, pitch, yaw)
+        normal = tuple(row[2] for row in turn)
+        points = [camera_point(turn, (x, y, z), *corner) for corner in CORNERS.tolist()]
+        expected = CAMERA.to_pixels([ellipse_centre(point, normal, RADIUS) for point in points])
         assert np.abs(shoot(rng, (452, 322), pose=pose).centres - expected).max() < 0.02
 
 
 def test_scenes_and_projection_mean_the_same_pose():
-    rng, matrix = np.random.default_rng(5), np.array([[430.0, 2, 225.5], [0, 438, 160.5], [0, 0, 1]])
-    camera = CameraCalibration((452, 322), matrix, np.zeros(5))
+    rng = np.random.default_rng(5)
     for _ in range(5):
         x, y, z, roll, pitch, yaw = draw_pose(rng, (452, 322), Condition(tilt=25.0))
         turn, shift = camera_pose(np.array([x, y, 4.5 - z]), np.array([roll, pitch, yaw]), 4.5)
-        expected = camera.project(target_corners(1.0) @ turn.T + shift)
+        expected = CAMERA.project(target_corners(1.0) @ turn.T + shift)
         h = homography((452, 322), (x, y, z, roll, pitch, yaw))
         assert np.abs(project(h, CORNERS) - expected).max() < 1e-9

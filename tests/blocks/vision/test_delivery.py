@@ -7,9 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quadvis.block import Out, ParameterError
+from quadvis.block import Block, Out, ParameterError
 from quadvis.testing import drive
-from quadvis_blocks.vision._delayed_camera import SEQUENCE, STAMP, DeliveringCamera
+from quadvis_blocks.vision._delayed_camera import (
+    SEQUENCE,
+    STAMP,
+    DeliveringCamera,
+    advance,
+    deliver,
+    draw,
+    take,
+)
 from quadvis_blocks.vision.geometric_camera import GeometricCamera
 from quadvis_blocks.vision.rendered_camera import RenderedCamera
 from tests.stages import mostly_slow
@@ -18,21 +26,22 @@ CALIBRATION = str(Path(__file__).parents[3] / "diagrams" / "calib" / "camera.yam
 HOVER = {"position": [0.1, -0.2, 1.4], "attitude": [0.0, 0.0, 0.0]}
 
 
-class Clock(DeliveringCamera, numeric=False):
+class Clock(DeliveringCamera, Block):
     """A camera whose frames show nothing."""
 
     sequence = Out("int64", doc="of the frame on the wire")
     stamp = Out(unit="s", doc="of the frame on the wire")
 
+    def start(self):
+        draw(self)
+
     def output(self, time):
-        shown = self._deliver(self._frame(time), time)
-        return int(shown[SEQUENCE]), shown[STAMP]
+        take(self, time, time)
+        deliver(self, time)
+        return int(self.wire[SEQUENCE]), self.wire[STAMP]
 
-    def update(self):
-        self._advance()
-
-    def _frame(self, time):
-        return self._row(time, []) if self._is_captured() and not self._is_lost(time) else None
+    def update(self, time):
+        advance(self, time)
 
 
 def clock(steps, rate="10 Hz", seed=1, **parameters):

@@ -10,8 +10,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from quadvis_vision.pose.level import level_covariance, level_pose
-from quadvis_vision.pose.refine import View
+from quadvis_vision.pose import level
+from quadvis_vision.pose.level import level_covariance
+from quadvis_vision.pose.refine import Unknowns
+from tests.blocks.vision.plain import circles_at, full
 
 SIDE = 1.3
 CORNERS = np.array([[-1.0, 1], [1, 1], [1, -1], [-1, -1]]) * SIDE / 2
@@ -50,6 +52,13 @@ def exact_points(pose, radius=0.0):
     return ellipse_centres(h, radius) if radius else corners[:, :2] / corners[:, 2:]
 
 
+def level_pose(points, roll, pitch, radius=0.0):
+    """x, y, z, yaw from points (4, 2)."""
+    found = level.level_pose(circles_at(points, CORNERS), roll, pitch, radius)
+    assert found is None or found[4:] == (roll, pitch)
+    return None if found is None else found[:4]
+
+
 def only(points, rows):
     left = np.full((4, 2), np.nan)
     left[list(rows)] = points[list(rows)]
@@ -63,7 +72,7 @@ def test_exact_points_of_two_circles_or_more_give_the_pose_back(rows, radius, po
     x, y, z, roll, pitch, yaw = pose
     assume((np.column_stack((CORNERS, np.ones(4))) @ homography(pose)[2]).min() > 0.5)
     points = only(exact_points(pose, radius), rows)
-    found = level_pose(points, roll, pitch, SIDE, radius)
+    found = level_pose(points, roll, pitch, radius)
     # Two corrections for the radius leave a hundredth of a millimetre, for two circles near by at 40 degrees.
     assert found == pytest.approx((x, y, z, yaw), abs=1e-5 if radius else 1e-9)
 
@@ -71,7 +80,7 @@ def test_exact_points_of_two_circles_or_more_give_the_pose_back(rows, radius, po
 def test_without_its_radius_a_circle_is_taken_for_a_point_and_the_pose_is_off():
     pose = (0.3, -0.2, 2.0, 0.2, -0.3, 0.5)
     points = exact_points(pose, 0.15)
-    off = np.array(level_pose(points, 0.2, -0.3, SIDE)) - (*pose[:3], pose[5])
+    off = np.array(level_pose(points, 0.2, -0.3)) - (*pose[:3], pose[5])
     assert 1e-3 < np.abs(off).max() < 0.05
 
 
@@ -88,15 +97,15 @@ def test_the_fit_is_the_least_squares_solution_of_the_eight_linear_equations():
         (a, b, *c), *_ = np.linalg.lstsq(np.array(rows), m.ravel())
         x, y = -np.linalg.solve([[a, -b], [b, a]], c)
         expected = (x, y, 1 / math.hypot(a, b), math.atan2(-b, a))
-        assert level_pose(points, roll, pitch, SIDE) == pytest.approx(expected, rel=1e-9)
+        assert level_pose(points, roll, pitch) == pytest.approx(expected, rel=1e-9)
 
 
 def test_a_craft_that_is_tilted_only_in_what_it_is_told_seems_beside_the_target():
     points = exact_points((0, 0, 3.0, 0, 0, 0))
     # Told that its right side is down, it takes what it sees overhead for something to its right ...
-    assert level_pose(points, 0.1, 0.0, SIDE)[1] == pytest.approx(-0.3, abs=0.02)
+    assert level_pose(points, 0.1, 0.0)[1] == pytest.approx(-0.3, abs=0.02)
     # ... and told that its nose is up, for something behind it.
-    assert level_pose(points, 0.0, 0.1, SIDE)[0] == pytest.approx(0.3, abs=0.02)
+    assert level_pose(points, 0.0, 0.1)[0] == pytest.approx(0.3, abs=0.02)
 
 
 @pytest.mark.parametrize("rows", SUBSETS)
@@ -111,33 +120,31 @@ def test_the_covariance_is_how_the_pose_follows_its_measurements(rows):
         def solve(measured, exact=exact, tilt=tilt):
             # Pixels and angles in standard deviations, 0.3 px and 0.01 rad, from the exact ones.
             pixels = 0.3 * measured[:8].reshape(4, 2) @ np.linalg.inv(lens).T
-            return np.array(level_pose(only(exact + pixels, rows), *(tilt + 0.01 * measured[8:]), SIDE))
+            return np.array(level_pose(only(exact + pixels, rows), *(tilt + 0.01 * measured[8:])))
 
         steps = 0.01 * np.eye(10)
         slopes = np.array([(solve(step) - solve(-step)) / 0.02 for step in steps]).T
         expected = slopes @ slopes.T
         scale = np.sqrt(np.diag(expected))
-        corners = np.column_stack((CORNERS, np.zeros(4)))[rows]
-        view = View(corners, exact[rows], np.tile(lens / 0.3, (len(rows), 1, 1)))
-        found = level_covariance(view, np.array([*pose[:3], yaw, *tilt]), 0.01)
+        circles = circles_at(exact[rows], CORNERS[rows], np.tile(lens / 0.3, (len(rows), 1, 1)))
+        found = full(level_covariance(circles, Unknowns(*pose[:3], yaw, *tilt), 0.01), 4)
         assert found / np.outer(scale, scale) == pytest.approx(expected / np.outer(scale, scale), abs=1e-5)
 
 
 @pytest.mark.parametrize("rows", [(), (0,), (3,)])
 def test_fewer_than_two_circles_give_no_pose(rows):
-    assert level_pose(only(exact_points((0, 0, 3.0, 0, 0, 0)), rows), 0.0, 0.0, SIDE) is None
+    assert level_pose(only(exact_points((0, 0, 3.0, 0, 0, 0)), rows), 0.0, 0.0) is None
 
 
 def test_points_below_the_horizon_and_circles_in_one_place_give_no_pose():
     points = exact_points((0, 0, 3.0, 0, 0, 0))
-    assert level_pose(points, 3.0, 0.0, SIDE) is None
-    assert level_pose(np.tile(points[:1], (4, 1)), 0.0, 0.0, SIDE) is None
+    assert level_pose(points, 3.0, 0.0) is None
+    assert level_pose(np.tile(points[:1], (4, 1)), 0.0, 0.0) is None
 
 
 def test_a_camera_above_its_target_has_no_covariance():
-    corners = np.column_stack((CORNERS, np.zeros(4)))
-    view = View(corners, np.zeros((4, 2)), np.tile(np.eye(2), (4, 1, 1)))
-    assert level_covariance(view, np.array([0.0, 0, -3, 0, 0, 0]), 0.01) is None
+    circles = circles_at(np.zeros((4, 2)), CORNERS)
+    assert level_covariance(circles, Unknowns(0.0, 0.0, -3.0, 0.0, 0.0, 0.0), 0.01) == []
 
 
 @given(
@@ -146,5 +153,5 @@ def test_a_camera_above_its_target_has_no_covariance():
     radius=st.floats(0, 10),
 )
 def test_no_points_raise_an_error(points, tilt, radius):
-    found = level_pose(points, *tilt, SIDE, radius)
+    found = level_pose(points, *tilt, radius)
     assert found is None or len(found) == 4

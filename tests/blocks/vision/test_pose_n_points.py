@@ -17,6 +17,7 @@ from quadvis_blocks.vision.pose_plane import PosePlane
 from quadvis_vision.camera.calibration import CameraCalibration
 from quadvis_vision.camera.two_planes import TwoPlanesCalibration
 from quadvis_vision.pose.pose import pose_from_n_points, pose_from_plane
+from tests.blocks.vision.plain import pose_by
 
 REPO = Path(__file__).parents[3]
 CAMERA = str(REPO / "diagrams/calib/camera.yaml")
@@ -190,7 +191,7 @@ def test_both_methods_give_the_same_rotation_also_from_noisy_pixels(pose, noise)
     points = camera_points(pose)
     assume(points[:, 2].min() > 0.3)
     rays = np.column_stack((pixels(points, np.eye(3)) + noise / 430, np.ones(4)))
-    first, second = pose_from_n_points(rays, SIDE), pose_from_plane(rays, SIDE)
+    first, second = pose_by(pose_from_n_points, rays, SIDE), pose_by(pose_from_plane, rays, SIDE)
     assert (first is None) == (second is None)
     if first is not None and second is not None:
         # Nearly edge on, the two edges that are made orthogonal lose digits.
@@ -206,7 +207,7 @@ def test_both_methods_give_the_same_rotation_also_from_noisy_pixels(pose, noise)
 )
 def test_no_rays_raise_an_error_and_every_pose_is_in_front(rays, side):
     for method in (pose_from_n_points, pose_from_plane):
-        pose = method(rays, side)
+        pose = pose_by(method, rays, side)
         assert pose is None or pose.position[2] > 0
 
 
@@ -215,8 +216,8 @@ def test_the_lengths_of_the_rays_do_not_matter(pose, lengths):
     points = camera_points(pose)
     assume(points[:, 2].min() > 0.3)
     for method in (pose_from_n_points, pose_from_plane):
-        assert method(points, SIDE).position == pytest.approx(
-            method(points * lengths[:, None], SIDE).position, rel=1e-9, abs=1e-9
+        assert pose_by(method, points, SIDE).position == pytest.approx(
+            pose_by(method, points * lengths[:, None], SIDE).position, rel=1e-9, abs=1e-9
         )
 
 
@@ -265,7 +266,7 @@ def test_unless_told_otherwise_a_block_is_the_method_of_the_paper_alone(method):
     image = pixels(camera_points((0.2, 0.1, 3.0, 0.05, -0.1, 0.4)))
     image += np.random.default_rng(6).normal(0, 0.7, (4, 2))
     rays = np.column_stack((CameraCalibration.load(CAMERA).normalise(image), np.ones(4)))
-    seen, expected = solve(method(calibration=CAMERA), image), function(rays, SIDE)
+    seen, expected = solve(method(calibration=CAMERA), image), pose_by(function, rays, SIDE)
     assert (seen.position[0] == expected.position).all()
     assert (seen.rotation[0] == expected.rotation).all()
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from quadvis_vision.pose.pose import pose_from_n_points, pose_from_plane
+from tests.blocks.vision.plain import pose_by
 
 CORNERS = np.array([[-0.5, 0.5], [0.5, 0.5], [0.5, -0.5], [-0.5, -0.5]])
 
@@ -31,7 +32,7 @@ def test_it_is_the_published_formula_with_its_misprints_corrected():
         n3 = np.column_stack((n, np.cross(n[:, 0], n[:, 1])))
         mu = s.sum() / (s**2).sum()
         w = n3.T @ a @ (0, 0, mu)
-        pose = pose_from_plane(rays, 1.0)
+        pose = pose_by(pose_from_plane, rays, 1.0)
         assert pose is not None
         # getPerspectiveTransform takes single precision.
         assert pose.rotation == pytest.approx(n3, abs=1e-5)
@@ -42,7 +43,7 @@ def test_no_other_rotation_is_nearer_to_the_homography():
     rng = np.random.default_rng(2)
     for _ in range(20):
         rays = noisy_rays(rng, 5e-3)
-        pose = pose_from_plane(rays, 1.0)
+        pose = pose_by(pose_from_plane, rays, 1.0)
         a = cv2.findHomography(CORNERS, rays[:, :2])[0]
         a *= np.sign(a[2, 2])
 
@@ -62,7 +63,7 @@ def test_the_two_methods_differ_in_distance_alone():
     differences = []
     for _ in range(100):
         rays = noisy_rays(rng, 2e-3)
-        first, second = pose_from_n_points(rays, 1.0), pose_from_plane(rays, 1.0)
+        first, second = pose_by(pose_from_n_points, rays, 1.0), pose_by(pose_from_plane, rays, 1.0)
         assert first.rotation == pytest.approx(second.rotation, abs=1e-12)
         scale = first.position[2] / second.position[2]
         assert first.position == pytest.approx(scale * second.position, rel=1e-9)

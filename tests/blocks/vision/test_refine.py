@@ -9,9 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from quadvis_vision.pose.level import level_pose
+from quadvis_vision.pose import level
 from quadvis_vision.pose.pose import Pose, pose_from_plane
-from quadvis_vision.pose.refine import Tilt, View, pose_of, refine, unknowns_of
+from quadvis_vision.pose.refine import Estimate, Tilt, Unknowns, pose_of, unknowns_of
+from quadvis_vision.pose.refine import refine as refine_circles
+from tests.blocks.vision.plain import arrays_of, circles_at, full, pose_by
 
 SIDE = 1.0
 CORNERS = np.array([[-0.5, 0.5, 0], [0.5, 0.5, 0], [0.5, -0.5, 0], [-0.5, -0.5, 0]])
@@ -42,8 +44,20 @@ def draw(rng, noise):
     return unknowns, project(unknowns) + rng.normal(0, noise, (4, 2)) / 435
 
 
+def refine(points, weights, start, tilt=None):
+    """Unknowns (6,) and covariance (6, 6) from points (n, 2)."""
+    found = refine_circles(
+        circles_at(points, CORNERS[: len(points)], weights), 0.0, Unknowns(*np.asarray(start).tolist()), tilt
+    )
+    return None if found is None else Estimate(np.array(found.unknowns), full(found.covariance, 6))
+
+
+def level_pose(points, tilt):
+    return level.level_pose(circles_at(points, CORNERS), *tilt)
+
+
 def from_plane(points):
-    return unknowns_of(pose_from_plane(np.column_stack((points, np.ones(4))), SIDE))
+    return unknowns_of(pose_by(pose_from_plane, np.column_stack((points, np.ones(4))), SIDE))
 
 
 def from_opencv(turn, shift):
@@ -63,7 +77,7 @@ def test_from_beside_it_exact_points_lead_to_the_pose():
     for _ in range(50):
         truth, points = draw(rng, 0)
         start = truth + rng.normal(0, [0.05, 0.05, 0.1, 0.05, 0.03, 0.03])
-        found = refine(View(CORNERS, points, WEIGHTS), start)
+        found = refine(points, WEIGHTS, start)
         assert found.unknowns == pytest.approx(truth, abs=1e-6)
 
 
@@ -72,10 +86,9 @@ def test_the_pose_of_the_paper_refined_is_where_opencv_s_refinements_end():
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 200, 1e-15)
     for _ in range(50):
         _, points = draw(rng, 0.3)
-        start = pose_from_plane(np.column_stack((points, np.ones(4))), SIDE)
+        start = pose_by(pose_from_plane, np.column_stack((points, np.ones(4))), SIDE)
         # OpenCV weighs x and y alike and knows no skew.
-        view = View(CORNERS, points, np.tile(430 * np.eye(2), (4, 1, 1)))
-        found = refine(view, unknowns_of(start)).unknowns
+        found = refine(points, np.tile(430 * np.eye(2), (4, 1, 1)), unknowns_of(start)).unknowns
         turn, shift = cv2.Rodrigues(start.rotation)[0], -(start.rotation @ start.position)[:, None]
         virtual = cv2.solvePnPRefineVVS(
             CORNERS, points, np.eye(3), None, turn.copy(), shift.copy(), criteria, 1
@@ -94,8 +107,8 @@ def test_no_pose_near_by_has_a_smaller_sum_of_squares(tilted):
     for _ in range(20):
         truth, points = draw(rng, 0.4)
         tilt = Tilt(*(truth[4:] + rng.normal(0, SIGMA, 2)), SIGMA) if tilted else None
-        start = np.array([*level_pose(points, *tilt[:2], SIDE), *tilt[:2]]) if tilted else from_plane(points)
-        found = refine(View(CORNERS, points, WEIGHTS / 0.4), start, tilt)
+        start = np.array(level_pose(points, tilt[:2])) if tilted else from_plane(points)
+        found = refine(points, WEIGHTS / 0.4, start, tilt)
         least = cost(found.unknowns, points, tilt, 0.4)
         assert least <= cost(start, points, tilt, 0.4)
         deviations = np.linalg.cholesky(found.covariance)
@@ -109,22 +122,21 @@ def test_a_tilt_that_is_sure_stays_and_one_that_is_not_says_nothing():
     for _ in range(20):
         truth, points = draw(rng, 0.2)
         roll, pitch = truth[4:] + rng.normal(0, SIGMA, 2)
-        view = View(CORNERS, points, WEIGHTS / 0.2)
-        sure = refine(view, truth, Tilt(roll, pitch, 1e-7))
+        seen = points, WEIGHTS / 0.2
+        sure = refine(*seen, truth, Tilt(roll, pitch, 1e-7))
         assert sure.unknowns[4:] == pytest.approx((roll, pitch), abs=1e-7)
-        unsure, alone = refine(view, truth, Tilt(roll, pitch, 1e3)), refine(view, truth)
+        unsure, alone = refine(*seen, truth, Tilt(roll, pitch, 1e3)), refine(*seen, truth)
         assert unsure.unknowns == pytest.approx(alone.unknowns, abs=1e-4)
 
 
 def test_two_circles_leave_the_measured_tilt_as_it_is_and_are_met_exactly():
     truth, points = draw(np.random.default_rng(5), 0.5)
     tilt = Tilt(truth[4] + 0.01, truth[5] - 0.01, SIGMA)
-    view = View(CORNERS[:2], points[:2], WEIGHTS[:2])
-    found = refine(view, truth, tilt).unknowns
+    found = refine(points[:2], WEIGHTS[:2], truth, tilt).unknowns
     assert found[4:] == pytest.approx(tilt[:2], abs=1e-7)
     assert project(found)[:2] == pytest.approx(points[:2], abs=1e-7)
     half = np.vstack((points[:2], np.full((2, 2), np.nan)))
-    assert found[:4] == pytest.approx(level_pose(half, *tilt[:2], SIDE), abs=1e-6)
+    assert found[:4] == pytest.approx(level_pose(half, tilt[:2])[:4], abs=1e-6)
 
 
 @pytest.mark.parametrize("tilted", [False, True])
@@ -137,13 +149,13 @@ def test_the_covariance_is_how_the_pose_follows_its_measurements(tilted):
             # Pixels and angles in standard deviations, from the exact ones.
             pixels = 0.3 * measured[:8].reshape(4, 2) @ np.linalg.inv(MATRIX[:2, :2]).T
             tilt = Tilt(*(truth[4:] + SIGMA * measured[8:]), SIGMA) if tilted else None
-            return refine(View(CORNERS, points + pixels, WEIGHTS / 0.3), truth, tilt).unknowns
+            return refine(points + pixels, WEIGHTS / 0.3, truth, tilt).unknowns
 
         slopes = numerical_jacobian(solve, np.zeros(10), 0.02)
         expected = slopes @ slopes.T
         scale = np.sqrt(np.diag(expected))
         covariance = refine(
-            View(CORNERS, points, WEIGHTS / 0.3), truth, Tilt(*truth[4:], SIGMA) if tilted else None
+            points, WEIGHTS / 0.3, truth, Tilt(*truth[4:], SIGMA) if tilted else None
         ).covariance
         assert covariance / np.outer(scale, scale) == pytest.approx(
             expected / np.outer(scale, scale), abs=0.01
@@ -154,7 +166,7 @@ def test_poses_and_unknowns_are_one():
     rng = np.random.default_rng(8)
     for _ in range(20):
         truth, points = draw(rng, 0)
-        pose = pose_of(truth)
+        pose = arrays_of(pose_of(Unknowns(*truth)))
         assert unknowns_of(pose) == pytest.approx(truth, abs=1e-12)
         image = (CORNERS - pose.position) @ pose.rotation.T
         assert image[:, :2] / image[:, 2:] == pytest.approx(points, abs=1e-12)
@@ -163,7 +175,7 @@ def test_poses_and_unknowns_are_one():
 def test_what_determines_no_pose_gives_none():
     _, points = draw(np.random.default_rng(9), 0)
     above = unknowns_of(Pose(np.eye(3), np.array([0.0, 0, 2])))  # the camera looks away from the target
-    assert refine(View(CORNERS, points, WEIGHTS), above) is None
+    assert refine(points, WEIGHTS, above) is None
 
 
 @given(
@@ -172,6 +184,5 @@ def test_what_determines_no_pose_gives_none():
     tilt=st.tuples(st.floats(-10, 10), st.floats(-10, 10), st.floats(1e-9, 1e3)),
 )
 def test_no_view_raises_an_error(points, start, tilt):
-    view = View(CORNERS, points, WEIGHTS)
-    for found in (refine(view, start), refine(view, start, Tilt(*tilt))):
+    for found in (refine(points, WEIGHTS, start), refine(points, WEIGHTS, start, Tilt(*tilt))):
         assert found is None or np.isfinite(found.unknowns).all()
