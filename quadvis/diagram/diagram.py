@@ -80,7 +80,7 @@ class Diagram:
     def hash(self) -> str:
         """SHA-256 of the resolved diagram: two runs with one hash and one seed are the same to the bit.
 
-        On one kind of processor, with one set of versions: BLAS, OpenCV and the C library choose their code
+        On one kind of processor, with one set of versions: OpenCV and the C library choose their code
         by the processor, and may round the last digit otherwise.
         """
         from hashlib import sha256

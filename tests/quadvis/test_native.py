@@ -11,7 +11,7 @@ from collections.abc import Callable
 from fractions import Fraction
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import quadvis
-from quadvis.block import Block, In, Out, Param, Random, State, Work
+from quadvis.block import Block, Derived, In, Out, Param, Random, State, Work
 from quadvis.engine.engine import Engine
 from quadvis.engine.memory import Memory, Record, Slot
 from quadvis.engine.program import Op
@@ -634,8 +634,37 @@ def test_what_a_function_reaches_decides_over_its_fingerprint() -> None:
     long[1, 2500] = 1.0  # where a printed array has dots
     kinds = [enum.IntEnum("Kind", {"A": number}) for number in (1, 2)]
     compiled = [types.SimpleNamespace(py_func=made(number), __qualname__="method") for number in (1.0, 2.0)]
-    for one, other in ((tuple([long[0]]), tuple([long[1]])), kinds, compiled):
+    tuples = [NamedTuple("Place", [(name, float) for name in names]) for names in ("xy", "yx")]
+    for one, other in ((tuple([long[0]]), tuple([long[1]])), kinds, compiled, tuples):
         assert fingerprint(made(one)) != fingerprint(made(other))
+
+
+# Numbers that a block derives from its parameters
+
+
+class Curve(Block):
+    u = In("float64")
+    y = Out("float64")
+    factors = Param((1.0, 2.0), type="float64[2]")
+    squares = Derived("float64[2]", doc="the factors, squared")
+
+    def check(self):
+        self.squares = [factor * factor for factor in self.factors]
+
+    def output(self, u):
+        return self.squares[0] * u + self.squares[1]
+
+
+@pytest.mark.parametrize("kind", ["python", "native"])
+def test_what_check_derives_from_parameters_is_in_memory_before_a_run(kind: str) -> None:
+    engine = alone(Curve(factors=(3.0, 0.5)), {"u": 2.0}, {}, Fraction(1))
+    begin = engine.snapshot()  # no block is open yet
+    assert engine.read(ALONE, "squares").tolist() == [9.0, 0.25]
+    use(engine, choose(engine, 1, kind))
+    with engine:
+        engine.restore(begin)
+        engine.run(1)
+        assert engine.read(ALONE, "y") == 18.25
 
 
 # The choice

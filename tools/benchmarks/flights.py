@@ -22,10 +22,10 @@ FLIGHTS = (
     (None, "python", True, ""),
     (None, "native", True, ">= 60"),
     ("geometric", "python", True, ""),
-    ("geometric", "native", True, ">= 250"),
-    ("geometric", "native", False, ">= 600"),
+    ("geometric", "native", True, ">= 500"),
+    ("geometric", "native", False, ">= 1200"),
     ("fused_geometric", "native", True, ""),
-    ("fused_geometric", "native", False, ">= 300"),
+    ("fused_geometric", "native", False, ">= 500"),
 )
 PARTED = ("python", True)  # such flights are shown in parts
 ENGINE = "engine alone: "

@@ -63,7 +63,8 @@ class Ground(Block):
         right = max(0.0, spring * (depth + span * side) - damper * (climb - rolling))
         left = max(0.0, spring * (depth - span * side) - damper * (climb + rolling))
         normal = front + right + rear + left
-        drag = self.friction * normal / max(SLIP, math.hypot(velocity[0], velocity[1]))
+        speed = math.sqrt(velocity[0] * velocity[0] + velocity[1] * velocity[1])
+        drag = self.friction * normal / max(SLIP, speed)
         turning = span * float(rates[2])
         brake = self.friction * normal * span * turning / max(SLIP, abs(turning))
         return (

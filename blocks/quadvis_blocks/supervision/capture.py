@@ -78,7 +78,8 @@ def _shifted(shift: Any, error: Any, engaged: Any, rearmed: bool, distance: floa
     """Return the shift after the captures of this tick, and whether x and y were captured."""
     taken = engaged[ROLL] or engaged[PITCH]
     if rearmed:
-        taken = taken or math.hypot(error[0] - shift[0], error[1] - shift[1]) > distance
+        x, y = error[0] - shift[0], error[1] - shift[1]
+        taken = taken or math.sqrt(x * x + y * y) > distance
     x, y = (error[0], error[1]) if taken else (shift[0], shift[1])
     return np.array((x, y, error[2] if engaged[COLLECTIVE] else shift[2])), taken
 
