@@ -19,6 +19,7 @@ from quadvis_vision.pose.refine import Estimate, Tilt, pose_of, refine
 
 LEVEL, MAP = range(2)
 NO_TILT = 8  # a status; smaller numbers are those of the detector
+_NUMBERS = 10  # of the triangle of 4 x 4
 MISFIT_MAX = 0.1  # sides; greatest rms error of the levelled pose: 10 deg of tilt give 0.05 at 1.6 sides
 
 
@@ -76,8 +77,9 @@ class PoseImu(PoseFromCircles, Block):
             return *no_pose(), covariance, NO_TILT
         tilt = Tilt(imu_roll, imu_pitch, self.tilt_sigma)
         estimate = _estimate(circles, tilt, self.side, self.radius, self.mode)
-        if estimate is None or not _is_written(estimate.covariance, covariance):
+        if estimate is None or not _is_whole(estimate.covariance):
             return *no_pose(), covariance, INCONSISTENT
+        _write(estimate.covariance, covariance)
         pose = pose_of(estimate.unknowns)
         return *described(pose, circles, self.radius, camera), covariance, 4 - len(circles)
 
@@ -95,13 +97,18 @@ def _estimate(circles: list[Circle], tilt: Tilt, side: float, radius: float, mod
     return Estimate(level, level_covariance(circles, level, tilt.sigma))
 
 
-def _is_written(triangle: Triangle, covariance: Any) -> bool:
-    """Write the covariance of x, y, z, yaw from the triangle of it; return whether it is there and finite."""
-    if not triangle:
-        return False
+def _is_whole(triangle: Triangle) -> bool:
+    """Return whether there is a covariance, and x, y, z and yaw have a finite one."""
+    for index in range(min(len(triangle), _NUMBERS)):
+        if not math.isfinite(triangle[index]):
+            return False
+    return len(triangle) >= _NUMBERS
+
+
+def _write(triangle: Triangle, covariance: Any) -> None:
+    """Write the covariance of x, y, z and yaw."""
     place = 0
     for row in range(4):
         for column in range(row + 1):
             covariance[row, column] = covariance[column, row] = triangle[place]
             place += 1
-    return bool(np.isfinite(covariance).all())

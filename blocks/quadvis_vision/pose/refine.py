@@ -74,11 +74,16 @@ def refine(
     With a `radius` (m) above 0, what is seen are the centres of the ellipses that circles become. Without a
     tilt four circles are needed. With a tilt two are enough; they do not change the tilt.
     """
-    place, damping = start, 0.0
-    found = _look(circles, radius, place, tilt)
-    if not found:
-        return None
+    place = beside = start
+    found, damping = undetermined(), 0.0
     for _ in range(_STEPS):
+        there = _look(circles, radius, beside, tilt)
+        if there and (not found or there[-1] < found[-1]):
+            place, found, damping = beside, there, damping / 10
+        elif found:
+            damping = max(10 * damping, _DAMPING)
+        else:
+            return None
         gradient = found[_CURVATURE:-1]
         factor = factored(_damped(found, damping), _UNKNOWNS)
         if not factor:
@@ -88,11 +93,6 @@ def refine(
         if not _gain(step, gradient) > _NEAR:
             place = place if damping else beside
             break
-        there = _look(circles, radius, beside, tilt)
-        if there and there[-1] < found[-1]:
-            place, found, damping = beside, there, damping / 10
-        else:
-            damping = max(10 * damping, _DAMPING)
     factor = factored(found, _UNKNOWNS)
     if not (factor and math.isfinite(found[-1]) and _is_finite(place)):
         return None
