@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -13,6 +12,7 @@ from quadvis.diagram.draft import Draft
 from quadvis.errors import Faults, Place, QuadvisError, quoted
 from quadvis.library.own_package import own_files
 from quadvis.machine.files import same_file
+from quadvis.machine.source_line import file_of
 
 
 class Writer(NamedTuple):
@@ -32,8 +32,8 @@ def files_read(blocks: Iterable[Block], sources: Iterable[Path]) -> list[Path]:
         kind = type(block)
         if kind not in kinds:
             kinds.add(kind)
-            module = getattr(sys.modules.get(kind.__module__), "__file__", None)
-            found |= dict.fromkeys(([Path(module)] if module else []) + own_files(kind.__module__))
+            files = [Path(file_of(kind)), *own_files(kind.__module__)] if file_of(kind) else []
+            found |= dict.fromkeys(files)
         found |= dict.fromkeys(map(Path, block.reads()))
     return list(found)
 

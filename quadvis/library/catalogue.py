@@ -142,7 +142,11 @@ class Catalogue:
 def _own_folder(folder: Path) -> Path:
     """Return the folder of own blocks: beside the diagram, or beside a folder ``diagrams`` around it."""
     beside = folder / "blocks"
-    if os.path.basename(os.path.abspath(folder)) != "diagrams" or beside.is_dir():
+    try:
+        name = os.path.basename(os.path.abspath(folder))
+    except OSError:  # the current folder is gone
+        name = ""
+    if name != "diagrams" or beside.is_dir():
         return beside
     return Path(os.path.normpath(folder / os.pardir / "blocks"))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import sys
 import traceback
@@ -24,7 +25,12 @@ def source_line(error: BaseException, source: str) -> str:
 
 def file_of(kind: type) -> str:
     """Return the file in which a class was written; "" if it was in none."""
-    return str(getattr(sys.modules.get(kind.__module__), "__file__", None) or "")
+    file = getattr(sys.modules.get(kind.__module__), "__file__", None)
+    if file is None:  # the module may be forgotten by now: the class knows by its methods
+        bases = (base for base in kind.__mro__ if base.__module__ == kind.__module__)
+        methods = (value for base in bases for value in vars(base).values() if inspect.isfunction(value))
+        file = next((method.__code__.co_filename for method in methods), "")
+    return str(file)
 
 
 def shown(file: str) -> str:

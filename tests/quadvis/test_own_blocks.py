@@ -258,6 +258,13 @@ def test_shared_modules_are_inputs_and_no_blocks(project: Path, capsys: Captured
     assert "wind.big" in shown and "speeds" not in shown and "_curves" not in shown
 
 
+def test_a_block_is_an_input_also_after_another_diagram_of_its_folder_was_loaded(project: Path) -> None:
+    diagram = quadvis.load(sharing(project))
+    (project / "two.yaml").write_text(ONE.replace("wind.fan", "wind.big"))
+    quadvis.load("two.yaml")
+    assert {"fan.py", "big.py"} <= {path.name for path in diagram.inputs}
+
+
 @pytest.mark.parametrize("text", ["LIFT = 1 / 0\n", "LIFT = (\n"], ids=["error", "syntax"])
 def test_an_error_in_a_shared_module_is_reported_at_its_line(project: Path, text: str) -> None:
     path = sharing(project)

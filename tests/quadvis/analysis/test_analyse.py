@@ -17,7 +17,7 @@ from quadvis.analysis.questions import read_cuts, read_limits
 from quadvis.cli import main
 from quadvis.errors import QuadvisError
 
-from .loops import DIAGRAMS, sampled
+from .loops import DIAGRAMS, limitless, sampled
 
 MARGINS = str(DIAGRAMS / "margins.yaml")
 
@@ -70,10 +70,9 @@ def test_cuts_and_limits_can_be_asked_for_on_the_command_line(capsys, tmp_path) 
 
 @pytest.fixture
 def without_limits(tmp_path) -> str:
-    """The same diagram without the search for limits, which takes most of the time."""
+    """The same diagram without the search for limits."""
     path = tmp_path / "margins.yaml"
-    text = (DIAGRAMS / "margins.yaml").read_text().partition("  limits:")[0]
-    path.write_text("".join(line for line in text.splitlines(True) if "{limit: " not in line))
+    path.write_text(limitless("margins.yaml"))
     return str(path)
 
 

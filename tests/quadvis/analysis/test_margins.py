@@ -10,7 +10,7 @@ from quadvis.analysis.margins import Margins
 from quadvis.api import load_text
 from tests.stages import mostly_slow
 
-from .loops import DIAGRAMS, lifted, sampled, write
+from .loops import DIAGRAMS, lifted, limitless, sampled, write
 
 
 @pytest.fixture(scope="module")
@@ -128,7 +128,7 @@ def test_a_loop_that_is_not_stable_has_no_margins() -> None:
     ("margin", "inside", "outside"), mostly_slow([("gain_up", 0.98, 1.02), ("gain_down", 1.02, 0.98)])
 )
 def test_scaled_by_its_gain_margin_a_loop_of_several_rates_is_at_the_edge(margin, inside, outside) -> None:
-    text = (DIAGRAMS / "sampled_margins.yaml").read_text().partition("  limits:")[0]
+    text = limitless("sampled_margins.yaml")
     found = getattr(load_text(text, DIAGRAMS).analyse().loops["torque"].margins, margin)
 
     def is_stable(factor: float) -> bool:
