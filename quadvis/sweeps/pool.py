@@ -9,20 +9,16 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import sys
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from multiprocessing import resource_tracker
 from multiprocessing.process import BaseProcess
 from queue import Empty, SimpleQueue
-from types import ModuleType
 
 from quadvis.errors import RunError
 from quadvis.errors.caller import IS_COMMAND
-from quadvis.machine.interrupts import held_back
-from quadvis.sweeps.worker import ONE_THREAD, Job, Row, begin, perform
+from quadvis.machine.processes import launching
+from quadvis.sweeps.worker import Job, Row, begin, perform
 
 IDLE = 1.0  # s without a row after which the caller gets None
 
@@ -42,17 +38,16 @@ def perform_all(jobs: Sequence[Job], workers: int) -> Generator[Row | None, None
     if not jobs:
         return
     before = set(multiprocessing.active_children())
-    with held_back():  # Python's own helper process must survive the terminal, too
-        resource_tracker.ensure_running()
-    executor = ProcessPoolExecutor(
-        min(workers, len(jobs)),
-        multiprocessing.get_context("spawn"),
-        initializer=begin,
-        initargs=(IS_COMMAND.get(),),
-    )
+    with launching():
+        executor = ProcessPoolExecutor(
+            min(workers, len(jobs)),
+            multiprocessing.get_context("spawn"),
+            initializer=begin,
+            initargs=(IS_COMMAND.get(),),
+        )
     finished = False
     try:
-        with _launching():
+        with launching():
             futures = [executor.submit(perform, job) for job in jobs]  # this starts the processes
         done: SimpleQueue[Future[Row]] = SimpleQueue()
         for future in futures:
@@ -77,25 +72,3 @@ def perform_all(jobs: Sequence[Job], workers: int) -> Generator[Row | None, None
                 child.kill()
         for child in children:
             child.join()
-
-
-@contextmanager
-def _launching() -> Iterator[None]:
-    """Start processes with one thread for each library, without the terminal's signals and the main script.
-
-    The workers do not need the script, so a script works without `if __name__ == "__main__":`.
-    """
-    environment = {name: os.environ.get(name) for name in ONE_THREAD}
-    main = sys.modules["__main__"]
-    os.environ.update(ONE_THREAD)
-    sys.modules["__main__"] = ModuleType("__main__")
-    try:
-        with held_back():
-            yield
-    finally:
-        sys.modules["__main__"] = main
-        for name, value in environment.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value

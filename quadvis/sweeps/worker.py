@@ -21,19 +21,6 @@ if TYPE_CHECKING:
     from quadvis.library.catalogue import OwnBlocks
     from quadvis.run.verdict import Outcome
 
-# When runs share the processors, threads inside a run only wait for each other.
-ONE_THREAD = dict.fromkeys(
-    (
-        "MKL_NUM_THREADS",
-        "NUMBA_NUM_THREADS",
-        "OMP_NUM_THREADS",
-        "OPENBLAS_NUM_THREADS",
-        "OPENCV_FOR_THREADS_NUM",
-        "VECLIB_MAXIMUM_THREADS",
-    ),
-    "1",
-)
-
 
 @dataclass(frozen=True)
 class Configuration:

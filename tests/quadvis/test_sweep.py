@@ -10,7 +10,6 @@ import signal
 import statistics
 import subprocess
 import sys
-import time
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -32,6 +31,7 @@ from quadvis.sweeps.picture import draw
 from quadvis.sweeps.summary import SweepLine, duration_text, sweep_lines
 from quadvis.sweeps.table import read_rows
 from quadvis.sweeps.worker import Job, Row, perform
+from tests.processes import children, gone, linux, wait_for
 from tests.stages import mostly_slow
 
 ROOT = Path(__file__).parents[2]
@@ -482,40 +482,6 @@ def quadvis_sweep(
     )  # fmt: skip
 
 
-def children(process: subprocess.Popen[str]) -> list[int]:
-    """Return the worker processes of a sweep."""
-    found = []
-    for entry in Path("/proc").glob("[0-9]*"):
-        try:
-            parent = (entry / "stat").read_text().rpartition(")")[2].split()[1]
-            if int(parent) == process.pid and b"spawn_main" in (entry / "cmdline").read_bytes():
-                found.append(int(entry.name))
-        except OSError:
-            continue
-    return found
-
-
-def wait_for(condition: Any) -> Any:
-    end = time.monotonic() + 60
-    while time.monotonic() < end:
-        found = condition()
-        if found:
-            return found
-        time.sleep(0.02)
-    raise AssertionError("it did not happen")
-
-
-def gone(pid: int) -> bool:
-    stat = Path(f"/proc/{pid}/stat")
-    try:
-        return stat.read_text().rpartition(")")[2].split()[0] == "Z"
-    except OSError:
-        return True
-
-
-linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes in /proc")
-
-
 @pytest.mark.parametrize(
     ("kind", "workers"), mostly_slow([("csv", "3"), ("csv", "1"), ("parquet", "1"), ("parquet", "3")])
 )
@@ -552,10 +518,10 @@ def test_a_worker_has_one_thread_for_each_library() -> None:
 
     import cv2
 
-    from quadvis.sweeps.pool import _launching
+    from quadvis.machine.processes import launching
 
     with ProcessPoolExecutor(1, get_context("spawn")) as executor:
-        with _launching():
+        with launching():
             threads = executor.submit(cv2.getNumThreads)
         assert threads.result() == 1
 
