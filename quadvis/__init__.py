@@ -9,15 +9,17 @@ from quadvis.version import __version__
 if TYPE_CHECKING:
     from quadvis.api import Diagram, load
     from quadvis.output.log_reader import Log, read_log
+    from quadvis.realtime.options import RealTime
     from quadvis.sweeps.sweep import sweep
 
-__all__ = ["Diagram", "Log", "__version__", "load", "read_log", "sweep"]
+__all__ = ["Diagram", "Log", "RealTime", "__version__", "load", "read_log", "sweep"]
 
 _HOMES = {
     "Diagram": "api",
     "load": "api",
     "Log": "output.log_reader",
     "read_log": "output.log_reader",
+    "RealTime": "realtime.options",
     "sweep": "sweeps.sweep",
 }
 

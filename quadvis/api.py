@@ -16,6 +16,7 @@ from quadvis.library.catalogue import OwnBlocks
 if TYPE_CHECKING:
     from quadvis.analysis.analyse import Analysis
     from quadvis.output.recording import Recorded
+    from quadvis.realtime.options import RealTime
     from quadvis.run.live import LiveRun
     from quadvis.run.session import Progress, Result
     from quadvis.run.verdict import Outcome
@@ -34,11 +35,14 @@ class Diagram(Checked):
         keep: Sequence[str] | None = None,
         engine: str = "auto",
         announce: Callable[[str], None] | None = None,
+        real_time: RealTime | None = None,
     ) -> Result:
         """Run to the stop time; see ``quadvis.run.session.run``."""
         from quadvis.run.session import run
 
-        return run(self, log=log, progress=progress, keep=keep, engine=engine, announce=announce)
+        return run(
+            self, log=log, progress=progress, keep=keep, engine=engine, announce=announce, real_time=real_time
+        )
 
     def start(self) -> LiveRun:
         """Return a run to be advanced step by step; see ``quadvis.run.live.LiveRun``."""

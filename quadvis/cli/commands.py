@@ -19,6 +19,7 @@ from quadvis.machine.shipped import PREFIX, named_file
 
 if TYPE_CHECKING:
     from quadvis.library.catalogue import Catalogue, OwnBlocks
+    from quadvis.realtime.options import RealTime
 
 SCHEMA = Kind("the schema", (b"{",), rb'"\$schema"')
 FAILED = 1
@@ -51,6 +52,7 @@ def run(options: argparse.Namespace) -> int:
     from quadvis.run.report import summary_lines
     from quadvis.run.session import run as run_diagram
 
+    real_time = _real_time(options)
     diagram = _load(options, stop_time=options.stop_time, seed=options.seed)
     log = log_path(options.log, diagram)
     _print_warnings(diagram, options)
@@ -58,8 +60,9 @@ def run(options: argparse.Namespace) -> int:
     try:
         with ProgressLine(diagram.duration) as progress:
             result = run_diagram(
-                diagram, log=log, progress=progress, keep=(), engine=options.engine, announce=progress.say
-            )
+                diagram, log=log, progress=progress, keep=(), engine=options.engine, announce=progress.say,
+                real_time=real_time,
+            )  # fmt: skip
     except (RunError, KeyboardInterrupt):
         if log is not None and log.is_file():
             print(f"log up to there: {log}", file=sys.stderr)
@@ -74,6 +77,17 @@ def run(options: argparse.Namespace) -> int:
     if result.lost:
         print(f"{result.lost}; the run itself is judged in full", file=sys.stderr)
     return 0 if result.passed and not result.lost else FAILED
+
+
+def _real_time(options: argparse.Namespace) -> RealTime | None:
+    """Return what a real-time run is to ask for; None for a simulation."""
+    from quadvis.realtime.options import RealTime
+
+    chosen = {name: getattr(options, name) for name in ("cpu", "priority", "poll")}
+    given = {name: value for name, value in chosen.items() if value is not None}
+    if given and not options.real_time:
+        raise QuadvisError(f"--{next(iter(given))} is for a real-time run; add --real-time")
+    return RealTime(**given) if options.real_time else None
 
 
 def sweep(options: argparse.Namespace) -> int:

@@ -12,6 +12,8 @@ from quadvis.version import __version__
 JSON_HELP = """\
 --json prints one object: diagram, variant, params, hash, seed, passed, duration_s, wall_s, cpu_s,
 engine, real_time_factor, log, lost (what the log lacks, and why);
+real_time (null for a simulation): {granted, not_granted, lost_rows, tasks: {name: {period_s, steps, overruns,
+lateness and execution: {min_s, mean_s, max_s, p99_s, p99.9_s}}}};
 summary: {label: {signal, unit, and the statistics by name, final of a vector as a list}};
 expect: [{expectation, signal, kind, unit, limit, found, met, lack (why the run cannot be judged)}];
 margins: the number of expectations that only 'quadvis analyse' judges;
@@ -66,6 +68,7 @@ def parser() -> Parser:
         help="where to write the log; default runs/NAME-VARIANT-SETS.mcap, '' for none",
     )
     _engine_option(run)
+    _real_time_options(run)
     run.add_argument("--json", action="store_true", help="print one JSON object instead of the summary")
     _sweep_options(add("sweep", commands.sweep, "run a diagram at every point of a grid", SWEEP_HELP))
     check = add("check", commands.check, "check a diagram and report all its faults")
@@ -123,6 +126,17 @@ def parser() -> Parser:
 def _engine_option(parser: Parser) -> None:
     words = "python starts at once; native compiles, once, and is much faster; auto takes the sooner one"
     parser.add_argument("--engine", choices=("auto", "python", "native"), default="auto", help=words)
+
+
+def _real_time_options(parser: Parser) -> None:
+    words = "let each tick wait for its time, in a process of its own; needs Linux and 'tasking: single'"
+    parser.add_argument("--real-time", action="store_true", help=words)
+    words = "with --real-time: the processor for the loop"
+    parser.add_argument("--cpu", type=int, metavar="N", help=words)
+    words = "with --real-time: its priority, 1 to 99, or 0 for none; default 80"
+    parser.add_argument("--priority", type=int, metavar="P", help=words)
+    words = "with --real-time: look at the clock so long before each tick, such as '60 us'; default auto"
+    parser.add_argument("--poll", metavar="T", help=words)
 
 
 def _own_block_option(parser: Parser) -> None:

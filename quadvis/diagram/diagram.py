@@ -16,6 +16,7 @@ from quadvis.diagram.requirements import Entry, Expectation
 from quadvis.diagram.sections.analyse import ANALYSE, Questions
 from quadvis.diagram.sections.expect import EXPECT
 from quadvis.diagram.sections.log import LOG
+from quadvis.diagram.sections.overload import OVERLOAD, OverloadLimits
 from quadvis.diagram.sections.section import Values
 from quadvis.diagram.sections.summary import SUMMARY
 from quadvis.diagram.settings import ParameterFile
@@ -116,6 +117,11 @@ class Diagram:
     def questions(self) -> Questions:
         """The questions for an analysis of the loop."""
         return self.values[ANALYSE]
+
+    @property
+    def overload(self) -> OverloadLimits:
+        """How many overruns a real-time run may have."""
+        return self.values[OVERLOAD]
 
     def logs(self, path: str) -> bool:
         """Whether a block's outputs are logged."""

@@ -1,4 +1,4 @@
-"""Clocks: the loop waits for one before each tick."""
+"""Clocks: the loop asks one which ticks may run, and when."""
 
 from __future__ import annotations
 
@@ -6,15 +6,18 @@ from typing import Protocol
 
 
 class Clock(Protocol):
-    """Says when a tick may run. The loop asks before it runs a tick, and again where the answer ends."""
+    """Says which ticks may run. The loop asks before it runs a tick, and again where the answer ends."""
 
-    def wait(self, tick: int, end: int) -> int:
-        """Wait until ``tick`` may run; return the tick, at most ``end``, before which to ask again."""
+    def wait(self, tick: int, end: int) -> range:
+        """Wait until a tick may run; return the ticks to run before asking again.
+
+        They lie between ``tick``, the next one, and ``end``. Ticks before the first of them are left out.
+        """
 
 
 class Unpaced:
     """The clock of a simulation: every tick may run at once."""
 
-    def wait(self, tick: int, end: int) -> int:
-        """Return ``end``."""
-        return end
+    def wait(self, tick: int, end: int) -> range:
+        """Return all ticks before ``end``."""
+        return range(tick, end)

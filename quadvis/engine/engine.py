@@ -139,12 +139,13 @@ class Engine:
 
     @np.errstate(all="ignore")  # what is not finite is found here, and reported with its block
     def run(self, ticks: int) -> None:
-        """Run that many ticks."""
+        """Run that many ticks, without those that the clock leaves out."""
         end = self.tick + ticks
         while self.tick < end:
-            until = self.clock.wait(self.tick, end)
+            due = self.clock.wait(self.tick, end)
+            self._executor.tick = due.start
             self.tuning.apply(self.tick)
-            stop = self._executor.run(until)
+            stop = self._executor.run(due.stop)
             if stop is not None:
                 raise explained(stop, self.graph, self.program, self.memory) from stop.error
 

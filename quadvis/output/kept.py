@@ -28,6 +28,9 @@ class Judge(Protocol):
     def take(self, name: str, number: int, rows: NDArray[Any]) -> None:
         """Take rows of a signal; ``number`` is the number of rows before them since the start of the run."""
 
+    def miss(self, name: str, number: int, count: int) -> None:
+        """Note that ``count`` rows do not exist, in place of taking them."""
+
 
 class RowJudge:
     """Collects the rows of a block and hands them to the judging, many at a time."""
@@ -66,6 +69,13 @@ class RowJudge:
             done += len(some)
             if self._count >= room:
                 self.flush()
+
+    def miss(self, count: int) -> None:
+        """Note that the next rows do not exist: a real-time run has left out their ticks."""
+        self.flush()
+        for name, _, _ in self._ports:
+            self._judging.miss(name, self._first, count)
+        self._first += count
 
     def flush(self) -> None:
         """Hand on the waiting rows."""

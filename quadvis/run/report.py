@@ -5,8 +5,12 @@ from __future__ import annotations
 from quadvis.diagram.requirements import Entry
 from quadvis.errors import counted
 from quadvis.machine.columns import table
+from quadvis.realtime.times import Spread, TaskTimes
 from quadvis.run.session import Result
 from quadvis.run.verdict import Outcome, Verdict
+from quadvis.units import Unit, format_quantity
+
+SECOND, MILLISECOND, MICROSECOND, HERTZ = map(Unit.parse, ("s", "ms", "us", "Hz"))
 
 
 def summary_lines(result: Result) -> list[str]:
@@ -20,6 +24,9 @@ def summary_lines(result: Result) -> list[str]:
     lines += [f"  {line}" for line in table([_verdict_row(verdict) for verdict in outcome.verdicts])]
     speed = f", {result.real_time_factor:.0f} x real time" if result.duration and result.wall else ""
     lines.append(f"  {result.wall:.1f} s of wall time{speed}; engine: {result.engine}")
+    if result.flight:
+        lines += [f"  {line}" for line in table([_task_row(times) for times in result.flight.tasks])]
+        lines.append(f"  real time: {result.flight.grants}")
     lines += not_judged(len(diagram.loop_requirements))
     met = sum(verdict.met for verdict in outcome.verdicts)
     if outcome.verdicts:
@@ -42,6 +49,24 @@ def _entry_row(entry: Entry, outcome: Outcome) -> tuple[str, ...]:
         shown,
         ", ".join(filter(None, (of, str(entry.selection.stretch), entry.selection.stretch.cut))),
     )
+
+
+def _task_row(times: TaskTimes) -> tuple[str, ...]:
+    found = f"{counted(times.steps, 'step')}, {counted(times.overruns, 'overrun')}"
+    late, taken = times.lateness, times.execution
+    return (
+        f"task {times.task}",
+        format_quantity(1 / times.period, HERTZ),
+        found,
+        f"lateness {_spread(late)}" if late else "",
+        f"execution {_spread(taken)}" if taken else "",
+    )
+
+
+def _spread(spread: Spread) -> str:
+    shown = {"min": spread.least, "avg": spread.mean, "p99.9": spread.p999, "max": spread.most}
+    unit = next((unit for unit in (SECOND, MILLISECOND) if spread.most >= unit.scale), MICROSECOND)
+    return ", ".join(f"{name} {value / unit.scale:.3g}" for name, value in shown.items()) + f" {unit}"
 
 
 def _verdict_row(verdict: Verdict) -> tuple[str, ...]:

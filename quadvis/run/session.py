@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 import platform
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from fractions import Fraction
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -18,30 +18,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.engine.engine import Engine
-from quadvis.engine.taps import Tap
 from quadvis.graph.graph import Node
 from quadvis.native.choice import AUTO, PYTHON, Announce, Choice, choose, use
 from quadvis.output.kept import ALL, RowJudge, RunSignals
 from quadvis.output.recording import RecordedBlock, RecordedPort, Recording
 from quadvis.output.statistics import finite
-from quadvis.output.stretch import NANOSECONDS
+from quadvis.realtime.supervisor import Flight, supervise
+from quadvis.run.row_tap import PacedTap, RowTap, Taker
 from quadvis.run.verdict import Judging, Outcome
 from quadvis.version import __version__
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
     from quadvis.output.log import LogWriter
+    from quadvis.realtime.options import RealTime
 
 Progress = Callable[[float, float], None]  # simulated time reached, wall time spent (s)
 PYTHON_ONLY = Choice(PYTHON)
 SLICE = 0.1  # s of wall time between two calls of the progress; Ctrl-C and rows for the log wait no longer
 
 
-class Taker(NamedTuple):
-    """A consumer of a block's rows: ``one`` takes a stamp (ns) and a row, ``many`` those of N rows."""
+class Taken(NamedTuple):
+    """A block whose rows are taken, by what and for which judge."""
 
-    one: Callable[[int, bytes], object]
-    many: Callable[[NDArray[np.int64], NDArray[np.int64]], object]
+    node: Node
+    judge: RowJudge
+    tap: RowTap
+
+
+Loop = Callable[[Sequence[Taken], Progress, ExitStack], tuple[Choice, Flight | None]]
 
 
 @dataclass(frozen=True)
@@ -50,7 +55,8 @@ class Result:
 
     ``duration`` is the simulated time (s), ``wall`` the wall time (s), ``cpu`` the processor time (s).
     ``lost`` says which rows the log lacks because the disk refused them; "" without a log or without lost
-    rows. ``engine`` is what ran the diagram, and why.
+    rows. ``engine`` is what ran the diagram, and why. ``flight`` has the times of the tasks of a real-time
+    run; None after a simulation.
     """
 
     diagram: Diagram
@@ -61,6 +67,7 @@ class Result:
     cpu: float
     lost: str = ""
     engine: Choice = PYTHON_ONLY
+    flight: Flight | None = None
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.signals[name]
@@ -107,7 +114,8 @@ class Result:
         ``diagram``, ``variant`` (or None), ``params`` (the parameter files), ``hash`` and ``seed`` identify
         the run. ``passed`` says whether all expectations are met. ``duration_s`` is the simulated time,
         ``wall_s`` the wall time, ``cpu_s`` the processor time, ``engine`` "python" or "native";
-        ``real_time_factor`` is simulated time divided by wall time. ``summary``
+        ``real_time_factor`` is simulated time divided by wall time. ``real_time`` holds what was granted and
+        the times of all tasks, None for a simulation. ``summary``
         holds ``{signal, unit, rms, max, ...}`` by label; ``final`` of several elements is a list. ``expect``
         is a list of ``{expectation, signal, kind, unit, limit, found, met, lack}``; ``lack`` says why the run
         cannot be judged. ``margins`` is the number of expectations on the loop, which only an analysis
@@ -134,6 +142,7 @@ class Result:
             "cpu_s": self.cpu,
             "engine": self.engine.engine,
             "real_time_factor": finite(self.real_time_factor),
+            "real_time": self.flight.facts() if self.flight else None,
             "summary": summary,
             "expect": [verdict.facts() for verdict in self.outcome.verdicts],
             "margins": len(self.diagram.loop_requirements),
@@ -148,6 +157,7 @@ def run(
     keep: Sequence[str] | None = None,
     engine: str = AUTO,
     announce: Announce | None = None,
+    real_time: RealTime | None = None,
 ) -> Result:
     """Run a diagram to its stop time; RunError if a block fails, with a log that is readable up to that time.
 
@@ -157,43 +167,87 @@ def run(
 
     ``engine`` is ``python``, ``native`` (machine code, compiled once and kept), or ``auto``: the one that is
     sooner through. Both give the same bits. ``announce`` takes a sentence on what is compiled or chosen.
+
+    ``real_time`` lets every tick wait for its time, in a process of its own; see "Real time" in
+    quadvis/README.md. Ticks that such a run misses have no rows.
     """
-    made = Engine(diagram.graph, diagram.seed)
-    choice = choose(made, diagram.ticks, engine, announce)
-    use(made, choice)
+    begin = _simulated if real_time is None else partial(_paced, wishes=real_time)
+    loop = begin(diagram, engine, announce)
     logged = [node for node in diagram.graph.nodes if diagram.logs(node.path) and _fields(node)]
     recorded = [RecordedBlock(f"/{node.path}", _fields(node), node.task.name) for node in logged]
     patterns = ((ALL,) if log is None else ()) if keep is None else tuple(keep)
     signals = RunSignals(recorded, diagram.ports, patterns)
     judging = Judging(diagram.summary, diagram.expectations)
-    wall, cpu = time.perf_counter(), time.process_time()
+    wall, cpu = time.perf_counter(), _processor_time()
     with ExitStack() as stack:
         stack.enter_context(diagram.guarded(log))
-        writer = stack.enter_context(_writer(log, recorded, diagram)) if log is not None else None
-        judges = []
+        facts = metadata(diagram, real_time is not None)
+        writer = stack.enter_context(_writer(log, recorded, facts)) if log is not None else None
+        taken = []
         for index, node in enumerate(logged):
             judge = RowJudge(recorded[index], judging)
             takers = _takers(index, signals, writer, judge)
             if takers:
-                made.attach(_RowTap(node.path, diagram.decimation(node.path), made.period, takers))
-                judges.append(judge)
-        stack.enter_context(made)
-        _advance(made, diagram.ticks, progress, writer)
-        for judge in judges:
-            judge.flush()
+                tap = RowTap(node.path, diagram.decimation(node.path), diagram.graph.tick, takers)
+                taken.append(Taken(node, judge, tap))
+
+        def tend(reached: float, spent: float) -> None:
+            if writer:
+                writer.flush_late()
+            if progress:
+                progress(reached, spent)
+
+        choice, flight = loop(taken, tend, stack)
+        for each in taken:
+            each.judge.flush()
         outcome = judging.outcome()
         if writer:
-            writer.close(_closing(outcome))
+            writer.close(_closing(outcome, flight))
             signals.written(writer.path, writer.loss)
-    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    lost = writer.loss if writer else ""
-    return Result(diagram, signals, outcome, diagram.duration, wall, cpu, lost, choice)
+    wall, cpu = time.perf_counter() - wall, _processor_time() - cpu
+    lost = "; ".join(filter(None, (writer.loss if writer else "", flight.loss if flight else "")))
+    return Result(diagram, signals, outcome, diagram.duration, wall, cpu, lost, choice, flight)
 
 
-def _writer(log: str | Path, recorded: Sequence[RecordedBlock], diagram: Diagram) -> LogWriter:
+def _simulated(diagram: Diagram, engine: str, announce: Announce | None) -> Loop:
+    """Return the loop of a simulation, with its engine ready."""
+    made = Engine(diagram.graph, diagram.seed)
+    choice = choose(made, diagram.ticks, engine, announce)
+    use(made, choice)
+
+    def loop(taken: Sequence[Taken], tend: Progress, stack: ExitStack) -> tuple[Choice, None]:
+        for each in taken:
+            made.attach(each.tap)
+        stack.enter_context(made)  # to be closed when the log is
+        _advance(made, diagram.ticks, tend)
+        return choice, None
+
+    return loop
+
+
+def _paced(diagram: Diagram, engine: str, announce: Announce | None, wishes: RealTime) -> Loop:
+    """Return the loop of a real-time run."""
+
+    def loop(taken: Sequence[Taken], tend: Progress, _: ExitStack) -> tuple[Choice, Flight]:
+        taps = [PacedTap(each.tap, each.node, diagram.graph, each.judge) for each in taken]
+        flight = supervise(diagram, wishes, engine, taps, tend, announce)
+        for tap in taps:
+            tap.end(diagram.ticks)
+        return flight.engine, flight
+
+    return loop
+
+
+def _processor_time() -> float:
+    """Return the processor time of this process and of those that it has begun and that have ended (s)."""
+    times = os.times()
+    return time.process_time() + times.children_user + times.children_system
+
+
+def _writer(log: str | Path, recorded: Sequence[RecordedBlock], facts: Mapping[str, str]) -> LogWriter:
     from quadvis.output.log import LogWriter  # only a run with a log waits for this import
 
-    return LogWriter(log, recorded, metadata(diagram))
+    return LogWriter(log, recorded, facts)
 
 
 def _takers(index: int, signals: RunSignals, writer: LogWriter | None, judge: RowJudge) -> list[Taker]:
@@ -208,7 +262,7 @@ def _takers(index: int, signals: RunSignals, writer: LogWriter | None, judge: Ro
     return takers
 
 
-def _advance(engine: Engine, ticks: int, progress: Progress | None, writer: LogWriter | None) -> None:
+def _advance(engine: Engine, ticks: int, tend: Progress) -> None:
     """Run in slices; between slices hand rows on, show the progress and notice an interruption."""
     began = time.perf_counter()
     count = 1
@@ -217,35 +271,7 @@ def _advance(engine: Engine, ticks: int, progress: Progress | None, writer: LogW
         engine.run(min(count, ticks - engine.tick))
         spent = time.perf_counter() - start
         count = max(1, min(2 * count, int(count * SLICE / max(spent, 1e-6))))
-        if writer:
-            writer.flush_late()
-        if progress:
-            progress(engine.time, time.perf_counter() - began)
-
-
-class _RowTap(Tap):
-    """Hands the rows of a block with their stamps (ns) to all its consumers."""
-
-    def __init__(self, block: str, every: int, period: Fraction, takers: Sequence[Taker]) -> None:
-        self.block, self.every = block, every
-        self._one = tuple(taker.one for taker in takers)
-        self._many = tuple(taker.many for taker in takers)
-        self._numerator, self._denominator = (period * NANOSECONDS).as_integer_ratio()
-
-    def take(self, tick: int, row: memoryview) -> None:
-        """Copy the row once for all."""
-        data, stamp = bytes(row), tick * self._numerator // self._denominator
-        for take in self._one:
-            take(stamp, data)
-
-    def take_all(self, ticks: NDArray[np.int64], rows: NDArray[np.int64]) -> None:
-        """Hand many rows on together."""
-        if int(ticks[-1]) * self._numerator > np.iinfo(np.int64).max:
-            super().take_all(ticks, rows)
-            return
-        stamps = ticks * self._numerator // self._denominator
-        for take in self._many:
-            take(stamps, rows)
+        tend(engine.time, time.perf_counter() - began)
 
 
 def _fields(node: Node) -> tuple[RecordedPort, ...]:
@@ -257,7 +283,7 @@ def _fields(node: Node) -> tuple[RecordedPort, ...]:
     )
 
 
-def metadata(diagram: Diagram) -> dict[str, str]:
+def metadata(diagram: Diagram, real_time: bool = False) -> dict[str, str]:
     """Return the facts of a run for its log as texts; see ``quadvis.output.log``."""
     from quadvis.output.log import PORTS
 
@@ -270,11 +296,14 @@ def metadata(diagram: Diagram) -> dict[str, str]:
         "hash": diagram.hash,
         "start": datetime.now(UTC).isoformat(timespec="seconds"),
         "python": platform.python_version(),
+        "clock": "real time" if real_time else "simulated",
         PORTS: json.dumps(dict(diagram.ports)),
         "diagram": diagram.resolved,
     }
 
 
-def _closing(outcome: Outcome) -> dict[str, str]:
+def _closing(outcome: Outcome, flight: Flight | None) -> dict[str, str]:
     lines = {f"expect {index}": str(verdict) for index, verdict in enumerate(outcome.verdicts, 1)}
+    if flight:
+        lines |= {"real time": json.dumps(flight.facts())}
     return {"passed": str(outcome.passed).lower(), **lines}

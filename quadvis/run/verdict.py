@@ -28,7 +28,7 @@ class Measured:
     """Statistics of a selection from ``size`` rows, by default all rows of its stretch, as they come."""
 
     def __init__(self, selection: Selection, names: Iterable[str], size: int | None = None) -> None:
-        self.selection, self.found = selection, 0
+        self.selection, self.found, self.missed = selection, 0, 0
         count = len(selection.stretch.rows) if size is None else size
         self._statistics = {name: STATISTICS[name](count, len(selection.elements)) for name in names}
 
@@ -47,8 +47,11 @@ class Measured:
 
     @property
     def lack(self) -> str:
-        """Why these are not the statistics of the whole stretch; "" if they are."""
-        return self.selection.stretch.lack(self.found)
+        """Why these are not the statistics of the whole stretch; "" if they are.
+
+        Rows that do not exist are no lack, as long as there are others.
+        """
+        return self.selection.stretch.lack(self.found + (self.missed if self.found else 0))
 
 
 class Verdict(NamedTuple):
@@ -134,6 +137,14 @@ class Judging:
             wanted = self._measured[place].selection.stretch.rows
             first, last = max(wanted.start - number, 0), max(wanted.stop - number, 0)
             self._measured[place].add(rows[first:last])
+
+    def miss(self, name: str, number: int, count: int) -> None:
+        """Note that ``count`` rows do not exist, in place of taking them."""
+        for place in self._by_name[name]:
+            wanted = self._measured[place].selection.stretch.rows
+            self._measured[place].missed += len(
+                range(max(wanted.start, number), min(wanted.stop, number + count))
+            )
 
     def read(self, signals: Recorded) -> None:
         """Take all rows of a recording; some rows may be missing."""

@@ -116,7 +116,7 @@ def test_the_facts_are_plain_json_with_null_for_what_is_not_there() -> None:
     facts = json.loads(json.dumps(result.facts(), allow_nan=False))
     assert set(facts) == {
         "diagram", "variant", "params", "hash", "seed", "passed", "duration_s", "wall_s", "cpu_s", "engine",
-        "real_time_factor", "summary", "expect", "margins",
+        "real_time_factor", "real_time", "summary", "expect", "margins",
     }  # fmt: skip
     assert (facts["diagram"], facts["variant"], facts["seed"], facts["passed"]) == ("ramp", None, 5, False)
     assert facts["duration_s"] == 2.0

@@ -1,0 +1,1 @@
+"""A run paced by the monotonic clock, in a process of its own that another one supervises."""

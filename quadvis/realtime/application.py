@@ -1,0 +1,225 @@
+"""The application: the process in which the loop of a real-time run is, and little else.
+
+It loads the resolved diagram, opens the blocks, asks the system for what it wants, and runs. While it runs it
+writes no file and no text, and uses no socket: rows, times and the present tick go into shared memory.
+
+SIGTERM ends the run before its next step; a second one ends the step that is running. Then, as at every end
+but SIGKILL, the safe values are written and the blocks closed. The terminal's signals are left to the
+supervisor. If the supervisor has ended, so does this process.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+import traceback
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from multiprocessing import parent_process
+from multiprocessing.connection import Connection
+from typing import Any
+
+from quadvis.diagram.load import load_text
+from quadvis.engine.engine import Engine
+from quadvis.errors import QuadvisError, RunError
+from quadvis.errors.caller import IS_COMMAND
+from quadvis.machine.failures import surroundings
+from quadvis.machine.interrupts import leave_to_parent
+from quadvis.native.choice import Choice, choose, use
+from quadvis.realtime import control
+from quadvis.realtime.control import SharedMemory
+from quadvis.realtime.options import RealTime
+from quadvis.realtime.overload import OverloadWatch
+from quadvis.realtime.pacer import Ended, Pacer
+from quadvis.realtime.schedule import Schedule
+from quadvis.realtime.streams import RowStream
+from quadvis.realtime.system import SHARE, Grants, Sleeper, ask_all, wake_up_time
+
+LEAD = 2_000_000  # ns from the last preparation to the deadline of tick 0
+GRACE = 2.0  # s that a step has to end, once it was asked to
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What an application needs: a resolved diagram, how to run it, what it shares with its supervisor."""
+
+    text: str
+    folder: str
+    name: str
+    own_blocks: bool
+    is_command: bool
+    engine: str
+    wishes: RealTime
+    tasks: int
+    streams: tuple[RowStream, ...]
+    words: Any
+    link: Connection
+
+
+@dataclass(frozen=True)
+class Ready:
+    """The application begins to run: what the system has granted, and which engine runs."""
+
+    grants: Grants
+    engine: Choice
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How an application has ended: at its stop time if ``reason`` is "", else why.
+
+    ``exit_code`` is that of the error, ``asked`` says that somebody has asked for the end.
+    """
+
+    reason: str = ""
+    block: str = ""
+    port: str = ""
+    time: float | None = None
+    notes: tuple[str, ...] = ()
+    exit_code: int = RunError.exit_code
+    asked: bool = False
+
+    @staticmethod
+    def of(error: BaseException) -> Ending:
+        """Return the ending that an error is."""
+        notes = tuple(getattr(error, "__notes__", ()))
+        if isinstance(error, RunError):
+            return Ending(error.reason, error.block, error.port, error.time, notes)
+        if isinstance(error, QuadvisError):
+            return Ending(str(error), notes=notes, exit_code=error.exit_code)
+        words = surroundings(error) or "".join(traceback.format_exception(error))
+        return Ending(words, notes=notes)
+
+    def error(self) -> QuadvisError:
+        """Return the error, to be raised."""
+        made: QuadvisError
+        if self.exit_code == RunError.exit_code:
+            made = RunError(self.reason, block=self.block, port=self.port, time=self.time)
+        else:
+            made = QuadvisError(self.reason)
+        for note in self.notes:
+            made.add_note(note)
+        return made
+
+
+class Interrupted(BaseException):
+    """The process is to end, in the middle of what it does."""
+
+
+class _Signals:
+    """SIGTERM as the request to end; it raises `Interrupted` where no step is about to end."""
+
+    def __init__(self, words: Any) -> None:
+        self._words, self._asked = words, False
+        self.looping = self.closing = False
+        signal.signal(signal.SIGTERM, self._take)
+
+    def _take(self, *_: object) -> None:
+        asked, self._asked = self._asked, True
+        self._words[control.END] = 1
+        if not self.closing and (asked or not self.looping):
+            raise Interrupted
+
+    def close(self) -> None:
+        """Let nothing interrupt the closing of the blocks."""
+        self.closing = True
+
+
+class _Application:
+    """One run, from the resolved diagram to the closed blocks."""
+
+    def __init__(self, setup: Setup) -> None:
+        self._setup = setup
+        self._shared = SharedMemory(setup.words, setup.tasks, [stream.ring for stream in setup.streams])
+        self._signals = _Signals(self._shared.control)
+        self._engine: Engine | None = None
+        self._start = 0
+
+    def run(self) -> None:
+        """Run to the stop time."""
+        setup, shared = self._setup, self._shared
+        diagram = load_text(setup.text, setup.folder, setup.name, setup.own_blocks)
+        schedule = Schedule.of(diagram.graph)
+        watch = OverloadWatch([task.name for task in diagram.graph.tasks], diagram.overload)
+        sleeper = Sleeper()
+        pacer = Pacer(
+            schedule,
+            watch,
+            shared,
+            lambda: time.monotonic_ns() - self._start,
+            lambda instant: sleeper.until(self._start + instant),
+        )
+        engine = self._engine = Engine(diagram.graph, diagram.seed, pacer)
+        choice = choose(engine, diagram.ticks, setup.engine, setup.link.send)
+        use(engine, choice)
+        for stream, ring in zip(setup.streams, shared.rings, strict=True):
+            engine.observe(stream.task, stream.put_into(ring, engine), stream.every)
+        with ExitStack() as stack:
+            stack.enter_context(diagram.guarded())
+            stack.enter_context(engine)
+            stack.callback(self._signals.close)
+            grants = ask_all(setup.wishes)
+            sleeper.polled = _polled(setup.wishes, schedule, sleeper)
+            grants.granted.append(f"polling {sleeper.polled / 1e3:.0f} us")
+            setup.link.send(Ready(grants, Choice(choice.engine, choice.reason)))
+            self._start = time.monotonic_ns() + LEAD
+            shared.control[control.START] = self._start
+            self._signals.looping = True
+            engine.run(diagram.ticks)
+            pacer.finish()
+
+    def ended_early(self, error: BaseException) -> Ending:
+        """Return the ending of a run that was asked to end."""
+        engine = self._engine
+        if engine is None or not self._start:
+            return Ending("the application was told to end", asked=True)
+        block = _running(error, engine) if isinstance(error, Interrupted) else ""
+        return Ending("the application was told to end", block, time=engine.time, asked=True)
+
+
+def perform(setup: Setup) -> None:
+    """Run an application: the whole life of its process."""
+    application = _Application(setup)
+    leave_to_parent()
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    IS_COMMAND.set(setup.is_command)
+    try:
+        application.run()
+        ending = Ending()
+    except (Ended, Interrupted) as error:
+        ending = application.ended_early(error)
+    except Exception as error:
+        ending = Ending.of(error)
+    with suppress(OSError):  # the supervisor may have ended
+        setup.link.send(ending)
+
+
+def _polled(wishes: RealTime, schedule: Schedule, sleeper: Sleeper) -> int:
+    """Return how long (ns) before each deadline the loop is to look at the clock."""
+    polled = wishes.polled()
+    return min(wake_up_time(sleeper), schedule.interval // SHARE) if polled is None else polled
+
+
+def _running(error: BaseException, engine: Engine) -> str:
+    """Return the path of the block that an exception has interrupted; "" if none was running."""
+    blocks = {id(engine.bound(block.path)): block.path for block in engine.program.blocks}
+    found = ""
+    trace = error.__traceback__
+    while trace is not None:
+        found = blocks.get(id(trace.tb_frame.f_locals.get("self")), found)
+        trace = trace.tb_next
+    return found
+
+
+def _end_with_parent() -> None:
+    """End this process when its supervisor has ended: orderly if possible."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())  # they are for the main thread
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        for _ in range(2):
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(GRACE)
+        os._exit(1)

@@ -1,0 +1,43 @@
+"""The words by which the loop and its supervisor know of each other, and the whole of their shared memory.
+
+Each word has one writer. A word is 8 bytes and is read and written whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from quadvis.realtime import times
+from quadvis.realtime.ring import RecordRing
+
+START = 0  # by the loop: the instant of the start on the monotonic clock (ns); 0 before
+TICK = 1  # by the loop: the tick whose step began last
+BEGUN = (
+    2  # by the loop: when the step began that is running (ns since the start, at least 1); 0 between steps
+)
+DONE = 3  # by the loop: the number of steps
+END = 4  # by either: not 0 if the run is to end before its next step
+WORDS = 8
+
+
+class SharedMemory:
+    """The words of a real-time run: of control, of the times of each task, and of the rings."""
+
+    def __init__(self, words: Any, tasks: int, rings: Sequence[tuple[int, int]]) -> None:
+        """Divide the ``words``; ``rings`` are the records that each has room for, and their widths."""
+        view = memoryview(words).cast("B").cast("q")
+        self.control = view[:WORDS]
+        ends = [WORDS + times.WORDS * (task + 1) for task in range(tasks)]
+        self.tasks = [view[end - times.WORDS : end] for end in ends]
+        self.rings = []
+        start = WORDS + times.WORDS * tasks
+        for room, width in rings:
+            size = RecordRing.size(room, width)
+            self.rings.append(RecordRing(view[start : start + size], room, width))
+            start += size
+
+    @staticmethod
+    def size(tasks: int, rings: Sequence[tuple[int, int]]) -> int:
+        """Return the number of words."""
+        return WORDS + times.WORDS * tasks + sum(RecordRing.size(*ring) for ring in rings)

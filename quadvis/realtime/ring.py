@@ -1,0 +1,68 @@
+"""A ring of records between two processes: one puts, the other takes, and neither waits for the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+SLOT = 8
+PUT, TAKEN, LOST = range(3)  # numbers of records: put and lost by the producer, taken by the consumer
+HEAD = 8  # words before the records: a line of the processor's cache
+
+Words = NDArray[np.int64]
+
+
+class RecordRing:
+    """Records of ``width`` words, a whole number and then slots; at most ``room`` records wait.
+
+    Both processes make one over the same words, which are 0 at the beginning. If the ring is full, a new
+    record is lost and counted.
+    """
+
+    def __init__(self, words: Any, room: int, width: int) -> None:
+        self._words, self._bytes = words, words.cast("B")
+        self._room, self._width = room, width
+        self._records = np.frombuffer(words, np.int64)[HEAD:].reshape(room, width)
+        self._put = self._taken = self._seen = 0
+
+    @staticmethod
+    def size(room: int, width: int) -> int:
+        """Return the number of words of a ring."""
+        return HEAD + room * width
+
+    @property
+    def lost(self) -> int:
+        """How many records found no room."""
+        return int(self._words[LOST])
+
+    def put(self, number: int, raw: memoryview, pieces: Sequence[slice]) -> None:
+        """Add a record: a number, and pieces of bytes one after another, which fill its other words."""
+        words = self._words
+        if self._put - words[TAKEN] >= self._room:
+            words[LOST] += 1
+            return
+        at = HEAD + self._put % self._room * self._width
+        words[at] = number
+        start = SLOT * (at + 1)
+        for piece in pieces:
+            end = start + piece.stop - piece.start
+            self._bytes[start:end] = raw[piece]
+            start = end
+        self._put += 1
+        words[PUT] = self._put
+
+    def take(self, *, last: bool = False) -> Words:
+        """Return the records (N, width) that were there at the last call already, or all with ``last``.
+
+        Some processors let another one see the number of records before their words; by the next call these
+        have surely come through. With ``last`` the producer must have ended.
+        """
+        present = int(self._words[PUT])
+        until, self._seen = (present if last else self._seen), present
+        places = np.arange(self._taken, until) % self._room
+        found = self._records[places]
+        self._taken = self._words[TAKEN] = until
+        return found

@@ -1,0 +1,84 @@
+"""Streams: the rows of several blocks on their way from the loop to those who take them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import NamedTuple
+
+from quadvis.engine.engine import Engine
+from quadvis.engine.taps import Tap
+from quadvis.graph.graph import Graph, Node
+from quadvis.realtime.ring import RecordRing, Words
+
+HELD = 2.0  # s of rows for which there is room
+SPARE = 16  # records besides
+
+
+class RowStream(NamedTuple):
+    """The blocks of a task whose rows are taken at the same ticks; their rows lie side by side in a record.
+
+    ``every`` counts the task's own ticks, ``sizes`` the slots of each row. ``room`` is the number of records
+    that may wait.
+    """
+
+    task: str
+    every: int
+    blocks: tuple[str, ...]
+    sizes: tuple[int, ...]
+    room: int
+
+    @property
+    def ring(self) -> tuple[int, int]:
+        """The room and the width of its ring: a record is a tick and the rows."""
+        return self.room, 1 + sum(self.sizes)
+
+    def put_into(self, ring: RecordRing, engine: Engine) -> Callable[[int], None]:
+        """Return what an engine has to do at each of its ticks."""
+        rows = [engine.program[path].row for path in self.blocks]
+        return partial(_put, ring, engine.memory.raw, _joined(rows))
+
+    def hand_on(self, records: Words, taps: Sequence[Tap]) -> None:
+        """Give the rows in records to the taps, one for each of its blocks."""
+        if not len(records):
+            return
+        start = 1
+        for tap, size in zip(taps, self.sizes, strict=True):
+            tap.take_all(records[:, 0].copy(), records[:, start : start + size].copy())
+            start += size
+
+
+def streams_of(graph: Graph, taps: Sequence[Tap]) -> list[tuple[RowStream, list[Tap]]]:
+    """Return the streams that taps need, each with its taps."""
+    groups: dict[tuple[str, int], list[Tap]] = {}
+    for tap in taps:
+        groups.setdefault((graph[tap.block].task.name, tap.every), []).append(tap)
+    found = []
+    for (task, every), group in groups.items():
+        nodes = [graph[tap.block] for tap in group]
+        room = math.ceil(HELD / (nodes[0].task.period * every)) + SPARE
+        sizes = tuple(map(_row_size, nodes))
+        found.append((RowStream(task, every, tuple(tap.block for tap in group), sizes, room), group))
+    return found
+
+
+def _put(ring: RecordRing, raw: memoryview, pieces: Sequence[slice], tick: int) -> None:
+    ring.put(tick, raw, pieces)
+
+
+def _joined(rows: Sequence[slice]) -> list[slice]:
+    """Return the same bytes in fewer pieces: neighbours in memory are one."""
+    found = list(rows[:1])
+    for row in rows[1:]:
+        if row.start == found[-1].stop:
+            found[-1] = slice(found[-1].start, row.stop)
+        else:
+            found.append(row)
+    return found
+
+
+def _row_size(node: Node) -> int:
+    """Return the slots of a block's row."""
+    outputs = node.block.interface.outputs.items()
+    return sum(math.prod(node.shape(name)) for name, port in outputs if port.signal.scalar != "frame")

@@ -1,0 +1,168 @@
+"""What a loop asks of Linux: a real-time priority, a processor, memory that stays, exact timers; and sleep.
+
+Each wish is tried by itself. What is not granted does not stop a run, but is reported with its reason.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import gc
+import os
+import resource
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from quadvis.machine.files import reason
+from quadvis.realtime.options import RealTime
+from quadvis.realtime.schedule import NANOSECONDS
+
+CAP_IPC_LOCK, CAP_SYS_NICE = 14, 23
+PR_SET_TIMERSLACK = 29
+MCL_CURRENT, MCL_FUTURE = 1, 2
+CLOCK_MONOTONIC, TIMER_ABSTIME = 1, 1
+AMPLE = 4  # later allocations fail where future memory is locked under a limit that is near
+
+TRIALS = 200  # sleeps whose lateness is measured
+TRIAL = 500_000  # ns that each lasts
+LATEST = 0.99  # of these sleeps end within the time that is polled then
+SHARE = 10  # at most one in so many parts of the period is polled without being asked for
+
+
+@dataclass
+class Grants:
+    """What the system has granted, and what it has not and why."""
+
+    granted: list[str] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)
+
+    def ask(self, what: str, request: Callable[[], str]) -> None:
+        """Try a wish; ``request`` returns why it is not granted, or ""."""
+        why = request()
+        if why:
+            self.refused.append(f"{what} ({why})")
+        else:
+            self.granted.append(what)
+
+    def __str__(self) -> str:
+        granted = ", ".join(self.granted) or "nothing granted"
+        return f"{granted}; not granted: {', '.join(self.refused)}" if self.refused else granted
+
+
+def ask_all(wishes: RealTime) -> Grants:
+    """Ask for everything, for the calling thread and its process."""
+    grants = Grants()
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    if wishes.priority:
+        grants.ask(f"SCHED_FIFO {wishes.priority}", lambda: _priority(wishes.priority))
+    cpu = wishes.cpu
+    if cpu is not None:
+        grants.ask(f"cpu {cpu}", lambda: _processor(cpu))
+    grants.ask("memory locked", _lock_memory)
+    grants.ask("timers exact", _exact_timers)
+    grants.granted.append("gc off")
+    return grants
+
+
+def _priority(priority: int) -> str:
+    try:
+        # Threads and processes that blocks begin later do not inherit the priority.
+        policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+        os.sched_setscheduler(0, policy, os.sched_param(priority))
+    except OSError as error:
+        if error.errno == errno.EPERM and _has(CAP_SYS_NICE):
+            return "the control group has no time for it: cpu.rt_runtime_us is 0"
+        if error.errno == errno.EPERM:
+            limit = resource.getrlimit(resource.RLIMIT_RTPRIO)[0]
+            return f"needs CAP_SYS_NICE, or a limit rtprio of {priority}; it is {limit}"
+        return reason(error)
+    return ""
+
+
+def _processor(cpu: int) -> str:
+    try:
+        os.sched_setaffinity(0, {cpu})
+    except (OSError, OverflowError, ValueError):
+        allowed = ", ".join(map(str, sorted(os.sched_getaffinity(0))))
+        return f"this process may use {allowed}"
+    return ""
+
+
+def _lock_memory() -> str:
+    limit = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0]
+    used = _memory_in_use()
+    ample = limit == resource.RLIM_INFINITY or _has(CAP_IPC_LOCK) or limit >= AMPLE * used
+    if not ample:
+        size = f"{limit / 2**20:.0f} MB, and {used / 2**20:.0f} MB are in use"
+        return f"needs CAP_IPC_LOCK, or a limit memlock of {AMPLE} times what is in use; it is {size}"
+    number = _libc("mlockall", MCL_CURRENT | MCL_FUTURE)
+    return os.strerror(number).lower() if number else ""
+
+
+def _exact_timers() -> str:
+    number = _libc("prctl", PR_SET_TIMERSLACK, 1, 0, 0, 0)
+    return os.strerror(number).lower() if number else ""
+
+
+def _libc(name: str, *arguments: int) -> int:
+    """Call a function of the C library; return the number of its error, or 0."""
+    library = ctypes.CDLL(None, use_errno=True)
+    found = getattr(library, name)(*map(ctypes.c_ulong, arguments))
+    return ctypes.get_errno() if found else 0
+
+
+def _has(capability: int) -> bool:
+    """Return whether this process has a capability."""
+    return bool(int(_status("CapEff"), 16) >> capability & 1)
+
+
+def _memory_in_use() -> int:
+    """Return the bytes that this process has, as the limit counts them."""
+    return int(_status("VmSize").split()[0]) << 10
+
+
+def _status(key: str) -> str:
+    with open("/proc/self/status", encoding="ascii") as lines:
+        return next(line.partition(":")[2].strip() for line in lines if line.startswith(f"{key}:"))
+
+
+class _Timespec(ctypes.Structure):
+    _fields_ = (("seconds", ctypes.c_long), ("nanoseconds", ctypes.c_long))
+
+
+class Sleeper:
+    """Waits until an instant of the monotonic clock: asleep at first, at the end by looking at the clock.
+
+    ``polled`` is the time (ns) before the instant at which the sleep ends. Only this clock counts, which
+    nobody can set.
+    """
+
+    def __init__(self, polled: int = 0) -> None:
+        self.polled = polled
+        self._sleep = ctypes.CDLL(None).clock_nanosleep
+        self._time = _Timespec()
+        self._arguments = (CLOCK_MONOTONIC, TIMER_ABSTIME, ctypes.byref(self._time), None)
+
+    def until(self, instant: int) -> None:
+        """Wait until an instant (ns), or until a signal comes."""
+        wake = instant - self.polled
+        if time.monotonic_ns() < wake:
+            self._time.seconds, self._time.nanoseconds = divmod(wake, NANOSECONDS)
+            if self._sleep(*self._arguments):
+                return
+        while time.monotonic_ns() < instant:
+            pass
+
+
+def wake_up_time(sleeper: Sleeper) -> int:
+    """Return how late (ns) the system wakes this thread, but for one time in a hundred."""
+    late = []
+    instant = time.monotonic_ns()
+    for _ in range(TRIALS):
+        instant = max(instant, time.monotonic_ns()) + TRIAL
+        sleeper.until(instant)
+        late.append(time.monotonic_ns() - instant)
+    return sorted(late)[int(LATEST * TRIALS)]

@@ -1,0 +1,211 @@
+"""The pacer by a clock that stands still: which ticks run, what is missed, and what is counted."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from quadvis.api import Diagram, load_text
+from quadvis.diagram.sections.overload import OverloadLimits
+from quadvis.errors import RunError
+from quadvis.realtime import control
+from quadvis.realtime.pacer import Ended
+from tests.quadvis.realtime.fakes import WARN, FakeClock, Paced
+
+MS = 1_000_000
+FAST = """\
+quadvis: 1
+name: paced
+rates: {fast: 1 kHz}
+stop_time: 100 s
+blocks:
+  ramp: {block: sources.ramp, rate: fast, with: {slope: 1 m/s}}
+"""
+TWO = FAST.replace("{fast: 1 kHz}", "{fast: 1 kHz, slow: {rate: 200 Hz, offset: 2 ms}}") + (
+    "  slow: {block: signal.gain, rate: slow, in: {u: {from: ramp.y, across: sample}}}\n"
+)
+
+
+def diagram(text: str = FAST, **replaced: str) -> Diagram:
+    for old, new in replaced.items():
+        text = text.replace(old, new)
+    return load_text(text)
+
+
+def busy(paced: Paced, clock: FakeClock, takes: dict[int, float], task: str = "fast") -> list[int]:
+    """Let the step of some ticks take so many ms; return a list that gets the ticks that run."""
+    ticks: list[int] = []
+
+    def work(tick: int) -> None:
+        ticks.append(tick)
+        clock.instant += round(takes.get(tick, 0.1) * MS)
+
+    paced.engine.observe(task, work)
+    return ticks
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize(("periods", "missed"), [(0.5, 0), (1.0, 0), (1.5, 1), (3.1, 3), (250.5, 250)])
+def test_a_step_of_so_many_periods_misses_so_many_ticks_and_the_grid_stays(
+    periods: float, missed: int, engine: str
+) -> None:
+    clock = FakeClock()
+    paced = Paced(diagram(), clock, engine=engine)
+    ticks = busy(paced, clock, {10: periods})
+    starts: list[int] = []
+    paced.engine.observe("fast", lambda tick: starts.append(clock.instant))
+    times = paced.run(600)["fast"]
+    assert ticks == [*range(11), *range(11 + missed, 600)]
+    assert (times.steps, times.overruns) == (600 - missed, missed)
+    assert times.lateness is not None and times.execution is not None
+    assert (times.lateness.least, times.lateness.most) == (0.0, 0.0)
+    assert times.execution.most == pytest.approx(max(periods, 0.1) / 1000)
+    assert paced.shared.control[control.DONE] == 600 - missed
+
+
+@given(st.dictionaries(st.integers(0, 99), st.floats(0, 12), max_size=6), st.booleans())
+def test_every_due_tick_of_every_task_has_a_step_or_an_overrun(takes: dict[int, float], late: bool) -> None:
+    """Steps done and missed are those of the elapsed time, and no step begins before its deadline."""
+    clock = FakeClock({place: round(taken * MS) for place, taken in takes.items()} if late else {})
+    paced = Paced(diagram(TWO), clock)
+    begun: list[tuple[int, int]] = []
+    paced.engine.observe("fast", lambda tick: begun.append((tick, clock.instant)))
+    busy(paced, clock, {} if late else takes)
+    slow: list[int] = []
+    paced.engine.observe("slow", slow.append)
+    times = paced.run(200)
+    assert times["fast"].steps == len(begun)
+    assert times["fast"].steps + times["fast"].overruns == 200
+    assert times["slow"].steps == len(slow)
+    assert times["slow"].steps + times["slow"].overruns == len(range(2, 200, 5))
+    assert all(0 <= instant - tick * MS < MS for tick, instant in begun)
+    if not late:
+        assert all(instant == tick * MS for tick, instant in begun)
+
+
+def test_a_tick_runs_late_until_the_next_one_is_due() -> None:
+    clock = FakeClock({5: MS - 1, 10: MS, 15: 7 * MS + 3})
+    paced = Paced(diagram(), clock)
+    ticks = busy(paced, clock, dict.fromkeys(range(100), 0.0))
+    times = paced.run(100)["fast"]
+    assert [tick for tick in range(100) if tick not in ticks] == [10, *range(16, 23)]
+    assert times.overruns == 8
+    assert times.lateness is not None
+    assert times.lateness.most == (MS - 1) / 1e9
+
+
+def test_time_follows_the_ticks_and_the_period_does_not() -> None:
+    clock = FakeClock()
+    paced = Paced(diagram(), clock)
+    busy(paced, clock, {3: 2.5})
+    seen: list[Any] = []
+    ramp = paced.engine.bound("ramp")
+    paced.engine.observe("fast", lambda tick: seen.append((paced.engine.read("ramp", "y"), ramp.period)))
+    paced.run(8)
+    assert seen == [(tick / 1000, 0.001) for tick in (0, 1, 2, 3, 6, 7)]
+
+
+def test_a_tick_of_a_slow_task_that_is_missed_is_an_overrun_of_that_task_too() -> None:
+    clock = FakeClock()
+    paced = Paced(diagram(TWO), clock)
+    ticks = busy(paced, clock, {6: 1.5, 20: 3.0})  # 7 is a tick of the slow task; 21 and 22 are none run late
+    slow: list[int] = []
+    paced.engine.observe("slow", slow.append)
+    times = paced.run(30)
+    assert [tick for tick in range(30) if tick not in ticks] == [7, 21, 22]
+    assert slow == [2, 12, 17, 27]
+    assert (times["fast"].overruns, times["slow"].overruns) == (3, 2)
+
+
+def test_ticks_without_a_due_task_are_passed_over() -> None:
+    text = FAST.replace("{fast: 1 kHz}", "{fast: 10 Hz, odd: 1/15 s}") + (
+        "  odd: {block: sources.ramp, rate: odd}\n"
+    )
+    clock = FakeClock()
+    paced = Paced(load_text(text), clock)
+    assert paced.engine.period == Fraction(1, 30)
+    times = paced.run(31)  # one second
+    assert (times["fast"].steps, times["odd"].steps) == (11, 16)
+    assert clock.sleeps == 21  # 6 ticks are those of both
+    assert (times["fast"].overruns, times["odd"].overruns) == (0, 0)
+
+
+def test_a_run_that_is_to_end_does_so_between_two_steps() -> None:
+    clock = FakeClock()
+    paced = Paced(diagram(), clock)
+    ended: list[int] = []
+
+    def work(tick: int) -> None:
+        if tick == 4:
+            paced.shared.control[control.END] = 1
+            ended.append(tick)
+
+    paced.engine.observe("fast", work)
+    with pytest.raises(Ended), paced.engine:
+        paced.engine.run(100)
+    assert paced.engine.tick == 5
+    assert paced.times["fast"].steps == 5
+
+
+# Overload
+
+
+def overloaded(takes: dict[int, float], limits: OverloadLimits, text: str = FAST) -> str:
+    """Return the message that stops a run; "" if it goes on."""
+    clock = FakeClock()
+    paced = Paced(load_text(text), clock, limits)
+    busy(paced, clock, takes)
+    try:
+        paced.run(100)
+    except RunError as error:
+        return str(error)
+    return ""
+
+
+def test_one_overrun_stops_a_run_that_may_have_none() -> None:
+    assert overloaded({10: 3.1}, OverloadLimits()) == (
+        "t = 0.011 s: task 'fast': overload limit (0) exceeded with 3 overruns: the step of t = 0.01 s took "
+        "3.1 ms; make the blocks faster or the rate lower, or allow overruns with the key 'overload'"
+    )
+
+
+def test_a_loop_that_wakes_late_says_so() -> None:
+    clock = FakeClock({9: 2 * MS})
+    paced = Paced(diagram(), clock, OverloadLimits())
+    with pytest.raises(
+        RunError, match=r"t = 0.009 s: task 'fast': .* with 2 overruns: the loop woke 2 ms late;"
+    ):
+        paced.run(100)
+
+
+@pytest.mark.parametrize(
+    ("limits", "takes", "stops"),
+    [
+        (OverloadLimits(max=3), {10: 3.1}, False),
+        (OverloadLimits(max=3), {10: 3.1, 50: 1.5}, True),
+        (OverloadLimits(max=2), {10: 3.1}, True),
+        (OverloadLimits(max=100, consecutive=2), dict.fromkeys(range(10, 90, 5), 2.5), False),
+        (OverloadLimits(max=100, consecutive=1), {10: 2.5}, True),
+        (OverloadLimits(startup=5), {4: 3.1}, False),
+        (OverloadLimits(startup=5), {5: 3.1}, True),
+        (OverloadLimits(startup=0), {0: 1.1}, True),
+        (WARN, dict.fromkeys(range(100), 5.0), False),
+    ],
+)
+def test_the_limits_of_xpc_target(limits: OverloadLimits, takes: dict[int, float], stops: bool) -> None:
+    assert bool(overloaded(takes, limits)) == stops
+
+
+def test_each_task_has_its_own_count_and_its_own_startup() -> None:
+    limits = OverloadLimits(max=3, startup=2)
+    assert overloaded({6: 1.5, 21: 1.5}, limits, TWO) == ""  # one overrun of 'slow' in its startup, one later
+    slow = overloaded(dict.fromkeys((16, 21, 26, 31), 1.5), limits._replace(max=2), TWO)
+    assert slow.startswith("t = 0.027 s: task 'fast': overload limit (2) exceeded with 3 overruns")
+    only = OverloadLimits(max=10, consecutive=1, startup=1)
+    assert "task 'slow': overload limit (1 in a row) exceeded with 2 overruns in a row" in overloaded(
+        {16: 1.1, 21: 1.1}, only, TWO
+    )
