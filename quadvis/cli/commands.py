@@ -81,13 +81,15 @@ def run(options: argparse.Namespace) -> int:
 
 def _real_time(options: argparse.Namespace) -> RealTime | None:
     """Return what a real-time run is to ask for; None for a simulation."""
-    from quadvis.realtime.options import RealTime
-
     chosen = {name: getattr(options, name) for name in ("cpu", "priority", "poll")}
     given = {name: value for name, value in chosen.items() if value is not None}
     if given and not options.real_time:
         raise QuadvisError(f"--{next(iter(given))} is for a real-time run; add --real-time")
-    return RealTime(**given) if options.real_time else None
+    if not options.real_time:
+        return None
+    from quadvis.realtime.options import RealTime
+
+    return RealTime(**given)
 
 
 def sweep(options: argparse.Namespace) -> int:

@@ -31,6 +31,9 @@ class NativeExecutor:
         self._function = function
         self._run = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(address)
         self._tables: Tables | None = None
+        self._reached = -1  # the tick for which the tables are ready, if nothing else has moved it
+        numerator, denominator = interpreter.program.period.as_integer_ratio()
+        self._last = (EXACT - 1) // numerator if denominator < EXACT else -1  # the last tick in exact time
 
     @property
     def tick(self) -> int:
@@ -54,12 +57,12 @@ class NativeExecutor:
     def _made(self) -> Tables:
         if self._tables is None:
             self._tables = Tables(self.interpreter, self._function)
+            self._reached = -1
         return self._tables
 
     def run(self, until: int) -> Stop | None:
         """Run all ticks before ``until``; None if nothing failed."""
-        numerator, denominator = self.interpreter.program.period.as_integer_ratio()
-        if max(until * numerator, denominator) >= EXACT:
+        if until > self._last:
             return self.interpreter.run(until)
         tables = self._made()
         turn = max(1, INSTRUCTIONS // max(1, len(tables.code)))
@@ -71,13 +74,16 @@ class NativeExecutor:
 
     def _turn(self, tables: Tables, until: int) -> Stop | None:
         control = tables.control
-        tables.waits(self.tick)
+        if self.tick != self._reached:
+            tables.waits(self.tick)
+        self._reached = -1
         control[loop.TICK], control[loop.UNTIL], control[loop.SEGMENT] = self.tick, until, -1
         try:
             while True:
-                self._run(tables.table.ctypes.data)
+                self._run(tables.address)
                 self.tick, result = control[loop.TICK], control[loop.RESULT]
                 if result == loop.DONE:
+                    self._reached = self.tick
                     return None
                 if result == loop.FULL:
                     _hand_on(tables)

@@ -271,7 +271,8 @@ class Tables:
             control, self.rhythms, self.due, self.segments, self.code, self.operands, memory.floats,
             memory.floats, self.taps, self.ring, self.states, self.stages, self.scratch,
         )  # fmt: skip
-        self.table: Whole = np.array([array.ctypes.data for array in arrays], np.int64)
+        self._table: Whole = np.array([array.ctypes.data for array in arrays], np.int64)
+        self.address = int(self._table.ctypes.data)  # of the table of addresses, which the loop takes
 
     def rows(self) -> Iterator[tuple[Tap, Whole, Whole]]:
         """Yield the taps with rows: their ticks (N,), and their slots (N, size); then the rings are empty."""

@@ -4,8 +4,8 @@ It loads the resolved diagram, opens the blocks, asks the system for what it wan
 writes no file and no text, and uses no socket: rows, times and the present tick go into shared memory.
 
 SIGTERM ends the run before its next step; a second one ends the step that is running. Then, as at every end
-but SIGKILL, the safe values are written and the blocks closed. The terminal's signals are left to the
-supervisor. If the supervisor has ended, so does this process.
+but SIGKILL, the safe values are written and the blocks closed. The terminal's signals go to the
+supervisor alone. If the supervisor has ended, so does this process.
 """
 
 from __future__ import annotations
@@ -182,6 +182,7 @@ class _Application:
 def perform(setup: Setup) -> None:
     """Run an application: the whole life of its process."""
     application = _Application(setup)
+    os.setsid()  # no terminal stops it (Ctrl-Z) or kills it
     leave_to_parent()
     threading.Thread(target=_end_with_parent, daemon=True).start()
     IS_COMMAND.set(setup.is_command)

@@ -76,14 +76,13 @@ def supervise(
     tend: Callable[[float, float], None],
     announce: Announce | None = None,
 ) -> Flight:
-    """Run a diagram in real time to its stop time, in a process of its own.
+    """Run a diagram in real time to its stop time, in a process of its own; ``wishes`` have been checked.
 
     ``taps`` take rows here. ``tend`` is called again and again while it runs, with the time of the last tick
     and the time since the start (s). RunError if a block fails, if the tasks have too many overruns, if a
     step does not end, or if the process is killed. However this ends, the process has ended then, and all
     rows have been handed on.
     """
-    wishes.check(diagram.graph)
     supervisor = _Supervisor(diagram, wishes, engine, taps, announce or _nothing)
     try:
         return supervisor.follow(tend)
@@ -138,6 +137,7 @@ class _Supervisor:
         if self._ending.reason or self._ready is None:
             raise self._ending.error()
         tend(self._time, self._now)
+        self._warn(last=True)
         tasks = zip(self._diagram.graph.tasks, self._shared.tasks, strict=True)
         found = tuple(TaskTimes.read(task.name, float(task.period), words) for task, words in tasks)
         lost = sum(len(stream.blocks) * ring.lost for (stream, _), ring in self._rings)
@@ -189,10 +189,10 @@ class _Supervisor:
         except (EOFError, OSError):
             self._listening = False
 
-    def _warn(self) -> None:
-        """Announce new overruns, at most once in a while."""
+    def _warn(self, *, last: bool = False) -> None:
+        """Announce new overruns, at most once in a while and at the end."""
         found = [int(words[times.OVERRUNS]) for words in self._shared.tasks]
-        if found == self._overruns or self._now < self._warned + WARNED:
+        if found == self._overruns or not (last or self._now >= self._warned + WARNED):
             return
         names = [task.name for task in self._diagram.graph.tasks]
         more = [

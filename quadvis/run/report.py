@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from quadvis.diagram.requirements import Entry
 from quadvis.errors import counted
 from quadvis.machine.columns import table
-from quadvis.realtime.times import Spread, TaskTimes
 from quadvis.run.session import Result
 from quadvis.run.verdict import Outcome, Verdict
 from quadvis.units import Unit, format_quantity
+
+if TYPE_CHECKING:
+    from quadvis.realtime.times import Spread, TaskTimes
 
 SECOND, MILLISECOND, MICROSECOND, HERTZ = map(Unit.parse, ("s", "ms", "us", "Hz"))
 

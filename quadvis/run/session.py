@@ -23,7 +23,6 @@ from quadvis.native.choice import AUTO, PYTHON, Announce, Choice, choose, use
 from quadvis.output.kept import ALL, RowJudge, RunSignals
 from quadvis.output.recording import RecordedBlock, RecordedPort, Recording
 from quadvis.output.statistics import finite
-from quadvis.realtime.supervisor import Flight, supervise
 from quadvis.run.row_tap import PacedTap, RowTap, Taker
 from quadvis.run.verdict import Judging, Outcome
 from quadvis.version import __version__
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
     from quadvis.output.log import LogWriter
     from quadvis.realtime.options import RealTime
+    from quadvis.realtime.supervisor import Flight
 
 Progress = Callable[[float, float], None]  # simulated time reached, wall time spent (s)
 PYTHON_ONLY = Choice(PYTHON)
@@ -46,7 +46,7 @@ class Taken(NamedTuple):
     tap: RowTap
 
 
-Loop = Callable[[Sequence[Taken], Progress, ExitStack], tuple[Choice, Flight | None]]
+Loop = Callable[[Sequence[Taken], Progress, ExitStack], "tuple[Choice, Flight | None]"]
 
 
 @dataclass(frozen=True)
@@ -226,7 +226,9 @@ def _simulated(diagram: Diagram, engine: str, announce: Announce | None) -> Loop
 
 
 def _paced(diagram: Diagram, engine: str, announce: Announce | None, wishes: RealTime) -> Loop:
-    """Return the loop of a real-time run."""
+    """Return the loop of a real-time run; QuadvisError if it cannot be one."""
+    wishes.check(diagram.graph)
+    from quadvis.realtime.supervisor import supervise  # what it needs is Unix's, and takes a while
 
     def loop(taken: Sequence[Taken], tend: Progress, _: ExitStack) -> tuple[Choice, Flight]:
         taps = [PacedTap(each.tap, each.node, diagram.graph, each.judge) for each in taken]

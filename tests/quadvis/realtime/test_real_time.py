@@ -190,6 +190,19 @@ def test_an_overload_stops_the_run() -> None:
 
 
 @pytest.mark.slow
+def test_overruns_are_announced_once_a_second_and_add_up() -> None:
+    write("clock.sleep(0.03)", overload="{action: warn}")
+    said: list[str] = []
+    result = quadvis.load("flight.yaml", stop_time="2.5 s").run(real_time=CALM, announce=said.append)
+    assert result.flight is not None
+    warnings = said[1:]
+    assert 2 <= len(warnings) <= 4
+    told = [int(count) for line in warnings for count in re.findall(r"'fast' has (\d+) more overrun", line)]
+    assert sum(told) == result.flight.tasks[0].overruns >= 50
+    assert result.passed  # what the diagram allows is no lack
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("at", "words", "traces"),
     [
@@ -278,9 +291,11 @@ def test_if_the_application_is_killed_the_command_says_so() -> None:
 def test_options_that_are_refused(
     arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["run", "flight.yaml", "--log", "", *arguments]) == 2
+    Path("run.mcap").write_text("the log of an earlier run")
+    assert main(["run", "flight.yaml", "--log", "run.mcap", *arguments]) == 2
     assert words in capsys.readouterr().err
     assert not Path("life").exists()
+    assert Path("run.mcap").read_text() == "the log of an earlier run"
 
 
 def test_only_one_task_at_a_time_can_run_in_real_time() -> None:
