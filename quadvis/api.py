@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from quadvis.output.recording import Recorded
     from quadvis.realtime.options import RealTime
     from quadvis.run.live import LiveRun
-    from quadvis.run.session import Progress, Result
+    from quadvis.run.result import Result
+    from quadvis.run.session import Progress
     from quadvis.run.verdict import Outcome
 
 # What a method needs it imports when it is called: a diagram that is only looked at costs no engine.

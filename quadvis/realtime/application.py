@@ -216,7 +216,6 @@ def _running(error: BaseException, engine: Engine) -> str:
 
 def _end_with_parent() -> None:
     """End this process when its supervisor has ended: orderly if possible."""
-    signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())  # they are for the main thread
     parent = parent_process()
     if parent is not None:
         parent.join()

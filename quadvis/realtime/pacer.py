@@ -100,7 +100,7 @@ class Pacer:
             words[times.STEPS] += 1
             times.count(words, times.LATENESS, late, late_bin)
             times.count(words, times.TET, taken, taken_bin)
-            self._watch.ran(task)
+        self._watch.ran(self._due, min([self._tasks[task][times.STEPS] for task in self._due]))
         self._due = []
         self._control[control.DONE] += 1
         self._control[control.BEGUN] = 0
@@ -112,7 +112,7 @@ class Pacer:
             if count:
                 words = self._tasks[task]
                 words[times.OVERRUNS] += count
-                exceeded = self._watch.missed(task, count, words[times.STEPS])
+                exceeded = self._watch.missed(task, count)
                 if exceeded:
                     self._refuse(exceeded, rhythm.first(tick), instant)
 

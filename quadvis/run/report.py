@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from quadvis.diagram.requirements import Entry
 from quadvis.errors import counted
 from quadvis.machine.columns import table
-from quadvis.run.session import Result
+from quadvis.run.result import Result
 from quadvis.run.verdict import Outcome, Verdict
 from quadvis.units import Unit, format_quantity
 
@@ -26,7 +26,8 @@ def summary_lines(result: Result) -> list[str]:
     lines = [f"{what}: {result.duration:g} s, seed {diagram.seed}"]
     lines += [f"  {line}" for line in table([_entry_row(entry, outcome) for entry in diagram.summary])]
     lines += [f"  {line}" for line in table([_verdict_row(verdict) for verdict in outcome.verdicts])]
-    speed = f", {result.real_time_factor:.0f} x real time" if result.duration and result.wall else ""
+    shown = result.duration and result.wall and not result.flight
+    speed = f", {result.real_time_factor:.0f} x real time" if shown else ""
     lines.append(f"  {result.wall:.1f} s of wall time{speed}; engine: {result.engine}")
     if result.flight:
         lines += [f"  {line}" for line in table([_task_row(times) for times in result.flight.tasks])]

@@ -1,4 +1,4 @@
-"""One run of a diagram: engine, recording, log, progress, verdicts."""
+"""One run of a diagram: engine or application, recording, log, progress, verdicts."""
 
 from __future__ import annotations
 
@@ -6,23 +6,19 @@ import json
 import os
 import platform
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, NamedTuple
 
 from quadvis.engine.engine import Engine
 from quadvis.graph.graph import Node
-from quadvis.native.choice import AUTO, PYTHON, Announce, Choice, choose, use
+from quadvis.native.choice import AUTO, Announce, Choice, choose, use
 from quadvis.output.kept import ALL, RowJudge, RunSignals
-from quadvis.output.recording import RecordedBlock, RecordedPort, Recording
-from quadvis.output.statistics import finite
+from quadvis.output.recording import RecordedBlock, RecordedPort
+from quadvis.run.result import Result
 from quadvis.run.row_tap import PacedTap, RowTap, Taker
 from quadvis.run.verdict import Judging, Outcome
 from quadvis.version import __version__
@@ -34,7 +30,6 @@ if TYPE_CHECKING:
     from quadvis.realtime.supervisor import Flight
 
 Progress = Callable[[float, float], None]  # simulated time reached, wall time spent (s)
-PYTHON_ONLY = Choice(PYTHON)
 SLICE = 0.1  # s of wall time between two calls of the progress; Ctrl-C and rows for the log wait no longer
 
 
@@ -47,106 +42,6 @@ class Taken(NamedTuple):
 
 
 Loop = Callable[[Sequence[Taken], Progress, ExitStack], "tuple[Choice, Flight | None]"]
-
-
-@dataclass(frozen=True)
-class Result:
-    """The result of a run: ``result["plant.position"]`` is an array with a leading time axis.
-
-    ``duration`` is the simulated time (s), ``wall`` the wall time (s), ``cpu`` the processor time (s).
-    ``lost`` says which rows the log lacks because the disk refused them; "" without a log or without lost
-    rows. ``engine`` is what ran the diagram, and why. ``flight`` has the times of the tasks of a real-time
-    run; None after a simulation.
-    """
-
-    diagram: Diagram
-    signals: Recording
-    outcome: Outcome
-    duration: float
-    wall: float
-    cpu: float
-    lost: str = ""
-    engine: Choice = PYTHON_ONLY
-    flight: Flight | None = None
-
-    def __getitem__(self, name: str) -> NDArray[Any]:
-        return self.signals[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.signals)
-
-    def __len__(self) -> int:
-        return len(self.signals)
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.signals
-
-    def __repr__(self) -> str:
-        passed = "passed" if self.passed else "failed"
-        return f"<Result of {self.diagram.name}: {self.duration:g} s, {len(self)} signals, {passed}>"
-
-    def times(self, name: str) -> NDArray[np.float64]:
-        """Return the times of a signal's rows (s)."""
-        return self.signals.times(name)
-
-    def rate(self, name: str) -> str:
-        """Return the name of the rate of a signal's block."""
-        return self.signals.rate(name)
-
-    @property
-    def units(self) -> Mapping[str, str]:
-        """The unit of every signal."""
-        return self.signals.units
-
-    @property
-    def passed(self) -> bool:
-        """True if every expectation of the diagram on a run is met; those on its loop `analyse` judges."""
-        return self.outcome.passed
-
-    @property
-    def real_time_factor(self) -> float:
-        """Simulated time divided by wall time."""
-        return self.duration / self.wall if self.wall else float("inf")
-
-    def facts(self) -> dict[str, Any]:
-        """Return the outcome as plain data: what `quadvis run --json` prints.
-
-        ``diagram``, ``variant`` (or None), ``params`` (the parameter files), ``hash`` and ``seed`` identify
-        the run. ``passed`` says whether all expectations are met. ``duration_s`` is the simulated time,
-        ``wall_s`` the wall time, ``cpu_s`` the processor time, ``engine`` "python" or "native";
-        ``real_time_factor`` is simulated time divided by wall time. ``real_time`` holds what was granted and
-        the times of all tasks, None for a simulation. ``summary``
-        holds ``{signal, unit, rms, max, ...}`` by label; ``final`` of several elements is a list. ``expect``
-        is a list of ``{expectation, signal, kind, unit, limit, found, met, lack}``; ``lack`` says why the run
-        cannot be judged. ``margins`` is the number of expectations on the loop, which only an analysis
-        judges. Numbers are in the unit beside them; None stands for a number that is unknown or
-        infinite.
-        """
-        summary = {
-            entry.label: {
-                "signal": entry.selection.text,
-                "unit": str(entry.selection.unit),
-                **{name: finite(value) for name, value in self.outcome.summary[entry.label].items()},
-            }
-            for entry in self.diagram.summary
-        }
-        return {
-            "diagram": self.diagram.name,
-            "variant": self.diagram.variant,
-            "params": [str(file.path) for file in self.diagram.parameter_files],
-            "hash": self.diagram.hash,
-            "seed": self.diagram.seed,
-            "passed": self.passed,
-            "duration_s": self.duration,
-            "wall_s": self.wall,
-            "cpu_s": self.cpu,
-            "engine": self.engine.engine,
-            "real_time_factor": finite(self.real_time_factor),
-            "real_time": self.flight.facts() if self.flight else None,
-            "summary": summary,
-            "expect": [verdict.facts() for verdict in self.outcome.verdicts],
-            "margins": len(self.diagram.loop_requirements),
-        }
 
 
 def run(

@@ -18,8 +18,8 @@ LARGEST = 10**9
 class OverloadLimits(NamedTuple):
     """How many overruns each task may have: ``max`` in all, ``consecutive`` in a row (None: no own limit).
 
-    Overruns before a task has done more than ``startup`` steps do not count. ``action`` says what follows
-    one overrun too many: the run stops, or goes on with a warning.
+    Overruns that one of the first ``startup`` steps of any task causes do not count. ``action`` says what
+    follows one overrun too many: the run stops, or goes on with a warning.
     """
 
     max: int = 0
@@ -34,7 +34,8 @@ class OverloadSection(FileSection[OverloadLimits]):
     key = "overload"
     words = (
         "`{max: 0, consecutive: n, startup: 5, action: stop or warn}`: how many ticks each task may miss in "
-        "a real-time run, in all and in a row, after its first steps; and what follows one more"
+        "a real-time run, in all and in a row, apart from what the first steps of a task cause; and what "
+        "follows one more"
     )
 
     def read(self, node: YamlNode | None, faults: Faults) -> OverloadLimits:
@@ -58,7 +59,7 @@ class OverloadSection(FileSection[OverloadLimits]):
         return closed(OVERLOAD_KEYS, {
             "max": {**number, "description": "ticks that each task may miss in all; 0 if left out"},
             "consecutive": {**number, "description": "ticks that each task may miss in a row"},
-            "startup": {**number, "description": "first steps of a task that do not count; 5 if left out"},
+            "startup": {**number, "description": "first steps of each task, which may last; 5 if left out"},
             "action": {"enum": list(ACTIONS), "description": "what follows one missed tick too many"},
         })  # fmt: skip
 

@@ -200,9 +200,16 @@ def test_the_limits_of_xpc_target(limits: OverloadLimits, takes: dict[int, float
     assert bool(overloaded(takes, limits)) == stops
 
 
-def test_each_task_has_its_own_count_and_its_own_startup() -> None:
+def test_the_first_steps_of_a_slow_task_may_last() -> None:
+    """Ticks 2 and 7 are its first two, when the fast task has long left its own."""
+    assert overloaded({2: 3.5, 7: 30.5}, OverloadLimits(startup=2), TWO) == ""
+    assert "overload limit (0) exceeded" in overloaded({12: 1.5}, OverloadLimits(startup=2), TWO)
+    assert "overload limit (0) exceeded" in overloaded({8: 1.5}, OverloadLimits(startup=2), TWO)
+
+
+def test_each_task_has_its_own_count() -> None:
     limits = OverloadLimits(max=3, startup=2)
-    assert overloaded({6: 1.5, 21: 1.5}, limits, TWO) == ""  # one overrun of 'slow' in its startup, one later
+    assert overloaded({6: 1.5, 21: 1.5}, limits, TWO) == ""
     slow = overloaded(dict.fromkeys((16, 21, 26, 31), 1.5), limits._replace(max=2), TWO)
     assert slow.startswith("t = 0.027 s: task 'fast': overload limit (2) exceeded with 3 overruns")
     only = OverloadLimits(max=10, consecutive=1, startup=1)
