@@ -76,6 +76,8 @@ def run(options: argparse.Namespace) -> int:
             print(f"log: {log}")
     if result.lost:
         print(f"{result.lost}; the run itself is judged in full", file=sys.stderr)
+    if result.flight and result.flight.loss:
+        print(result.flight.loss, file=sys.stderr)
     return 0 if result.passed and not result.lost else FAILED
 
 

@@ -105,22 +105,22 @@ class _Supervisor:
         words = context.RawArray("q", SharedMemory.size(len(tasks), rings))
         self._shared = SharedMemory(words, len(tasks), rings)
         self._control = self._shared.control
-        self._link, theirs = context.Pipe()
+        self._link, self._theirs = context.Pipe()
         setup = Setup(
             diagram.resolved, str(diagram.path.parent), diagram.path.name, diagram.own_blocks,
-            IS_COMMAND.get(), engine, wishes, len(tasks), streams, words, theirs,
+            IS_COMMAND.get(), engine, wishes, len(tasks), streams, words, self._theirs,
         )  # fmt: skip
         self._process: BaseProcess = context.Process(target=perform, args=(setup,), name="application")
         self._listening = True
         self._ready: Ready | None = None
         self._ending: Ending | None = None
         self._warned, self._overruns = 0.0, [0] * len(tasks)
-        with launching():
-            self._process.start()
-        theirs.close()
 
     def follow(self, tend: Callable[[float, float], None]) -> Flight:
-        """Hand rows on until the application has ended; an error if this is before its stop time."""
+        """Start the application and hand rows on until it has ended; an error if this is too early."""
+        with launching():
+            self._process.start()
+        self._theirs.close()
         while self._process.is_alive():
             wait([self._process.sentinel, *([self._link] if self._listening else [])], LOOK)
             self._listen()

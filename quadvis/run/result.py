@@ -72,8 +72,11 @@ class Result:
 
     @property
     def passed(self) -> bool:
-        """True if every expectation of the diagram on a run is met; those on its loop `analyse` judges."""
-        return self.outcome.passed
+        """True if every expectation on a run is met, and no row was lost on the way to the verdicts.
+
+        Those on the loop `analyse` judges.
+        """
+        return self.outcome.passed and not (self.flight and self.flight.lost)
 
     @property
     def real_time_factor(self) -> float:

@@ -100,7 +100,7 @@ def run(
             writer.close(_closing(outcome, flight))
             signals.written(writer.path, writer.loss)
     wall, cpu = time.perf_counter() - wall, _processor_time() - cpu
-    lost = "; ".join(filter(None, (writer.loss if writer else "", flight.loss if flight else "")))
+    lost = writer.loss if writer else ""
     return Result(diagram, signals, outcome, diagram.duration, wall, cpu, lost, choice, flight)
 
 

@@ -279,6 +279,27 @@ def test_if_the_application_is_killed_the_command_says_so() -> None:
     assert len(stamps) > 3
 
 
+@pytest.mark.slow
+def test_a_supervisor_that_is_stopped_does_not_stop_the_loop() -> None:
+    """Its rings overflow, which is counted; their rows are no part of the log, and all others are."""
+    process = started("--stop-time", "8 s", "--json")
+    os.kill(process.pid, signal.SIGSTOP)
+    time.sleep(4)
+    os.kill(process.pid, signal.SIGCONT)
+    out, told = process.communicate(timeout=60)
+    facts = json.loads(out)
+    lost = facts["real_time"]["lost_rows"]
+    assert process.returncode == 1
+    assert lost > 0
+    assert told.endswith(f"{lost} rows found no room on the way to the log and the verdicts\n")
+    assert not facts["passed"]
+    tasks = facts["real_time"]["tasks"]
+    assert tasks["fast"]["steps"] + tasks["fast"]["overruns"] == 401
+    log = read_log("run.mcap")
+    rows = sum(len(log[name]) for name in ("wave.y", "slow.y", "end.y"))
+    assert rows + lost == 2 * tasks["fast"]["steps"] + tasks["slow"]["steps"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
