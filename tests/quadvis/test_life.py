@@ -165,14 +165,16 @@ def test_what_was_never_opened_is_not_written_to() -> None:
 
 
 class Stepped:
-    """A clock that lets two ticks at a time go, and remembers what it was asked."""
+    """A clock that leaves some ticks out, lets two at a time go, and remembers what it was asked."""
 
-    def __init__(self) -> None:
+    def __init__(self, left_out: int = 0) -> None:
+        self.left_out = left_out
         self.asked: list[tuple[int, int]] = []
 
-    def wait(self, tick: int, end: int) -> int:
+    def wait(self, tick: int, end: int) -> range:
         self.asked.append((tick, end))
-        return min(tick + 2, end)
+        first = min(tick + self.left_out, end)
+        return range(first, min(first + 2, end))
 
 
 def test_the_loop_asks_its_clock_before_ticks_and_runs_no_further_than_it_allows() -> None:
@@ -181,6 +183,17 @@ def test_the_loop_asks_its_clock_before_ticks_and_runs_no_further_than_it_allows
     with made:
         made.run(5)
     assert clock.asked == [(0, 5), (2, 5), (4, 5)] and made.tick == 5
+
+
+def test_ticks_that_the_clock_leaves_out_do_not_run() -> None:
+    clock = Stepped(left_out=3)
+    made = engine(node("gain", Gain()), clock=clock)
+    ticks: list[int] = []
+    made.observe(made.graph.tasks[0].name, ticks.append)
+    with made:
+        made.run(12)
+    assert (ticks, made.tick) == ([3, 4, 8, 9], 12)
+    assert clock.asked == [(0, 12), (5, 12), (10, 12)]
 
 
 class Keeps(Tap):
