@@ -1,8 +1,11 @@
-"""Angles on the circle."""
+"""Angles on the circle, and the rotations that roll, pitch and yaw stand for."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
+
+import numpy as np
 
 TURN = 2.0 * math.pi
 
@@ -11,3 +14,35 @@ def wrapped(angle: float) -> float:
     """Return the same direction in (-pi, pi]; an angle in that interval is returned bit for bit."""
     turned = angle - TURN * math.ceil((angle - math.pi) / TURN)
     return math.pi if turned > math.pi else turned  # one rounding step beyond pi is pi
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> Any:
+    """Return Rz(yaw) Ry(pitch) Rx(roll) (3, 3), from body axes (forward, right, down) to level axes."""
+    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    return np.array(
+        (
+            (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+            (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+            (-sp, cp * sr, cp * cr),
+        )
+    )
+
+
+def askew(attitude: Any, mount: Any) -> Any:
+    """Return roll, pitch and yaw (3,) of a device that sits on a craft turned by `mount`, itself such angles.
+
+    The mount (0, 0, 0) gives the attitude to the bit.
+    """
+    if mount[0] == 0.0 and mount[1] == 0.0 and mount[2] == 0.0:
+        return attitude.copy()
+    craft = rotation(float(attitude[0]), float(attitude[1]), float(attitude[2]))
+    turn = craft @ rotation(float(mount[0]), float(mount[1]), float(mount[2]))
+    across, up = float(turn[2, 1]), float(turn[2, 2])
+    return np.array(
+        (
+            math.atan2(across, up),
+            math.atan2(-float(turn[2, 0]), math.hypot(across, up)),
+            math.atan2(float(turn[1, 0]), float(turn[0, 0])),
+        )
+    )

@@ -20,7 +20,8 @@ class Rotorcraft(Block):
 
     World: x forward, y right, h up; roll > 0 right side down, pitch > 0 nose up, yaw > 0 clockwise from
     above. Rotors: 0 front, 1 right, 2 rear, 3 left; front and rear turn counterclockwise seen from above.
-    Each thrust follows its command, held to the limits, with a first-order lag. u is the sum of the thrusts.
+    Each thrust follows its command, held to the limits and times ``thrust_scale``, with a first-order lag. u
+    is the sum of the thrusts.
     The torques over inertia are l (f3 - f1) / Ix, l (f0 - f2) / Iy, c (f0 + f2 - f1 - f3) / Iz, each plus its
     ``torque_bias``. With ``bias_sign: random`` each bias is a size, and gets a random sign of its own at the
     start of a run. Other forces and torques on the craft, such as those of the ground or a tether, are the
@@ -49,6 +50,10 @@ class Rotorcraft(Block):
     lag = Param(MOTOR_LAG, unit="s", above=0.0, tune=True, doc="time constant of a motor")
     thrust_min = Param(0.0, unit="N", min=0.0, doc="least thrust of a rotor")
     thrust_max = Param(THRUST_MAX, unit="N", above=0.0, doc="greatest thrust of a rotor")
+    thrust_scale = Param(
+        (1.0, 1.0, 1.0, 1.0), type="float64[4]", above=0.0, tune=True,
+        doc="thrust that each rotor gives over the thrust commanded: error of the thrust curve",
+    )  # fmt: skip
     drag = Param(
         DRAG, unit="N*s/m", min=0.0, tune=True, doc="drag force divided by the speed through the air"
     )
@@ -150,13 +155,13 @@ class Rotorcraft(Block):
             r_rate += (ix - iy) / iz * p * q
             roll_rate, pitch_rate, yaw_rate = _angle_rates(roll, pitch, p, q, r)
             forward, rightward, upward = _lift(roll, pitch, self.yaw)
-        mass, drag = self.mass, self.drag
+        mass, drag, scale = self.mass, self.drag, self.thrust_scale
         lift = front + right + rear + left
         return (
-            (clip(float(thrust[0]), least, most) - front) / lag,
-            (clip(float(thrust[1]), least, most) - right) / lag,
-            (clip(float(thrust[2]), least, most) - rear) / lag,
-            (clip(float(thrust[3]), least, most) - left) / lag,
+            (clip(float(thrust[0]), least, most) * float(scale[0]) - front) / lag,
+            (clip(float(thrust[1]), least, most) * float(scale[1]) - right) / lag,
+            (clip(float(thrust[2]), least, most) * float(scale[2]) - rear) / lag,
+            (clip(float(thrust[3]), least, most) * float(scale[3]) - left) / lag,
             vx, vy, vh,
             (lift * forward + drag * (float(wind[0]) - vx) + float(force[0])) / mass,
             (lift * rightward + drag * (float(wind[1]) - vy) + float(force[1])) / mass,

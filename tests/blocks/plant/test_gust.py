@@ -30,6 +30,13 @@ def test_it_blows_with_full_strength_from_the_first_sample_on() -> None:
     assert first.std() == pytest.approx(0.2, rel=4 / math.sqrt(2 * 900))
 
 
+def test_a_step_changes_the_mean_wind_once_and_not_the_gusts() -> None:
+    calm = drive(Gust(), rate="10 Hz", steps=20, seed=3).wind
+    stepped = drive(Gust(step=(6.0, 0.0, -1.0), step_time=0.7), rate="10 Hz", steps=20, seed=3).wind
+    assert stepped[:7].tolist() == calm[:7].tolist()
+    assert stepped[7:] - calm[7:] == pytest.approx(np.tile([6.0, 0.0, -1.0], (13, 1)))
+
+
 def test_a_negative_strength_is_refused() -> None:
     with pytest.raises(ParameterError, match="rms must be at least 0 m/s, got -1 m/s"):
         Gust(rms=(0.2, -1.0, 0.2))

@@ -68,6 +68,15 @@ def test_signs_nose_up_goes_back_right_side_down_goes_right(model: str) -> None:
 
 
 @BOTH
+def test_rotors_give_the_share_of_their_commands_that_the_scale_says(model: str) -> None:
+    weak = fly(model=model, thrust_scale=(0.9,) * 4, lag=1e-3, drag=0.0, rate=2000)
+    assert weak.velocity[-1, 2] == pytest.approx(-0.1 * 9.81 * (1.0 - 1e-3), rel=1e-3)
+    crooked = fly(model=model, thrust_scale=(1.0, 1.0, 1.0, 1.1), lag=1e-3, rate=2000, seconds=0.1)
+    torque = 0.24 * 0.1 * HOVER[3] / 5e-3
+    assert crooked.rates[-1, 0] == pytest.approx(torque * (0.1 - 1e-3), rel=1e-2)
+
+
+@BOTH
 def test_another_force_accelerates_it_by_its_mass_and_another_torque_by_its_inertia(model: str) -> None:
     pulled = fly(model=model, drag=0.0, force=[0.1, -0.2, 0.3])
     assert pulled.velocity[-1] == pytest.approx([0.2, -0.4, 0.6], abs=1e-9)

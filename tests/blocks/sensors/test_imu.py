@@ -3,6 +3,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from quadvis.block import ParameterError
 from quadvis.testing import Driven, drive
@@ -113,3 +116,48 @@ def test_yaw_is_not_measured_and_the_stamp_is_the_instant() -> None:
 def test_a_negative_noise_is_refused() -> None:
     with pytest.raises(ParameterError, match="rate_noise must be at least 0 rad/s, got -1 rad/s"):
         Imu(rate_noise=-1.0)
+
+
+def sine(**parameters: Any) -> Driven:
+    time = np.arange(60) / 100
+    wave = np.sin(3.0 * time)
+    attitude = np.column_stack((wave, 0.5 * wave, 0.0 * wave))
+    return drive(Imu(**QUIET, **parameters), attitude=attitude, rates=2.0 * attitude, rate="100 Hz")
+
+
+@pytest.mark.parametrize("delay", [0.004, 0.01, 0.03, 0.0425])
+def test_a_delay_gives_what_was_measured_before(delay: float) -> None:
+    result = sine(delay=delay)
+    time = np.arange(60) / 100
+    then = np.sin(3.0 * (time - delay))[6:]
+    assert result.roll[6:] == pytest.approx(then, abs=9 * 0.01**2 / 8)  # of straight lines between ticks
+    assert result.gyro[6:, 1] == pytest.approx(then, abs=9 * 0.01**2 / 8)
+    assert result.stamp == pytest.approx(time - delay)
+    assert result.roll[0] == 0.0
+
+
+def test_a_delay_of_whole_ticks_gives_the_samples_themselves() -> None:
+    assert np.array_equal(sine(delay=0.03).roll[3:], sine().roll[:-3])
+
+
+def test_a_delay_that_holds_too_many_samples_is_refused() -> None:
+    with pytest.raises(ParameterError, match=r"at most 128 ticks of the block, 1\.28 s, got 2 s"):
+        sine(delay=2.0)
+
+
+def test_the_scale_multiplies_angles_and_rates_but_not_their_errors() -> None:
+    result = measure(**QUIET, scale=1.2, angle_bias=(0.01, 0.0))
+    assert (result.roll[0], result.pitch[0]) == pytest.approx((0.13, -0.24))
+    assert result.gyro[0] == pytest.approx(1.2 * RATES)
+
+
+small = st.floats(-0.3, 0.3)
+
+
+@given(st.tuples(small, small, small), st.tuples(small, small, st.floats(-3.0, 3.0)))
+def test_a_misaligned_unit_measures_about_its_own_axes(mount: Any, attitude: Any) -> None:
+    result = drive(Imu(**QUIET, misalignment=mount), attitude=np.array(attitude), rates=RATES, steps=1)
+    craft, unit = (Rotation.from_euler("ZYX", angles[::-1]) for angles in (attitude, mount))
+    _, pitch, roll = (craft * unit).as_euler("ZYX")
+    assert (result.roll[0], result.pitch[0]) == pytest.approx((roll, pitch), abs=1e-9)
+    assert result.gyro[0] == pytest.approx(unit.inv().apply(RATES), abs=1e-12)
