@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from quadvis.block import Block, In, Out, Param, saturated
+from quadvis.block import Block, In, Out, Param, State, Work, saturated
 from quadvis_blocks._craft import GRAVITY, MASS
-from quadvis_blocks.control._gains import check_gains, gain_pair
+from quadvis_blocks.control._gains import check_gains, check_integral, gain_pair, integrated
 
 
 class Altitude(Block):
@@ -17,7 +17,12 @@ class Altitude(Block):
     ``force_limit``. The gains follow from the bandwidth: a1 = 2 m lambda and a2 = m lambda^2 give two poles
     at -lambda. ``gains`` replace these values unless both are zero.
 
-    Source: equations (17) and (18). Error: a force error d leaves a height error of d / a2.
+    With an ``integral`` w, the integral of w times the height error is added to the height error, so that a
+    craft of unknown mass comes to its height as well: slowly with a small w, with poles at the roots of s^3 +
+    (a1 s^2 + a2 s + a2 w) / m. It stands still while r1 is at its limit.
+
+    Source: equations (17) and (18); the integral is an addition. Error: without integral a force error d
+    leaves a height error of d / a2.
     """
 
     bandwidth = Param(1.0, unit="rad/s", above=0.0, tune=True, doc="lambda, the place of the two poles")
@@ -25,6 +30,13 @@ class Altitude(Block):
         (0.0, 0.0), type="float64[2]", unit="N*s/m N/m", min=0.0, tune=True,
         doc="a1, a2 of equation (18); both zero: from the bandwidth",
     )  # fmt: skip
+    integral = Param(
+        0.0,
+        unit="1/s",
+        min=0.0,
+        tune=True,
+        doc="w, rate of the integral of the height error; 0: none, as in the paper",
+    )
     mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass of the craft; default: Draganfly IV")
     gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
     force_limit = Param(2.0, unit="N", above=0.0, tune=True, doc="greatest |r1|")
@@ -36,11 +48,15 @@ class Altitude(Block):
     height_reference = In(unit="m", doc="height to hold")
     climb_reference = In(unit="m/s", default=0.0, doc="rate of change of the reference")
     feedforward = In(unit="N", default=0.0, doc="upward force that balances a known disturbance")
+    lasting = State(unit="m")  # the integral
+    error = Work(unit="m")
+    wanted = Work(unit="N")  # r1 before its limit
     thrust = Out(unit="N", doc="collective thrust u, the sum over the rotors")
 
     def check(self) -> None:
-        """Refuse gains of which only one is zero."""
+        """Refuse gains of which only one is zero, and an integral that is too fast for them."""
         check_gains(self.gains)
+        check_integral(self.integral, *gain_pair(self.gains, self.bandwidth, self.mass), self.mass)
 
     def output(
         self,
@@ -54,7 +70,17 @@ class Altitude(Block):
     ) -> float:
         """Return the collective thrust."""
         damping, stiffness = gain_pair(self.gains, self.bandwidth, self.mass)
-        force = -damping * (climb - climb_reference) - stiffness * (height - height_reference)
-        lift: float = saturated(force, self.force_limit) + feedforward + self.mass * self.gravity
+        self.error = height - height_reference
+        self.wanted = -damping * (climb - climb_reference) - stiffness * (self.error + self.lasting)
+        lift: float = saturated(self.wanted, self.force_limit) + feedforward + self.mass * self.gravity
         upright: float = max(math.cos(pitch) * math.cos(roll), self.tilt_floor)
         return lift / upright
+
+    def update(self) -> None:
+        """Integrate the error."""
+        if self.integral > 0.0:
+            stiffness = gain_pair(self.gains, self.bandwidth, self.mass)[1]
+            step = self.integral * self.period
+            self.lasting = integrated(
+                self.lasting, self.error, step, self.wanted, self.force_limit, stiffness
+            )

@@ -132,6 +132,10 @@ class PositionFilter(Block):
         above=0.0,
         doc="deviation of position and velocity at the start",
     )
+    initial_disturbance = Param(
+        (0.0, 0.0, 0.0), type="float64[3]", unit="m/s^2", min=0.0,
+        doc="deviation of the disturbance at the start, such as that of an unknown mass; 0: its wander",
+    )  # fmt: skip
 
     ticks = State(f"float64[{TICKS},4]")  # instant and acceleration, newest last
     past = State(f"float64[{TICKS},3,9]")  # estimates just before the frames of that instant
@@ -162,7 +166,8 @@ class PositionFilter(Block):
     def start(self) -> None:
         """Begin at rest at the initial position."""
         begin_clock(self.stamps)
-        begin(self.past[TICKS - 1], self.initial, self.initial_sigma, self.wander)
+        disturbance = np.where(self.initial_disturbance > 0.0, self.initial_disturbance, self.wander)
+        begin(self.past[TICKS - 1], self.initial, self.initial_sigma, disturbance)
 
     def output(
         self, acceleration: Any, position: Any, stamp: float, valid: bool, measured: Any, time: float

@@ -1,9 +1,11 @@
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from quadvis.api import load_text
 from quadvis.block import ParameterError
 from quadvis.testing import drive
 from quadvis_blocks.control.yaw import Yaw
@@ -50,3 +52,40 @@ def test_reference_rate_and_feedforward_shift_the_balance() -> None:
 def test_one_gain_without_the_other_is_refused() -> None:
     with pytest.raises(ParameterError, match="gains must both be above 0, or both 0"):
         Yaw(gains=(0.0, 1.0))
+
+
+LOOP = """
+quadvis: 1
+name: loop
+rates: {control: 20 Hz}
+solver: {method: ode4, step: 10 ms}
+stop_time: 40 s
+blocks:
+  craft: {block: plant.lateral, in: {torque: {from: sum.y, across: hold}}}
+  law:
+    block: control.yaw
+    rate: control
+    with: {integral: INTEGRAL 1/s}
+    in:
+      angle: {from: craft.angle, across: sample}
+      angular_rate: {from: craft.angular_rate, across: sample}
+  sum: {block: signal.sum, rate: control, in: {a: law.torque, b: {value: 0.025, unit: rad/s^2}}}
+"""
+
+
+@pytest.mark.parametrize(("integral", "left"), [(0.0, 0.025), (0.2, 0.0)])  # d / a2, and nothing
+def test_with_an_integral_a_torque_that_lasts_leaves_no_error(integral: float, left: float) -> None:
+    flown = load_text(LOOP.replace("INTEGRAL", f"{integral}")).run()
+    assert flown["craft.angle"][-1] == pytest.approx(left, abs=1e-4)
+
+
+def test_the_integral_goes_the_short_way_and_stands_still_at_the_limit() -> None:
+    block = Yaw(integral=0.5, torque_limit=1.0)
+    result = drive(block, angle=[3.0] * 100 + [-0.1], angular_rate=0.0, rate="10 Hz")
+    assert result.torque[:100] == pytest.approx(np.full(100, -1.0))
+    assert result.torque[100] == pytest.approx(0.1)
+
+
+def test_an_integral_faster_than_the_damping_is_refused() -> None:
+    with pytest.raises(ParameterError, match="integral must be below 2 1/s, the damping, got 3 1/s"):
+        Yaw(integral=3.0)

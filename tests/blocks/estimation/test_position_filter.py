@@ -325,6 +325,16 @@ def test_what_the_pose_says_of_its_variance_adds_to_the_noise() -> None:
     assert both.estimate == pytest.approx(estimate(known, position, stamp).estimate, abs=1e-12)
 
 
+def test_it_begins_with_a_disturbance_as_unknown_as_it_is_told() -> None:
+    count, known, parameters = 13, np.zeros((13, 3)), {"initial_disturbance": (5.0, 0.0, 0.0)}
+    time = STEP * np.arange(count)
+    position = np.repeat(0.5 * 4.0 * time[:, None] ** 2, 3, axis=1)
+    result = estimate(known, position, time, **parameters)
+    assert result.covariance[0, :, 2, 2] == pytest.approx([25.0, WANDER**2, WANDER**2])
+    assert result.disturbance[-1, 0] == pytest.approx(4.0, rel=0.1)
+    assert (np.abs(result.disturbance[-1, 1:]) < 2.0).all()
+
+
 def test_it_begins_at_its_initial_position_and_is_not_ok_before_a_frame() -> None:
     result = drive(
         PositionFilter(initial=(1.0, 2.0, 3.0)), acceleration=np.zeros(3), position=np.full(3, np.nan),
