@@ -29,8 +29,10 @@ def fill_slots(spec: FileSpec, variant: str | None, faults: Faults, place: Place
     blocks = dict(spec[BLOCKS])
     fitting = {name: dict(_fitting(spec, name, faults)) for name in variants}
     for name in reversed(lineages.get(variant or "", [])):
-        for slot, (base, block) in fitting[name].items():
-            blocks[slot] = in_slot(base, block)
+        for slot, block in fitting[name].items():
+            before = blocks[slot]
+            assert known(before)
+            blocks[slot] = in_slot(before, block)
     return replace(spec, values=spec.values.replaced(BLOCKS, blocks), base=spec)
 
 
@@ -54,10 +56,8 @@ def _lineage(variants: Variants, variant: str, faults: Faults) -> list[str]:
     return names
 
 
-def _fitting(
-    spec: FileSpec, variant: str, faults: Faults
-) -> Iterator[tuple[str, tuple[BlockSpec, BlockSpec]]]:
-    """Yield for each slot the diagram's block and the variant's; report blocks without a slot."""
+def _fitting(spec: FileSpec, variant: str, faults: Faults) -> Iterator[tuple[str, BlockSpec]]:
+    """Yield the variant's block for each slot; report blocks without a slot."""
     blocks = spec[BLOCKS]
     for slot, block in spec[VARIANTS][variant].slots.items():
         base = blocks.get(slot)
@@ -71,11 +71,11 @@ def _fitting(
             problem = f"variant '{variant}' fills '{slot}', which is not a slot"
             faults.add(block.place, problem, f"write 'slot: true' in block '{slot}'")
         elif known(base.slot):
-            yield slot, (base, block)
+            yield slot, block
 
 
 def in_slot(base: BlockSpec, block: BlockSpec) -> BlockSpec:
-    """Return the block for a slot: it has the slot's wires and rate unless it has its own."""
+    """Return the block for a slot: without wires or rate of its own it has those of the block before it."""
     if block.inputs is None:
         block = block._replace(inputs=base.inputs, inherits=True)
     slot = base.slot if block.slot is None else block.slot

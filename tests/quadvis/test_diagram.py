@@ -214,6 +214,23 @@ def test_a_variant_builds_on_another_and_goes_before_it(tmp_path: Path) -> None:
     assert kinds == {"both": ["Ramp", "Difference"], "ramped": ["Ramp", "UnitDelay"]}
 
 
+def test_what_a_variant_leaves_out_is_that_of_the_variant_on_which_it_builds(tmp_path: Path) -> None:
+    (tmp_path / "case.yaml").write_text(
+        "quadvis: 1\nname: case\nrates: {fast: 10 Hz, slow: 1 Hz}\nstop_time: 1 s\nblocks:\n"
+        "  wave: {block: sources.sine, rate: fast}\n"
+        "  law: {slot: true, block: signal.gain, rate: fast, in: {u: wave.y}}\n"
+        "variants:\n"
+        "  slow: {slots: {law: {block: signal.gain, rate: slow, in: {u: {from: wave.y, across: sample}}}}}\n"
+        "  slow_twice: {base: slow, slots: {law: {block: signal.gain, with: {factor: 2}}}}\n"
+    )
+    law = load(tmp_path / "case.yaml", variant="slow_twice").graph["law"]
+    assert (law.block.factor, law.task.name, law.inputs) == (
+        2.0,
+        "slow",
+        load(tmp_path / "case.yaml", variant="slow").graph["law"].inputs,
+    )
+
+
 @pytest.mark.parametrize("path", sorted(DIAGRAMS.glob("*.yaml")), ids=lambda path: path.name)
 def test_every_diagram_of_the_repository_is_right_with_every_variant(path: Path) -> None:
     check(path)
