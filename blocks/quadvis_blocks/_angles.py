@@ -29,6 +29,11 @@ def rotation(roll: float, pitch: float, yaw: float) -> Any:
     )
 
 
+def turned(turn: Any, vector: Any) -> Any:
+    """Return a rotation (3, 3) times a vector (3,), without the library that a matrix product would call."""
+    return turn[:, 0] * vector[0] + turn[:, 1] * vector[1] + turn[:, 2] * vector[2]
+
+
 def askew(attitude: Any, mount: Any) -> Any:
     """Return roll, pitch and yaw (3,) of a device that sits on a craft turned by `mount`, itself such angles.
 
@@ -37,12 +42,17 @@ def askew(attitude: Any, mount: Any) -> Any:
     if mount[0] == 0.0 and mount[1] == 0.0 and mount[2] == 0.0:
         return attitude.copy()
     craft = rotation(float(attitude[0]), float(attitude[1]), float(attitude[2]))
-    turn = craft @ rotation(float(mount[0]), float(mount[1]), float(mount[2]))
-    across, up = float(turn[2, 1]), float(turn[2, 2])
+    device = rotation(float(mount[0]), float(mount[1]), float(mount[2]))
+    forward, right, down = (
+        turned(craft, device[:, 0]),
+        turned(craft, device[:, 1]),
+        turned(craft, device[:, 2]),
+    )
+    across, up = float(right[2]), float(down[2])
     return np.array(
         (
             math.atan2(across, up),
-            math.atan2(-float(turn[2, 0]), math.hypot(across, up)),
-            math.atan2(float(turn[1, 0]), float(turn[0, 0])),
+            math.atan2(-float(forward[2]), math.hypot(across, up)),
+            math.atan2(float(forward[1]), float(forward[0])),
         )
     )

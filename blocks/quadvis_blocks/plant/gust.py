@@ -43,8 +43,8 @@ class Gust(Block):
 
     def output(self, time: float) -> Any:
         """Return the present wind."""
-        mean = self.mean + self.step if reached(time, self.step_time) else self.mean
-        return mean + self.rms * self.state
+        stepped = 1.0 if reached(time, self.step_time) else 0.0
+        return self.mean + stepped * self.step + self.rms * self.state
 
     def update(self) -> None:
         """Advance the process by one period."""

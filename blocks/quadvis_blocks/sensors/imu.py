@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import INSTANT, Block, In, Out, Param, Random, State, fill_normal, random_signs
-from quadvis_blocks._angles import askew, rotation
+from quadvis_blocks._angles import askew, rotation, turned
 from quadvis_blocks._delay import check_delay
 
 DEGREE = math.pi / 180.0
@@ -120,7 +120,7 @@ def _sensed(attitude: Any, rates: Any, misalignment: Any, scale: float) -> Any:
     sensed[2:] = rates
     if misalignment[0] != 0.0 or misalignment[1] != 0.0 or misalignment[2] != 0.0:
         turn = rotation(float(misalignment[0]), float(misalignment[1]), float(misalignment[2]))
-        sensed[2:] = turn.T @ rates
+        sensed[2:] = turned(turn.T, rates)
     return scale * sensed
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from quadvis.block import Block, In, Out, Param
-from quadvis_blocks._angles import askew, rotation
+from quadvis_blocks._angles import askew, rotation, turned
 
 
 class Mount(Block):
@@ -36,7 +38,6 @@ class Mount(Block):
         place, offset = position.copy(), self.offset
         if offset[0] != 0.0 or offset[1] != 0.0 or offset[2] != 0.0:
             turn = rotation(float(attitude[0]), float(attitude[1]), float(attitude[2]))
-            for axis in range(3):
-                along = turn[axis, 0] * offset[0] + turn[axis, 1] * offset[1] - turn[axis, 2] * offset[2]
-                place[axis] += along if axis < 2 else -along
+            forward, right, down = turned(turn, np.array((offset[0], offset[1], -offset[2])))
+            place += np.array((forward, right, -down))
         return place, askew(attitude, self.angles)
