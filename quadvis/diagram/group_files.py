@@ -10,7 +10,7 @@ from quadvis.diagram.group import GROUP_KEY, Group, Use, names_group
 from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.spec import FileSpec
 from quadvis.document import YamlMap, YamlNode
-from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known, suggestion
+from quadvis.errors import UNKNOWN, Faults, Place, Unknown, closest, known, quoted
 from quadvis.machine.missing_file import RELATIVE, file_trouble
 from quadvis.machine.shipped import named_file
 
@@ -65,12 +65,17 @@ class GroupFiles:
         return self._groups[key]
 
     def warn_unused(self) -> None:
-        """Warn of parameters of groups that nothing took; all blocks have been made before."""
+        """Warn of parameters of groups that nothing took, and whose names are near one that would be taken.
+
+        A group serves several diagrams, so one that a diagram has no use for is no mistake. All blocks have
+        been made before.
+        """
         for real, use in self._uses.items():
             for name, node in self._entries(real):
-                if name not in use.taken:
-                    remedy = suggestion(name, use.wanted - use.taken) or "leave it out"
-                    self.faults.warn(node.place, f"nothing takes '{name}' of this group", remedy)
+                near = closest(name, use.wanted - use.taken) if name not in use.taken else None
+                if near is not None:
+                    problem = f"nothing takes '{name}' of this group"
+                    self.faults.warn(node.place, problem, f"did you mean {quoted(near)}?")
 
     def _entries(self, real: str) -> Iterator[tuple[str, YamlNode]]:
         spec = self._specs[real]

@@ -148,13 +148,14 @@ def test_a_change_of_the_file_changes_the_hash(project: Path) -> None:
     assert loaded().hash != before
 
 
-def test_a_parameter_that_nothing_takes_is_a_warning_with_the_name_that_was_meant(project: Path) -> None:
+def test_a_misspelt_parameter_that_nothing_takes_is_a_warning_with_the_name_that_was_meant(
+    project: Path,
+) -> None:
     assert check("craft.yaml").warnings == ()
     text = FILES["crafts/large.yaml"].replace("arm:", "amr:") + "  colour: 3\n"
     (project / "crafts/large.yaml").write_text(text)
-    arm, colour = map(str, check("craft.yaml").warnings)
-    assert arm.endswith("nothing takes 'amr' of this group; did you mean 'arm'?")
-    assert colour == "crafts/large.yaml:8:11: warning: nothing takes 'colour' of this group; leave it out"
+    (arm,) = map(str, check("craft.yaml").warnings)  # the colour is for another diagram
+    assert arm == "crafts/large.yaml:6:8: warning: nothing takes 'amr' of this group; did you mean 'arm'?"
 
 
 def test_a_sweep_goes_over_crafts_and_over_a_parameter_of_one() -> None:

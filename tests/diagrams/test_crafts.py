@@ -1,0 +1,82 @@
+"""The craft is stated once: another one is one file, which reaches every block that needs it and flies."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import quadvis
+from quadvis.diagram.diagram import Diagram
+from quadvis_blocks import _craft
+from tests.diagrams.golden import DIAGRAMS, cases
+from tests.stages import mostly_slow
+
+CRAFTS = DIAGRAMS / "crafts"
+NAMES = sorted(path.stem for path in CRAFTS.glob("*.yaml"))
+FLIGHTS = [
+    case
+    for case in cases()
+    if case[0]
+    in ("hover.yaml", "step.yaml", "trajectory.yaml", "blackout.yaml", "landing.yaml", "takeover.yaml")
+]
+NANO = {"mass": 0.03, "arm": 0.046, "inertia": (17e-6, 17e-6, 29e-6), "torque_ratio": 0.006, "lag": 0.05}
+NANO |= {"thrust_max": 0.15, "drag": 0.01, "feet": 0.03, "stiffness": 30.0}
+NANO["force_limit"] = 0.12
+
+
+def loaded(name: str, variant: str | None, craft: Path, **more: object) -> Diagram:
+    return quadvis.load(DIAGRAMS / name, variant=variant, settings=[f"vehicle={craft}"], **more)
+
+
+@pytest.mark.parametrize(("name", "variant"), FLIGHTS)
+def test_every_block_of_a_flight_has_the_craft_that_its_diagram_names(name: str, variant: str | None) -> None:
+    found = set()
+    for node in loaded(name, variant, CRAFTS / "nano.yaml").graph.nodes:
+        for parameter in NANO.keys() & node.block.interface.params.keys():
+            value = getattr(node.block, parameter)
+            assert np.array_equal(value, NANO[parameter]), f"{node.path}.{parameter}"
+            found.add(parameter)
+        if node.kind == "signal.transport_delay":
+            assert node.block.initial == pytest.approx(0.25 * 0.03 * _craft.GRAVITY)
+    assert found >= {"mass", "arm", "inertia", "torque_ratio", "lag", "drag", "thrust_max"}
+
+
+@pytest.mark.parametrize("craft", NAMES)
+def test_what_arrives_before_the_first_command_carries_the_craft(craft: str) -> None:
+    graph = loaded("hover.yaml", "geometric", CRAFTS / f"{craft}.yaml").graph
+    mass = graph["craft"].block.mass
+    assert graph["radio"].block.initial == pytest.approx(0.25 * mass * _craft.GRAVITY, rel=1e-12)
+
+
+def test_the_papers_craft_is_the_default_of_the_blocks() -> None:
+    block = loaded("hover.yaml", "geometric", CRAFTS / "draganfly.yaml").graph["craft"].block
+    assert (block.mass, block.arm, tuple(block.inertia)) == (_craft.MASS, _craft.ARM, _craft.INERTIA)
+    assert (block.lag, block.torque_ratio) == (_craft.MOTOR_LAG, _craft.TORQUE_RATIO)
+    assert (block.thrust_max, block.drag) == (_craft.THRUST_MAX, _craft.DRAG)
+
+
+@pytest.mark.parametrize(
+    ("craft", "variant"),
+    mostly_slow(
+        [
+            (craft, variant)
+            for craft in NAMES
+            for variant in ("geometric", "robust_geometric", "fused_geometric")
+        ]
+    ),
+)
+def test_every_craft_hovers(craft: str, variant: str) -> None:
+    result = loaded("hover.yaml", variant, CRAFTS / f"{craft}.yaml").run(engine="native")
+    assert result.passed, [str(verdict) for verdict in result.outcome.verdicts if not verdict.met]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("craft", NAMES)
+@pytest.mark.parametrize(
+    ("name", "variant"), [("landing.yaml", "fused"), ("blackout.yaml", "fused"), ("takeover.yaml", "fused")]
+)
+def test_every_craft_flies_under_the_failsafe(craft: str, name: str, variant: str) -> None:
+    result = loaded(name, variant, CRAFTS / f"{craft}.yaml").run(engine="native")
+    assert result.passed, [str(verdict) for verdict in result.outcome.verdicts if not verdict.met]
