@@ -8,7 +8,7 @@ from quadvis.errors import QuadvisError, suggestion
 from quadvis.machine.columns import table
 from quadvis.machine.shipped import PREFIX, named_file, shipped_folder
 
-KINDS = ("*.yaml", "parts/*.yaml", "calib/*.yaml", "sets/*.yaml", "models/*.xml")
+KINDS = ("*.yaml", "parts/*.yaml", "crafts/*.yaml", "calib/*.yaml", "sets/*.yaml", "models/*.xml")
 
 
 def shipped_names() -> list[str]:

@@ -85,7 +85,7 @@ def faulty(folder: Path, name: str, pictures: bool) -> Path:
         text = text.replace(given, "with: {ceiling: $ceiling, side: $side}")
         text = text.replace("  noise: 0.1 px  # what the detector makes of rendered pictures\n", "")
     text = text.replace("parts/", f"{DIAGRAMS}/parts/").replace(f"{DIAGRAMS}/{DIAGRAMS}/", f"{DIAGRAMS}/")
-    text = text.replace("calib/camera", f"{DIAGRAMS}/calib/camera")
+    text = text.replace("calib/camera", f"{DIAGRAMS}/calib/camera").replace("crafts/", f"{DIAGRAMS}/crafts/")
     path = folder / f"{name}_{'pictures' if pictures else 'points'}.yaml"
     path.write_text(text)
     return path

@@ -78,7 +78,7 @@ def test_all_that_is_listed_is_there_and_nothing_is_left_out() -> None:
 
 def test_a_part_a_calibration_and_a_base_are_found_from_any_folder() -> None:
     diagram = quadvis.load("lab/ours.yaml")
-    assert set(diagram.listing) == {"eyes/camera", "pose"}
+    assert set(diagram.listing) == {"eyes/mount", "eyes/camera", "pose"}
     assert {path.name for path in diagram.inputs} >= {"ours.yaml", "geometric_eyes.yaml", "camera.yaml"}
 
 
