@@ -17,20 +17,19 @@ import numpy as np
 
 from quadvis.errors import QuadvisError
 from quadvis_vision.calibrate.colour_names import cost, named, nearest_name
-from quadvis_vision.detection.blobs import find_patches
+from quadvis_vision.detection.blobs import View
 from quadvis_vision.detection.circles import SMALLEST, Ceiling, Disc, Pixels, locate
 from quadvis_vision.detection.colours import APART, THRESHOLD, Colour, tone
-from quadvis_vision.detection.detect import usable
-from quadvis_vision.detection.square import expected_radii, square_cost
+from quadvis_vision.detection.detect import BENDS_MAX, usable
+from quadvis_vision.detection.square import expected_bends, expected_radii, expected_shapes, square_cost
 
 THRESHOLDS = (THRESHOLD, 0.9, 0.55)  # tried one after the other, as the colours are unknown
 WIDTH = 400  # px: about the size to which a picture is reduced for a first look
 RADIUS_MIN = 3.0  # px
 RADIUS_MAX = 0.2  # of the picture's width
 CIRCLES_MAX = 60  # that are considered; the time to arrange circles grows with the square of their number
-SYMMETRY_MIN = (
-    0.75  # of a whole circle; compression takes more from one that is nearly as bright as the ceiling
-)
+GUESSES_MAX = 300  # patches that are measured
+SYMMETRY_MIN = 0.85  # of a whole circle
 SIZES_MAX = math.log(1.2)  # size of one circle relative to the others
 NEIGHBOURS = 0.3  # of half a diagonal: distance of a corner from the place that two opposite corners predict
 INSIDE = 0.7  # of the radius: a circle's colour is measured within this radius
@@ -122,17 +121,15 @@ def _other(name: str, seen: Sighting, order: Sequence[str]) -> str:
 def _discs(pixels: Pixels, ceiling: Ceiling, threshold: float) -> list[Disc]:
     """Return all whole circles, the largest first."""
     reduction = max(2, round(pixels.shape[1] / WIDTH))
-    limits = (RADIUS_MIN, RADIUS_MAX * pixels.shape[1])
-    patches, _ = find_patches(pixels, ceiling, threshold, limits, reduction)
+    patches = View(pixels, ceiling, reduction).plain(threshold, (RADIUS_MIN, RADIUS_MAX * pixels.shape[1]))
+    guesses = [(centre, radius) for centre, radius, _ in sorted(patches, key=lambda patch: -patch[1])]
     found: list[Disc] = []
-    for centre, radius, _ in sorted(patches, key=lambda patch: -patch[1]):
-        disc = locate(pixels, ceiling, centre, radius, slack=reduction / 2)
-        new = disc and all(abs(disc.centre - other.centre) > disc.radius for other in found)
-        if disc is not None and new and disc.symmetry >= SYMMETRY_MIN:
+    for disc in locate(pixels, guesses[:GUESSES_MAX]):
+        if disc is None or disc.symmetry < SYMMETRY_MIN:
+            continue
+        if all(abs(disc.centre - other.centre) > disc.radius for other in found):
             found.append(disc)
-        if len(found) == CIRCLES_MAX:
-            break
-    return found
+    return found[:CIRCLES_MAX]
 
 
 def _squares(discs: Sequence[Disc], ratio: float) -> Iterator[tuple[tuple[Disc, ...], float]]:
@@ -154,8 +151,22 @@ def _squares(discs: Sequence[Disc], ratio: float) -> Iterator[tuple[tuple[Disc, 
                 if misfit == math.inf:
                     continue
                 sizes = [math.log(disc.radius / radius) for disc, radius in zip(corners, radii, strict=True)]
-                if max(sizes) - min(sizes) < SIZES_MAX:
+                if max(sizes) - min(sizes) < SIZES_MAX and _whole(corners, ratio):
                     yield corners, misfit
+
+
+def _whole(corners: Sequence[Disc], ratio: float) -> bool:
+    """Return whether each circle has the ellipse of such a square; a partly hidden one has not."""
+    shapes = expected_shapes([disc.centre for disc in corners], ratio)
+    if shapes is None:
+        return False
+    off = [
+        abs(disc.bend - bend) * disc.radius
+        for disc, bend in zip(corners, expected_bends(shapes), strict=True)
+    ]
+    return all(
+        part < BENDS_MAX[0] * disc.radius + BENDS_MAX[1] for part, disc in zip(off, corners, strict=True)
+    )
 
 
 def _look(pixels: Pixels, ceiling: Ceiling, corners: Sequence[Disc]) -> Sighting:

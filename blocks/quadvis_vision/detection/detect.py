@@ -13,11 +13,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis_vision.detection.blobs import find_blobs, reductions
-from quadvis_vision.detection.circles import SMALLEST, Ceiling, Disc, Pixels, Target, locate, measure
+from quadvis_vision.detection import rays
+from quadvis_vision.detection.blobs import looks
+from quadvis_vision.detection.circles import SMALLEST, Ceiling, Disc, Pixels, Target, discs_of, locate, refine
 from quadvis_vision.detection.colours import Colour
 from quadvis_vision.detection.partial import Known, three_of_four, two_of_four, whole
-from quadvis_vision.detection.square import Blob, arrangements, expected_radii, motion, square_cost
+from quadvis_vision.detection.square import (
+    Blob,
+    arrangements,
+    expected_bends,
+    expected_radii,
+    expected_shapes,
+    motion,
+    square_cost,
+)
 
 Array = NDArray[np.float64]
 
@@ -25,15 +34,13 @@ FOUR_CIRCLES, THREE_CIRCLES, TWO_CIRCLES, NOT_FOUND, INCONSISTENT, STALE, UNCALI
 """Status: four, three or two circles seen; no target; four circles that are no square; no picture yet; no
 calibration; a picture that is empty, too small, of another size or not uint8 blue-green-red."""
 
-QUALITY_MIN = (
-    0.9  # of the median: a circle that lost a fifth of its area, or a tenth of its diameter at an edge
-)
+QUALITY_MIN = 0.9  # of the symmetry, and of the median size: a circle that lost a fifth of its area
 SIZES_MAX = math.log(1.15)  # of whole circles of a new target against their median
+BENDS_MAX = (0.12, 1.0)  # of a circle's ellipse against that of the square: the second is px of radius
 CHOICES = 6  # squares that are measured at full resolution
-ROUGH = 1.0  # px: error of a circle's place in a reduced picture
 NEAR = 0.45  # largest distance of a colour from that of its circle where only two circles are seen
 FEW = 8  # circles of one colour that are measured at full resolution where no four form a square
-SLACK = 0.008  # of the picture's width: the usual movement of the first circle
+JUMP = 0.3  # of a radius: after a larger movement of the target the rough places are taken once more
 REACH = 0.025  # of the picture's width, plus half a radius: the distance over which a circle is followed
 GROWTH_MAX = math.log(1.33)  # of the square from one picture to the next
 TURN_MAX = 0.5  # rad, the same
@@ -79,58 +86,108 @@ def nothing(status: int) -> Detection:
     return Detection(np.full((4, 2), np.nan), np.full(4, np.nan), status, np.zeros((4, 6)))
 
 
-def search(pixels: Pixels, target: Target, fewest: int = 2) -> Detection:
-    """Search the whole picture for the circles; fewer than `fewest` are no target."""
+def search(pixels: Pixels, target: Target, fewest: int = 2, thorough: bool = True) -> Detection:
+    """Search the whole picture for the circles; fewer than `fewest` are no target.
+
+    Without `thorough` there is one look only, which is enough on a plain ceiling.
+    """
     ceiling = Ceiling(pixels)
     status = NOT_FOUND
     blobs: Sequence[Sequence[Blob]] = ()
-    for reduction in reductions(pixels):
-        blobs, crowded = find_blobs(pixels, ceiling, target, reduction)
+    measured: dict[Blob, Disc | None] = {}
+    for blobs in looks(pixels, ceiling, target):
         if all(blobs):
             status = INCONSISTENT
-            found = _four(pixels, ceiling, target, arrangements(blobs, target.ratio, CHOICES))
+            found = _four(pixels, target, arrangements(blobs, target.ratio, CHOICES), measured)
             if found is not None:
                 return found
-        if crowded:  # a larger size would show even more patches
+        if not thorough:
             break
     if fewest < 4 and sum(map(bool, blobs)) >= fewest:
-        return _few(pixels, ceiling, target, blobs, fewest) or nothing(status)
+        return _few(pixels, target, blobs, fewest, measured) or nothing(status)
     return nothing(status)
 
 
+def _measure(pixels: Pixels, blobs: Sequence[Blob], measured: dict[Blob, Disc | None]) -> None:
+    """Measure blobs at full resolution, unless that was done before."""
+    new = [blob for blob in dict.fromkeys(blobs) if blob not in measured]
+    discs = locate(pixels, [(blob.centre, blob.radius) for blob in new])
+    measured.update(zip(new, discs, strict=True))
+
+
 def _four(
-    pixels: Pixels, ceiling: Ceiling, target: Target, choices: Sequence[Sequence[Blob]]
+    pixels: Pixels,
+    target: Target,
+    choices: Sequence[Sequence[Blob]],
+    measured: dict[Blob, Disc | None],
 ) -> Detection | None:
     """Return the best of some squares after measuring them at full resolution, or None."""
+    _measure(pixels, [blob for corners in choices for blob in corners], measured)
     best, least = None, math.inf
     for corners in choices:
-        discs = [locate(pixels, ceiling, blob.centre, blob.radius, ROUGH) for blob in corners]
-        known = [disc for disc in discs if disc is not None]
-        if len(known) < 4:
-            continue
-        radii, cost = _fit(known, target)
-        if cost >= least:
-            continue
-        sizes = sorted(math.log(disc.radius / radius) for disc, radius in zip(known, radii, strict=True))
-        # One of the four may be partly hidden.
-        if sizes[3] - sizes[1] > SIZES_MAX or sum(disc.symmetry >= QUALITY_MIN for disc in known) < 3:
-            continue
-        best, least = _detection(known, _places(known, radii)), cost
-    return best
+        known = [disc for blob in corners if (disc := measured[blob]) is not None]
+        if len(known) == 4:
+            cost = _square_cost(known, target)
+            if cost < least:
+                best, least = known, cost
+    return None if best is None else _refined(pixels, best, target)
+
+
+def _square_cost(known: Sequence[Disc], target: Target) -> float:
+    """Return the misfit of four measured circles to a new target; infinity if they are none."""
+    radii, cost = _fit(known, target)
+    if cost == math.inf:
+        return cost
+    sizes = sorted(math.log(disc.radius / radius) for disc, radius in zip(known, radii, strict=True))
+    shapes = expected_shapes([disc.centre for disc in known], target.ratio)
+    if shapes is None:
+        return math.inf
+    whole = 0
+    for corner, (disc, bend) in enumerate(zip(known, expected_bends(shapes), strict=True)):
+        fits = abs(disc.bend - bend) < BENDS_MAX[0] + BENDS_MAX[1] / disc.radius
+        whole += fits and disc.symmetry >= QUALITY_MIN and target.colours.nearest(disc.ratio)[0] == corner
+    # One of the four may be partly hidden, or deformed by a line beside it.
+    return cost if whole >= 3 and sizes[3] - sizes[1] <= SIZES_MAX else math.inf
+
+
+def _refined(pixels: Pixels, known: Sequence[Disc], target: Target) -> Detection | None:
+    """Return the detection of a square of circles, each measured as the ellipse that the square makes it."""
+    radii, cost = _fit(known, target)
+    shapes = expected_shapes([disc.centre for disc in known], target.ratio)
+    if cost == math.inf or shapes is None:
+        return None
+    scale = sorted(disc.radius / radius for disc, radius in zip(known, radii, strict=True))
+    seen = refine(pixels, known, shapes * ((scale[1] + scale[2]) / 2))
+    discs = [
+        disc if disc is not None and target.colours.nearest(disc.ratio)[0] == corner else None
+        for corner, disc in enumerate(seen)
+    ]
+    found = [disc for disc in discs if disc is not None]
+    if len(found) == 4:
+        return _square(found, target)
+    return _detection(discs, _places(known, radii))
 
 
 def _few(
-    pixels: Pixels, ceiling: Ceiling, target: Target, blobs: Sequence[Sequence[Blob]], fewest: int
+    pixels: Pixels,
+    target: Target,
+    blobs: Sequence[Sequence[Blob]],
+    fewest: int,
+    measured: dict[Blob, Disc | None],
 ) -> Detection | None:
     """Return three or two circles that can only be those of the target, or None."""
+    _measure(pixels, [blob for some in blobs for blob in some[:FEW]], measured)
     discs: list[list[Disc]] = [[], [], [], []]
     alike: list[list[Disc]] = [[], [], [], []]
     for corner in range(4):
         for blob in blobs[corner][:FEW]:
-            disc = locate(pixels, ceiling, blob.centre, blob.radius, ROUGH)
-            if disc is not None and disc.symmetry >= QUALITY_MIN:
+            disc = measured[blob]
+            if disc is None or disc.symmetry < QUALITY_MIN:
+                continue
+            nearest, distance = target.colours.nearest(disc.ratio)
+            if nearest == corner and not any(abs(disc.centre - o.centre) < o.radius for o in discs[corner]):
                 discs[corner].append(disc)
-                if blob.distance < NEAR:
+                if distance < NEAR:
                     alike[corner].append(disc)
     found = three_of_four(discs, target.ratio)
     if not found and fewest < 3 and sum(map(len, alike)) == 2:
@@ -152,28 +209,18 @@ def _known(known: Known, target: Target) -> Detection | None:
 
 def follow(pixels: Pixels, target: Target, places: Array, fewest: int = 2) -> Detection:
     """Search for the circles near their `places` (4, 6); if one is not there, search the whole picture."""
-    ceiling = Ceiling(pixels)
     known = [CirclePlace(complex(u, v), radius, (b, g, r)) for u, v, radius, b, g, r in places.tolist()]
-    discs: list[Disc | None] = [None] * 4
-    before: list[complex] = []
-    after: list[complex] = []
-    for corner, place in enumerate(known):
-        # The circles found so far predict the place of the next.
-        centre, slack = place.centre, SLACK * pixels.shape[1]
-        if before:
-            factor, shift, _ = motion(before, after)
-            centre, slack = factor * centre + shift, 0.0
-        disc = _near(pixels, ceiling, target, corner, place, centre, slack)
-        if disc is not None:
-            discs[corner] = disc
-            before.append(place.centre)
-            after.append(disc.centre)
-    moved = _moved(discs, known)
-    if moved is not None:
-        # The circles that were found predict the places of the others, even beyond the reach of following.
-        for corner, place in enumerate(moved):
-            discs[corner] = discs[corner] or _near(pixels, ceiling, target, corner, place, place.centre)
-    seen = _square(discs, target)
+    discs: list[Disc | None] = [
+        disc if disc is not None and _same(disc, target, corner, place.radius) else None
+        for corner, (place, disc) in enumerate(zip(known, _followed(pixels, target, places), strict=True))
+    ]
+    whole = [disc for disc in discs if disc is not None and disc.symmetry >= QUALITY_MIN]
+    if len(whole) < 4:
+        _look_around(pixels, target, known, discs)
+        whole = [disc for disc in discs if disc is not None]
+        seen = _refined(pixels, whole, target) if len(whole) == 4 else None
+    else:
+        seen = _square(whole, target)
     if seen is not None:
         return seen
     moved = _moved(discs, known)
@@ -181,33 +228,51 @@ def follow(pixels: Pixels, target: Target, places: Array, fewest: int = 2) -> De
     if kept is None:
         return search(pixels, target, fewest)
     # The search gives a better target only if it finds more circles than were followed.
-    found = search(pixels, target, max(fewest, 5 - kept.status))
+    found = search(pixels, target, max(fewest, 5 - kept.status), thorough=False)
     return found if found.status < kept.status else kept
 
 
-def _near(
-    pixels: Pixels,
-    ceiling: Ceiling,
-    target: Target,
-    corner: int,
-    place: CirclePlace,
-    centre: complex,
-    slack: float = 0.0,
-) -> Disc | None:
-    """Return a corner's circle near a centre: at the centre, or found around it by its last colour."""
-    radius = place.radius
-    disc = locate(pixels, ceiling, centre, radius, slack)
-    if slack and (disc is None or disc.symmetry < QUALITY_MIN):  # another thing may be beside the circle
-        disc = locate(pixels, ceiling, centre, radius)
-    if disc is not None and _same(disc, target, corner, radius):
-        return disc
-    light, ratio = ceiling.at(centre), place.ratio
-    colour = (light[0] * ratio[0], light[1] * ratio[1], light[2] * ratio[2])
-    rough = measure(pixels, ceiling, centre, radius, REACH * pixels.shape[1] + radius / 2, colour)
-    if rough is None or abs(math.log(rough.radius / radius)) > RADIUS_MAX:
-        return None
-    disc = locate(pixels, ceiling, rough.centre, max(radius, rough.radius))
-    return disc if disc is not None and _same(disc, target, corner, radius) else None
+def _followed(pixels: Pixels, target: Target, places: Array) -> list[Disc | None]:
+    """Return what is near the places (4, 6), measured as the ellipses that the last square had."""
+    centres, radii = places[:, :2], places[:, 2]
+    points = [complex(u, v) for u, v in centres.tolist()]
+    shapes = expected_shapes(points, target.ratio)
+    if shapes is None:
+        shapes = radii[:, None, None] * np.eye(2)
+    rough, _, contrast = rays.approach(pixels, centres, radii)
+    shift = np.sort(rough - centres, axis=0)[1:3].mean(0)
+    if np.hypot(*shift.tolist()) > JUMP * radii.min():
+        rough, _, contrast = rays.approach(pixels, centres + shift, radii)
+    found, width = rays.sharpen(pixels, rough, shapes, 0.0, contrast)
+    return discs_of(pixels, found, radii, width)
+
+
+def _look_around(
+    pixels: Pixels, target: Target, known: Sequence[CirclePlace], discs: list[Disc | None]
+) -> None:
+    """Add the circles that moved farther, by the blobs of their colours around the places to expect."""
+    blobs = next(looks(pixels, Ceiling(pixels), target))
+    moved = _moved(discs, known)
+    reach = REACH * pixels.shape[1]
+    for corner, disc in enumerate(discs):
+        if disc is not None and disc.symmetry >= QUALITY_MIN:
+            continue
+        place = known[corner] if moved is None else moved[corner]
+        near = [
+            (abs(blob.centre - place.centre), blob)
+            for blob in blobs[corner]
+            if abs(math.log(blob.radius / place.radius)) < RADIUS_MAX
+        ]
+        guesses = [
+            (blob.centre, blob.radius) for away, blob in sorted(near) if away < reach + place.radius / 2
+        ]
+        guesses = guesses[:1] if moved is None else [*guesses[:1], (place.centre, place.radius)]
+        for other in locate(pixels, guesses):
+            if other is None or not _same(other, target, corner, place.radius):
+                continue
+            best = discs[corner]
+            if best is None or best.symmetry < other.symmetry:
+                discs[corner] = other
 
 
 def _same(disc: Disc, target: Target, corner: int, radius: float) -> bool:
@@ -216,11 +281,8 @@ def _same(disc: Disc, target: Target, corner: int, radius: float) -> bool:
     )
 
 
-def _square(discs: Sequence[Disc | None], target: Target) -> Detection | None:
+def _square(known: Sequence[Disc], target: Target) -> Detection | None:
     """Return the detection of four circles that form a square, or None."""
-    known = [disc for disc in discs if disc is not None]
-    if len(known) < 4:
-        return None
     radii, cost = _fit(known, target)
     return None if cost == math.inf else _detection(known, _places(known, radii))
 
@@ -269,15 +331,23 @@ def _area(points: Sequence[complex]) -> float:
 
 def _detection(discs: Sequence[Disc | None], places: Sequence[CirclePlace]) -> Detection | None:
     """Return the detection without partly hidden circles; None if fewer than two circles are left."""
-    quality = [
-        math.nan if disc is None else min(disc.radius / place.radius, disc.symmetry)
+    sizes = [
+        math.nan if disc is None else disc.radius / place.radius
         for disc, place in zip(discs, places, strict=True)
     ]
-    order = sorted(part for part in quality if part == part)
+    order = sorted(part for part in sizes if part == part)
     if not order:
         return None
     limit = QUALITY_MIN * (order[(len(order) - 1) // 2] + order[len(order) // 2]) / 2
-    hidden = [corner for corner, part in enumerate(quality) if not part >= limit]
+    quality = [
+        math.nan if disc is None else min(size, disc.symmetry)
+        for disc, size in zip(discs, sizes, strict=True)
+    ]
+    hidden = [
+        corner
+        for corner, (disc, size) in enumerate(zip(discs, sizes, strict=True))
+        if disc is None or size < limit or disc.symmetry < QUALITY_MIN
+    ]
     if len(hidden) > 2:
         return None
     table = np.array([(p.centre.real, p.centre.imag, p.radius, *p.ratio) for p in places])

@@ -10,6 +10,10 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 Homography = tuple[float, float, float, float, float, float, float, float, float]
 
 # Corners of the unit square around the origin.
@@ -18,10 +22,10 @@ CORNERS = (complex(-0.5, -0.5), complex(0.5, -0.5), complex(0.5, 0.5), complex(-
 # Limits within which four blobs count as a square with four equal circles. A tilt of 25 deg, seen from 1.6
 # sides away, deviates from a similarity by 0.1 side. Radii differ from the expected ones by noise, by blur,
 # and by an inexact ratio of radius to side.
-MISFIT_MAX = 0.2  # of the side, rms
+MISFIT_MAX = 0.3  # of the side, rms
 SIZE_MAX = math.log(1.6)  # of all circles together
 SPREAD_MAX = math.log(1.4)  # size of one circle relative to the others
-OFFSET_MAX = 0.35  # of half a diagonal: distance of a corner from the place that two opposite corners predict
+OFFSET_MAX = 0.5  # of half a diagonal: distance of a corner from the place that two opposite corners predict
 
 
 class Blob(NamedTuple):
@@ -66,6 +70,33 @@ def expected_radii(points: Sequence[complex], ratio: float) -> tuple[float, floa
     determinant = _cross(points[1] - points[0], points[3] - points[0]) * across * down
     r1, r2, r3, r4 = (ratio * math.sqrt(determinant / w**3) for w in (1.0, across, across + down - 1, down))
     return r1, r2, r3, r4
+
+
+def expected_shapes(points: Sequence[complex], ratio: float) -> Array | None:
+    """Return the maps (4, 2, 2) from the unit circle to the images (px) of small circles on the four corners.
+
+    Each is the derivative of the homography at its corner. None as for `expected_radii`.
+    """
+    h = square_homography(points)
+    if h is None:
+        return None
+    maps = []
+    for point, p, q in zip(points, (0.0, 1.0, 1.0, 0.0), (0.0, 0.0, 1.0, 1.0), strict=True):
+        share = ratio / (h[6] * p + h[7] * q + 1)
+        u, v = point.real, point.imag
+        maps.append(
+            (
+                ((h[0] - u * h[6]) * share, (h[1] - u * h[7]) * share),
+                ((h[3] - v * h[6]) * share, (h[4] - v * h[7]) * share),
+            )
+        )
+    return np.array(maps)
+
+
+def expected_bends(shapes: Array) -> list[complex]:
+    """Return, for each map from the unit circle to an ellipse, the `bend` of a `Disc` of that ellipse."""
+    squares = (shapes @ shapes.transpose(0, 2, 1)).tolist()
+    return [complex(a - d, 2 * b) / (a + d) for (a, b), (_, d) in squares]
 
 
 def arrangement_cost(corners: Sequence[Blob], ratio: float) -> float:
