@@ -10,6 +10,7 @@ others count less, by the weights of Geman and McClure. All circles of a picture
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,6 +27,8 @@ AGREE = (0.06, 0.01)  # px and part of the radius: the least scale of the disagr
 STEP = (0.2, 0.8)  # the soft step, as parts of the way from a ray's outer level to its inner one
 ROUNDS = 4  # of weighting
 SCATTER = (0.02, 8.0)  # part of the contrast, and grey levels: of colours around a circle, at least
+CALM = 0.6  # of the least variance: colours around that vary less need no discriminant
+CLEAR = 0.5  # the least weight of rays that may all count alike
 STRANGE = 0.3  # of the contrast: a ray with another or a brighter colour inside does not start on the paint
 MIXED = 0.12  # of the contrast: if more than half of all rays are so strange, all are
 SHORT = (0.6, 0.04)  # px and part of the radius: a ray with its edge so far inside is hidden
@@ -37,11 +40,7 @@ SOFT = (0.92, 1.4)  # of the contrast: if short rays see less of it, edges are a
 BLURRED = 0.1  # px: edges that are wider than was thought by more are looked at again
 REACH = (2.6, 5.0)  # px: half the length of a ray for a sharp edge, and how it grows with the edge's width
 FIRST = (0.6, 6.0)  # of the radius, and px: half the length of rays where the width is not known
-STEADY = (
-    0.1,
-    0.02,
-    0.3,
-)  # px and part of the radius, and px at most: an edge that moves less from look to look is final
+STEADY = 0.3  # px: an edge that moves less from look to look is final
 LOOKS = 3
 _GRID = 11  # samples along an edge of the coarse window
 _WINDOW = 1.7  # half the edge of this window, in radii
@@ -59,7 +58,11 @@ _IDENTITY = np.eye(3)
 _LEVELS = np.zeros((SAMPLES, 2), np.float32)
 _LEVELS[-LEVEL:, 0] = _LEVELS[:LEVEL, 1] = 1 / LEVEL
 _ENDS = np.kron(_LEVELS, np.eye(3)).astype(np.float32)
-_MOMENT = (4 * _PLACES / SAMPLES).astype(np.float32)
+# The mean of a ray and its first moment, so that a sharp edge at x gives x + 1 and x^2 - 1.
+_MOMENTS = np.column_stack((np.full(SAMPLES, 2 / SAMPLES), 4 * _PLACES / SAMPLES)).astype(np.float32)
+_TWICE = _MOMENTS[:, 0].copy()
+_STRAINS = np.array([[1, 0, 0, 1], [0, 0, 0, 0], [0, 0, 0, 0], [1, 0, 0, -1], [0, 1, 1, 0]], float)
+_ONES = np.eye(2)
 
 
 def _window() -> Array:
@@ -71,8 +74,9 @@ def _window() -> Array:
 
 _SPOTS = _window()
 _FAR = np.hypot(*_SPOTS.T)
-_CORE, _RIM = np.flatnonzero(_FAR < 0.45), np.flatnonzero(_FAR > 1.5)
-_SUMS = np.column_stack((np.ones(len(_SPOTS)), _SPOTS)) * (_FAR < 1.6)[:, None]
+_RIM = np.flatnonzero(_FAR > 1.5)
+_CORE = np.where(_FAR < 0.45, 1 / np.count_nonzero(_FAR < 0.45), 0.0).astype(np.float32)
+_SUMS = (np.column_stack((np.ones(len(_SPOTS)), _SPOTS)) * (_FAR < 1.6)[:, None]).astype(np.float32)
 _CELL = (2 * _WINDOW / _GRID) ** 2 / math.pi
 
 
@@ -95,19 +99,25 @@ class Ellipses(NamedTuple):
 
 def approach(pixels: Pixels, centres: Array, radii: Array) -> tuple[Array, Array, Array]:
     """Return rough centres (n, 2), radii (n,) and contrasts (n,) of discs near given places and radii."""
-    places = (_SPOTS * radii[:, None, None] + centres[:, None]).astype(np.float32)
+    places = np.multiply(_SPOTS, radii[:, None, None], dtype=np.float32)
+    places += centres[:, None].astype(np.float32)
     seen = _sampled(pixels, places)
-    paints, lights = seen[:, _CORE].mean(1), np.sort(seen[:, _RIM], axis=1)[:, len(_RIM) // 2]
+    paints = _CORE @ seen
+    rim = seen[:, _RIM]
+    rim.sort(axis=1)
+    lights = rim[:, len(_RIM) // 2]
     contrast = lights - paints
-    # Grey things are darker by a factor: along the axis they differ from the ceiling as little as can be.
-    power = (contrast * contrast).sum(1)
-    axis = _axis(0.5 * lights[:, None], contrast, power)
-    dark = ((lights[:, None] - seen) @ axis[:, :, None])[..., 0]
-    sums = np.clip(2 * dark - 0.5, 0.0, 1.0) @ _SUMS
+    power = _product(contrast, contrast) + 1e-6
+    # Grey things are darker by a factor: along this axis they differ from the ceiling as little as can be.
+    slope = _product(contrast, lights) / (_product(lights, lights) + 4 * _floor(power))
+    axis = contrast - slope[:, None] * lights
+    axis /= _product(axis, contrast)[:, None] + 1e-6
+    dark = _product(lights, axis)[:, None] - (seen @ axis[:, :, None])[..., 0]
+    sums = _stepped(dark, 0.25, 0.75) @ _SUMS
     area = np.maximum(sums[:, :1], 1e-6)
-    shift = np.clip(sums[:, 1:] / area, -1.0, 1.0) * radii[:, None]
-    sizes = radii * np.clip(np.sqrt(area[:, 0] * _CELL), 0.6, 1.3)
-    return centres + shift, sizes, np.sqrt(power) + 1e-6
+    shift = np.maximum(np.minimum(sums[:, 1:] / area, 1.0), -1.0) * radii[:, None]
+    growth = np.maximum(np.minimum(np.sqrt(area[:, 0] * _CELL), 1.3), 0.6)
+    return centres + shift, radii * growth, np.sqrt(power)
 
 
 def look(pixels: Pixels, centres: Array, shapes: Array, reach: Array, stiff: float = 0.0) -> Ellipses:
@@ -118,39 +128,36 @@ def look(pixels: Pixels, centres: Array, shapes: Array, reach: Array, stiff: flo
     count = len(centres)
     radii = radii_of(shapes)
     share = np.minimum(reach / radii, 0.95)
-    ways = (shapes @ _UNITS.T).transpose(0, 2, 1)
-    along = 1 + share[:, None] * _PLACES
+    ways = (shapes @ _UNITS.T).transpose(0, 2, 1).astype(np.float32)
+    along = (1 + share[:, None] * _PLACES).astype(np.float32)
     places = ways[:, :, None] * along[:, None, :, None]
-    places += centres[:, None, None]
-    seen = _sampled(pixels, places.astype(np.float32).reshape(count * RAYS, SAMPLES, 2))
+    places += centres.astype(np.float32)[:, None, None]
+    seen = _sampled(pixels, places.reshape(count * RAYS, SAMPLES, 2))
     ends = (seen.reshape(count * RAYS, 3 * SAMPLES) @ _ENDS).reshape(count, RAYS, 2, 3)
-    ordered = np.sort(ends, axis=1)
-    lights, paints = ordered[:, RAYS // 2, 0], ordered[:, RAYS // 2, 1]
+    middle = np.sort(ends, axis=1)[:, RAYS // 2]
+    lights, paints = middle[:, 0], middle[:, 1]
     contrast = lights - paints
-    power = (contrast * contrast).sum(1) + 1e-6
+    power = _product(contrast, contrast) + 1e-6
     axis = _axis(ends[:, :, 0] - lights[:, None], contrast, power)
-    levels = (lights * axis).sum(1)[:, None] - (seen.reshape(count, -1, 3) @ axis[:, :, None])[..., 0]
+    levels = _product(lights, axis)[:, None] - (seen.reshape(count, -1, 3) @ axis[:, :, None])[..., 0]
     levels = levels.reshape(count, RAYS, SAMPLES)
-    outer, inner = (levels @ _LEVELS).transpose(2, 0, 1)
-    span = inner - outer
+    both = levels @ _LEVELS
+    outer, span = both[..., 0], both[..., 1] - both[..., 0]
     good = span > SPAN_MIN
     span = np.where(good, span, 1.0)
     dark = (levels - outer[..., None]) / span[..., None]
-    width = 2 * dark.mean(-1) - 1
-    variance = (dark @ _MOMENT + 1 - width * width) * (share * share)[:, None]
+    sums = dark @ _MOMENTS
+    first = sums[..., 0] - 1
+    variance = (sums[..., 1] + 1 - first * first) * (share * share)[:, None]
     # A soft step removes most of the noise, and all that is only a little darker than the ceiling.
-    edge = 2 * np.clip((dark - STEP[0]) / (STEP[1] - STEP[0]), 0.0, 1.0).mean(-1) - 1
+    edge = _stepped(dark, *STEP) @ _TWICE - 1
     least = (AGREE[0] / radii + AGREE[1])[:, None]
     waves, off, weights = _fit(share[:, None] * edge, good * np.minimum(span, 1.0) ** 2, least, stiff)
-    strain = np.empty((count, 2, 2))
-    strain[:, 0, 0], strain[:, 1, 1] = 1 + waves[:, 0] + waves[:, 3], 1 + waves[:, 0] - waves[:, 3]
-    strain[:, 0, 1] = strain[:, 1, 0] = waves[:, 4]
     moved = centres + (shapes @ waves[:, 1:3, None])[..., 0]
-    hidden = (
-        _hidden(ends[:, :, 1], ends[:, :, 0], paints, lights, power)
-        | ~good
-        | (off < -(SHORT[0] / radii + SHORT[1])[:, None])
-    )
+    strain = (waves @ _STRAINS).reshape(count, 2, 2) + _ONES
+    hidden = _hidden(ends[:, :, 1] - paints[:, None], ends[:, :, 0], paints, lights, power)
+    hidden |= ~good
+    hidden |= off < -(SHORT[0] / radii + SHORT[1])[:, None]
     return Ellipses(moved, shapes @ strain, lights, paints, weights, hidden, variance)
 
 
@@ -170,7 +177,7 @@ def _steady(found: Ellipses, centres: Array, radii: Array) -> bool:
     """Return whether ellipses are where a look expected them, with the sizes it expected."""
     moved = np.abs(found.centres - centres).max(1)
     grown = np.abs(radii_of(found.shapes) - radii)
-    return bool((np.maximum(moved, grown) < np.minimum(STEADY[0] + STEADY[1] * radii, STEADY[2])).all())
+    return bool(max(moved.max(), grown.max()) < STEADY)
 
 
 def sharpen(
@@ -209,8 +216,10 @@ def radii_of(shapes: Array) -> Array:
 def symmetry(found: Ellipses) -> list[float]:
     """Return for each ellipse 1 if it is whole, less for each hidden ray, below 0.9 if a part is hidden."""
     result = []
+    if not found.hidden.any() and found.weights.min() > CLEAR:
+        return [1.0] * len(found.hidden)
     for hidden, share in zip(found.hidden, found.weights.mean(1).tolist(), strict=True):
-        run = _longest_run(hidden) if hidden.any() else 0
+        run = _longest_run(hidden)
         result.append(
             min(1.0 - 0.1 * run / (HIDDEN - 0.5), 0.9 * share / SHARE_MIN if share < SHARE_MIN else 1.0)
         )
@@ -219,9 +228,10 @@ def symmetry(found: Ellipses) -> list[float]:
 
 def edge_width(found: Ellipses) -> float:
     """Return the width (px, a standard deviation) of the edges of all ellipses, where the blur is largest."""
-    variance = found.variance * (radii_of(found.shapes) ** 2)[:, None]
-    normal = np.einsum("nr,ri,rj->ij", found.weights, _BLUR_WAVES, _BLUR_WAVES) + 1e-6 * np.eye(3)
-    mean, along, across = np.linalg.solve(normal, ((found.weights * variance) @ _BLUR_WAVES).sum(0)).tolist()
+    weights = found.weights
+    variance = (weights * found.variance * (radii_of(found.shapes) ** 2)[:, None]).sum(0)
+    normal = _BLUR_WAVES.T @ (weights.sum(0)[:, None] * _BLUR_WAVES) + 1e-6 * _IDENTITY
+    mean, along, across = np.linalg.solve(normal, variance @ _BLUR_WAVES).tolist()
     return min(math.sqrt(max(0.0, mean + math.hypot(along, across))), WIDEST)
 
 
@@ -236,7 +246,24 @@ def _sampled(pixels: Pixels, places: Array) -> Array:
 
     nothing: Any = None
     seen = cv2.remap(pixels, places, nothing, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(seen, dtype=np.float32)
+    return seen.astype(np.float32)
+
+
+def _product(first: Array, second: Array) -> Array:
+    """Return the scalar products (n,) of rows (n, 3)."""
+    return np.asarray(np.einsum("ij,ij->i", first, second))
+
+
+def _stepped(dark: Array, low: float, high: float) -> Array:
+    """Return 0 up to `low`, 1 from `high` on, and a straight slope between."""
+    step = (dark - low) * (1 / (high - low))
+    np.maximum(step, 0.0, out=step)
+    return np.minimum(step, 1.0, out=step)
+
+
+def _floor(power: Array) -> Array:
+    """Return the least variance (n,) of the colours around circles, from the squared contrast."""
+    return SCATTER[0] ** 2 * power + SCATTER[1] ** 2
 
 
 def _axis(around: Array, contrast: Array, power: Array) -> Array:
@@ -244,14 +271,29 @@ def _axis(around: Array, contrast: Array, power: Array) -> Array:
 
     `around` (n, m, 3) are the differences of the colours around from the ceiling's.
     """
+    floor = _floor(power)
     scatter = around.transpose(0, 2, 1) @ around / around.shape[1]
-    scatter += (SCATTER[0] ** 2 * power + SCATTER[1] ** 2)[:, None, None] * _IDENTITY
+    if (np.einsum("nii->n", scatter) < CALM * floor).all():
+        return contrast / power[:, None]
+    scatter += floor[:, None, None] * _IDENTITY
     axis = np.linalg.solve(scatter, contrast[..., None])[..., 0]
-    return np.asarray(axis / np.maximum((axis * contrast).sum(1), 1e-9)[:, None])
+    return np.asarray(axis / np.maximum(_product(axis, contrast), 1e-9)[:, None])
+
+
+@lru_cache(4)
+def _solution(stiff: float) -> Array:
+    """Return the map from edges (rays,) to their waves (5,) where all rays count alike."""
+    prior = RAYS * np.diag([stiff, 0, 0, stiff, stiff])
+    return np.asarray(np.linalg.solve(_WAVES.T @ _WAVES + prior, _WAVES.T).T.astype(np.float32))
 
 
 def _fit(edges: Array, start: Array, least: Array, stiff: float) -> tuple[Array, Array, Array]:
     """Return the waves (n, 5) through edges (n, rays), what they leave of each edge, and the weights."""
+    if start.min() > CLEAR:
+        waves = edges @ _solution(stiff)
+        off = edges - waves @ _WAVES.T
+        if (np.abs(off) < 2 * least).all():
+            return waves, off, np.ones_like(edges)
     weights = start
     prior = RAYS * np.diag([stiff, 0, 0, stiff, stiff]) + 1e-6 * np.eye(5)
     for turn in range(ROUNDS):
@@ -259,22 +301,25 @@ def _fit(edges: Array, start: Array, least: Array, stiff: float) -> tuple[Array,
         waves = np.linalg.solve(normal, ((weights * edges) @ _WAVES)[..., None])[..., 0]
         off = edges - waves @ _WAVES.T
         away = np.abs(off)
-        if (away < 2 * least).all() and (start > 0.5).all():
-            break  # all rays agree
         scale = 2 * (weights * away).sum(1, keepdims=True) / (weights.sum(1, keepdims=True) + 1e-9)
         scale = np.maximum(scale, least) * 1.6 ** max(0, ROUNDS - 2 - turn)
         weights = start / (1 + (off / scale) ** 2) ** 2
     return waves, off, weights
 
 
-def _hidden(inner: Array, outer: Array, paints: Array, lights: Array, power: Array) -> Array:
-    """Return which rays (n, rays) start on something else than the paint, which may be in a shadow."""
-    bright = (paints * paints).sum(1) + 1e-6
-    along = (inner @ paints[:, :, None])[..., 0] / bright[:, None]
-    light = (outer @ lights[:, :, None])[..., 0] / ((lights * lights).sum(1) + 1e-6)[:, None]
-    aside = inner - along[..., None] * paints[:, None]
-    more = np.maximum(along / np.maximum(light, 1.0) - 1.0, 0.0)
-    far = (aside * aside).sum(-1) / power[:, None]
+def _hidden(away: Array, outer: Array, paints: Array, lights: Array, power: Array) -> Array:
+    """Return which rays (n, rays) start on something else than the paint, which may be in a shadow.
+
+    `away` (n, rays, 3) are the differences of the inner colours from the paint.
+    """
+    distance = np.einsum("nrc,nrc->nr", away, away) / power[:, None]
+    if distance.max() < MIXED**2:
+        return np.zeros(distance.shape, bool)
+    bright = _product(paints, paints) + 1e-6
+    along = (away @ paints[:, :, None])[..., 0] / bright[:, None]
+    light = (outer @ lights[:, :, None])[..., 0] / (_product(lights, lights) + 1e-6)[:, None]
+    far = distance - along * along * (bright / power)[:, None]
+    more = np.maximum((1 + along) / np.maximum(light, 1.0) - 1.0, 0.0)
     # If the paint is half hidden, the median colour is none of the two.
     mixed = (far > MIXED**2).mean(1) > 0.5
     brighter = more * more * (bright / power)[:, None] > STRANGE**2
