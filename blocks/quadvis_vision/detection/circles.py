@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from quadvis_vision.detection import rays
 from quadvis_vision.detection.colours import Colour, ColourCalibration
+from quadvis_vision.detection.square import expected_bends
 
 Pixels = NDArray[np.uint8]
 
@@ -102,16 +103,14 @@ def discs_of(pixels: Pixels, found: rays.Ellipses, radii: Any, edge: float) -> l
     """Return what was measured; None for what is no circle near the expected `radii` (n,), or is cut."""
     height, width = pixels.shape[:2]
     sizes = rays.radii_of(found.shapes)
-    squares = found.shapes @ found.shapes.transpose(0, 2, 1)
+    bends = expected_bends(found.shapes)
     ratios = (found.paints / np.maximum(found.lights, 1.0)).tolist()
     contrast = rays.contrasts(found).tolist()
     result: list[Disc | None] = []
-    for (u, v), size, radius, square, ratio, light, whole in zip(
-        found.centres.tolist(), sizes.tolist(), radii.tolist(), squares.tolist(), ratios, contrast,
+    for (u, v), size, radius, bend, ratio, light, whole in zip(
+        found.centres.tolist(), sizes.tolist(), radii.tolist(), bends, ratios, contrast,
         rays.symmetry(found), strict=True,
     ):  # fmt: skip
-        (a, b), (_, d) = square
-        bend = complex(a - d, 2 * b) / (a + d) if a + d > 0 else math.inf
         # The picture ends half a pixel beyond the centres of its outermost pixels.
         room = min(u, v, width - 1 - u, height - 1 - v) + 0.5
         there = light >= CONTRAST_MIN and size > 0.5 and room >= size and abs(bend) < BEND_MAX

@@ -40,7 +40,7 @@ SOFT = (0.92, 1.4)  # of the contrast: if short rays see less of it, edges are a
 BLURRED = 0.1  # px: edges that are wider than was thought by more are looked at again
 REACH = (2.6, 5.0)  # px: half the length of a ray for a sharp edge, and how it grows with the edge's width
 FIRST = (0.6, 6.0)  # of the radius, and px: half the length of rays where the width is not known
-STEADY = 0.3  # px: an edge that moves less from look to look is final
+STEADY = 0.6  # px: an edge that moves less from look to look is final
 LOOKS = 3
 _GRID = 11  # samples along an edge of the coarse window
 _WINDOW = 1.7  # half the edge of this window, in radii
@@ -52,6 +52,7 @@ _WAVES = np.column_stack((np.ones(RAYS), _UNITS, np.cos(2 * _ANGLES), np.sin(2 *
 _PRODUCTS = (_WAVES[:, :, None] * _WAVES[:, None, :]).reshape(RAYS, 25)
 _BLUR_WAVES = _WAVES[:, [0, 3, 4]]
 _MIDDLE = RAYS // 2
+_EVEN = np.linalg.pinv(_BLUR_WAVES).T
 _IDENTITY = np.eye(3)
 
 
@@ -229,6 +230,10 @@ def symmetry(found: Ellipses) -> list[float]:
 def edge_width(found: Ellipses) -> float:
     """Return the width (px, a standard deviation) of the edges of all ellipses, where the blur is largest."""
     weights = found.weights
+    if weights.min() == 1.0:
+        radii = radii_of(found.shapes)
+        mean, along, across = ((radii * radii) @ found.variance @ _EVEN / len(radii)).tolist()
+        return min(math.sqrt(max(0.0, mean + math.hypot(along, across))), WIDEST)
     variance = (weights * found.variance * (radii_of(found.shapes) ** 2)[:, None]).sum(0)
     normal = _BLUR_WAVES.T @ (weights.sum(0)[:, None] * _BLUR_WAVES) + 1e-6 * _IDENTITY
     mean, along, across = np.linalg.solve(normal, variance @ _BLUR_WAVES).tolist()

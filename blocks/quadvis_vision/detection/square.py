@@ -96,7 +96,7 @@ def expected_shapes(points: Sequence[complex], ratio: float) -> Array | None:
 def expected_bends(shapes: Array) -> list[complex]:
     """Return, for each map from the unit circle to an ellipse, the `bend` of a `Disc` of that ellipse."""
     squares = (shapes @ shapes.transpose(0, 2, 1)).tolist()
-    return [complex(a - d, 2 * b) / (a + d) for (a, b), (_, d) in squares]
+    return [complex(a - d, 2 * b) / max(a + d, 1e-9) for (a, b), (_, d) in squares]
 
 
 def arrangement_cost(corners: Sequence[Blob], ratio: float) -> float:
