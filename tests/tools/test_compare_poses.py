@@ -94,6 +94,25 @@ def test_both_methods_of_the_paper_find_the_same_attitude(tmp_path):
     assert np.array(pair["z_ratios"]) == pytest.approx(1, abs=1e-3)
 
 
+def test_the_radius_of_the_circles_reaches_the_detector(tmp_path):
+    sizes = ("--rendered", "--side", "50 cm", "--radius", "6 cm", "--pictures", "1")
+    _, methods = found(*sizes, folder=tmp_path)
+    truth = methods.pop("truth")
+    for values in methods.values():
+        assert np.abs(values - truth)[:, :3].max() < 0.04
+
+
+def test_pictures_without_any_pose_are_a_failed_run(tmp_path):
+    (tmp_path / "pictures").mkdir()
+    for number in range(2):
+        cv2.imwrite(
+            str(tmp_path / "pictures" / f"{number}.png"), np.full((322, 452, 3), 200 + number, np.uint8)
+        )
+    done = compare("--folder", "pictures", folder=tmp_path)
+    assert done.returncode == 1 and not done.stdout
+    assert "no method finds a pose in any of the 2 pictures" in done.stderr
+
+
 @pytest.mark.slow
 def test_a_folder_of_any_length_is_played_to_its_end(tmp_path):
     folder = tmp_path / "pictures: 7 #1"

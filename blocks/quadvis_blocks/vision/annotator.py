@@ -18,8 +18,10 @@ class Annotator(Block, numeric=False):
 
     The circles are marked by their numbers, a partly hidden circle also by its quality. If there is a pose,
     the square, its axes (x red, y green, z blue) and the outlines of the circles are drawn at their places by
-    the pose; outlines of circles that were not seen are orange. A caption below the picture shows the time,
-    the detector's status in words, and the pose in cm and degrees.
+    the pose; outlines of missing circles are orange. Beside each missing circle, where the pose or the other
+    circles let one expect it, stands why it is missing: hidden (in part, with its quality), cut (by the edge
+    of the picture) or not seen. A caption below the picture shows the time, the detector's status in words,
+    and the pose in cm and degrees.
 
     The picture and its results must come at the same tick, as they do from a detector at the same rate. All
     inputs except the picture and the circles may stay open. A frame that is not a picture becomes grey, so

@@ -122,7 +122,7 @@ class View:
             yield self._patches(dark, part * threshold, limits, light)
 
     def plain(self, threshold: float, limits: Limits) -> list[Patch]:
-        """Return patches with a radius within `limits` (px) and a channel below `threshold` of the ceiling."""
+        """Return patches with a radius within `limits` (px), darker than `threshold` times the ceiling."""
         return self._patches(self._dark, threshold, limits, self._ceiling)
 
     def _patches(self, dark: Any, threshold: float, limits: Limits, light: Any) -> list[Patch]:

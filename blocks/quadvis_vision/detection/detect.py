@@ -17,10 +17,11 @@ from quadvis_vision.detection import rays
 from quadvis_vision.detection.blobs import looks
 from quadvis_vision.detection.circles import SMALLEST, Ceiling, Disc, Pixels, Target, discs_of, locate, refine
 from quadvis_vision.detection.colours import Colour
-from quadvis_vision.detection.partial import Known, three_of_four, two_of_four, whole
+from quadvis_vision.detection.partial import Known, three_of_four, two_of_four
 from quadvis_vision.detection.square import (
     Blob,
     arrangements,
+    completed,
     expected_bends,
     expected_radii,
     expected_shapes,
@@ -190,7 +191,8 @@ def _few(
                 if distance < NEAR:
                     alike[corner].append(disc)
     found = three_of_four(discs, target.ratio)
-    if not found and fewest < 3 and sum(map(len, alike)) == 2:
+    # Where there are more round things of about these colours, two of them may fit by chance.
+    if not found and fewest < 3 and sum(map(len, alike)) == sum(map(len, discs)) == 2:
         found = two_of_four(alike, target.ratio)
     return _known(found[0], target) if len(found) == 1 else None
 
@@ -202,7 +204,7 @@ def _known(known: Known, target: Target) -> Detection | None:
         CirclePlace(known[k].centre, known[k].radius, known[k].ratio)
         if k in known
         else CirclePlace(centre, radius, target.colours.ratios[k])
-        for k, centre in enumerate(whole(known))
+        for k, centre in enumerate(completed({k: disc.centre for k, disc in known.items()}))
     ]
     return _detection([known.get(k) for k in range(4)], places)
 

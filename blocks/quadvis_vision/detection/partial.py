@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from itertools import combinations, product
 
 from quadvis_vision.detection.circles import Disc
-from quadvis_vision.detection.square import CORNERS, motion
+from quadvis_vision.detection.square import CORNERS
 
 Known = dict[int, Disc]  # by corner 0..3
 
@@ -19,6 +19,7 @@ SIZE_MAX = (
     0.03,
     0.35,
 )  # of the circles against what their places make one expect: the second is px of radius
+PAIR_MAX = (0.02, 0.15)  # the same for two circles alone
 SPREAD_MAX = math.log(1.28)  # size of one circle relative to another: 25 deg of tilt nearby make a quarter
 BEND_MAX = 0.25  # of a circle: by a tilt of 37 deg
 BENDS_MAX = 0.18  # between the ellipses of two circles
@@ -46,23 +47,9 @@ def two_of_four(discs: Sequence[Sequence[Disc]], ratio: float) -> list[Known]:
     for i, j in combinations(range(4), 2):
         square = abs(CORNERS[j] - CORNERS[i]) ** 2
         for p, q in product(discs[i], discs[j]):
-            if _alike(p, q) and _apart(q.centre - p.centre, p, q, square, ratio):
+            if _alike(p, q) and _apart(q.centre - p.centre, p, q, square, ratio, PAIR_MAX):
                 found.append({i: p, j: q})
     return found
-
-
-def whole(known: Known) -> tuple[complex, complex, complex, complex]:
-    """Return the centres of all four circles: known ones, and the others where a square would have them."""
-    if len(known) == 3:
-        (missing,) = set(range(4)) - set(known)
-        before, opposite, after = (known[(missing + k) % 4].centre for k in (3, 2, 1))
-        places = {corner: disc.centre for corner, disc in known.items()} | {
-            missing: before + after - opposite
-        }
-        return places[0], places[1], places[2], places[3]
-    factor, shift, _ = motion([CORNERS[k] for k in known], [disc.centre for disc in known.values()])
-    p1, p2, p3, p4 = (known[k].centre if k in known else factor * CORNERS[k] + shift for k in range(4))
-    return p1, p2, p3, p4
 
 
 def _alike(p: Disc, q: Disc) -> bool:
@@ -72,7 +59,9 @@ def _alike(p: Disc, q: Disc) -> bool:
     return abs(p.bend - q.bend) < BENDS_MAX + BLUR / (p.radius * q.radius)
 
 
-def _apart(step: complex, p: Disc, q: Disc, square: float, ratio: float) -> bool:
+def _apart(
+    step: complex, p: Disc, q: Disc, square: float, ratio: float, limits: tuple[float, float] = SIZE_MAX
+) -> bool:
     """Return whether a step on the ceiling, `step` in the picture, has the squared length `square`.
 
     A circle's ellipse measures lengths on the ceiling. If A maps the ceiling to the picture, A A' has the
@@ -82,7 +71,7 @@ def _apart(step: complex, p: Disc, q: Disc, square: float, ratio: float) -> bool
     bend, radius = (p.bend + q.bend) / 2, (p.radius + q.radius) / 2
     length = abs(step) ** 2 - (bend.conjugate() * step * step).real
     length *= ratio * ratio / (radius * radius * math.sqrt(1 - abs(bend) ** 2))
-    return abs(math.log(max(length, 1e-9) / square)) / 2 < _size_max(radius)
+    return abs(math.log(max(length, 1e-9) / square)) / 2 < limits[0] + limits[1] / radius
 
 
 def _corner(p: Disc, q: Disc, r: Disc, ratio: float) -> bool:

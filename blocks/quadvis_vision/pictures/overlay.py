@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from quadvis_vision.camera.projection import circle_outline, target_corners
+from quadvis_vision.detection.square import completed
 from quadvis_vision.pictures.drawing import (
     PLATE,
     SHIFT,
@@ -75,6 +76,7 @@ class Overlay:
 
     def __init__(self, camera: CameraCalibration, side: float, radius: float, zoom: int) -> None:
         self.camera, self.zoom, self.side = camera, zoom, side
+        self._ratio = radius / side
         corners = target_corners(side)
         self._edges = _polygon(corners)
         self._outlines = [circle_outline(corner[:2].tolist(), radius) for corner in corners]
@@ -89,6 +91,8 @@ class Overlay:
         with np.errstate(all="ignore"):  # a pose may be anything
             if _has_view(found):
                 self._draw_target(canvas, found, found.rotation, -found.rotation @ found.position)
+            else:
+                self._draw_missing(canvas, found)
             self._draw_circles(canvas, found)
         return np.vstack((canvas, _caption(canvas.shape[1], found, title)))
 
@@ -120,8 +124,33 @@ class Overlay:
             self._line(canvas, closed, turn, shift, colour, 1)
             if missing:
                 (pixel,) = self.camera.project(outline.mean(axis=0) @ turn.T + shift)
+                edge = self.camera.project(outline @ turn.T + shift)
                 if np.isfinite(pixel).all():
-                    self._word(canvas, f"{number} missing", pixel, (-30, 5), _WARNING)
+                    reach = np.abs(edge - pixel).max(axis=0)
+                    self._name_missing(canvas, number, found, pixel, reach)
+
+    def _draw_missing(self, canvas: Any, found: Finding) -> None:
+        """Name the missing circles where the others let one expect them, without a pose."""
+        places = expected_places(found.centres)
+        if places is None:
+            return
+        reach = np.full(2, self._ratio * abs(places[2] - places[0]) / math.sqrt(2))
+        for number, (place, centre) in enumerate(zip(places, found.centres, strict=True), 1):
+            if not np.isfinite(centre).all():
+                self._name_missing(canvas, number, found, np.array((place.real, place.imag)), reach)
+
+    def _name_missing(self, canvas: Any, number: int, found: Finding, pixel: Floats, reach: Floats) -> None:
+        """Write why a circle is missing: it is partly hidden, cut by the edge of the picture, or not seen."""
+        quality = found.quality[number - 1]
+        size = np.array(canvas.shape[1::-1]) / self.zoom
+        if np.isfinite(quality):
+            why = f"hidden ({quality:.2f})"
+        elif (pixel - reach < -0.5).any() or (pixel + reach > size - 0.5).any():
+            why = "cut"
+        else:
+            why = "not seen"
+        inside = np.clip(pixel, 0, size - 1)
+        self._word(canvas, f"{number} {why}", inside, (-30, 5), _WARNING)
 
     def _draw_circles(self, canvas: Any, found: Finding) -> None:
         """Mark each circle that was seen by a cross and its number, and write its hidden share beside it."""
@@ -154,6 +183,13 @@ class Overlay:
     def _word(self, canvas: Any, text: str, pixel: Floats, offset: tuple[int, int], colour: Colour) -> None:
         x, y = (sixteenths(pixel[None], self.zoom)[0] >> SHIFT).tolist()
         write_on_plate(canvas, text, (x + offset[0], y + offset[1]), colour, 0.5)
+
+
+def expected_places(centres: Floats) -> list[complex] | None:
+    """Return the places (px) of all four circles from three or two known `centres` (4, 2), None without."""
+    points = centres[:, 0] + 1j * centres[:, 1]
+    known = {k: complex(point) for k, point in enumerate(points) if np.isfinite(point)}
+    return list(completed(known)) if 2 <= len(known) <= 3 else None
 
 
 def pose_text(found: Finding) -> str:
