@@ -95,7 +95,7 @@ def locate(pixels: Pixels, guesses: Sequence[tuple[complex, float]]) -> list[Dis
 def refine(pixels: Pixels, guesses: Sequence[Disc], shapes: Any) -> list[Disc | None]:
     """Return circles measured once more, with the `shapes` (n, 2, 2) in px that a target gives them."""
     centres = np.array([(disc.centre.real, disc.centre.imag) for disc in guesses])
-    found, width = rays.sharpen(pixels, centres, shapes, guesses[0].width)
+    found, width, _ = rays.sharpen(pixels, centres, shapes, guesses[0].width)
     return discs_of(pixels, found, rays.radii_of(shapes), width)
 
 

@@ -212,9 +212,10 @@ def _known(known: Known, target: Target) -> Detection | None:
 def follow(pixels: Pixels, target: Target, places: Array, fewest: int = 2) -> Detection:
     """Search for the circles near their `places` (4, 6); if one is not there, search the whole picture."""
     known = [CirclePlace(complex(u, v), radius, (b, g, r)) for u, v, radius, b, g, r in places.tolist()]
+    measured, exact = _followed(pixels, target, places)
     discs: list[Disc | None] = [
         disc if disc is not None and _same(disc, target, corner, place.radius) else None
-        for corner, (place, disc) in enumerate(zip(known, _followed(pixels, target, places), strict=True))
+        for corner, (place, disc) in enumerate(zip(known, measured, strict=True))
     ]
     whole = [disc for disc in discs if disc is not None and disc.symmetry >= QUALITY_MIN]
     if len(whole) < 4:
@@ -222,7 +223,7 @@ def follow(pixels: Pixels, target: Target, places: Array, fewest: int = 2) -> De
         whole = [disc for disc in discs if disc is not None]
         seen = _refined(pixels, whole, target) if len(whole) == 4 else None
     else:
-        seen = _square(whole, target)
+        seen = _square(whole, target) if exact else _refined(pixels, whole, target)
     if seen is not None:
         return seen
     moved = _moved(discs, known)
@@ -234,8 +235,11 @@ def follow(pixels: Pixels, target: Target, places: Array, fewest: int = 2) -> De
     return found if found.status < kept.status else kept
 
 
-def _followed(pixels: Pixels, target: Target, places: Array) -> list[Disc | None]:
-    """Return what is near the places (4, 6), measured as the ellipses that the last square had."""
+def _followed(pixels: Pixels, target: Target, places: Array) -> tuple[list[Disc | None], bool]:
+    """Return what is near the places (4, 6), measured as the ellipses that the last square had.
+
+    The second value is false if they moved or grew so much that their ellipses are others.
+    """
     centres, radii = places[:, :2], places[:, 2]
     points = [complex(u, v) for u, v in centres.tolist()]
     shapes = expected_shapes(points, target.ratio)
@@ -245,8 +249,8 @@ def _followed(pixels: Pixels, target: Target, places: Array) -> list[Disc | None
     shift = np.sort(rough - centres, axis=0)[1:3].mean(0)
     if np.hypot(*shift.tolist()) > JUMP * radii.min():
         rough, _, contrast = rays.approach(pixels, centres + shift, radii)
-    found, width = rays.sharpen(pixels, rough, shapes, 0.0, contrast)
-    return discs_of(pixels, found, radii, width)
+    found, width, exact = rays.sharpen(pixels, rough, shapes, 0.0, contrast)
+    return discs_of(pixels, found, radii, width), exact
 
 
 def _look_around(

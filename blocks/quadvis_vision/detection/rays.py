@@ -183,23 +183,26 @@ def _steady(found: Ellipses, centres: Array, radii: Array) -> bool:
 
 def sharpen(
     pixels: Pixels, centres: Array, shapes: Array, width: float, contrast: Array | None = None
-) -> tuple[Ellipses, float]:
+) -> tuple[Ellipses, float, bool]:
     """Look with short rays until the ellipses, of known shapes, stay where they are.
 
     `width` (px) is that of the edges; the second value is what was measured. If it is not known, `contrast`
-    (n,) is that of the circles: short rays see less of it where edges are wide.
+    (n,) is that of the circles: short rays see less of it where edges are wide. The third value is whether
+    the first look found the ellipses where they were expected.
     """
-    radii = radii_of(shapes)
-    for _ in range(LOOKS):
+    radii, first = radii_of(shapes), True
+    for turn in range(LOOKS):
         found = look(pixels, centres, shapes, np.full(len(shapes), reach_for(width)), stiff=1.0)
         steady = _steady(found, centres, radii)
         centres, before, width = found.centres, max(width, SHARP), max(width, edge_width(found))
         if contrast is not None:
             seen = np.sort(contrasts(found) / contrast)
             width, contrast = max(width, SOFT[1] if seen[len(seen) // 2] < SOFT[0] else 0.0), None
+        if turn == 0:
+            first = steady
         if steady and width - before < BLURRED:
             break
-    return found, width
+    return found, width, first
 
 
 def contrasts(found: Ellipses) -> Array:
