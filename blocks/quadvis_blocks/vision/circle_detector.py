@@ -55,9 +55,10 @@ class CircleDetector(Block, numeric=False):
     4      circles of all colours that are no square
     5      no picture yet
     7      the frame is not a picture, or its size is not the size for `calibration`
+    8      four circles of the target that are larger than `radius_max`
     ====== ===========================================================================
 
-    With status 7, too, the target is not found.
+    With status 7 and 8, too, the target is not found.
 
     Source: sections 5 (centres of gravity, colour calibration, order of the corners) and 6.
     """

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -31,9 +32,11 @@ from quadvis_vision.detection.square import (
 
 Array = NDArray[np.float64]
 
-FOUR_CIRCLES, THREE_CIRCLES, TWO_CIRCLES, NOT_FOUND, INCONSISTENT, STALE, UNCALIBRATED, UNUSABLE = range(8)
+FOUR_CIRCLES, THREE_CIRCLES, TWO_CIRCLES, NOT_FOUND, INCONSISTENT = range(5)
+STALE, UNCALIBRATED, UNUSABLE, TOO_LARGE = range(5, 9)
 """Status: four, three or two circles seen; no target; four circles that are no square; no picture yet; no
-calibration; a picture that is empty, too small, of another size or not uint8 blue-green-red."""
+calibration; a picture that is empty, too small, of another size or not uint8 blue-green-red; a square of
+circles that are larger than is allowed."""
 
 QUALITY_MIN = 0.9  # of the symmetry, and of the median size: a circle that lost a fifth of its area
 SIZES_MAX = math.log(1.15)  # of whole circles of a new target against their median
@@ -105,8 +108,17 @@ def search(pixels: Pixels, target: Target, fewest: int = 2, thorough: bool = Tru
         if not thorough:
             break
     if fewest < 4 and sum(map(bool, blobs)) >= fewest:
-        return _few(pixels, target, blobs, fewest, measured) or nothing(status)
-    return nothing(status)
+        found = _few(pixels, target, blobs, fewest, measured)
+        if found is not None:
+            return found
+    return nothing(TOO_LARGE if thorough and _larger(pixels, ceiling, target) else status)
+
+
+def _larger(pixels: Pixels, ceiling: Ceiling, target: Target) -> bool:
+    """Return whether a target with circles that are too large is in the picture."""
+    larger = replace(target, radius_min=target.radius_max, radius_max=max(pixels.shape) / 2)
+    blobs = next(looks(pixels, ceiling, larger))
+    return all(blobs) and _four(pixels, larger, arrangements(blobs, target.ratio, CHOICES), {}) is not None
 
 
 def _measure(pixels: Pixels, blobs: Sequence[Blob], measured: dict[Blob, Disc | None]) -> None:

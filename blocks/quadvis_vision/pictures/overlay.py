@@ -39,6 +39,7 @@ STATUS = (
     "no picture yet",
     "no calibration",
     "not a picture",
+    "circles larger than radius_max",
 )
 _PARTIAL, _LOST = 1, 3  # the first status with missing circles, and the first without any circle
 

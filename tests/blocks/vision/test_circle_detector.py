@@ -14,7 +14,7 @@ from hypothesis.extra.numpy import arrays
 from quadvis.block import Frame, ParameterError
 from quadvis.testing import drive
 from quadvis_blocks.vision.circle_detector import CircleDetector
-from quadvis_vision.detection.detect import INCONSISTENT, NOT_FOUND, STALE, UNUSABLE
+from quadvis_vision.detection.detect import INCONSISTENT, NOT_FOUND, STALE, TOO_LARGE, UNUSABLE
 from quadvis_vision.detection.square import MISFIT_MAX, expected_radii, motion, square_cost, square_homography
 
 REPO = Path(__file__).parents[3]
@@ -281,6 +281,14 @@ def test_a_target_that_jumps_is_found_at_once():
     assert rms(seen.centres, np.array([truth for _, truth in scenes])) < 0.03
 
 
+def test_circles_that_are_larger_than_allowed_are_no_target_and_are_reported():
+    rng = np.random.default_rng(31)
+    picture, _ = scene((0, 0, 2.0, 0, 0, 0.2))
+    seen = detect([expose(picture, rng), expose(picture, rng)], radius_max=20.0)
+    assert (seen.status == TOO_LARGE).all() and seen.lost.all() and np.isnan(seen.centres).all()
+    assert (detect([expose(picture, rng)], radius_max=30.0).status == 0).all()
+
+
 def test_a_circle_at_the_edge_of_the_picture_is_missing_not_displaced():
     rng = np.random.default_rng(22)
     scenes = [scene((x, 0, 2.6, 0, 0, 0)) for x in (0.0, 0.3, 0.5, 0.7, 0.78, 0.82, 0.86, 0.9)]
@@ -396,7 +404,7 @@ def test_no_picture_raises_an_error(pixels, places):
     for place, colour in zip(places, PAINT, strict=True):
         cv2.circle(pixels, tuple(int(p) for p in place), 6, colour, -1)
     seen = detect([pixels, plain_shot(), pixels, pixels])
-    assert ((seen.status >= 0) & (seen.status <= UNUSABLE)).all()
+    assert ((seen.status >= 0) & (seen.status <= TOO_LARGE)).all()
     assert (seen.found == ~np.isnan(seen.centres).any((1, 2))).all()
 
 
