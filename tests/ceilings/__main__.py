@@ -22,7 +22,8 @@ import numpy as np
 
 from quadvis_vision.detection.circles import Target
 from quadvis_vision.detection.colours import ColourCalibration
-from quadvis_vision.detection.detect import follow, search
+from quadvis_vision.detection.detect import search
+from quadvis_vision.detection.follow import follow
 from tests.ceilings.kinds import KINDS
 from tests.ceilings.stage import DISC, SQUARE, Kind, Shot, shoot
 

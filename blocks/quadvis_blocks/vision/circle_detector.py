@@ -18,11 +18,11 @@ from quadvis_vision.detection.detect import (
     TWO_CIRCLES,
     UNUSABLE,
     Detection,
-    follow,
     nothing,
     search,
     usable,
 )
+from quadvis_vision.detection.follow import follow
 
 STALE_PICTURE = 0  # of the choices of repeats
 RECENT = 32  # remembered pictures

@@ -17,7 +17,7 @@ import numpy as np
 
 from quadvis.errors import QuadvisError
 from quadvis_vision.calibrate.colour_names import cost, named, nearest_name
-from quadvis_vision.detection.blobs import View
+from quadvis_vision.detection.blobs import ReducedPicture
 from quadvis_vision.detection.circles import SMALLEST, Ceiling, Disc, Pixels, locate
 from quadvis_vision.detection.colours import APART, THRESHOLD, Colour, tone
 from quadvis_vision.detection.detect import BENDS_MAX, usable
@@ -121,7 +121,10 @@ def _other(name: str, seen: Sighting, order: Sequence[str]) -> str:
 def _discs(pixels: Pixels, ceiling: Ceiling, threshold: float) -> list[Disc]:
     """Return all whole circles, the largest first."""
     reduction = max(2, round(pixels.shape[1] / WIDTH))
-    patches = View(pixels, ceiling, reduction).plain(threshold, (RADIUS_MIN, RADIUS_MAX * pixels.shape[1]))
+    view, limits = ReducedPicture(pixels, ceiling, reduction), (RADIUS_MIN, RADIUS_MAX * pixels.shape[1])
+    # Lines that touch a circle join its patch; they vanish at lower thresholds, or where they are closed.
+    looks = (view.lower(threshold, limits), view.closed(threshold, limits))
+    patches = [*view.plain(threshold, limits), *(patch for look in looks for some in look for patch in some)]
     guesses = [(centre, radius) for centre, radius, _ in sorted(patches, key=lambda patch: -patch[1])]
     found: list[Disc] = []
     for disc in locate(pixels, guesses[:GUESSES_MAX]):

@@ -44,7 +44,7 @@ def reductions(pixels: Pixels) -> tuple[int, ...]:
 def looks(pixels: Pixels, ceiling: Ceiling, target: Target) -> Iterator[Blobs]:
     """Yield, look after look, all blobs found so far: for each corner those of its colour, the best first."""
     blobs: Blobs = [[], [], [], []]
-    views = [View(pixels, ceiling, reduction) for reduction in reductions(pixels)]
+    views = [ReducedPicture(pixels, ceiling, reduction) for reduction in reductions(pixels)]
     threshold, limits = target.colours.threshold, (target.radius_min, target.radius_max)
     for view in views:
         _add(blobs, view.plain(threshold, limits), target)
@@ -71,7 +71,7 @@ def _add(blobs: Blobs, patches: list[Patch], target: Target) -> None:
         del some[BLOBS_MAX:]
 
 
-class View:
+class ReducedPicture:
     """A reduced picture over its ceiling."""
 
     def __init__(self, pixels: Pixels, ceiling: Ceiling, reduction: int) -> None:

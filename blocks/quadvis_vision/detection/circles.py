@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis_vision.detection import rays
+from quadvis_vision.detection.approach import approach
 from quadvis_vision.detection.colours import Colour, ColourCalibration
 from quadvis_vision.detection.square import expected_bends
 
@@ -87,7 +88,7 @@ def locate(pixels: Pixels, guesses: Sequence[tuple[complex, float]]) -> list[Dis
         return []
     centres = np.array([(centre.real, centre.imag) for centre, _ in guesses])
     radii = np.array([radius for _, radius in guesses])
-    centres, sizes, _ = rays.approach(pixels, centres, radii)
+    centres, sizes, _ = approach(pixels, centres, radii)
     found = rays.settle(pixels, centres, sizes[:, None, None] * np.eye(2))
     return discs_of(pixels, found, radii, rays.edge_width(found))
 

@@ -1,7 +1,7 @@
-"""From a picture to four circles: search the whole picture, or follow the circles of the picture before.
+"""From a picture to four circles: search the whole picture.
 
 A search takes the best square of four circles. Without a square it takes three or two circles that cannot be
-anything else; see `partial`. Once the circles are known, three or two that moved together keep the target.
+anything else; see `partial`. Once the circles are known they are followed; see `follow`.
 """
 
 from __future__ import annotations
@@ -14,19 +14,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis_vision.detection import rays
 from quadvis_vision.detection.blobs import looks
-from quadvis_vision.detection.circles import SMALLEST, Ceiling, Disc, Pixels, Target, discs_of, locate, refine
+from quadvis_vision.detection.circles import SMALLEST, Ceiling, Disc, Pixels, Target, locate, refine
 from quadvis_vision.detection.colours import Colour
-from quadvis_vision.detection.partial import Known, three_of_four, two_of_four
+from quadvis_vision.detection.partial import Known, three_of_four, two_of_four, whole
 from quadvis_vision.detection.square import (
     Blob,
     arrangements,
-    completed,
     expected_bends,
     expected_radii,
     expected_shapes,
-    motion,
     square_cost,
 )
 
@@ -44,12 +41,6 @@ BENDS_MAX = (0.12, 1.0)  # of a circle's ellipse against that of the square: the
 CHOICES = 6  # squares that are measured at full resolution
 NEAR = 0.45  # largest distance of a colour from that of its circle where only two circles are seen
 FEW = 8  # circles of one colour that are measured at full resolution where no four form a square
-JUMP = 0.3  # of a radius: after a larger movement of the target the rough places are taken once more
-REACH = 0.025  # of the picture's width, plus half a radius: the distance over which a circle is followed
-GROWTH_MAX = math.log(1.33)  # of the square from one picture to the next
-TURN_MAX = 0.5  # rad, the same
-BEND_MAX = 0.08  # of the side: deviation of three circles from a motion of the whole square
-RADIUS_MAX = math.log(1.6)  # of a followed circle against its expected radius
 
 
 class Detection(NamedTuple):
@@ -143,7 +134,7 @@ def _four(
             cost = _square_cost(known, target)
             if cost < least:
                 best, least = known, cost
-    return None if best is None else _refined(pixels, best, target)
+    return None if best is None else refined(pixels, best, target)
 
 
 def _square_cost(known: Sequence[Disc], target: Target) -> float:
@@ -163,7 +154,7 @@ def _square_cost(known: Sequence[Disc], target: Target) -> float:
     return cost if whole >= 3 and sizes[3] - sizes[1] <= SIZES_MAX else math.inf
 
 
-def _refined(pixels: Pixels, known: Sequence[Disc], target: Target) -> Detection | None:
+def refined(pixels: Pixels, known: Sequence[Disc], target: Target) -> Detection | None:
     """Return the detection of a square of circles, each measured as the ellipse that the square makes it."""
     radii, cost = _fit(known, target)
     shapes = expected_shapes([disc.centre for disc in known], target.ratio)
@@ -177,8 +168,8 @@ def _refined(pixels: Pixels, known: Sequence[Disc], target: Target) -> Detection
     ]
     found = [disc for disc in discs if disc is not None]
     if len(found) == 4:
-        return _square(found, target)
-    return _detection(discs, _places(known, radii))
+        return square_seen(found, target)
+    return detection(discs, _places(known, radii))
 
 
 def _few(
@@ -216,93 +207,15 @@ def _known(known: Known, target: Target) -> Detection | None:
         CirclePlace(known[k].centre, known[k].radius, known[k].ratio)
         if k in known
         else CirclePlace(centre, radius, target.colours.ratios[k])
-        for k, centre in enumerate(completed({k: disc.centre for k, disc in known.items()}))
+        for k, centre in enumerate(whole(known))
     ]
-    return _detection([known.get(k) for k in range(4)], places)
+    return detection([known.get(k) for k in range(4)], places)
 
 
-def follow(pixels: Pixels, target: Target, places: Array, fewest: int = 2) -> Detection:
-    """Search for the circles near their `places` (4, 6); if one is not there, search the whole picture."""
-    known = [CirclePlace(complex(u, v), radius, (b, g, r)) for u, v, radius, b, g, r in places.tolist()]
-    measured, exact = _followed(pixels, target, places)
-    discs: list[Disc | None] = [
-        disc if disc is not None and _same(disc, target, corner, place.radius) else None
-        for corner, (place, disc) in enumerate(zip(known, measured, strict=True))
-    ]
-    whole = [disc for disc in discs if disc is not None and disc.symmetry >= QUALITY_MIN]
-    if len(whole) < 4:
-        _look_around(pixels, target, known, discs)
-        whole = [disc for disc in discs if disc is not None]
-        seen = _refined(pixels, whole, target) if len(whole) == 4 else None
-    else:
-        seen = _square(whole, target) if exact else _refined(pixels, whole, target)
-    if seen is not None:
-        return seen
-    moved = _moved(discs, known)
-    kept = None if moved is None else _detection(discs, moved)
-    if kept is None:
-        return search(pixels, target, fewest)
-    # The search gives a better target only if it finds more circles than were followed.
-    found = search(pixels, target, max(fewest, 5 - kept.status), thorough=False)
-    return found if found.status < kept.status else kept
-
-
-def _followed(pixels: Pixels, target: Target, places: Array) -> tuple[list[Disc | None], bool]:
-    """Return what is near the places (4, 6), measured as the ellipses that the last square had.
-
-    The second value is false if they moved or grew so much that their ellipses are others.
-    """
-    centres, radii = places[:, :2], places[:, 2]
-    points = [complex(u, v) for u, v in centres.tolist()]
-    shapes = expected_shapes(points, target.ratio)
-    if shapes is None:
-        shapes = radii[:, None, None] * np.eye(2)
-    rough, _, contrast = rays.approach(pixels, centres, radii)
-    shift = np.sort(rough - centres, axis=0)[1:3].mean(0)
-    if np.hypot(*shift.tolist()) > JUMP * radii.min():
-        rough, _, contrast = rays.approach(pixels, centres + shift, radii)
-    found, width, exact = rays.sharpen(pixels, rough, shapes, 0.0, contrast)
-    return discs_of(pixels, found, radii, width), exact
-
-
-def _look_around(
-    pixels: Pixels, target: Target, known: Sequence[CirclePlace], discs: list[Disc | None]
-) -> None:
-    """Add the circles that moved farther, by the blobs of their colours around the places to expect."""
-    blobs = next(looks(pixels, Ceiling(pixels), target))
-    moved = _moved(discs, known)
-    reach = REACH * pixels.shape[1]
-    for corner, disc in enumerate(discs):
-        if disc is not None and disc.symmetry >= QUALITY_MIN:
-            continue
-        place = known[corner] if moved is None else moved[corner]
-        near = [
-            (abs(blob.centre - place.centre), blob)
-            for blob in blobs[corner]
-            if abs(math.log(blob.radius / place.radius)) < RADIUS_MAX
-        ]
-        guesses = [
-            (blob.centre, blob.radius) for away, blob in sorted(near) if away < reach + place.radius / 2
-        ]
-        guesses = guesses[:1] if moved is None else [*guesses[:1], (place.centre, place.radius)]
-        for other in locate(pixels, guesses):
-            if other is None or not _same(other, target, corner, place.radius):
-                continue
-            best = discs[corner]
-            if best is None or best.symmetry < other.symmetry:
-                discs[corner] = other
-
-
-def _same(disc: Disc, target: Target, corner: int, radius: float) -> bool:
-    return (
-        abs(math.log(disc.radius / radius)) < RADIUS_MAX and target.colours.nearest(disc.ratio)[0] == corner
-    )
-
-
-def _square(known: Sequence[Disc], target: Target) -> Detection | None:
+def square_seen(known: Sequence[Disc], target: Target) -> Detection | None:
     """Return the detection of four circles that form a square, or None."""
     radii, cost = _fit(known, target)
-    return None if cost == math.inf else _detection(known, _places(known, radii))
+    return None if cost == math.inf else detection(known, _places(known, radii))
 
 
 def _fit(discs: Sequence[Disc], target: Target) -> tuple[Sequence[float], float]:
@@ -318,36 +231,7 @@ def _places(discs: Sequence[Disc], radii: Sequence[float]) -> list[CirclePlace]:
     return [CirclePlace(disc.centre, radius, disc.ratio) for disc, radius in zip(discs, radii, strict=True)]
 
 
-def _moved(discs: Sequence[Disc | None], known: Sequence[CirclePlace]) -> list[CirclePlace] | None:
-    """Return the places of all circles if three or two moved together since the last picture, else None."""
-    seen = [(place, disc) for place, disc in zip(known, discs, strict=True) if disc is not None]
-    if not 2 <= len(seen) <= 3:
-        return None
-    before, after = [place.centre for place, _ in seen], [disc.centre for _, disc in seen]
-    factor, shift, left = motion(before, after)
-    growth = abs(factor)
-    side = abs(known[2].centre - known[0].centre) / math.sqrt(2)
-    if not growth > 0 or left > BEND_MAX * side * growth or abs(math.log(growth)) > GROWTH_MAX:
-        return None
-    if abs(math.atan2(factor.imag, factor.real)) > TURN_MAX:
-        return None
-    if len(seen) == 3:
-        # Radii grow with the root of the area, as a tilt shortens one direction only.
-        growth = math.sqrt(abs(_area(after) / (_area(before) or math.inf))) or growth
-    return [
-        CirclePlace(factor * place.centre + shift, place.radius * growth, place.ratio)
-        if disc is None
-        else CirclePlace(disc.centre, place.radius * growth, disc.ratio)
-        for place, disc in zip(known, discs, strict=True)
-    ]
-
-
-def _area(points: Sequence[complex]) -> float:
-    """Return twice the area of a triangle."""
-    return ((points[1] - points[0]).conjugate() * (points[2] - points[0])).imag
-
-
-def _detection(discs: Sequence[Disc | None], places: Sequence[CirclePlace]) -> Detection | None:
+def detection(discs: Sequence[Disc | None], places: Sequence[CirclePlace]) -> Detection | None:
     """Return the detection without partly hidden circles; None if fewer than two circles are left."""
     sizes = [
         math.nan if disc is None else disc.radius / place.radius

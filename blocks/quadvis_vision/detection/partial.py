@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from itertools import combinations, product
 
 from quadvis_vision.detection.circles import Disc
-from quadvis_vision.detection.square import CORNERS
+from quadvis_vision.detection.square import CORNERS, motion
 
 Known = dict[int, Disc]  # by corner 0..3
 
@@ -50,6 +50,20 @@ def two_of_four(discs: Sequence[Sequence[Disc]], ratio: float) -> list[Known]:
             if _alike(p, q) and _apart(q.centre - p.centre, p, q, square, ratio, PAIR_MAX):
                 found.append({i: p, j: q})
     return found
+
+
+def whole(known: Known) -> tuple[complex, complex, complex, complex]:
+    """Return the centres of all four circles: known ones, and the others where a square would have them."""
+    if len(known) == 3:
+        (missing,) = set(range(4)) - set(known)
+        before, opposite, after = (known[(missing + k) % 4].centre for k in (3, 2, 1))
+        places = {corner: disc.centre for corner, disc in known.items()} | {
+            missing: before + after - opposite
+        }
+        return places[0], places[1], places[2], places[3]
+    factor, shift, _ = motion([CORNERS[k] for k in known], [disc.centre for disc in known.values()])
+    p1, p2, p3, p4 = (known[k].centre if k in known else factor * CORNERS[k] + shift for k in range(4))
+    return p1, p2, p3, p4
 
 
 def _alike(p: Disc, q: Disc) -> bool:

@@ -42,8 +42,6 @@ REACH = (2.6, 5.0)  # px: half the length of a ray for a sharp edge, and how it 
 FIRST = (0.6, 6.0)  # of the radius, and px: half the length of rays where the width is not known
 STEADY = 0.4  # px: an edge that moves less from look to look is final
 LOOKS = 3
-_GRID = 11  # samples along an edge of the coarse window
-_WINDOW = 1.7  # half the edge of this window, in radii
 
 _PLACES = (2 * np.arange(SAMPLES) + 1) / SAMPLES - 1  # of samples, in halves of a ray's length
 _ANGLES = 2 * math.pi * np.arange(RAYS) / RAYS
@@ -66,21 +64,6 @@ _STRAINS = np.array([[1, 0, 0, 1], [0, 0, 0, 0], [0, 0, 0, 0], [1, 0, 0, -1], [0
 _ONES = np.eye(2)
 
 
-def _window() -> Array:
-    """Return the places (n, 2) of the samples of the coarse window, in radii."""
-    edge = _WINDOW * ((2 * np.arange(_GRID) + 1) / _GRID - 1)
-    u, v = np.meshgrid(edge, edge)
-    return np.column_stack((u.ravel(), v.ravel()))
-
-
-_SPOTS = _window()
-_FAR = np.hypot(*_SPOTS.T)
-_RIM = np.flatnonzero(_FAR > 1.5)
-_CORE = np.where(_FAR < 0.45, 1 / np.count_nonzero(_FAR < 0.45), 0.0).astype(np.float32)
-_SUMS = (np.column_stack((np.ones(len(_SPOTS)), _SPOTS)) * (_FAR < 1.6)[:, None]).astype(np.float32)
-_CELL = (2 * _WINDOW / _GRID) ** 2 / math.pi
-
-
 class Ellipses(NamedTuple):
     """Measured ellipses: `centres` (n, 2) px, and `shapes` (n, 2, 2) px, maps from the unit circle.
 
@@ -98,29 +81,6 @@ class Ellipses(NamedTuple):
     variance: Array
 
 
-def approach(pixels: Pixels, centres: Array, radii: Array) -> tuple[Array, Array, Array]:
-    """Return rough centres (n, 2), radii (n,) and contrasts (n,) of discs near given places and radii."""
-    places = np.multiply(_SPOTS, radii[:, None, None], dtype=np.float32)
-    places += centres[:, None].astype(np.float32)
-    seen = _sampled(pixels, places)
-    paints = _CORE @ seen
-    rim = seen[:, _RIM]
-    rim.sort(axis=1)
-    lights = rim[:, len(_RIM) // 2]
-    contrast = lights - paints
-    power = _product(contrast, contrast) + 1e-6
-    # Grey things are darker by a factor: along this axis they differ from the ceiling as little as can be.
-    slope = _product(contrast, lights) / (_product(lights, lights) + 4 * _floor(power))
-    axis = contrast - slope[:, None] * lights
-    axis /= _product(axis, contrast)[:, None] + 1e-6
-    dark = _product(lights, axis)[:, None] - (seen @ axis[:, :, None])[..., 0]
-    sums = _stepped(dark, 0.25, 0.75) @ _SUMS
-    area = np.maximum(sums[:, :1], 1e-6)
-    shift = np.maximum(np.minimum(sums[:, 1:] / area, 1.0), -1.0) * radii[:, None]
-    growth = np.maximum(np.minimum(np.sqrt(area[:, 0] * _CELL), 1.3), 0.6)
-    return centres + shift, radii * growth, np.sqrt(power)
-
-
 def look(pixels: Pixels, centres: Array, shapes: Array, reach: Array, stiff: float = 0.0) -> Ellipses:
     """Return the ellipses next to given ones. Rays end `reach` (n,) px on either side of the given edges.
 
@@ -133,14 +93,14 @@ def look(pixels: Pixels, centres: Array, shapes: Array, reach: Array, stiff: flo
     along = (1 + share[:, None] * _PLACES).astype(np.float32)
     places = ways[:, :, None] * along[:, None, :, None]
     places += centres.astype(np.float32)[:, None, None]
-    seen = _sampled(pixels, places.reshape(count * RAYS, SAMPLES, 2))
+    seen = sampled(pixels, places.reshape(count * RAYS, SAMPLES, 2))
     ends = (seen.reshape(count * RAYS, 3 * SAMPLES) @ _ENDS).reshape(count, RAYS, 2, 3)
     middle = np.sort(ends, axis=1)[:, RAYS // 2]
     lights, paints = middle[:, 0], middle[:, 1]
     contrast = lights - paints
-    power = _product(contrast, contrast) + 1e-6
+    power = product(contrast, contrast) + 1e-6
     axis = _axis(ends[:, :, 0] - lights[:, None], contrast, power)
-    levels = _product(lights, axis)[:, None] - (seen.reshape(count, -1, 3) @ axis[:, :, None])[..., 0]
+    levels = product(lights, axis)[:, None] - (seen.reshape(count, -1, 3) @ axis[:, :, None])[..., 0]
     levels = levels.reshape(count, RAYS, SAMPLES)
     both = levels @ _LEVELS
     outer, span = both[..., 0], both[..., 1] - both[..., 0]
@@ -151,7 +111,7 @@ def look(pixels: Pixels, centres: Array, shapes: Array, reach: Array, stiff: flo
     first = sums[..., 0] - 1
     variance = (sums[..., 1] + 1 - first * first) * (share * share)[:, None]
     # A soft step removes most of the noise, and all that is only a little darker than the ceiling.
-    edge = _stepped(dark, *STEP) @ _TWICE - 1
+    edge = stepped(dark, *STEP) @ _TWICE - 1
     least = (AGREE[0] / radii + AGREE[1])[:, None]
     waves, off, weights = _fit(share[:, None] * edge, good * np.minimum(span, 1.0) ** 2, least, stiff)
     moved = centres + (shapes @ waves[:, 1:3, None])[..., 0]
@@ -248,7 +208,7 @@ def reach_for(width: float) -> float:
     return REACH[0] + REACH[1] * max(0.0, width - SHARP)
 
 
-def _sampled(pixels: Pixels, places: Array) -> Array:
+def sampled(pixels: Pixels, places: Array) -> Array:
     """Return the colours (..., 3) between pixels at places (rows, columns, 2)."""
     import cv2
 
@@ -257,19 +217,19 @@ def _sampled(pixels: Pixels, places: Array) -> Array:
     return seen.astype(np.float32)
 
 
-def _product(first: Array, second: Array) -> Array:
+def product(first: Array, second: Array) -> Array:
     """Return the scalar products (n,) of rows (n, 3)."""
     return np.asarray(np.einsum("ij,ij->i", first, second))
 
 
-def _stepped(dark: Array, low: float, high: float) -> Array:
+def stepped(dark: Array, low: float, high: float) -> Array:
     """Return 0 up to `low`, 1 from `high` on, and a straight slope between."""
     step = (dark - low) * (1 / (high - low))
     np.maximum(step, 0.0, out=step)
     return np.minimum(step, 1.0, out=step)
 
 
-def _floor(power: Array) -> Array:
+def floor(power: Array) -> Array:
     """Return the least variance (n,) of the colours around circles, from the squared contrast."""
     return SCATTER[0] ** 2 * power + SCATTER[1] ** 2
 
@@ -279,13 +239,13 @@ def _axis(around: Array, contrast: Array, power: Array) -> Array:
 
     `around` (n, m, 3) are the differences of the colours around from the ceiling's.
     """
-    floor = _floor(power)
+    least = floor(power)
     scatter = around.transpose(0, 2, 1) @ around / around.shape[1]
-    if (np.einsum("nii->n", scatter) < CALM * floor).all():
+    if (np.einsum("nii->n", scatter) < CALM * least).all():
         return contrast / power[:, None]
-    scatter += floor[:, None, None] * _IDENTITY
+    scatter += least[:, None, None] * _IDENTITY
     axis = np.linalg.solve(scatter, contrast[..., None])[..., 0]
-    return np.asarray(axis / np.maximum(_product(axis, contrast), 1e-9)[:, None])
+    return np.asarray(axis / np.maximum(product(axis, contrast), 1e-9)[:, None])
 
 
 @lru_cache(4)
@@ -323,9 +283,9 @@ def _hidden(away: Array, outer: Array, paints: Array, lights: Array, power: Arra
     distance = np.einsum("nrc,nrc->nr", away, away) / power[:, None]
     if distance.max() < MIXED**2:
         return np.zeros(distance.shape, bool)
-    bright = _product(paints, paints) + 1e-6
+    bright = product(paints, paints) + 1e-6
     along = (away @ paints[:, :, None])[..., 0] / bright[:, None]
-    light = (outer @ lights[:, :, None])[..., 0] / (_product(lights, lights) + 1e-6)[:, None]
+    light = (outer @ lights[:, :, None])[..., 0] / (product(lights, lights) + 1e-6)[:, None]
     far = distance - along * along * (bright / power)[:, None]
     more = np.maximum((1 + along) / np.maximum(light, 1.0) - 1.0, 0.0)
     # If the paint is half hidden, the median colour is none of the two.

@@ -7,7 +7,7 @@ iv (px, v down), because a similarity is then one multiplication and one additio
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -163,18 +163,6 @@ def motion(before: Sequence[complex], after: Sequence[complex]) -> tuple[complex
         off = factor * p + shift - q
         left += off.real * off.real + off.imag * off.imag
     return factor, shift, math.sqrt(left / count)
-
-
-def completed(known: Mapping[int, complex]) -> tuple[complex, complex, complex, complex]:
-    """Return all four corners from three or two, by number 0..3: the others are where a square has them."""
-    if len(known) == 3:
-        (missing,) = set(range(4)) - set(known)
-        before, opposite, after = (known[(missing + k) % 4] for k in (3, 2, 1))
-        places = {**known, missing: before + after - opposite}
-        return places[0], places[1], places[2], places[3]
-    factor, shift, _ = motion([CORNERS[k] for k in known], list(known.values()))
-    p1, p2, p3, p4 = (known[k] if k in known else factor * CORNERS[k] + shift for k in range(4))
-    return p1, p2, p3, p4
 
 
 def _misfit(points: Sequence[complex]) -> float:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from quadvis_vision.camera.projection import circle_outline, target_corners
-from quadvis_vision.detection.square import completed
 from quadvis_vision.pictures.drawing import (
     PLATE,
     SHIFT,
@@ -51,6 +50,7 @@ _GROUND = 96  # grey level in place of a frame that is not a picture
 
 _SCALE = 0.65  # of the letters in the caption; they become smaller if a line like the following would not fit
 _LONG = "t 100.00 s   picture 1000   four circles that are no square"
+_SQUARE_CORNERS = np.array([-1 - 1j, 1 - 1j, 1 + 1j, -1 + 1j])  # u + iv
 _STEPS = 12  # straight pieces of an edge, as a lens bends edges
 _REDUCED = 0.9  # of the expected radius: a smaller circle is partly hidden
 
@@ -189,8 +189,18 @@ class Overlay:
 def expected_places(centres: Floats) -> list[complex] | None:
     """Return the places (px) of all four circles from three or two known `centres` (4, 2), None without."""
     points = centres[:, 0] + 1j * centres[:, 1]
-    known = {k: complex(point) for k, point in enumerate(points) if np.isfinite(point)}
-    return list(completed(known)) if 2 <= len(known) <= 3 else None
+    known = np.flatnonzero(np.isfinite(points)).tolist()
+    if len(known) == 3:
+        missing = 6 - sum(known)
+        points[missing] = points[missing - 1] + points[(missing + 1) % 4] - points[missing - 2]
+    elif len(known) == 2:
+        i, j = known
+        points = points[i] + (points[j] - points[i]) * (_SQUARE_CORNERS - _SQUARE_CORNERS[i]) / (
+            _SQUARE_CORNERS[j] - _SQUARE_CORNERS[i]
+        )
+    else:
+        return None
+    return [complex(point) for point in points]
 
 
 def pose_text(found: Finding) -> str:

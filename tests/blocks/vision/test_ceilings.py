@@ -7,7 +7,8 @@ import pytest
 
 from quadvis_vision.detection.circles import Target
 from quadvis_vision.detection.colours import ColourCalibration
-from quadvis_vision.detection.detect import follow, search
+from quadvis_vision.detection.detect import search
+from quadvis_vision.detection.follow import follow
 from tests.ceilings.kinds import KINDS
 from tests.ceilings.stage import DISC, SQUARE, shoot
 from tests.stages import mostly_slow

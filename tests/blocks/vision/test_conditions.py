@@ -15,7 +15,8 @@ from quadvis_vision.camera.projection import (
 )
 from quadvis_vision.detection.circles import Target
 from quadvis_vision.detection.colours import ColourCalibration
-from quadvis_vision.detection.detect import follow, search
+from quadvis_vision.detection.detect import search
+from quadvis_vision.detection.follow import follow
 from quadvis_vision.trials.scenery import Condition, project
 from quadvis_vision.trials.scenes import (
     CONDITIONS,
