@@ -40,6 +40,7 @@ SOFT = (0.92, 1.4)  # of the contrast: if short rays see less of it, edges are a
 BLURRED = 0.1  # px: edges that are wider than was thought by more are looked at again
 REACH = (2.6, 5.0)  # px: half the length of a ray for a sharp edge, and how it grows with the edge's width
 FIRST = (0.6, 6.0)  # of the radius, and px: half the length of rays where the width is not known
+STRAIN_MAX = 0.4  # of the radius: how far an edge may move in one look, so that no ellipse degenerates
 STEADY = 0.4  # px: an edge that moves less from look to look is final
 LOOKS = 3
 
@@ -114,6 +115,7 @@ def look(pixels: Pixels, centres: Array, shapes: Array, reach: Array, stiff: flo
     edge = stepped(dark, *STEP) @ _TWICE - 1
     least = (AGREE[0] / radii + AGREE[1])[:, None]
     waves, off, weights = _fit(share[:, None] * edge, good * np.minimum(span, 1.0) ** 2, least, stiff)
+    waves = np.maximum(np.minimum(waves, STRAIN_MAX), -STRAIN_MAX)
     moved = centres + (shapes @ waves[:, 1:3, None])[..., 0]
     strain = (waves @ _STRAINS).reshape(count, 2, 2) + _ONES
     hidden = _hidden(ends[:, :, 1] - paints[:, None], ends[:, :, 0], paints, lights, power)
