@@ -1,4 +1,4 @@
-"""Print what the detector sees on each kind of ceiling, beside OpenCV's blob detector and a marker.
+"""Print what the detector sees on each kind of ceiling, beside OpenCV's blob detector.
 
     python -m tests.ceilings                       # 40 pictures of each kind
     python -m tests.ceilings 100 tiles wood        # 100 of each kind with one of these words in its name

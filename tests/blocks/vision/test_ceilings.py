@@ -2,13 +2,16 @@
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
+from quadvis_vision.calibrate.colour_calibration import calibrate_colours
 from quadvis_vision.detection.circles import Target
-from quadvis_vision.detection.colours import ColourCalibration
-from quadvis_vision.detection.detect import search
+from quadvis_vision.detection.colours import NAMES, ColourCalibration
+from quadvis_vision.detection.detect import TWO_CIRCLES, search
 from quadvis_vision.detection.follow import follow
+from quadvis_vision.trials.scenes import PAINT
 from tests.ceilings.kinds import KINDS
 from tests.ceilings.stage import DISC, SQUARE, shoot
 from tests.stages import mostly_slow
@@ -50,3 +53,27 @@ def test_99_of_100_pictures_are_seen_rightly_on_every_kind_of_ceiling(name):
     if KINDS[name].shown:
         assert followed >= 0.95
         assert np.sqrt(np.mean(errors**2)) <= HARD.get(name, 1.2 * RMS)
+
+
+@pytest.mark.parametrize("scenes", mostly_slow([30, 1000]))
+def test_coloured_discs_are_never_taken_for_a_part_of_the_target(scenes):
+    rng = np.random.default_rng(7)
+    for _ in range(scenes):
+        fine = np.full((480, 640, 3), (204, 208, 210), np.uint8)
+        for _ in range(int(rng.integers(4, 11))):
+            place, radius = rng.uniform(0, (640, 480)), 2 * np.exp(rng.uniform(np.log(3), np.log(22)))
+            paint = np.array(PAINT[int(rng.integers(4))]) + rng.normal(0, 12, 3)
+            colour = paint if rng.random() < 0.5 else rng.uniform(5, 235, 3)
+            cv2.circle(
+                fine, tuple(map(int, place)), int(radius), np.clip(colour, 0, 255).tolist(), -1, cv2.LINE_AA
+            )
+        picture = cv2.resize(fine, SIZE, interpolation=cv2.INTER_AREA) + rng.normal(0, 4, (240, 320, 3))
+        assert search(np.clip(picture, 0, 255).astype(np.uint8), TARGET).status > TWO_CIRCLES
+
+
+@pytest.mark.parametrize("name", mostly_slow(["tiles 30 cm, joints 0.35", "planks", "four sheets"]))
+def test_colours_are_calibrated_on_tiles_too(name):
+    shot = shoot(np.random.default_rng(5), (640, 480), KINDS[name])
+    (seen,) = calibrate_colours([shot.pixels], ["1.png"], DISC / SQUARE, NAMES).sightings
+    centres = np.array([(disc.centre.real, disc.centre.imag) for disc in seen.discs])
+    assert shot.errors(centres).max() < 0.5
