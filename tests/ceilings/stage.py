@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from quadvis_vision.camera.projection import ellipse_centres
 from quadvis_vision.trials.scenes import CORNERS, PAINT, homography
 
 FINE = 3  # rays along an edge of a pixel
@@ -25,6 +24,20 @@ WHITE = (204.0, 208.0, 210.0)
 FOCAL = 430 / 452  # of the picture's width
 
 Layer = Callable[["Stage"], None]
+
+
+def ellipse_centres(h: np.ndarray, centres: np.ndarray, radius: float) -> np.ndarray:
+    """Return the centres (n, 2) px of the ellipses that circles (n, 2) m become under a homography.
+
+    A circle's conic C becomes the conic of the inverse of H C^-1 H'; the last column of that dual conic is
+    the image of the pole of the line at infinity, the ellipse's centre.
+    """
+    found = []
+    for x, y in centres:
+        circle = np.array([[1.0, 0.0, -x], [0.0, 1.0, -y], [-x, -y, x * x + y * y - radius * radius]])
+        middle = (h @ np.linalg.inv(circle) @ h.T)[:, 2]
+        found.append(middle[:2] / middle[2])
+    return np.array(found)
 
 
 @dataclass(frozen=True)

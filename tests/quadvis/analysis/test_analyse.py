@@ -96,8 +96,8 @@ def test_pictures_are_refused_with_the_variant_that_has_none(capsys) -> None:
 def test_pictures_without_such_a_variant_are_refused_with_a_block_that_would_do(tmp_path) -> None:
     shutil.copytree(DIAGRAMS / "recordings", tmp_path / "recordings")
     text = (DIAGRAMS / "hover.yaml").read_text().partition("variants:")[0]
-    shutil.copytree(DIAGRAMS / "parts", tmp_path / "parts")
-    shutil.copytree(DIAGRAMS / "calib", tmp_path / "calib")
+    for folder in ("parts", "calib", "crafts"):
+        shutil.copytree(DIAGRAMS / folder, tmp_path / folder)
     (tmp_path / "hover.yaml").write_text(text)
     with pytest.raises(
         AnalysisError, match=r"use a camera without pictures, such as vision\.geometric_camera"
