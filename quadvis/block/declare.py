@@ -36,6 +36,9 @@ class Declared:
     def __post_init__(self) -> None:
         self.signal = SignalType.parse(self.type)
         self.units = parse_units(self.unit)
+        if self.signal.scalar == "frame" and self.signal.shape and not isinstance(self, State):
+            problem = f"{type(self).__name__} cannot be '{self.type}': only a state holds several frames"
+            raise TypeError(sentence(problem, "write frame"))
 
     def __set_name__(self, owner: Any, name: str) -> None:
         self.name = name

@@ -43,7 +43,10 @@ NO_FRAME = Frame(np.zeros((0, 0, 3), np.uint8), math.nan, 0)
 
 @dataclass(frozen=True)
 class SignalType:
-    """The type of a signal, a scalar kind and a shape: ``float64[4,2]``, ``float64[n]``, ``frame``."""
+    """The type of a signal, a scalar kind and a shape: ``float64[4,2]``, ``float64[n]``, ``frame``.
+
+    A wire carries one frame; a state may hold several, ``frame[4]``.
+    """
 
     scalar: str
     shape: tuple[int | str, ...]
@@ -51,9 +54,9 @@ class SignalType:
     @staticmethod
     @cache
     def parse(text: str) -> SignalType:
-        """Read ``float64``, ``int64[3]``, ``float64[n]``, ``float64[*]`` (any shape) or ``frame``."""
-        if text == "frame":
-            return SignalType("frame", ())
+        """Read ``float64``, ``bool[3]``, ``int64[n]``, ``float64[*]`` (of any shape) or ``frame[4]``."""
+        if several := re.fullmatch(r"frame(?:\[([1-9]\d*)\])?", text):
+            return SignalType("frame", (int(several[1]),) if several[1] else ())
         match = re.fullmatch(rf"(\w+)(?:\[({_SIZE}(?:, *{_SIZE})*|\*)\])?", text)
         if match is None or match[1] not in SCALARS:
             remedy = "write float64, int64 or bool, with a shape such as [3], [4,2], [n] or [*]"

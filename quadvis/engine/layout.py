@@ -164,10 +164,12 @@ class Layout:
         return self._records[kind]
 
     def _frames(self, block: Block) -> Slots:
-        states = [name for name, state in block.interface.states.items() if state.signal.scalar == "frame"]
-        first = self.frames
-        self.frames += len(states)
-        return Slots({name: Slot("frame", (), first + index) for index, name in enumerate(states)})
+        places = {}
+        for name, state in block.interface.states.items():
+            if state.signal.scalar == "frame":
+                places[name] = Slot("frame", state.signal.resolve({}), self.frames)
+                self.frames += places[name].size
+        return Slots(places)
 
     def _take(self, node: Node, port: str) -> Slot:
         interface = node.block.interface

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from quadvis.block import Block, Shape, Sizes
 from quadvis.block.returned import CALL
 from quadvis.block.signals import SCALARS
+from quadvis.engine.frames import Frames
 
 SLOT = 8
 C_TYPES = {"float64": ctypes.c_double, "int64": ctypes.c_int64, "bool": ctypes.c_bool}
@@ -28,7 +29,10 @@ VIEWS = {"float64": "d", "int64": "q", "bool": "?"}
 
 
 class Slot(NamedTuple):
-    """Where a signal or field lives: kind, shape, first slot; for ``frame`` its place in a list of frames."""
+    """Where a signal or field lives: kind, shape, first slot; for ``frame`` its place in a list of frames.
+
+    A state that holds several frames has the shape (n,) and n neighbouring places.
+    """
 
     scalar: str
     shape: Shape
@@ -124,16 +128,17 @@ class Memory:
         return np.ndarray(slot.shape, slot.scalar, self.raw, slot.position * SLOT, slot.strides)
 
     def read(self, slot: Slot) -> Any:
-        """Return the present value of a slot: a Python scalar, a copy of an array, or a frame."""
+        """Return the present value of a slot: a Python scalar, a copy of an array, a frame or a list."""
         if slot.scalar == "frame":
-            return self.frames[slot.position]
+            found = Frames(self.frames, slot.position, slot.size)
+            return list(found) if slot.shape else found[0]
         value = self.view(slot)
         return value.copy() if slot.shape else value.item()
 
     def write(self, slot: Slot, value: Any) -> None:
         """Store a value that fits the slot's shape."""
         if slot.scalar == "frame":
-            self.frames[slot.position] = value
+            Frames(self.frames, slot.position, slot.size).fill(value if slot.shape else [value])
         elif slot.shape:
             self.view(slot)[...] = value
         else:
@@ -208,7 +213,7 @@ class Memory:
             if param.is_text:
                 bound.__dict__[name] = getattr(block, name)
         for name, slot in frames.items():
-            bound.__dict__[_array_key(name)] = (self.frames, slot.position)
+            bound.__dict__[_array_key(name)] = Frames(self.frames, slot.position, slot.size)
         return bound
 
 
@@ -258,7 +263,8 @@ def _bound_class(block: type[Block], record: Record) -> type[Block]:
                 fields.append((f"{item.name}.rest", ctypes.c_uint8 * (SLOT - 1)))
     for state in block.interface.states.values():
         if state.signal.scalar == "frame":
-            attributes[state.name] = _frame_property(_array_key(state.name))
+            made = _frames_property if state.signal.shape else _frame_property
+            attributes[state.name] = made(_array_key(state.name))
     return types.new_class(
         block.__name__, (block, ctypes.Structure), {"bound": True}, lambda body: body.update(attributes)
     )
@@ -277,12 +283,14 @@ def _array_property(key: str) -> property:
 
 
 def _frame_property(key: str) -> property:
-    def read(block: Any) -> Any:
-        frames, place = block.__dict__[key]
-        return frames[place]
+    def write(block: Any, frame: Any) -> None:
+        block.__dict__[key][0] = frame
 
-    def write(block: Any, value: Any) -> None:
-        frames, place = block.__dict__[key]
-        frames[place] = value
+    return property(lambda block: block.__dict__[key][0], write)
 
-    return property(read, write)
+
+def _frames_property(key: str) -> property:
+    def write(block: Any, frames: Any) -> None:
+        block.__dict__[key].fill(frames)
+
+    return property(lambda block: block.__dict__[key], write)

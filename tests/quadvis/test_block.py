@@ -16,6 +16,7 @@ from quadvis.block import (
     Safe,
     SignalType,
     State,
+    Work,
     units_of,
 )
 
@@ -54,6 +55,7 @@ class Filter(Block):
         ("float64[4, n]", "float64", (4, "n")),
         ("bool[*]", "bool", ("*",)),
         ("frame", "frame", ()),
+        ("frame[16]", "frame", (16,)),
     ],
 )
 def test_a_type_is_a_scalar_kind_and_a_shape(text: str, scalar: str, shape: tuple) -> None:
@@ -74,6 +76,9 @@ def test_a_type_is_a_scalar_kind_and_a_shape(text: str, scalar: str, shape: tupl
         "float64[0]",
         "float64[-1]",
         "float64[*,3]",
+        "frame[0]",
+        "frame[n]",
+        "frame[4,4]",
     ],
 )
 def test_what_is_not_a_type_is_refused(text: str) -> None:
@@ -318,3 +323,12 @@ def test_what_reads_or_writes_outside_is_not_numeric_and_reads_before_there_are_
         type("Wrong", (Block,), {"read": lambda self: None})
     with pytest.raises(TypeError, match="read asks for 'u', which is not one of its inputs"):
         type("Wrong", (Block,), {"u": In(), "read": lambda self, u: None, "numeric": False})
+
+
+@pytest.mark.parametrize("kind", [In, Out, Work])
+def test_only_a_state_holds_several_frames(kind: type) -> None:
+    assert State("frame[2]").signal.shape == (2,)
+    with pytest.raises(
+        TypeError, match=rf"{kind.__name__} cannot be 'frame\[2\]': only a state .*; write frame"
+    ):
+        kind("frame[2]")

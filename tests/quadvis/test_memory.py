@@ -266,9 +266,69 @@ def test_a_frame_that_is_a_state_comes_back_with_a_snapshot() -> None:
     assert block.two is frames[4] and block.one is frames[5]
 
 
+class Ring(Block, numeric=False):
+    """A block that keeps the four frames before."""
+
+    frame = In("frame")
+    older = Out("frame")
+    first = State("frame")
+    ring = State("frame[4]")
+    count = State("int64")
+
+    def output(self):
+        return self.ring[self.count % 4]
+
+    def update(self, frame):
+        if self.count == 0:
+            self.first = frame
+        self.ring[self.count % 4] = frame
+        self.count += 1
+
+
+def numbered(count: int) -> list[Frame]:
+    return [Frame(np.full((2, 2, 3), k, np.uint8), 0.1 * k, k + 1) for k in range(count)]
+
+
+def test_a_state_holds_several_frames() -> None:
+    driven = drive(Ring(), frame=numbered(7), rate="10 Hz")
+    assert [frame.sequence for frame in driven.older] == [0, 0, 0, 0, 1, 2, 3]
+    engine = driven.engine
+    assert [frame.sequence for frame in engine.read("block", "ring")] == [5, 6, 7, 4]
+    assert engine.read("block", "first").sequence == 1
+    block = engine.bound("block")
+    assert len(block.ring) == 4 and block.ring[-1].sequence == 4
+    assert [frame.sequence for frame in block.ring[1:3]] == [6, 7]
+
+
+def test_several_frames_come_back_with_a_snapshot() -> None:
+    engine = drive(Ring(), frame=numbered(7), rate="10 Hz").engine
+    snapshot, before = engine.snapshot(), engine.read("block", "ring")
+    block = engine.bound("block")
+    block.ring[2] = Frame.none()
+    assert before[2].sequence == 7 and engine.read("block", "ring")[2].sequence == 0
+    engine.restore(snapshot)
+    assert all(one is other for one, other in zip(block.ring, before, strict=True))
+
+
+def test_a_state_of_several_frames_is_replaced_as_a_whole_or_not_at_all() -> None:
+    engine = drive(Ring(), frame=numbered(7), rate="10 Hz").engine
+    block, first = engine.bound("block"), engine.read("block", "first")
+    block.ring = reversed(block.ring)
+    assert [frame.sequence for frame in block.ring] == [4, 7, 6, 5] and block.first is first
+    with pytest.raises(ValueError, match="3 frames for a state that holds 4"):
+        block.ring = numbered(3)
+    with pytest.raises(IndexError):
+        block.ring[4] = first
+    assert [frame.sequence for frame in block.ring] == [4, 7, 6, 5]
+    engine.memory.write(engine.program["block"].field("ring"), numbered(4))
+    assert [frame.sequence for frame in block.ring] == [1, 2, 3, 4]
+
+
 def test_a_numeric_block_may_not_keep_a_frame() -> None:
     with pytest.raises(TypeError, match="Wrong keeps a frame as a state"):
         type("Wrong", (Block,), {"one": State("frame")})
+    with pytest.raises(TypeError, match="Wrong keeps a frame as a state"):
+        type("Wrong", (Block,), {"ring": State("frame[2]")})
 
 
 class Twice(Block):
