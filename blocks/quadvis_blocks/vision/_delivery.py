@@ -1,4 +1,4 @@
-"""The transport of a simulated camera's frames: frame rate, latency, jitter and losses."""
+"""The transport of frames: latency, jitter and losses; and the frame rate of a simulated camera."""
 
 from __future__ import annotations
 
@@ -13,20 +13,19 @@ CONTENT = 3
 
 if TYPE_CHECKING:
     _Base = Block
-else:  # `DeliveringCamera` alone is not a block: it declares Work, but has no output method
+else:  # the classes here alone are no blocks: they declare Work, but have no output method
     _Base = object
 
 
-class DeliveringCamera(_Base):
-    """A camera whose frames are late, may get lost, and may overtake each other.
+class Delivery(_Base):
+    """A transport whose frames are late, may get lost, and may overtake each other.
 
-    A frame is captured at every ``every``-th tick, from the first tick on. Frames are numbered from 1, lost
-    frames included. A frame is delivered at the first tick at or after stamp + latency + extra; the extra
-    time is drawn for each frame, uniformly from 0 to ``jitter``. The wire shows one frame, the one that
-    arrived last. With a jitter longer than the time between two frames, an older frame can follow a newer
-    one; its sequence number and stamp are then smaller. Of the frames that arrive between two ticks, the last
-    to arrive is shown; of frames that arrive together, the newest. With a latency of whole ticks any jitter
-    costs a whole tick; a faster rate of the block with an ``every`` above 1 resolves the jitter.
+    Frames are numbered from 1, lost frames included. A frame is delivered at the first tick at or after
+    beginning + latency + extra; the extra time is drawn for each frame, uniformly from 0 to ``jitter``. The
+    wire shows one frame, the one that arrived last. With a jitter longer than the time between two frames, an
+    older frame can follow a newer one. Of the frames that arrive between two ticks, the last to arrive is
+    shown; of frames that arrive together, the newest. With a latency of whole ticks any jitter costs a whole
+    tick.
 
     Losses are a two-state Markov chain. A frame is lost with probability ``drop_rate`` / ``drop_burst`` after
     a frame that was not lost, and with probability 1 - (1 - ``drop_rate``) / ``drop_burst`` after a lost
@@ -39,7 +38,6 @@ class DeliveringCamera(_Base):
     Source of the chain: E. N. Gilbert, Capacity of a burst-noise channel, 1960.
     """
 
-    every = Param(1, type="int64", min=1, doc="ticks of the block from one frame to the next")
     latency = Param(0.0, unit="s", min=0.0, doc="time from the stamp to the delivery")
     jitter = Param(0.0, unit="s", min=0.0, doc="greatest extra time of a frame; uniform from 0")
     drop_rate = Param(0.0, min=0.0, max=1.0, tune=True, doc="share of the frames that get lost")
@@ -56,18 +54,17 @@ class DeliveringCamera(_Base):
 
     delivery = Random()
     chances = State("float64[2]")  # random numbers of the coming frame: for its loss, and for its extra time
-    ticks = State("int64")
     captured = State("int64")
     dropped = State("bool")  # whether the last frame was lost by chance
-    pending = State(f"float64[{QUEUE},{CONTENT}]")  # rows on their way, oldest first; cameras widen all rows
+    pending = State(f"float64[{QUEUE},{CONTENT}]")  # rows on their way, oldest first; blocks widen all rows
     waiting = State("int64")  # number of rows on their way
     shown = State(f"float64[{CONTENT}]")  # the row on the wire; sequence 0 before the first
     taken = Work(f"float64[{CONTENT}]")  # the row of the frame captured at this tick; sequence 0 if none is
     wire = Work(f"float64[{CONTENT}]")  # the row on the wire now
 
-    def check(self) -> None:
-        """Refuse a latency that the queue cannot hold; ParameterError."""
-        longest = QUEUE * self.every * self.period
+    def check_queue(self, spacing: float) -> None:
+        """Refuse a latency that the queue cannot hold; ``spacing`` is the time between frames (s)."""
+        longest = QUEUE * spacing
         if passed(self.latency + self.jitter, longest):
             together = " and jitter together" if self.jitter else ""
             bound = f"at most {QUEUE} frames, {longest:g} s"
@@ -75,56 +72,75 @@ class DeliveringCamera(_Base):
             raise ParameterError("latency", problem)
 
 
-# Functions, since compiled methods can call functions only; each takes the camera.
+class DeliveringCamera(Delivery):
+    """A camera with such a transport, in which the latency counts from the stamp of a frame.
+
+    A frame is captured at every ``every``-th tick, from the first tick on. A faster rate of the block with an
+    ``every`` above 1 resolves the jitter.
+    """
+
+    every = Param(1, type="int64", min=1, doc="ticks of the block from one frame to the next")
+
+    ticks = State("int64")
+
+    def check(self) -> None:
+        """Refuse a latency that the queue cannot hold; ParameterError."""
+        self.check_queue(self.every * self.period)
 
 
-def draw(camera: Any) -> None:
+# Functions, since compiled methods can call functions only; each takes the block. ``captured`` says whether
+# this tick has a frame, lost or not.
+
+
+def draw(block: Any) -> None:
     """Draw the chances of the coming frame; for ``start``."""
-    fill_uniform(camera.delivery, camera.chances)
+    fill_uniform(block.delivery, block.chances)
 
 
 def is_captured(camera: Any) -> bool:
-    """Return whether this tick has a frame, lost or not."""
+    """Return whether this tick of a camera has a frame, lost or not."""
     return bool(camera.ticks % camera.every == 0)
 
 
-def take(camera: Any, time: float, stamp: float) -> bool:
-    """Begin the row of this tick's frame in ``taken``; return whether there is a frame that is not lost."""
-    if not is_captured(camera) or _is_lost(camera, time):
-        camera.taken[SEQUENCE] = 0.0
+def take(block: Any, captured: bool, time: float, begin: float) -> bool:
+    """Begin the row of this tick's frame in ``taken``; return whether there is a frame that is not lost.
+
+    ``begin`` is the instant from which the latency counts (s), that of the row.
+    """
+    if not captured or _is_lost(block, time):
+        block.taken[SEQUENCE] = 0.0
         return False
-    camera.taken[SEQUENCE] = camera.captured + 1
-    camera.taken[STAMP] = stamp
-    camera.taken[ARRIVAL] = stamp + camera.latency + camera.jitter * camera.chances[1]
+    block.taken[SEQUENCE] = block.captured + 1
+    block.taken[STAMP] = begin
+    block.taken[ARRIVAL] = begin + block.latency + block.jitter * block.chances[1]
     return True
 
 
-def deliver(camera: Any, time: float) -> None:
+def deliver(block: Any, time: float) -> None:
     """Put the row on the wire at this time into ``wire``; for ``output``, after `take`."""
-    camera.wire[:] = camera.shown
+    block.wire[:] = block.shown
     last = (-math.inf, 0.0)
-    for index in range(camera.waiting):
-        last = _show(camera.wire, camera.pending[index], time, last)
-    _show(camera.wire, camera.taken, time, last)
+    for index in range(block.waiting):
+        last = _show(block.wire, block.pending[index], time, last)
+    _show(block.wire, block.taken, time, last)
 
 
-def advance(camera: Any, time: float) -> None:
-    """Keep the rows on the wire and on their way, and go to the next tick; for ``update``."""
-    camera.shown[:] = camera.wire
+def advance(block: Any, captured: bool, time: float) -> None:
+    """Keep the rows on the wire and on their way; for ``update``."""
+    block.shown[:] = block.wire
     left = 0
-    for index in range(camera.waiting):
-        if not reached(time, camera.pending[index, ARRIVAL]):
-            camera.pending[left] = camera.pending[index]
+    for index in range(block.waiting):
+        if not reached(time, block.pending[index, ARRIVAL]):
+            block.pending[left] = block.pending[index]
             left += 1
-    if camera.taken[SEQUENCE] > 0 and not reached(time, camera.taken[ARRIVAL]):
-        camera.pending[left] = camera.taken
+    if block.taken[SEQUENCE] > 0 and not reached(time, block.taken[ARRIVAL]):
+        block.pending[left] = block.taken
         left += 1
-    camera.waiting = left
-    if is_captured(camera):
-        camera.dropped = _is_dropped(camera)
-        camera.captured += 1
-        draw(camera)
-    camera.ticks += 1
+    block.waiting = left
+    if captured:
+        block.dropped = _is_dropped(block)
+        block.captured += 1
+        draw(block)
 
 
 def _show(wire: Any, row: Any, time: float, last: tuple[float, float]) -> tuple[float, float]:
@@ -136,15 +152,15 @@ def _show(wire: Any, row: Any, time: float, last: tuple[float, float]) -> tuple[
     return arrival, sequence
 
 
-def _is_dropped(camera: Any) -> bool:
+def _is_dropped(block: Any) -> bool:
     """Return whether the frame of this tick gets lost by chance."""
-    rate, burst = camera.drop_rate, camera.drop_burst
-    if camera.captured > 0:
-        rate = 1 - (1 - rate) / burst if camera.dropped else rate / burst
-    return bool(camera.chances[0] < rate)
+    rate, burst = block.drop_rate, block.drop_burst
+    if block.captured > 0:
+        rate = 1 - (1 - rate) / burst if block.dropped else rate / burst
+    return bool(block.chances[0] < rate)
 
 
-def _is_lost(camera: Any, time: float) -> bool:
-    begin, length = float(camera.blackout[0]), float(camera.blackout[1])
+def _is_lost(block: Any, time: float) -> bool:
+    begin, length = float(block.blackout[0]), float(block.blackout[1])
     blind = length > 0.0 and reached(time, begin) and not reached(time, begin + length)
-    return blind or _is_dropped(camera)
+    return blind or _is_dropped(block)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, Derived, In, Out, Param, Random, State, Work, fill_normal
-from quadvis_blocks.vision._delayed_camera import (
+from quadvis_blocks.vision._delivery import (
     CONTENT,
     QUEUE,
     SEQUENCE,
@@ -95,7 +95,7 @@ class GeometricCamera(DeliveringCamera, Block):
 
     def output(self, position: Any, attitude: Any, time: float) -> tuple[Any, ...]:
         """Return the measurement that arrived last."""
-        if take(self, time, time):
+        if take(self, is_captured(self), time, time):
             _measure(self, position, attitude)
         deliver(self, time)
         sequence = int(self.wire[SEQUENCE])
@@ -116,9 +116,11 @@ class GeometricCamera(DeliveringCamera, Block):
 
     def update(self, time: float) -> None:
         """Keep the measurement of this tick, and the measurements that have arrived."""
-        if is_captured(self):
+        captured = is_captured(self)
+        if captured:
             fill_normal(self.stream, self.drawn)
-        advance(self, time)
+        advance(self, captured, time)
+        self.ticks += 1
         self.last_sequence = int(self.shown[SEQUENCE])
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, Frame, In, Out, Param, ParameterError, Random, State, Work, uniform
-from quadvis_blocks.vision._delayed_camera import (
+from quadvis_blocks.vision._delivery import (
     CONTENT,
     QUEUE,
     SEQUENCE,
@@ -130,16 +130,18 @@ class RenderedCamera(DeliveringCamera, Block, numeric=False):
 
     def output(self, position: Any, attitude: Any, time: float) -> Frame:
         """Return the frame that arrived last."""
-        if take(self, time, time - self.exposure_time / 2):
+        if take(self, is_captured(self), time, time - self.exposure_time / 2):
             self.taken[CONTENT:] = self._content(np.concatenate((position, attitude)))
         deliver(self, time)
         return self._picture(self.wire)
 
     def update(self, position: Any, attitude: Any, time: float) -> None:
         """Keep the frame captured at this tick, and the frame on the wire."""
-        if is_captured(self):
+        captured = is_captured(self)
+        if captured:
             self.grain = uniform(self.stream)
-        advance(self, time)
+        advance(self, captured, time)
+        self.ticks += 1
         self.previous[:3], self.previous[3:] = position, attitude
 
     def _content(self, pose: Any) -> Any:

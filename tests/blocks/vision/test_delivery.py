@@ -9,13 +9,14 @@ import pytest
 
 from quadvis.block import Block, Out, ParameterError
 from quadvis.testing import drive
-from quadvis_blocks.vision._delayed_camera import (
+from quadvis_blocks.vision._delivery import (
     SEQUENCE,
     STAMP,
     DeliveringCamera,
     advance,
     deliver,
     draw,
+    is_captured,
     take,
 )
 from quadvis_blocks.vision.geometric_camera import GeometricCamera
@@ -36,12 +37,13 @@ class Clock(DeliveringCamera, Block):
         draw(self)
 
     def output(self, time):
-        take(self, time, time)
+        take(self, is_captured(self), time, time)
         deliver(self, time)
         return int(self.wire[SEQUENCE]), self.wire[STAMP]
 
     def update(self, time):
-        advance(self, time)
+        advance(self, is_captured(self), time)
+        self.ticks += 1
 
 
 def clock(steps, rate="10 Hz", seed=1, **parameters):
