@@ -39,20 +39,46 @@ def askew(attitude: Any, mount: Any) -> Any:
 
     The mount (0, 0, 0) gives the attitude to the bit.
     """
-    if mount[0] == 0.0 and mount[1] == 0.0 and mount[2] == 0.0:
+    if is_zero(mount):
         return attitude.copy()
-    craft = rotation(float(attitude[0]), float(attitude[1]), float(attitude[2]))
     device = rotation(float(mount[0]), float(mount[1]), float(mount[2]))
-    forward, right, down = (
-        turned(craft, device[:, 0]),
-        turned(craft, device[:, 1]),
-        turned(craft, device[:, 2]),
+    return _angles_of(_product(rotation(float(attitude[0]), float(attitude[1]), float(attitude[2])), device))
+
+
+def carrier(attitude: Any, mount: Any) -> Any:
+    """Return roll, pitch and yaw (3,) of the craft that carries a device with this attitude; inverts `askew`.
+
+    The mount (0, 0, 0) gives the attitude to the bit.
+    """
+    if is_zero(mount):
+        return attitude.copy()
+    device = rotation(float(mount[0]), float(mount[1]), float(mount[2]))
+    return _angles_of(
+        _product(rotation(float(attitude[0]), float(attitude[1]), float(attitude[2])), device.T)
     )
-    across, up = float(right[2]), float(down[2])
+
+
+def is_zero(vector: Any) -> bool:
+    """Return whether all three numbers are 0."""
+    return bool(vector[0] == 0.0 and vector[1] == 0.0 and vector[2] == 0.0)
+
+
+def _product(first: Any, second: Any) -> Any:
+    """Return the product of two rotations (3, 3)."""
+    found = np.empty((3, 3))
+    for column in range(3):
+        found[:, column] = turned(first, second[:, column])
+    return found
+
+
+def _angles_of(turn: Any) -> Any:
+    """Return roll, pitch and yaw (3,) of a rotation (3, 3); inverts `rotation`."""
+    across, up = float(turn[2, 1]), float(turn[2, 2])
+    level = math.sqrt(across * across + up * up)  # `math.hypot` has other bits interpreted than compiled
     return np.array(
         (
             math.atan2(across, up),
-            math.atan2(-float(forward[2]), math.hypot(across, up)),
-            math.atan2(float(forward[1]), float(forward[0])),
+            math.atan2(-float(turn[2, 0]), level),
+            math.atan2(float(turn[1, 0]), float(turn[0, 0])),
         )
     )
