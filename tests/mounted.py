@@ -58,3 +58,36 @@ def mounted(
     path = diagrams / "mounted.yaml"
     path.write_text(DIAGRAM.format(variant=variant, offset=list(offset), angles=list(angles), more=more))
     return path
+
+
+TURNTABLE = '''"""A craft on a turntable."""
+
+import math
+
+import numpy as np
+
+from quadvis.block import Block, Out, Param
+
+
+class Turntable(Block, numeric=False):
+    """A craft that turns about its own middle, on a table that is not quite level and rocks."""
+
+    rate = Param(0.1, unit="rad/s")
+    position = Out("float64[3]", unit="m")
+    attitude = Out("float64[3]", unit="rad")
+    rates = Out("float64[3]", unit="rad/s")
+
+    def output(self, time):
+        rock = 0.03 * np.array((math.sin(2.1 * time), math.cos(1.7 * time), 0.0))
+        slide = 0.005 * np.array((math.sin(0.7 * time), math.cos(0.31 * time), 0.0))
+        turned = np.array((0.01, 0.0, self.rate * time))
+        return np.array((0.1, -0.05, 1.5)) + slide, turned + rock, np.array((0.0, 0.0, self.rate))
+'''
+
+
+def on_turntable(folder: Path, offset: Sequence[float], angles: Sequence[float], rate: float) -> Path:
+    """Write such a diagram whose craft stands on a turntable that turns at a rate in rad/s; return it."""
+    more = f"  craft: {{block: rig.turntable, rate: imu, with: {{rate: {rate} rad/s}}, in: {{}}}}\n"
+    path = mounted(folder, "geometric", offset, angles, more)
+    (path.parent / "blocks" / "rig" / "turntable.py").write_text(TURNTABLE)
+    return path
