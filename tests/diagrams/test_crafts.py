@@ -80,3 +80,17 @@ def test_every_craft_hovers(craft: str, variant: str) -> None:
 def test_every_craft_flies_under_the_failsafe(craft: str, name: str, variant: str) -> None:
     result = loaded(name, variant, CRAFTS / f"{craft}.yaml").run(engine="native")
     assert result.passed, [str(verdict) for verdict in result.outcome.verdicts if not verdict.met]
+
+
+@pytest.mark.parametrize("variant", mostly_slow(["fused_geometric", "robust_geometric"]))
+def test_a_craft_with_its_camera_off_and_askew_says_so_once_and_hovers(variant: str) -> None:
+    where = ["vehicle.mount_offset=[8 cm, -5 cm, 4 cm]", "vehicle.mount_angles=[3 deg, -2 deg, 15 deg]"]
+    result = quadvis.load(DIAGRAMS / "hover.yaml", variant=variant, settings=where).run(engine="native")
+    assert result.passed, [str(verdict) for verdict in result.outcome.verdicts if not verdict.met]
+    nobody_knows = [
+        *where,
+        "estimate.mount_offset=[0 m, 0 m, 0 m]",
+        "estimate.mount_angles=[0 deg, 0 deg, 0 deg]",
+    ]
+    wrong = quadvis.load(DIAGRAMS / "hover.yaml", variant=variant, settings=nobody_knows).run(engine="native")
+    assert not wrong.passed
