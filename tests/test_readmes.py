@@ -22,6 +22,7 @@ from quadvis.diagram.keys import SECTIONS, keys
 from quadvis.diagram.schema import diagram_schema
 from quadvis.diagram.sections.context import RunSection
 from quadvis.diagram.sections.section import DIAGRAM, GROUP, PART, FileSection
+from quadvis.machine.shipped import named_file
 from tests.diagrams.golden import cases
 
 ROOT = Path(__file__).parents[1]
@@ -247,7 +248,7 @@ def test_a_command_ends_as_its_readme_says(
 ) -> None:
     shutil.copytree(ROOT / "diagrams", tmp_path / "diagrams")
     monkeypatch.chdir(tmp_path)
-    if not Path(command.options.file).is_file():
+    if not named_file(command.options.file).is_file():
         assert main(["new", "diagram", command.options.file]) == 0
     if "colours.yaml" in str(command):
         shutil.copy("diagrams/calib/colours.yaml", "colours.yaml")
