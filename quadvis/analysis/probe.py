@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from quadvis.analysis.cut import break_path
 from quadvis.analysis.loops import blocks_on_loops, hyperperiod, instants_of
-from quadvis.block import Random
 from quadvis.diagram.sections.analyse import Cut
 from quadvis.engine.engine import Engine
 from quadvis.engine.layout import TIME, Placed
@@ -44,9 +43,8 @@ class Channel:
 def silence(engine: Engine) -> None:
     """Remove the noise: a random stream of zeros stays zero and gives 2e-5 sigma at every draw."""
     for node in engine.graph.nodes:
-        for name, state in node.block.interface.states.items():
-            if isinstance(state, Random):
-                engine.write(node.path, name, 0)
+        for name in node.block.interface.streams:
+            engine.write(node.path, name, 0)
 
 
 class Probe:

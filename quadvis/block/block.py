@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, TypeVar
 
-from quadvis.block.declare import Declared, Derived, In, Out, Param, ParameterError, Safe, State, Work
+from quadvis.block.declare import Declared, Derived, In, Out, Param, ParameterError, Random, Safe, State, Work
 from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.machine.inputs import file_digest, read_once
 from quadvis.machine.source_line import file_of, source_line
@@ -59,6 +59,11 @@ class Interface:
     def continuous(self) -> tuple[State, ...]:
         """The states that a solver integrates."""
         return tuple(state for state in self.states.values() if state.continuous)
+
+    @cached_property
+    def streams(self) -> tuple[str, ...]:
+        """The states that are random streams."""
+        return tuple(name for name, state in self.states.items() if isinstance(state, Random))
 
     @cached_property
     def wanted(self) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from typing import Any, NamedTuple
 
-from quadvis.block import Block, In, Param, ParameterError, Random
+from quadvis.block import Block, In, Param, ParameterError
 from quadvis.diagram.draft import Connection, Draft, unconnected
 from quadvis.diagram.expand import Expansion
 from quadvis.diagram.names import absent, remedy_for
@@ -82,7 +82,7 @@ class Builder:
         """Report blocks whose noise has one name: it would be the same noise."""
         first: dict[str, str] = {}
         for draft in drafts:
-            if not any(isinstance(state, Random) for state in draft.interface.states.values()):
+            if not draft.interface.streams:
                 continue
             other = first.setdefault(draft.stream, draft.path)
             if other != draft.path:

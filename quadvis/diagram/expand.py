@@ -148,7 +148,7 @@ class Expansion:
             self._refuse_groups(block, values)
             kind = self._class(block)
             if known(kind):
-                values = self._taken(scope, block, kind.interface.params) | values
+                values = self._with_taken(scope, block, kind.interface.params, values)
                 kind = self._with_ports(kind, block, values)
             if kind is UNKNOWN:
                 self._unknown.add(path)
@@ -172,17 +172,21 @@ class Expansion:
             return block.parameter_places
         return block.parameter_places | {name: setting.place for name, setting in settings.items()}
 
-    def _taken(
-        self, scope: Scope, block: BlockSpec, declared: Mapping[str, Any]
+    def _with_taken(
+        self,
+        scope: Scope,
+        block: BlockSpec,
+        declared: Mapping[str, Any],
+        given: dict[str, YamlNode | Unknown],
     ) -> dict[str, YamlNode | Unknown]:
-        """Return the parameters that a block or part takes from groups."""
+        """Return the parameters of a block or part, and those that it takes from groups besides."""
         found: dict[str, YamlNode | Unknown] = {}
         for node in block.groups:
             group = substitute(node, scope.params, self.faults)
             if not known(group):
                 continue
             taken = group.take_all(declared) if isinstance(group, Group) else {}
-            twice = [name for name in taken if name in found]
+            twice = [name for name in taken if name in found and name not in given]
             if not isinstance(group, Group):
                 self.faults.add(node.place, "this is not a group", "write '$name' of a group under 'params'")
             elif not taken:
@@ -192,7 +196,7 @@ class Expansion:
                 problem = f"more than one of these groups has '{twice[0]}'"
                 self.faults.add(node.place, problem, f"give '{twice[0]}' under 'with'")
             found |= taken
-        return found
+        return found | given
 
     def _refuse_groups(self, block: BlockSpec, values: dict[str, YamlNode | Unknown]) -> None:
         """Report groups in place of values of a block; they become `UNKNOWN`."""
@@ -253,7 +257,7 @@ class Expansion:
                 self.faults.add(places[name], problem, remedy)
         if block.inputs is not UNKNOWN:
             self._check_inputs(block, block.inputs or {}, spec[PORTS].inputs)
-        values = self._taken(scope, block, spec[PARAMS]) | values
+        values = self._with_taken(scope, block, spec[PARAMS], values)
         params = {
             name: self.groups.resolved(own, values.get(name, own)) for name, own in spec[PARAMS].items()
         }

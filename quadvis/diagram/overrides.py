@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 
 from quadvis.diagram.settings import Setting, Settings
 from quadvis.document import YamlNode, YamlScalar
@@ -17,9 +17,9 @@ class Overrides:
         self.settings, self.faults = settings, faults
         self._used: set[tuple[str, str]] = set()
 
-    def of(self, path: str) -> dict[str, Setting]:
+    def of(self, path: str) -> Mapping[str, Setting]:
         """Return the settings of a block, a part or a group, by parameter."""
-        return dict(self.settings.get(path, {}))
+        return self.settings.get(path, {})
 
     def chosen(self, path: str, name: str, own: YamlNode | Unknown) -> YamlNode | Unknown:
         """Return the value of a parameter: the setting if there is one.
@@ -27,7 +27,7 @@ class Overrides:
         A setting without a unit for a value with one is refused here, before others are blamed for it.
         """
         self._used.add((path, name))
-        setting = self.settings.get(path, {}).get(name)
+        setting = self.of(path).get(name)
         value = setting.value if setting is not None else UNKNOWN
         if setting is None or value is UNKNOWN:
             return own

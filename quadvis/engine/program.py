@@ -14,7 +14,6 @@ from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple
 
-from quadvis.block import Random
 from quadvis.block.random import stream_start
 from quadvis.engine.layout import TIME, Layout, Placed
 from quadvis.engine.memory import Memory, Slot
@@ -238,9 +237,8 @@ def _image(graph: Graph, layout: Layout, seed: int) -> bytes:
         for port, source in node.inputs.items():
             if isinstance(source, Constant) and block.inputs[port].scalar != "frame":
                 memory.write(block.inputs[port], source.value)
-        for name, state in node.block.interface.states.items():
-            if isinstance(state, Random):
-                memory.write(block.field(name), stream_start(seed, f"{node.stream or node.path}.{name}"))
+        for name in node.block.interface.streams:
+            memory.write(block.field(name), stream_start(seed, f"{node.stream or node.path}.{name}"))
     return bytes(memory.raw)
 
 

@@ -97,6 +97,18 @@ def test_a_block_takes_what_it_has_parameters_for_and_its_own_values_come_first(
     assert value(diagram, "mixer.inertia") == pytest.approx([0.012, 0.013, 0.020])
 
 
+def test_a_value_under_with_decides_what_two_groups_both_have(project: Path) -> None:
+    one, two = "vehicle: {group: crafts/large.yaml}", "small: {group: crafts/small.yaml}"
+    text = DIAGRAM.replace(one, f"{one}\n  {two}").replace(
+        "group: $vehicle\n    with: {arm: 0.5 m}",
+        "group: [$vehicle, $small]\n    with: {arm: 0.5 m, mass: 3 kg, inertia: $small.inertia}",
+    )
+    (project / "craft.yaml").write_text(text)
+    diagram = loaded()
+    assert (value(diagram, "body.mass"), value(diagram, "body.arm")) == (3.0, 0.5)
+    assert value(diagram, "body.inertia") == pytest.approx([15e-6, 15e-6, 25e-6])
+
+
 def test_a_parameter_of_a_group_is_taken_by_name_and_element() -> None:
     assert value(loaded(), "first.factor") == 0.013
 
