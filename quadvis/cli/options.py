@@ -12,8 +12,9 @@ from quadvis.version import __version__
 JSON_HELP = """\
 --json prints one object: diagram, variant, params, hash, seed, passed, duration_s, wall_s, cpu_s,
 engine, real_time_factor, log, lost (what the log lacks, and why);
-real_time (null for a simulation): {granted, not_granted, lost_rows, tasks: {name: {period_s, steps, overruns,
-lateness and execution: {min_s, mean_s, max_s, p99_s, p99.9_s}}}};
+real_time (null for a simulation): {lost_rows, computers: [{computer (null if the diagram names none), engine,
+granted, not_granted, tasks: {name: {period_s, steps, overruns,
+lateness and execution: {min_s, mean_s, max_s, p99_s, p99.9_s}}}}]};
 summary: {label: {signal, unit, and the statistics by name, final of a vector as a list}};
 expect: [{expectation, signal, kind, unit, limit, found, met, lack (why the run cannot be judged)}];
 margins: the number of expectations that only 'quadvis analyse' judges;

@@ -123,6 +123,9 @@ class Graph:
     def __getitem__(self, path: str) -> Node:
         return self._by_path[path]
 
+    def __contains__(self, path: object) -> bool:
+        return path in self._by_path
+
     @cached_property
     def tasks(self) -> list[Task]:
         """The tasks in use, fastest first (rate-monotonic), the continuous one before all."""

@@ -37,19 +37,22 @@ from quadvis.realtime.schedule import Schedule
 from quadvis.realtime.streams import RowStream
 from quadvis.realtime.system import SHARE, Grants, Sleeper, ask_all, wake_up_time
 
-LEAD = 2_000_000  # ns from the last preparation to the deadline of tick 0
 GRACE = 2.0  # s that a step has to end, once it was asked to
 
 
 @dataclass(frozen=True)
 class Setup:
-    """What an application needs: a resolved diagram, how to run it, what it shares with its supervisor."""
+    """What an application needs: a resolved diagram, how to run it, what it shares with its supervisor.
+
+    ``computer`` is the one whose blocks it runs, "" in a diagram without computers.
+    """
 
     text: str
     folder: str
     name: str
     own_blocks: bool
     is_command: bool
+    computer: str
     engine: str
     wishes: RealTime
     tasks: int
@@ -60,7 +63,7 @@ class Setup:
 
 @dataclass(frozen=True)
 class Ready:
-    """The application begins to run: what the system has granted, and which engine runs."""
+    """The application can begin to run: what the system has granted, and which engine runs."""
 
     grants: Grants
     engine: Choice
@@ -164,7 +167,7 @@ class _Application:
             sleeper.polled = _polled(setup.wishes, schedule, sleeper)
             grants.granted.append(f"polling {sleeper.polled / 1e3:.0f} us")
             setup.link.send(Ready(grants, Choice(choice.engine, choice.reason)))
-            self._start = time.monotonic_ns() + LEAD
+            self._start = setup.link.recv()  # all applications begin at one instant
             shared.control[control.START] = self._start
             self._signals.looping = True
             engine.run(diagram.ticks)

@@ -30,8 +30,10 @@ def summary_lines(result: Result) -> list[str]:
     speed = f", {result.real_time_factor:.0f} x real time" if shown else ""
     lines.append(f"  {result.wall:.1f} s of wall time{speed}; engine: {result.engine}")
     if result.flight:
-        lines += [f"  {line}" for line in table([_task_row(times) for times in result.flight.tasks])]
-        lines.append(f"  real time: {result.flight.grants}")
+        shares = result.flight.shares
+        rows = [_task_row(share.computer, times) for share in shares for times in share.tasks]
+        lines += [f"  {line}" for line in table(rows)]
+        lines += [f"  {_with('real time', share.computer)}: {share.grants}" for share in shares]
     lines += not_judged(len(diagram.loop_requirements))
     met = sum(verdict.met for verdict in outcome.verdicts)
     if outcome.verdicts:
@@ -56,11 +58,15 @@ def _entry_row(entry: Entry, outcome: Outcome) -> tuple[str, ...]:
     )
 
 
-def _task_row(times: TaskTimes) -> tuple[str, ...]:
+def _with(words: str, computer: str) -> str:
+    return f"{words} of {computer}" if computer else words
+
+
+def _task_row(computer: str, times: TaskTimes) -> tuple[str, ...]:
     found = f"{counted(times.steps, 'step')}, {counted(times.overruns, 'overrun')}"
     late, taken = times.lateness, times.execution
     return (
-        f"task {times.task}",
+        _with(f"task {times.task}", computer),
         format_quantity(1 / times.period, HERTZ),
         found,
         f"lateness {_spread(late)}" if late else "",

@@ -16,7 +16,7 @@ from quadvis.run.verdict import Outcome
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
-    from quadvis.realtime.supervisor import Flight
+    from quadvis.realtime.flight import Flight
 
 PYTHON_ONLY = Choice(PYTHON)
 

@@ -26,8 +26,8 @@ from quadvis.version import __version__
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
     from quadvis.output.log import LogWriter
+    from quadvis.realtime.flight import Flight
     from quadvis.realtime.options import RealTime
-    from quadvis.realtime.supervisor import Flight
 
 Progress = Callable[[float, float], None]  # simulated time reached, wall time spent (s)
 SLICE = 0.1  # s of wall time between two calls of the progress; Ctrl-C and rows for the log wait no longer

@@ -137,7 +137,7 @@ def test_a_real_time_run_gives_the_signals_of_a_simulation() -> None:
     assert result.passed
     assert life() == ["open", "safe", "close"] * 2
     assert result.flight is not None
-    fast, slow = result.flight.tasks
+    fast, slow = result.flight.shares[0].tasks
     assert (fast.steps + fast.overruns, slow.steps + slow.overruns) == (21, 5)
     assert len(result["wave.y"]) == fast.steps
     for name in ("wave.y", "slow.y", "end.y"):  # a stamp tells the tick; the loaded machine may miss some
@@ -146,7 +146,7 @@ def test_a_real_time_run_gives_the_signals_of_a_simulation() -> None:
     log = read_log("run.mcap")
     assert log.complete
     assert log.metadata["clock"] == "real time"
-    assert json.loads(log.summary["real time"])["tasks"]["fast"]["steps"] == fast.steps
+    assert json.loads(log.summary["real time"])["computers"][0]["tasks"]["fast"]["steps"] == fast.steps
 
 
 @pytest.mark.slow
@@ -154,9 +154,11 @@ def test_the_command_prints_times_and_what_was_granted(capsys: pytest.CaptureFix
     assert main(["run", "flight.yaml", "--real-time", "--priority", "0", "--log", "", "--json"]) == 0
     out, err = capsys.readouterr()
     facts = json.loads(out)["real_time"]
-    assert {"gc off", "timers exact"} <= set(facts["granted"])
-    assert set(facts["tasks"]) == {"fast", "slow"}
-    assert facts["tasks"]["fast"]["execution"]["max_s"] > 0
+    (computer,) = facts["computers"]
+    assert computer["computer"] is None
+    assert {"gc off", "timers exact"} <= set(computer["granted"])
+    assert set(computer["tasks"]) == {"fast", "slow"}
+    assert computer["tasks"]["fast"]["execution"]["max_s"] > 0
     assert facts["lost_rows"] == 0
     assert "real time: " in err
 
@@ -198,7 +200,7 @@ def test_overruns_are_announced_once_a_second_and_add_up() -> None:
     warnings = said[1:]
     assert 2 <= len(warnings) <= 4
     told = [int(count) for line in warnings for count in re.findall(r"'fast' has (\d+) more overrun", line)]
-    assert sum(told) == result.flight.tasks[0].overruns >= 50
+    assert sum(told) == result.flight.shares[0].tasks[0].overruns >= 50
     assert result.passed  # what the diagram allows is no lack
 
 
@@ -293,7 +295,7 @@ def test_a_supervisor_that_is_stopped_does_not_stop_the_loop() -> None:
     assert lost > 0
     assert told.endswith(f"{lost} rows found no room on the way to the log and the verdicts\n")
     assert not facts["passed"]
-    tasks = facts["real_time"]["tasks"]
+    tasks = facts["real_time"]["computers"][0]["tasks"]
     assert tasks["fast"]["steps"] + tasks["fast"]["overruns"] == 401
     log = read_log("run.mcap")
     rows = sum(len(log[name]) for name in ("wave.y", "slow.y", "end.y"))

@@ -1,0 +1,61 @@
+"""What a real-time run that has reached its stop time did, computer by computer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from quadvis.errors import counted
+from quadvis.native.choice import Choice
+from quadvis.realtime.system import Grants
+from quadvis.realtime.times import TaskTimes
+
+
+@dataclass(frozen=True)
+class Share:
+    """What one computer did in a real-time run; ``computer`` is "" in a diagram without computers."""
+
+    computer: str
+    engine: Choice
+    grants: Grants
+    tasks: tuple[TaskTimes, ...]
+
+    def facts(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {
+            "computer": self.computer or None,
+            "engine": self.engine.engine,
+            "granted": list(self.grants.granted),
+            "not_granted": list(self.grants.refused),
+            "tasks": {task.task: task.facts() for task in self.tasks},
+        }
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A real-time run that has reached its stop time.
+
+    ``lost`` is the number of rows that found no room on their way to the log and the verdicts.
+    """
+
+    shares: tuple[Share, ...]
+    lost: int
+
+    @property
+    def engine(self) -> Choice:
+        """What ran the diagram: the engine of all its computers, or of each."""
+        names = {share.engine.engine for share in self.shares}
+        if len(self.shares) == 1 or (len(names) == 1 and not any(each.engine.reason for each in self.shares)):
+            return self.shares[0].engine
+        said = [f"{share.computer}: {share.engine}" for share in self.shares]
+        return Choice(" and ".join(sorted(names)), f"({'; '.join(said)})")
+
+    @property
+    def loss(self) -> str:
+        """A sentence about the rows that were lost; "" if none were."""
+        found = counted(self.lost, "row")
+        return f"{found} found no room on the way to the log and the verdicts" if self.lost else ""
+
+    def facts(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {"computers": [share.facts() for share in self.shares], "lost_rows": self.lost}

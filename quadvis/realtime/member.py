@@ -1,0 +1,192 @@
+"""A member of a real-time run: the process of one computer, and what comes from it."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Iterable, Sequence
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnContext
+from multiprocessing.process import BaseProcess
+from typing import TYPE_CHECKING
+
+from quadvis.diagram.sections.overload import WARN
+from quadvis.engine.taps import Tap
+from quadvis.errors import QuadvisError, RunError, counted
+from quadvis.errors.caller import IS_COMMAND
+from quadvis.graph.graph import Graph
+from quadvis.native.choice import Announce
+from quadvis.realtime import control, times
+from quadvis.realtime.application import Ending, Ready, Setup, perform
+from quadvis.realtime.control import SharedMemory
+from quadvis.realtime.flight import Share
+from quadvis.realtime.options import RealTime
+from quadvis.realtime.ring import RecordRing
+from quadvis.realtime.schedule import NANOSECONDS
+from quadvis.realtime.streams import RowStream, streams_of
+from quadvis.realtime.times import TaskTimes
+
+if TYPE_CHECKING:
+    from quadvis.diagram.diagram import Diagram
+
+WARNED = 1.0  # s between two warnings
+
+
+class Member:
+    """One application: its process, the words that it shares, and the rows that come from it.
+
+    ``part`` is the graph of the computer, with the base tick of the whole. ``ready`` is what the application
+    said before its run, ``ending`` what it said after it.
+    """
+
+    def __init__(
+        self,
+        context: SpawnContext,
+        diagram: Diagram,
+        computer: str,
+        part: Graph,
+        wishes: RealTime,
+        engine: str,
+        taps: Sequence[Tap],
+        announce: Announce,
+    ) -> None:
+        self.computer, self._part, self._announce = computer, part, announce
+        self._limits = diagram.overload
+        self._streams = streams_of(part, taps)
+        streams = tuple(stream for stream, _ in self._streams)
+        rings = [stream.ring for stream in streams]
+        count = len(part.tasks)
+        words = context.RawArray("q", SharedMemory.size(count, rings))
+        self._shared = SharedMemory(words, count, rings)
+        self._control = self._shared.control
+        self._link, self._theirs = context.Pipe()
+        setup = Setup(
+            diagram.resolved, str(diagram.path.parent), diagram.path.name, diagram.own_blocks,
+            IS_COMMAND.get(), computer, engine, wishes, count, streams, words, self._theirs,
+        )  # fmt: skip
+        name = f"application {computer}".rstrip()
+        self.process: BaseProcess = context.Process(target=perform, args=(setup,), name=name)
+        self._listening = True
+        self.ready: Ready | None = None
+        self.ending: Ending | None = None
+        self._warned, self._overruns = 0.0, [0] * count
+
+    def start(self) -> None:
+        """Start the process; it gets ready to run, and waits."""
+        self.process.start()
+        self._theirs.close()
+
+    def begin(self, instant: int) -> None:
+        """Let the application run from an instant (ns) of the monotonic clock on."""
+        self._link.send(instant)
+
+    @property
+    def sources(self) -> list[Connection | int]:
+        """What becomes ready when the application says something, or has ended."""
+        return [self.process.sentinel, *([self._link] if self._listening else [])]
+
+    @property
+    def running(self) -> bool:
+        """True from the start of the run on."""
+        return bool(self._control[control.START])
+
+    @property
+    def time(self) -> float:
+        """The time of the last tick (s)."""
+        return float(self._control[control.TICK] * self._part.tick)
+
+    @property
+    def now(self) -> float:
+        """The time since the start (s)."""
+        return max(0, time.monotonic_ns() - self._control[control.START]) / NANOSECONDS
+
+    @property
+    def lost(self) -> int:
+        """How many rows found no room on the way here."""
+        return sum(len(stream.blocks) * ring.lost for (stream, _), ring in self._rings)
+
+    @property
+    def failed(self) -> bool:
+        """True if the application has ended before its stop time, or is about to."""
+        if self.ending is None:
+            return not self.process.is_alive()
+        return bool(self.ending.reason)
+
+    def ask(self) -> None:
+        """Ask for the end of the run before its next step."""
+        self._control[control.END] = 1
+
+    def take(self, *, last: bool = False) -> None:
+        """Hand on the rows that have come."""
+        for (stream, taps), ring in self._rings:
+            stream.hand_on(ring.take(last=last), taps)
+
+    @property
+    def _rings(self) -> Iterable[tuple[tuple[RowStream, list[Tap]], RecordRing]]:
+        return zip(self._streams, self._shared.rings, strict=True)
+
+    def listen(self) -> None:
+        """Take what the application says before and after its run."""
+        try:
+            while self._listening and self._link.poll():
+                said = self._link.recv()
+                if isinstance(said, Ending):
+                    self.ending = said
+                elif isinstance(said, Ready):
+                    self.ready = said
+                    self._announce(f"real time{self._name(', ')}: {said.grants}")
+                else:
+                    self._announce(said)
+        except (EOFError, OSError):
+            self._listening = False
+
+    def warn(self, *, last: bool = False) -> None:
+        """Announce new overruns, at most once in a while and at the end."""
+        found = [int(words[times.OVERRUNS]) for words in self._shared.tasks]
+        if found == self._overruns or not (last or self.now >= self._warned + WARNED):
+            return
+        names = [task.name for task in self._part.tasks]
+        more = [
+            f"task '{name}'{self._name(' of ')} has {counted(now - before, 'more overrun')}"
+            for name, before, now in zip(names, self._overruns, found, strict=True)
+            if now > before
+        ]
+        self._announce(f"t = {self.time:.9g} s: {', '.join(more)}")
+        self._warned, self._overruns = self.now, found
+
+    def hangs(self, patience: float) -> float:
+        """Return after how long (s) a step that has not ended counts as hanging, if it does now; else 0.
+
+        That is ``patience``, or longer if the diagram allows longer steps.
+        """
+        begun = self._control[control.BEGUN]
+        allowed = (self._limits.max + 1) * float(max(task.period for task in self._part.tasks))
+        longest = max(patience, allowed)
+        if not begun or self._limits.action == WARN or self.now - begun / NANOSECONDS < longest:
+            return 0.0
+        return longest
+
+    def share(self) -> Share:
+        """Return what the computer did, after the run."""
+        assert self.ready is not None
+        tasks = zip(self._part.tasks, self._shared.tasks, strict=True)
+        found = tuple(TaskTimes.read(task.name, float(task.period), words) for task, words in tasks)
+        return Share(self.computer, self.ready.engine, self.ready.grants, found)
+
+    def error(self) -> QuadvisError:
+        """Return why the application has ended early."""
+        if self.ending is not None:
+            return self.ending.error()
+        code = self.process.exitcode or 0
+        what = (
+            f"was killed by {signal.Signals(-code).name}" if code < 0 else f"has ended with exit code {code}"
+        )
+        return RunError(f"the application{self._name(' of ')} {what}", time=self.moment)
+
+    @property
+    def moment(self) -> float | None:
+        """The time of the last tick (s); None before the start."""
+        return self.time if self.running else None
+
+    def _name(self, before: str) -> str:
+        return f"{before}'{self.computer}'" if self.computer else ""
