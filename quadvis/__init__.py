@@ -10,9 +10,10 @@ if TYPE_CHECKING:
     from quadvis.api import Diagram, load
     from quadvis.output.log_reader import Log, read_log
     from quadvis.realtime.options import RealTime
+    from quadvis.run.replay import replay
     from quadvis.sweeps.sweep import sweep
 
-__all__ = ["Diagram", "Log", "RealTime", "__version__", "load", "read_log", "sweep"]
+__all__ = ["Diagram", "Log", "RealTime", "__version__", "load", "read_log", "replay", "sweep"]
 
 _HOMES = {
     "Diagram": "api",
@@ -20,6 +21,7 @@ _HOMES = {
     "Log": "output.log_reader",
     "read_log": "output.log_reader",
     "RealTime": "realtime.options",
+    "replay": "run.replay",
     "sweep": "sweeps.sweep",
 }
 

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from quadvis.output.recording import Recorded
     from quadvis.realtime.options import RealTime
     from quadvis.run.live import LiveRun
+    from quadvis.run.loops import Progress
     from quadvis.run.result import Result
-    from quadvis.run.session import Progress
     from quadvis.run.verdict import Outcome
 
 # What a method needs it imports when it is called: a diagram that is only looked at costs no engine.
@@ -45,11 +45,11 @@ class Diagram(Checked):
             self, log=log, progress=progress, keep=keep, engine=engine, announce=announce, real_time=real_time
         )
 
-    def start(self) -> LiveRun:
+    def start(self, log: str | Path | None = None) -> LiveRun:
         """Return a run to be advanced step by step; see ``quadvis.run.live.LiveRun``."""
         from quadvis.run.live import LiveRun
 
-        return LiveRun(self)
+        return LiveRun(self, log=log)
 
     def judge(self, signals: Recorded) -> Outcome:
         """Return the summary and the verdicts of a recorded run; it may have ended early."""

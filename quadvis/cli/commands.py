@@ -94,6 +94,29 @@ def _real_time(options: argparse.Namespace) -> RealTime | None:
     return RealTime(**given)
 
 
+def replay(options: argparse.Namespace) -> int:
+    """Repeat the run of a log; 1 if it differs, unless a parameter was replaced."""
+    from quadvis.machine.status_line import ProgressLine
+    from quadvis.output.log_reader import read_log
+    from quadvis.run.replay import replay as run_again
+    from quadvis.run.replay_report import replay_facts, replay_lines
+
+    log = read_log(options.log)
+    collected_from_now_on()
+    with ProgressLine(log.end or 0.0) as progress:
+        found = run_again(
+            log, settings=options.set, output=options.output, folder=options.folder, engine=options.engine,
+            progress=progress, announce=progress.say, own_blocks=_own_blocks(options),
+        )  # fmt: skip
+    if options.json:
+        _print_json(replay_facts(found))
+    else:
+        print("\n".join(replay_lines(found)))
+        if found.output:
+            print(f"log: {found.output}")
+    return 0 if found.same or options.set else FAILED
+
+
 def sweep(options: argparse.Namespace) -> int:
     """Run a diagram at every point of a grid; 1 if a run fails."""
     from quadvis.sweeps.summary import SweepLine, sweep_lines

@@ -23,6 +23,17 @@ Numbers are in the unit beside them, null for a number that is unknown or infini
 Exit code: 0 all expectations met, 1 an expectation is not met, the run stopped or its log lacks something,
 2 bad input; 130, 129 or 143 interrupted, hung up or ended."""
 
+REPLAY_HELP = """\
+The diagram, the seed, the ticks, and what came from outside are those of the log; the diagram's files must be
+what they were. No device is opened, and nothing is written but the new log.
+--json prints one object: log, diagram, hash, seed, set, clock, whole (the log has the run up to its stop
+time), damage, ticks, left_out, end_s, from_log and not_run (blocks), signals, rows (compared), same,
+differences: [{signal, unit, element, values, largest, rows, different_rows, tick, time_s}], in the order of
+the first tick that differs, for which element and values are given, as in the log and in the replay;
+lacks: [{block, rows, time_s, only_in}], engine, new_log. Numbers are null where they are infinite or NaN.
+Exit code: 0 the same to the bit, or with --set; 1 something differs, or a block fails; 2 the log does not
+hold what is needed, or bad input."""
+
 SWEEP_HELP = """\
 With several --over all combinations are run; the last one changes fastest. A name is that of a parameter, as
 for --set, or seed, variant, params (files); 'none' means no variant or no file. A range is 0..29, or
@@ -71,6 +82,7 @@ def parser() -> Parser:
     _engine_option(run)
     _real_time_options(run)
     run.add_argument("--json", action="store_true", help="print one JSON object instead of the summary")
+    _replay_options(add("replay", commands.replay, "repeat a run from its log, to the bit", REPLAY_HELP))
     _sweep_options(add("sweep", commands.sweep, "run a diagram at every point of a grid", SWEEP_HELP))
     check = add("check", commands.check, "check a diagram and report all its faults")
     _diagram_options(check)
@@ -124,6 +136,17 @@ def parser() -> Parser:
     return made
 
 
+def _replay_options(parser: Parser) -> None:
+    parser.add_argument("log", metavar="LOG")
+    _set_option(parser)
+    words = "the diagram's folder, if it is no longer where the log says"
+    parser.add_argument("--folder", metavar="FOLDER", help=words)
+    parser.add_argument("--output", "-o", metavar="NEWLOG", help="write a log of the replay; default: none")
+    _engine_option(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object instead of the report")
+    _own_block_option(parser)
+
+
 def _engine_option(parser: Parser) -> None:
     words = "python starts at once; native compiles, once, and is much faster; auto takes the sooner one"
     parser.add_argument("--engine", choices=("auto", "python", "native"), default="auto", help=words)
@@ -154,9 +177,13 @@ def _diagram_options(parser: Parser) -> None:
 def _setting_options(parser: Parser) -> None:
     words = "file of settings, applied before --set; may be repeated, later files win"
     parser.add_argument("--params", action="append", default=[], metavar="FILE", help=words)
+    _set_option(parser)
+    _own_block_option(parser)
+
+
+def _set_option(parser: Parser) -> None:
     words = "replace a parameter, such as control/roll.bandwidth='2 rad/s'; may be repeated"
     parser.add_argument("--set", action="append", default=[], metavar="BLOCK.PARAM=VALUE", help=words)
-    _own_block_option(parser)
 
 
 def _sweep_options(parser: Parser) -> None:

@@ -55,14 +55,23 @@ def load(
 
 
 def load_text(
-    text: str, folder: str | Path = ".", name: str = "diagram.yaml", own_blocks: OwnBlocks = True
+    text: str,
+    folder: str | Path = ".",
+    name: str = "diagram.yaml",
+    own_blocks: OwnBlocks = True,
+    settings: Given = (),
 ) -> Diagram:
-    """Load a diagram from a text, such as the resolved one in a log, as if it stood in a file of a folder."""
+    """Load a diagram from a text, such as the resolved one in a log, as if it stood in a file of a folder.
+
+    ``settings`` and ``own_blocks`` are those of `load`.
+    """
     faults = Faults()
-    with quoting_only([folder]), _reported_once(faults) as digests:
+    texts = setting_texts(settings)
+    with quoting_only(_quotable(Path(folder) / name, (), texts)), _reported_once(faults) as digests:
+        given, _ = read_settings(settings, (), faults)
         spec = standing(read_text(text, Path(folder) / name, faults), faults)
-        diagram = Assembly(spec, faults, own_blocks=own_blocks).diagram()
-        return replace(diagram, files=digests)
+        diagram = Assembly(spec, faults, own_blocks=own_blocks).diagram(settings=given)
+        return replace(diagram, settings=texts, files=digests, own_blocks=bool(own_blocks))
 
 
 def check(

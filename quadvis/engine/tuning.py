@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from quadvis.block import Block, ParameterError
@@ -12,7 +12,7 @@ from quadvis.errors import sentence, suggestion
 
 
 class Change(NamedTuple):
-    """A parameter that took a new value before a tick."""
+    """A parameter that took a new value before a tick: a value as a diagram gives it, in SI units."""
 
     tick: int
     path: str
@@ -23,7 +23,8 @@ class Change(NamedTuple):
 class Tuning:
     """Checks new values of tunable parameters, and writes them into memory between two ticks.
 
-    Values that are set together take effect at one tick. ``changes`` is the history of a run.
+    Values that are set together take effect at one tick. ``changes`` is the history of a run; ``noted``, if
+    it is set, is called with each change before the tick runs.
     """
 
     def __init__(self, program: Program, blocks: Sequence[Block], memory: Memory) -> None:
@@ -32,6 +33,7 @@ class Tuning:
         self._tunables = {(tunable.path, tunable.name): tunable for tunable in program.tunables}
         self._waiting: dict[tuple[str, str], Any] = {}
         self.changes: list[Change] = []
+        self.noted: Callable[[Change], None] | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -75,5 +77,10 @@ class Tuning:
         if self._waiting:
             for (path, name), value in self._waiting.items():
                 self._memory.write(self._tunables[path, name].slot, value)
-                self.changes.append(Change(tick, path, name, value))
+                param = self._blocks[self._tunables[path, name].block].interface.params[name]
+                self.changes.append(
+                    Change(tick, path, name, param.choices[value] if param.choices else value)
+                )
+                if self.noted is not None:
+                    self.noted(self.changes[-1])
             self._waiting.clear()

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,8 @@ LARGEST = 1 << 20  # bytes of a chunk: readers hold several in memory
 PATIENCE = 2.0  # s that a run waits for a slow disk in total, before rows are left out
 FORMAT = "1"
 DIAGRAM, METADATA, SUMMARY = "diagram.yaml", "quadvis", "summary"
+CHANGES = "changes"  # the name of the records of parameters that were tuned
+HIDDEN = "hidden"  # key of a channel that is no signal of the diagram: it serves to replay the run
 PORTS = "ports"  # key of the facts of a run: the sources of the ports of parts, as JSON
 
 
@@ -81,7 +83,7 @@ class LogWriter:
 
     def _describe(self, block: RecordedBlock, name: str, definition: str) -> int:
         fields = json.dumps([[port.name, port.type, port.shape, port.unit] for port in block.ports])
-        described = {"fields": fields, "rate": block.rate}
+        described = {"fields": fields, "rate": block.rate, **({HIDDEN: "true"} if block.hidden else {})}
         return self._file.add_channel(block.path, f"quadvis_msgs/msg/{name}", definition, described)
 
     def write(self, block: int, time: int, row: Buffer) -> None:
@@ -101,6 +103,13 @@ class LogWriter:
             self._rows(block).extend(times, rows)
             self._pending += (self._sizes[block] + AROUND) * len(rows)
             self._latest = max(self._latest, int(times[-1]))
+
+    def write_change(self, tick: int, path: str, name: str, value: Any) -> None:
+        """Write that a parameter of a block took a value, as a diagram gives it, before a tick."""
+        given = value.tolist() if isinstance(value, np.ndarray) else value
+        entries = {"tick": str(tick), "block": path, "parameter": name, "value": json.dumps(given)}
+        self._file.add_metadata(CHANGES, entries)
+        self._sink.hand_on()
 
     def _check(self, block: int, size: int) -> None:
         if size != self._sizes[block]:

@@ -11,7 +11,7 @@ from pathlib import Path
 from quadvis.errors import QuadvisError, quoted
 from quadvis.machine.inputs import read_input
 from quadvis.output import mcap_records as mcap
-from quadvis.output.log import DIAGRAM, METADATA, SUMMARY, ports_of
+from quadvis.output.log import CHANGES, DIAGRAM, HIDDEN, METADATA, SUMMARY, ports_of
 from quadvis.output.mcap_messages import CDR
 from quadvis.output.recording import SLOT_TYPES, RecordedBlock, RecordedPort, Recording
 
@@ -27,6 +27,7 @@ class Log(Recording):
     `diagram` is the resolved diagram's text, `metadata` the facts of the run, `summary` its outcome.
     `complete` is False if the run was killed, if the file is damaged, or if the diagram is not the one that
     ran; then `damage` says so in a sentence. `end` is the time (s) of the last row, None without rows.
+    `hidden` are the rows that only a replay needs, `changes` the facts of parameters that were tuned.
     """
 
     def __init__(self, path: Path) -> None:
@@ -36,9 +37,11 @@ class Log(Recording):
         self.diagram = ""
         self.metadata: dict[str, str] = {}
         self.summary: dict[str, str] = {}
+        self.hidden = Recording()
+        self.changes: list[dict[str, str]] = []
         self.damage = ""
         self.end: float | None = None
-        self._ids: dict[int, int] = {}
+        self._ids: dict[int, tuple[Recording, int]] = {}  # the recording of a channel, and the block in it
         self._early: dict[int, list[tuple[int, bytes]]] = {}  # rows whose block has not been described yet
 
     @property
@@ -55,8 +58,10 @@ class Log(Recording):
                 self._early.setdefault(record.channel, []).append((record.time, record.data))
         elif isinstance(record, mcap.ChannelRecord):
             if "fields" in record.entries and record.number not in self._ids:
-                self._ids[record.number] = len(self.blocks)
-                self.add(_block(record.topic, record.entries))
+                block = _block(record.topic, record.entries)
+                recording = self.hidden if block.hidden else self
+                self._ids[record.number] = recording, len(recording.blocks)
+                recording.add(block)
                 for time, data in self._early.pop(record.number, []):
                     self._row(record.number, time, data)
         elif isinstance(record, mcap.AttachmentRecord):
@@ -67,11 +72,13 @@ class Log(Recording):
             self.ports = ports_of(record.entries)
         elif record.name == SUMMARY:
             self.summary = record.entries
+        elif record.name == CHANGES:
+            self.changes.append(record.entries)
 
     def _row(self, number: int, time: int, data: bytes) -> None:
-        index = self._ids[number]
-        if len(data) == len(CDR) + self.blocks[index].size:
-            self.append(index, time, data[len(CDR) :])
+        recording, index = self._ids[number]
+        if len(data) == len(CDR) + recording.blocks[index].size:
+            recording.append(index, time, data[len(CDR) :])
             self.end = max(time / 1e9, self.end or 0.0)
 
     def _judge(self, scan: mcap.RecordScan) -> None:
@@ -134,7 +141,7 @@ def _block(path: str, described: Mapping[str, str]) -> RecordedBlock:
         known = all(type(size) is int and 1 <= size <= MOST_SLOTS for size in sizes)
         flat = all(len(port.shape) <= MOST_AXES for port in ports)
         if known and flat and ports and all(port.type in SLOT_TYPES for port in ports):
-            block = RecordedBlock(path, ports, described.get("rate", ""))
+            block = RecordedBlock(path, ports, described.get("rate", ""), HIDDEN in described)
             if sum(math.prod(port.shape) for port in ports) <= MOST_SLOTS:
                 return block
     except (ValueError, TypeError, LookupError, RecursionError):

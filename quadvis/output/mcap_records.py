@@ -29,7 +29,7 @@ FREE, RATIO = 4 << 20, 64  # bytes that any file may unpack to, plus a multiple 
 # Records that can be recognised in the middle of other data: chunks, and the first and last records of a log.
 KNOWN = re.compile(
     rb"\x06.{5}\0{3}.{28}(?:\0{4}|\x03\0{3}lz4|\x04\0{3}zstd)"
-    rb"|\x0c.{5}\0{3}\x07\0{3}(?:quadvis|summary)"
+    rb"|\x0c.{5}\0{3}\x07\0{3}(?:quadvis|summary|changes)"
     rb"|\x09.{5}\0{3}.{16}\x0c\0{3}diagram\.yaml"
     rb"|\x0f\x04\0{7}.{4}",
     re.DOTALL,

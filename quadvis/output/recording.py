@@ -62,11 +62,15 @@ class RecordedPort(NamedTuple):
 
 
 class RecordedBlock(NamedTuple):
-    """One recorded block: its path ("/vision/detector"), its ports in the order of memory, its rate."""
+    """One recorded block: its path ("/vision/detector"), its ports in the order of memory, its rate.
+
+    A ``hidden`` one is no signal of the diagram; it serves to replay the run.
+    """
 
     path: str
     ports: tuple[RecordedPort, ...]
     rate: str = ""
+    hidden: bool = False
 
     @property
     def size(self) -> int:

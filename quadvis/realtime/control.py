@@ -19,10 +19,17 @@ BEGUN = (
 DONE = 3  # by the loop: the number of steps
 END = 4  # by either: not 0 if the run is to end before its next step
 WORDS = 8
+LEFT_OUT = (
+    4096,
+    2,
+)  # the ring of the ticks that the loop leaves out: its room, and its records, first and count
 
 
 class SharedMemory:
-    """The words of a real-time run: of control, of the times of each task, and of the rings."""
+    """The words of a real-time run: of control, of the times of each task, and of the rings.
+
+    ``left_out`` is the ring of the ticks that the loop leaves out.
+    """
 
     def __init__(self, words: Any, tasks: int, rings: Sequence[tuple[int, int]]) -> None:
         """Divide the ``words``; ``rings`` are the records that each has room for, and their widths."""
@@ -30,14 +37,15 @@ class SharedMemory:
         self.control = view[:WORDS]
         ends = [WORDS + times.WORDS * (task + 1) for task in range(tasks)]
         self.tasks = [view[end - times.WORDS : end] for end in ends]
-        self.rings = []
+        made = []
         start = WORDS + times.WORDS * tasks
-        for room, width in rings:
+        for room, width in (*rings, LEFT_OUT):
             size = RecordRing.size(room, width)
-            self.rings.append(RecordRing(view[start : start + size], room, width))
+            made.append(RecordRing(view[start : start + size], room, width))
             start += size
+        self.rings, self.left_out = made[:-1], made[-1]
 
     @staticmethod
     def size(tasks: int, rings: Sequence[tuple[int, int]]) -> int:
         """Return the number of words."""
-        return WORDS + times.WORDS * tasks + sum(RecordRing.size(*ring) for ring in rings)
+        return WORDS + times.WORDS * tasks + sum(RecordRing.size(*ring) for ring in (*rings, LEFT_OUT))

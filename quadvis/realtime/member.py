@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
 from multiprocessing.process import BaseProcess
@@ -21,7 +21,7 @@ from quadvis.realtime.application import Ending, Ready, Setup, perform
 from quadvis.realtime.control import SharedMemory
 from quadvis.realtime.flight import Share
 from quadvis.realtime.options import RealTime
-from quadvis.realtime.ring import RecordRing
+from quadvis.realtime.ring import RecordRing, Words
 from quadvis.realtime.schedule import NANOSECONDS
 from quadvis.realtime.streams import RowStream, streams_of
 from quadvis.realtime.times import TaskTimes
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
 
 WARNED = 1.0  # s between two warnings
+LeftOut = Callable[[str, Words], None]  # takes a computer, and its ticks that were left out: first, count
 
 
 class Member:
@@ -48,9 +49,11 @@ class Member:
         wishes: RealTime,
         engine: str,
         taps: Sequence[Tap],
+        left_out: LeftOut,
         announce: Announce,
     ) -> None:
         self.computer, self._part, self._announce = computer, part, announce
+        self._left_out = left_out
         self._limits = diagram.overload
         self._streams = streams_of(part, taps)
         streams = tuple(stream for stream, _ in self._streams)
@@ -103,7 +106,8 @@ class Member:
     @property
     def lost(self) -> int:
         """How many rows found no room on the way here."""
-        return sum(len(stream.blocks) * ring.lost for (stream, _), ring in self._rings)
+        rows = sum(len(stream.blocks) * ring.lost for (stream, _), ring in self._rings)
+        return rows + self._shared.left_out.lost
 
     @property
     def failed(self) -> bool:
@@ -117,9 +121,14 @@ class Member:
         self._control[control.END] = 1
 
     def take(self, *, last: bool = False) -> None:
-        """Hand on the rows that have come."""
-        for (stream, taps), ring in self._rings:
-            stream.hand_on(ring.take(last=last), taps)
+        """Hand on the ticks that were left out, and the rows that have come.
+
+        Of both, what the loop has noted before a row that is handed on: the rows are taken first.
+        """
+        found = [(stream, taps, ring.take(last=last)) for (stream, taps), ring in self._rings]
+        self._left_out(self.computer, self._shared.left_out.take(last=last))
+        for stream, taps, records in found:
+            stream.hand_on(records, taps)
 
     @property
     def _rings(self) -> Iterable[tuple[tuple[RowStream, list[Tap]], RecordRing]]:

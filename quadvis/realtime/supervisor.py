@@ -15,7 +15,7 @@ from quadvis.machine.processes import launching
 from quadvis.native.choice import Announce
 from quadvis.realtime.application import GRACE
 from quadvis.realtime.flight import Flight
-from quadvis.realtime.member import Member
+from quadvis.realtime.member import LeftOut, Member
 from quadvis.realtime.options import RealTime
 
 if TYPE_CHECKING:
@@ -33,17 +33,19 @@ def supervise(
     wishes: RealTime,
     engine: str,
     taps: Sequence[Tap],
+    left_out: LeftOut,
     tend: Callable[[float, float], None],
     announce: Announce | None = None,
 ) -> Flight:
     """Run a diagram in real time to its stop time, each computer in a process of its own.
 
-    ``wishes`` have been checked. ``taps`` take rows here. ``tend`` is called again and again while it runs,
-    with the time of the last tick and the time since the start (s). RunError if a block fails, if the tasks
-    have too many overruns, if a step does not end, or if a process is killed. However this ends, all
-    processes have ended then, and all rows have been handed on.
+    ``wishes`` have been checked. ``taps`` take rows here, ``left_out`` the ticks that a computer has left
+    out, before the rows of later ticks. ``tend`` is called again and again while it runs, with the time of
+    the last tick and the time since the start (s). RunError if a block fails, if the tasks have too many
+    overruns, if a step does not end, or if a process is killed. However this ends, all processes have ended
+    then, and all rows have been handed on.
     """
-    supervisor = _Supervisor(diagram, wishes, engine, taps, announce or _nothing)
+    supervisor = _Supervisor(diagram, wishes, engine, taps, left_out, announce or _nothing)
     try:
         return supervisor.follow(tend)
     except BaseException as error:
@@ -54,13 +56,21 @@ def supervise(
 
 class _Supervisor:
     def __init__(
-        self, diagram: Diagram, wishes: RealTime, engine: str, taps: Sequence[Tap], announce: Announce
+        self,
+        diagram: Diagram,
+        wishes: RealTime,
+        engine: str,
+        taps: Sequence[Tap],
+        left_out: LeftOut,
+        announce: Announce,
     ) -> None:
         context = multiprocessing.get_context("spawn")
         self._members = []
         for computer, part in {"": diagram.graph}.items():
             own = [tap for tap in taps if tap.block in part]
-            self._members.append(Member(context, diagram, computer, part, wishes, engine, own, announce))
+            self._members.append(
+                Member(context, diagram, computer, part, wishes, engine, own, left_out, announce)
+            )
         self._begun = False
 
     def follow(self, tend: Callable[[float, float], None]) -> Flight:

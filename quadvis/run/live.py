@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from contextlib import ExitStack
 from fractions import Fraction
+from functools import partial
+from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from quadvis.block import Param
 from quadvis.diagram.diagram import Diagram
@@ -20,6 +22,12 @@ from quadvis.engine.tuning import Change
 from quadvis.errors import Faults, Place, QuadvisError, known, quoted, sentence, suggestion
 from quadvis.graph.graph import Node
 from quadvis.graph.names import read_name
+from quadvis.run.row_tap import RowTap, Taker
+from quadvis.run.rows import inputs_of, signals_of
+from quadvis.run.session import metadata
+
+if TYPE_CHECKING:
+    from quadvis.output.log import LogWriter
 
 
 class LiveRun:
@@ -28,18 +36,22 @@ class LiveRun:
     ``run["craft.position"]`` is the present value of a signal, parameter or state, in SI units; an index is
     allowed, and so are the ports of parts. ``run["control/roll.bandwidth"] = "3 rad/s"`` lets a tunable
     parameter have a new value from the next tick on; numbers are in SI units. Blocks are closed, and outputs
-    left at their safe values, when the context ends.
+    left at their safe values, when the context ends. ``log`` is the path of a log, which can be replayed.
     """
 
-    def __init__(self, diagram: Diagram, clock: Clock | None = None) -> None:
+    def __init__(self, diagram: Diagram, clock: Clock | None = None, log: str | Path | None = None) -> None:
         self.diagram = diagram
+        self._log = log
+        self._writer: LogWriter | None = None
         self._engine = Engine(diagram.graph, diagram.seed, clock)
         self._reached = Fraction(0)  # s; the run has passed all ticks before that
         self._stack = ExitStack()
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
-            stack.enter_context(self.diagram.guarded(None))
+            stack.enter_context(self.diagram.guarded(self._log))
+            if self._log is not None:
+                self._writer = stack.enter_context(self._begin_log(self._log))
             stack.enter_context(self._engine)
             self._stack = stack.pop_all()
         return self
@@ -47,7 +59,22 @@ class LiveRun:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        writer, early = self._writer, self._engine.tick != self.diagram.ticks
+        if writer is not None and error is None and early:
+            self._stack.callback(writer.close, {"stopped": f"it was ended at t = {self.time:.9g} s"})
         self._stack.__exit__(kind, error, trace)
+
+    def _begin_log(self, path: str | Path) -> LogWriter:
+        """Return the log, to which all rows and changes go from now on."""
+        from quadvis.output.log import LogWriter  # only a run with a log waits for this import
+
+        logged = [*signals_of(self.diagram), *inputs_of(self.diagram)]
+        writer = LogWriter(path, [each.block for each in logged], metadata(self.diagram))
+        for index, each in enumerate(logged):
+            taker = Taker(partial(writer.write, index), partial(writer.write_rows, index))
+            self._engine.attach(RowTap(each.node.path, each.every, self._engine.period, [taker]))
+        self._engine.tuning.noted = lambda change: writer.write_change(*change)
+        return writer
 
     @property
     def time(self) -> float:
@@ -68,6 +95,8 @@ class LiveRun:
         else:
             engine.run(1)
             self._reached = max(self._reached, engine.tick * engine.period)
+        if self._writer is not None:
+            self._writer.flush_late()
 
     def __getitem__(self, name: str) -> Any:
         path, port, index = self._find(name)
@@ -107,7 +136,12 @@ class LiveRun:
         return self._engine.snapshot()
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back to a snapshot of this diagram; the run from there repeats to the bit."""
+        """Go back to a snapshot of this diagram; the run from there repeats to the bit.
+
+        QuadvisError if it writes a log, in which time cannot go back.
+        """
+        if self._writer is not None:
+            raise QuadvisError("a run that writes a log cannot go back; start one without a log")
         self._engine.restore(snapshot)
         self._reached = snapshot.tick * self._engine.period
 

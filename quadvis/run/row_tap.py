@@ -17,6 +17,14 @@ from quadvis.output.stretch import NANOSECONDS
 Whole = NDArray[np.int64]
 
 
+def stamps_of(ticks: Whole, period: Fraction) -> Whole:
+    """Return the stamps (ns) of ticks, rounded down."""
+    numerator, denominator = (period * NANOSECONDS).as_integer_ratio()
+    if len(ticks) and int(ticks[-1]) * numerator > np.iinfo(np.int64).max:
+        return np.array([tick * numerator // denominator for tick in ticks.tolist()], np.int64)
+    return ticks * numerator // denominator
+
+
 @dataclass(frozen=True)
 class Taker:
     """A consumer of a block's rows: ``one`` takes a stamp (ns) and a row, ``many`` those of N rows."""
@@ -32,6 +40,7 @@ class RowTap(Tap):
         self.block, self.every = block, every
         self._one = tuple(taker.one for taker in takers)
         self._many = tuple(taker.many for taker in takers)
+        self._period = period
         self._numerator, self._denominator = (period * NANOSECONDS).as_integer_ratio()
 
     def take(self, tick: int, row: memoryview) -> None:
@@ -42,10 +51,7 @@ class RowTap(Tap):
 
     def take_all(self, ticks: Whole, rows: Whole) -> None:
         """Hand many rows on together."""
-        if int(ticks[-1]) * self._numerator > np.iinfo(np.int64).max:
-            super().take_all(ticks, rows)
-            return
-        stamps = ticks * self._numerator // self._denominator
+        stamps = stamps_of(ticks, self._period)
         for take in self._many:
             take(stamps, rows)
 

@@ -1,4 +1,4 @@
-"""One run of a diagram: engine or application, recording, log, progress, verdicts."""
+"""One run of a diagram: its loop, recording, log, progress, verdicts."""
 
 from __future__ import annotations
 
@@ -6,20 +6,25 @@ import json
 import os
 import platform
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from quadvis.engine.engine import Engine
-from quadvis.graph.graph import Node
-from quadvis.native.choice import AUTO, Announce, Choice, choose, use
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.engine.taps import Tap
+from quadvis.engine.tuning import Change
+from quadvis.native.choice import AUTO, Announce
 from quadvis.output.kept import ALL, RowJudge, RunSignals
-from quadvis.output.recording import RecordedBlock, RecordedPort
+from quadvis.output.recording import RecordedBlock
+from quadvis.run.loops import SIMULATED, Paced, Progress, RunLoop, Simulated, Taken, Takers
 from quadvis.run.result import Result
-from quadvis.run.row_tap import PacedTap, RowTap, Taker
+from quadvis.run.row_tap import RowTap, Taker, stamps_of
+from quadvis.run.rows import inputs_of, left_out, signals_of
 from quadvis.run.verdict import Judging, Outcome
 from quadvis.version import __version__
 
@@ -28,20 +33,6 @@ if TYPE_CHECKING:
     from quadvis.output.log import LogWriter
     from quadvis.realtime.flight import Flight
     from quadvis.realtime.options import RealTime
-
-Progress = Callable[[float, float], None]  # simulated time reached, wall time spent (s)
-SLICE = 0.1  # s of wall time between two calls of the progress; Ctrl-C and rows for the log wait no longer
-
-
-class Taken(NamedTuple):
-    """A block whose rows are taken, by what and for which judge."""
-
-    node: Node
-    judge: RowJudge
-    tap: RowTap
-
-
-Loop = Callable[[Sequence[Taken], Progress, ExitStack], "tuple[Choice, Flight | None]"]
 
 
 def run(
@@ -66,25 +57,54 @@ def run(
     ``real_time`` lets every tick wait for its time, in a process of its own; see "Real time" in
     quadvis/README.md. Ticks that such a run misses have no rows.
     """
-    begin = _simulated if real_time is None else partial(_paced, wishes=real_time)
-    loop = begin(diagram, engine, announce)
-    logged = [node for node in diagram.graph.nodes if diagram.logs(node.path) and _fields(node)]
-    recorded = [RecordedBlock(f"/{node.path}", _fields(node), node.task.name) for node in logged]
+    loop: RunLoop
+    if real_time is None:
+        loop = Simulated(diagram, engine, announce)
+    else:
+        loop = Paced(diagram, engine, announce, real_time)
+    return recorded(diagram, loop, log=log, progress=progress, keep=keep)
+
+
+def recorded(
+    diagram: Diagram,
+    loop: RunLoop,
+    *,
+    log: str | Path | None = None,
+    progress: Progress | None = None,
+    keep: Sequence[str] | None = None,
+    taps: Sequence[Tap] = (),
+    facts: Mapping[str, str] | None = None,
+) -> Result:
+    """Return the result of a loop's run; ``facts`` are more of them for the log, ``taps`` take rows, too."""
+    signals_logged = signals_of(diagram)
     patterns = ((ALL,) if log is None else ()) if keep is None else tuple(keep)
-    signals = RunSignals(recorded, diagram.ports, patterns)
+    signals = RunSignals([each.block for each in signals_logged], diagram.ports, patterns)
     judging = Judging(diagram.summary, diagram.expectations)
+    logged = [*signals_logged, *(inputs_of(diagram) if log is not None else ())]
     wall, cpu = time.perf_counter(), _processor_time()
     with ExitStack() as stack:
         stack.enter_context(diagram.guarded(log))
-        facts = metadata(diagram, real_time is not None)
-        writer = stack.enter_context(_writer(log, recorded, facts)) if log is not None else None
+        writer = None
+        if log is not None:
+            blocks = [*(each.block for each in logged), *map(left_out, loop.computers)]
+            about = metadata(diagram, loop.clock) | dict(facts or {})
+            writer = stack.enter_context(_writer(log, blocks, about))
         taken = []
-        for index, node in enumerate(logged):
-            judge = RowJudge(recorded[index], judging)
+        for index, each in enumerate(logged):
+            judge = RowJudge(each.block, judging)
             takers = _takers(index, signals, writer, judge)
             if takers:
-                tap = RowTap(node.path, diagram.decimation(node.path), diagram.graph.tick, takers)
-                taken.append(Taken(node, judge, tap))
+                tap = RowTap(each.node.path, each.every, diagram.graph.tick, takers)
+                taken.append(Taken(each.node, judge, tap))
+
+        def leave_out(computer: str, ticks: NDArray[np.int64]) -> None:
+            if writer and len(ticks):
+                index = len(logged) + list(loop.computers).index(computer)
+                writer.write_rows(index, stamps_of(ticks[:, 0], diagram.graph.tick), ticks)
+
+        def change(made: Change) -> None:
+            if writer:
+                writer.write_change(*made)
 
         def tend(reached: float, spent: float) -> None:
             if writer:
@@ -92,9 +112,9 @@ def run(
             if progress:
                 progress(reached, spent)
 
-        choice, flight = loop(taken, tend, stack)
-        for each in taken:
-            each.judge.flush()
+        choice, flight = loop.run(Takers(taken, taps, leave_out, change, tend), stack)
+        for row in taken:
+            row.judge.flush()
         outcome = judging.outcome()
         if writer:
             writer.close(_closing(outcome, flight))
@@ -102,37 +122,6 @@ def run(
     wall, cpu = time.perf_counter() - wall, _processor_time() - cpu
     lost = writer.loss if writer else ""
     return Result(diagram, signals, outcome, diagram.duration, wall, cpu, lost, choice, flight)
-
-
-def _simulated(diagram: Diagram, engine: str, announce: Announce | None) -> Loop:
-    """Return the loop of a simulation, with its engine ready."""
-    made = Engine(diagram.graph, diagram.seed)
-    choice = choose(made, diagram.ticks, engine, announce)
-    use(made, choice)
-
-    def loop(taken: Sequence[Taken], tend: Progress, stack: ExitStack) -> tuple[Choice, None]:
-        for each in taken:
-            made.attach(each.tap)
-        stack.enter_context(made)  # to be closed when the log is
-        _advance(made, diagram.ticks, tend)
-        return choice, None
-
-    return loop
-
-
-def _paced(diagram: Diagram, engine: str, announce: Announce | None, wishes: RealTime) -> Loop:
-    """Return the loop of a real-time run; QuadvisError if it cannot be one."""
-    wishes.check(diagram.graph)
-    from quadvis.realtime.supervisor import supervise  # what it needs is Unix's, and takes a while
-
-    def loop(taken: Sequence[Taken], tend: Progress, _: ExitStack) -> tuple[Choice, Flight]:
-        taps = [PacedTap(each.tap, each.node, diagram.graph, each.judge) for each in taken]
-        flight = supervise(diagram, wishes, engine, taps, tend, announce)
-        for tap in taps:
-            tap.end(diagram.ticks)
-        return flight.engine, flight
-
-    return loop
 
 
 def _processor_time() -> float:
@@ -159,28 +148,7 @@ def _takers(index: int, signals: RunSignals, writer: LogWriter | None, judge: Ro
     return takers
 
 
-def _advance(engine: Engine, ticks: int, tend: Progress) -> None:
-    """Run in slices; between slices hand rows on, show the progress and notice an interruption."""
-    began = time.perf_counter()
-    count = 1
-    while engine.tick < ticks:
-        start = time.perf_counter()
-        engine.run(min(count, ticks - engine.tick))
-        spent = time.perf_counter() - start
-        count = max(1, min(2 * count, int(count * SLICE / max(spent, 1e-6))))
-        tend(engine.time, time.perf_counter() - began)
-
-
-def _fields(node: Node) -> tuple[RecordedPort, ...]:
-    outputs = node.block.interface.outputs
-    return tuple(
-        RecordedPort(name, port.signal.scalar, node.shape(name), node.unit(name))
-        for name, port in outputs.items()
-        if port.signal.scalar != "frame"
-    )
-
-
-def metadata(diagram: Diagram, real_time: bool = False) -> dict[str, str]:
+def metadata(diagram: Diagram, clock: str = SIMULATED) -> dict[str, str]:
     """Return the facts of a run for its log as texts; see ``quadvis.output.log``."""
     from quadvis.output.log import PORTS
 
@@ -193,7 +161,8 @@ def metadata(diagram: Diagram, real_time: bool = False) -> dict[str, str]:
         "hash": diagram.hash,
         "start": datetime.now(UTC).isoformat(timespec="seconds"),
         "python": platform.python_version(),
-        "clock": "real time" if real_time else "simulated",
+        "folder": os.path.abspath(diagram.path.parent),
+        "clock": clock,
         PORTS: json.dumps(dict(diagram.ports)),
         "diagram": diagram.resolved,
     }

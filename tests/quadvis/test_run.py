@@ -161,7 +161,7 @@ def test_a_run_without_expectations_passes_without_a_word_about_it() -> None:
 
 
 def test_progress_tells_the_time_reached(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("quadvis.run.session.SLICE", 0.0)
+    monkeypatch.setattr("quadvis.run.loops.SLICE", 0.0)
     seen: list[tuple[float, float]] = []
     ramp().run(progress=lambda time, wall: seen.append((time, wall)))
     times = [time for time, _ in seen]

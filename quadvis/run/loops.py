@@ -1,0 +1,137 @@
+"""How the ticks of a run go on: all at once in a simulation, or each at its time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.engine.engine import Engine
+from quadvis.engine.taps import Tap
+from quadvis.engine.tuning import Change
+from quadvis.graph.graph import Node
+from quadvis.native.choice import Announce, Choice, choose, use
+from quadvis.output.kept import RowJudge
+from quadvis.run.row_tap import PacedTap, RowTap
+
+if TYPE_CHECKING:
+    from quadvis.diagram.diagram import Diagram
+    from quadvis.realtime.flight import Flight
+    from quadvis.realtime.options import RealTime
+
+SIMULATED, REAL_TIME = "simulated", "real time"  # the clock of a run, as its log says
+SLICE = 0.1  # s of wall time between two calls of the progress; Ctrl-C and rows for the log wait no longer
+
+Progress = Callable[[float, float], None]  # simulated time reached, wall time spent (s)
+
+
+class Taken(NamedTuple):
+    """A block whose rows are taken, by what and for which judge."""
+
+    node: Node
+    judge: RowJudge
+    tap: RowTap
+
+
+class Takers(NamedTuple):
+    """Who takes what comes from a loop.
+
+    ``left_out`` takes a computer's name and the ticks that it left out: the first and the count of each run
+    of ticks (N, 2). ``changed`` takes the parameters that were tuned, ``tend`` the progress.
+    """
+
+    taken: Sequence[Taken]
+    taps: Sequence[Tap]
+    left_out: Callable[[str, NDArray[np.int64]], None]
+    changed: Callable[[Change], None]
+    tend: Progress
+
+
+class RunLoop(Protocol):
+    """The ticks of a run, ready to begin.
+
+    ``clock`` is ``SIMULATED`` or ``REAL_TIME``. ``computers`` are those that may leave ticks out.
+    """
+
+    @property
+    def clock(self) -> str:
+        """Return it."""
+
+    @property
+    def computers(self) -> Sequence[str]:
+        """Return them."""
+
+    def run(self, takers: Takers, stack: ExitStack) -> tuple[Choice, Flight | None]:
+        """Run to the end; what is opened is closed with the stack."""
+
+
+class Simulated:
+    """All ticks at once."""
+
+    clock = SIMULATED
+    computers: Sequence[str] = ()
+
+    def __init__(self, diagram: Diagram, engine: str, announce: Announce | None) -> None:
+        self._engine = Engine(diagram.graph, diagram.seed)
+        self._ticks = diagram.ticks
+        self._choice = choose(self._engine, self._ticks, engine, announce)
+        use(self._engine, self._choice)
+
+    def run(self, takers: Takers, stack: ExitStack) -> tuple[Choice, None]:
+        """Run to the end."""
+        engine = self._engine
+        for tap in (*(each.tap for each in takers.taken), *takers.taps):
+            engine.attach(tap)
+        stack.enter_context(engine)  # to be closed when the log is
+        advance([engine], self._ticks, takers.tend)
+        return self._choice, None
+
+
+class Paced:
+    """Each tick at its time, in a process of its own; QuadvisError if the diagram cannot run so."""
+
+    clock = REAL_TIME
+
+    def __init__(self, diagram: Diagram, engine: str, announce: Announce | None, wishes: RealTime) -> None:
+        wishes.check(diagram.graph)
+        self._diagram, self._engine, self._announce, self._wishes = diagram, engine, announce, wishes
+        self.computers: Sequence[str] = ("",)
+
+    def run(self, takers: Takers, stack: ExitStack) -> tuple[Choice, Flight]:
+        """Run to the end."""
+        from quadvis.realtime.supervisor import supervise  # what it needs is Unix's, and takes a while
+
+        taps = paced_taps(takers.taken, self._diagram)
+        flight = supervise(
+            self._diagram, self._wishes, self._engine, [*taps, *takers.taps], takers.left_out, takers.tend,
+            self._announce,
+        )  # fmt: skip
+        for tap in taps:
+            tap.end(self._diagram.ticks)
+        return flight.engine, flight
+
+
+def paced_taps(taken: Sequence[Taken], diagram: Diagram) -> list[PacedTap]:
+    """Return taps for a run that may leave out ticks."""
+    return [PacedTap(each.tap, each.node, diagram.graph, each.judge) for each in taken]
+
+
+def advance(engines: Sequence[Engine], ticks: int, tend: Progress) -> None:
+    """Run in slices, each of all engines in turn; they have one base tick.
+
+    Between slices hand rows on, show the progress and notice an interruption.
+    """
+    began = time.perf_counter()
+    reached, count = 0, 1
+    while reached < ticks:
+        start = time.perf_counter()
+        reached = min(reached + count, ticks)
+        for engine in engines:
+            engine.run(reached - engine.tick)
+        spent = time.perf_counter() - start
+        count = max(1, min(2 * count, int(count * SLICE / max(spent, 1e-6))))
+        tend(engines[0].time, time.perf_counter() - began)

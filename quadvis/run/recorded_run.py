@@ -1,0 +1,166 @@
+"""What a log holds of a run, as a replay needs it: ticks, outputs from outside, tuned parameters."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.diagram.diagram import Diagram
+from quadvis.engine.tuning import Change
+from quadvis.errors import QuadvisError, quoted
+from quadvis.graph.graph import Graph, Node
+from quadvis.output.log_reader import Log
+from quadvis.output.recording import Recording, Slots
+from quadvis.output.stretch import NANOSECONDS
+from quadvis.run.loops import REAL_TIME, SIMULATED
+from quadvis.run.outside import outside
+from quadvis.run.row_tap import stamps_of
+from quadvis.run.rows import all_logged, input_topic, left_out, ports
+
+Whole = NDArray[np.int64]
+AGAIN = "run the diagram again with this quadvis"
+
+
+class RecordedRun:
+    """The run that a log holds. ``parts`` are its computers, each with a graph that runs by itself.
+
+    ``clock`` is that of the run. ``whole`` is true if it reached its stop time and the log has all of it.
+    QuadvisError says in a sentence what a replay needs and the log does not hold.
+    """
+
+    def __init__(self, log: Log, diagram: Diagram) -> None:
+        self._log, self._diagram = log, diagram
+        self.clock = log.metadata.get("clock", SIMULATED)
+        self.whole = log.complete and not {"stopped", "lost"} & log.summary.keys() and not _lost_rows(log)
+        self.parts = [RecordedPart(log, diagram, "", diagram.graph, self.clock == REAL_TIME)]
+
+    @cached_property
+    def ticks(self) -> int:
+        """The number of ticks up to which it can be repeated, with those that were left out."""
+        if self.whole:
+            return self._diagram.ticks
+        ends = [
+            int(recording.stamps(name)[-1])
+            for recording in (self._log, self._log.hidden)
+            for name in recording.names
+            if len(recording.stamps(name)) and not name.startswith(left_out("").path.strip("/"))
+        ]
+        if not ends:
+            raise QuadvisError(f"the log '{self._log.path}' holds no row that a replay could repeat")
+        last = _tick_of(max(ends), self._diagram.graph.tick) + 1
+        return min(part.known_to(last) for part in self.parts)
+
+
+class RecordedPart:
+    """What a log holds of one computer; ``computer`` is "" in a diagram without computers.
+
+    ``left_out`` are the ticks that it left out: the first, and how many (N, 2).
+    """
+
+    def __init__(self, log: Log, diagram: Diagram, computer: str, graph: Graph, may_leave_out: bool) -> None:
+        self._log, self._diagram = log, diagram
+        self.computer, self.graph = computer, graph
+        self.left_out = self._left_out() if may_leave_out else np.zeros((0, 2), np.int64)
+
+    def _left_out(self) -> Whole:
+        topic = left_out(self.computer).path
+        if not has(self._log.hidden, topic):
+            problem = f"the log '{self._log.path}' does not say which ticks the real-time run left out"
+            raise QuadvisError(f"{problem}: it is of an earlier quadvis; {AGAIN}")
+        return self._log.hidden.arrays(topic)[1].reshape(-1, 2)
+
+    def missed(self, end: int) -> int:
+        """Return how many ticks before ``end`` were left out."""
+        first, count = self.left_out[:, 0], self.left_out[:, 1]
+        return int(np.clip(end - first, 0, count).sum())
+
+    def ticks_of(self, path: str, every: int, end: int) -> Whole:
+        """Return the ticks before ``end`` at which a block had a row, if one in ``every`` was taken."""
+        task = self.graph[path].task
+        period = self.graph.ticks(task.period) * every
+        found = np.arange(self.graph.ticks(task.offset), end, period, dtype=np.int64)
+        if len(self.left_out):
+            place = np.searchsorted(self.left_out[:, 0], found, "right") - 1
+            found = found[(place < 0) | (found >= self.left_out[place].sum(axis=1))]
+        return found
+
+    def known_to(self, end: int) -> int:
+        """Return the number of ticks, up to ``end``, whose outputs from outside the log holds."""
+        for node in self._outside():
+            ticks, count = self.ticks_of(node.path, 1, end), len(self._rows(node)[0])
+            end = int(ticks[count]) if count < len(ticks) else end
+        return end
+
+    def inputs(self, end: int) -> dict[str, Slots]:
+        """Return the rows of the blocks that reach outside, by path: one for each of their ticks."""
+        found = {}
+        for node in self._outside():
+            stamps, rows = self._rows(node)
+            wanted = stamps_of(self.ticks_of(node.path, 1, end), self.graph.tick)
+            count = min(len(stamps), len(wanted))
+            wrong = np.flatnonzero(stamps[:count] != wanted[:count])
+            row = int(wrong[0]) if len(wrong) else count
+            if row < len(wanted):
+                moment = f"t = {wanted[row] / NANOSECONDS:.9g} s"
+                problem = f"the log '{self._log.path}' lacks the outputs of {quoted(node.path)} at {moment}"
+                raise QuadvisError(f"{problem}, and they came from outside")
+            found[node.path] = rows[:count]
+        return found
+
+    def _outside(self) -> Iterator[Node]:
+        yield from (node for node in outside(self.graph) if ports(node))
+
+    def _rows(self, node: Node) -> tuple[Whole, Slots]:
+        """Return the stamps and the rows of a block that reaches outside."""
+        visible = all_logged(self._diagram, node.path)
+        where, topic = (self._log, f"/{node.path}") if visible else (self._log.hidden, input_topic(node.path))
+        if not has(where, topic):
+            problem = f"the log '{self._log.path}' does not hold all outputs of {quoted(node.path)}"
+            raise QuadvisError(f"{problem}, which come from outside; {AGAIN}")
+        check_ports(self._log, where, topic, node)
+        return where.arrays(topic)
+
+    def changes(self) -> list[Change]:
+        """Return the parameters that were tuned."""
+        found = []
+        for entries in self._log.changes:
+            try:
+                path, name = entries["block"], entries["parameter"]
+                found.append(Change(int(entries["tick"]), path, name, json.loads(entries["value"])))
+            except (LookupError, ValueError):
+                problem = f"the log '{self._log.path}' describes a change of a parameter"
+                raise QuadvisError(f"{problem} in a way that this quadvis does not know") from None
+        return [change for change in found if change.path in self.graph]
+
+
+def check_ports(log: Log, where: Recording, topic: str, node: Node) -> None:
+    """Refuse rows of a block that has other outputs now."""
+    block = next(block for block in where.blocks if block.path == topic)
+    now, then = ([port[:3] for port in found] for found in (ports(node), block.ports))
+    if now != then:
+        problem = f"in the log '{log.path}' {quoted(node.path)} has other outputs than the block has now"
+        raise QuadvisError(f"{problem}; replay it with quadvis {log.metadata.get('quadvis', '')}".rstrip())
+
+
+def has(recording: Recording, topic: str) -> bool:
+    """Whether a recording has a topic."""
+    return any(block.path == topic for block in recording.blocks)
+
+
+def _lost_rows(log: Log) -> bool:
+    """Whether rows of a real-time run found no room on their way to its log."""
+    try:
+        return bool(json.loads(log.summary.get("real time", "{}")).get("lost_rows"))
+    except (ValueError, AttributeError):
+        return False
+
+
+def _tick_of(stamp: int, period: Fraction) -> int:
+    """Return the tick of a stamp (ns) that was rounded down."""
+    numerator, denominator = (period * NANOSECONDS).as_integer_ratio()
+    return -(-stamp * denominator // numerator)

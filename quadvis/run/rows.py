@@ -1,0 +1,66 @@
+"""Which rows a run records: those that its diagram logs, and those that only a replay needs."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from quadvis.diagram.diagram import Diagram
+from quadvis.graph.graph import Node
+from quadvis.output.recording import RecordedBlock, RecordedPort
+from quadvis.run.outside import outside
+
+FOLDER = "/_replay"  # of the topics that only a replay needs
+LEFT_OUT = (RecordedPort("first", "int64"), RecordedPort("count", "int64"))  # ticks that a run left out
+
+
+class RecordedNode(NamedTuple):
+    """A node whose outputs are recorded at its first and then at every ``every`` of its ticks."""
+
+    node: Node
+    block: RecordedBlock
+    every: int
+
+
+def signals_of(diagram: Diagram) -> list[RecordedNode]:
+    """Return what a diagram logs."""
+    return [
+        RecordedNode(
+            node, RecordedBlock(f"/{node.path}", ports(node), node.task.name), diagram.decimation(node.path)
+        )
+        for node in diagram.graph.nodes
+        if diagram.logs(node.path) and ports(node)
+    ]
+
+
+def inputs_of(diagram: Diagram) -> list[RecordedNode]:
+    """Return what a log holds besides: blocks that reach outside and whose rows are not all logged."""
+    return [
+        RecordedNode(node, RecordedBlock(input_topic(node.path), ports(node), node.task.name, True), 1)
+        for node in outside(diagram.graph)
+        if ports(node) and not all_logged(diagram, node.path)
+    ]
+
+
+def all_logged(diagram: Diagram, path: str) -> bool:
+    """Whether a diagram logs a block's outputs at all its ticks."""
+    return diagram.logs(path) and diagram.decimation(path) == 1
+
+
+def input_topic(path: str) -> str:
+    """Return the topic of the rows of a block that only a replay needs."""
+    return f"{FOLDER}/inputs/{path}"
+
+
+def left_out(computer: str) -> RecordedBlock:
+    """Return the topic of the ticks that a computer has left out in a real-time run: the first, how many."""
+    return RecordedBlock("/".join(filter(None, (FOLDER, "left_out", computer))), LEFT_OUT, hidden=True)
+
+
+def ports(node: Node) -> tuple[RecordedPort, ...]:
+    """Return the outputs of a node that a row holds: all but frames."""
+    outputs = node.block.interface.outputs
+    return tuple(
+        RecordedPort(name, port.signal.scalar, node.shape(name), node.unit(name))
+        for name, port in outputs.items()
+        if port.signal.scalar != "frame"
+    )

@@ -1,0 +1,409 @@
+"""Runs repeated from their logs, to the bit; and logs that differ, are cut, or lack what is needed."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import quadvis
+from quadvis import Log, read_log, replay
+from quadvis.cli import main
+from quadvis.errors import DiagramError, QuadvisError
+from quadvis.output.log import LogWriter
+
+ROOT = Path(__file__).parents[2]
+TEXT = """\
+quadvis: 1
+name: flight
+rates: {fast: 30 Hz, slow: 10 Hz}
+stop_time: 2 s
+seed: 7
+blocks:
+  noise: {block: sources.noise, rate: fast, with: {sigma: 0.1 m}}
+  outside: {block: own.outside, rate: fast}
+  sum: {block: signal.sum, rate: fast, in: {a: noise.y, b: outside.y}}
+  filter: {block: signal.low_pass, rate: fast, with: {time_constant: 0.2 s}, in: {u: sum.y}}
+  slow: {block: signal.gain, rate: slow, with: {factor: 2}, in: {u: {from: filter.y, across: sample}}}
+log: {every: {fast: 4}}
+"""
+OUTSIDE = '''
+"""A block that reads what the world says."""
+
+from pathlib import Path
+
+from quadvis.block import Block, Out
+
+
+class Outside(Block, numeric=False):
+    """Reads a number from the file 'world', and adds one to it."""
+
+    not_replayable = "it reads the world"
+
+    y = Out(unit="m", nan=True)
+    even = Out("bool")
+
+    def read(self):
+        self.number = int(Path("world").read_text())
+        Path("world").write_text(str(self.number + 1))
+
+    def output(self):
+        return 0.1 * self.number, self.number % 2 == 0
+'''
+
+Rows = NDArray[np.int64]
+Edit = Callable[[str, Rows, Rows], tuple[Rows, Rows]]
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    Path("flight.yaml").write_text(TEXT)
+    Path("blocks/own").mkdir(parents=True)
+    Path("blocks/own/outside.py").write_text(OUTSIDE)
+    Path("world").write_text("5")
+    return tmp_path
+
+
+def flown(log: str = "run.mcap", **more: Any) -> Log:
+    quadvis.load("flight.yaml", **more).run(log=log)
+    return read_log(log)
+
+
+def rewritten(log: Log, edit: Edit, summary: Mapping[str, str] | None = None, path: str = "new.mcap") -> Log:
+    """Write a log again, with the stamps and rows of each topic as ``edit`` returns them."""
+    blocks = [*log.blocks, *log.hidden.blocks]
+    with LogWriter(path, blocks, {**log.metadata, "diagram": log.diagram}) as writer:
+        for index, block in enumerate(blocks):
+            where = log.hidden if block.hidden else log
+            writer.write_rows(index, *edit(block.path, *where.arrays(block.path)))
+        writer.close(log.summary if summary is None else summary)
+    return read_log(path)
+
+
+def without(topic: str, *rows: int) -> Edit:
+    """Leave rows of a topic out."""
+
+    def edit(path: str, stamps: Rows, slots: Rows) -> tuple[Rows, Rows]:
+        some = np.array([row not in rows or path != topic for row in range(len(stamps))], bool)
+        return stamps[some], slots[some]
+
+    return edit
+
+
+def flipped(topic: str, row: int, slot: int) -> Edit:
+    """Flip the last bit of a value."""
+
+    def edit(path: str, stamps: Rows, slots: Rows) -> tuple[Rows, Rows]:
+        slots = slots.copy()
+        if path == topic:
+            slots[row, slot] ^= 1
+        return stamps, slots
+
+    return edit
+
+
+@pytest.mark.parametrize("engine", ["python", pytest.param("native", marks=pytest.mark.slow)])
+def test_a_hover_is_the_same_to_the_bit(engine: str, capsys: pytest.CaptureFixture[str]) -> None:
+    diagram = quadvis.load(ROOT / "diagrams/hover.yaml", variant="geometric", stop_time=2.0)
+    diagram.run(log="hover.mcap", engine="python")
+    assert main(["replay", "hover.mcap", "--engine", engine]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "replayed 401 ticks: the same to the bit"
+
+
+def test_what_came_from_outside_comes_from_the_log() -> None:
+    log = flown()
+    assert "outside.y" in log.names and len(log["outside.y"]) == 16  # as the diagram wants it
+    assert log.hidden.names == ("_replay/inputs/outside.y", "_replay/inputs/outside.even")
+    assert len(log.hidden["_replay/inputs/outside.y"]) == 61
+    Path("world").write_text("1000")
+    found = replay("run.mcap")
+    assert found.same and found.whole
+    assert (found.ticks, found.played, found.time) == (61, ("outside",), 2.0)
+    assert Path("world").read_text() == "1000"
+    assert found.signals == 4 and found.rows == 3 * 16 + 21
+
+
+def test_rows_that_are_all_logged_are_not_written_twice() -> None:
+    Path("flight.yaml").write_text(TEXT.replace("log: {every: {fast: 4}}\n", ""))
+    assert not flown().hidden.names
+    assert replay("run.mcap").same
+
+
+def test_a_block_that_is_not_logged_is_recorded_all_the_same() -> None:
+    Path("flight.yaml").write_text(TEXT.replace("{every: {fast: 4}}", "{signals: [slow]}"))
+    log = flown()
+    assert log.names == ("slow.y",)
+    assert replay("run.mcap").same
+
+
+def test_a_flipped_bit_is_found_and_named(capsys: pytest.CaptureFixture[str]) -> None:
+    log = rewritten(flown(), flipped("/filter", 5, 0))
+    old, new = log["filter.y"][5], read_log("run.mcap")["filter.y"][5]
+    assert main(["replay", "new.mcap"]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert "replayed 61 ticks: 1 of 4 signals differ" in lines
+    where = "filter.y at tick 20, t = 0.666666667 s"
+    assert f"  first {where}: {float(old)!r} m in the log, {float(new)!r} m in the replay" in lines
+    assert main(["replay", "new.mcap", "--json"]) == 1
+    facts = json.loads(capsys.readouterr().out)
+    (difference,) = facts["differences"]
+    assert (facts["same"], difference["tick"], difference["different_rows"]) == (False, 20, 1)
+
+
+def test_the_first_difference_is_that_of_the_first_tick() -> None:
+    log = flown()
+    twice = rewritten(rewritten(log, flipped("/filter", 9, 0)), flipped("/slow", 11, 0), path="twice.mcap")
+    found = replay(twice)
+    assert [each.difference.signal for each in found.differences] == ["slow.y", "filter.y"]
+    assert [each.tick for each in found.differences] == [33, 36]
+
+
+def test_a_damaged_byte_is_no_row_of_another_run() -> None:
+    flown()
+    data = bytearray(Path("run.mcap").read_bytes())
+    row = read_log("run.mcap").arrays("/slow")[1][3].tobytes()
+    data[data.index(row)] ^= 1
+    Path("run.mcap").write_bytes(data)
+    with pytest.raises(QuadvisError, match=r"holds no row that|lacks the outputs of 'outside'"):
+        replay("run.mcap")
+
+
+def test_a_row_that_a_whole_log_lacks_is_a_difference(capsys: pytest.CaptureFixture[str]) -> None:
+    rewritten(flown(), without("/slow", 4, 5))
+    assert main(["replay", "new.mcap"]) == 1
+    assert "  the log lacks 2 rows of slow, the first at t = 0.4 s" in capsys.readouterr().out.splitlines()
+
+
+def test_a_log_that_is_cut_is_replayed_as_far_as_it_goes(capsys: pytest.CaptureFixture[str]) -> None:
+    def cut(path: str, stamps: Rows, slots: Rows) -> tuple[Rows, Rows]:
+        count = 42 if path == "/_replay/inputs/outside" else np.searchsorted(stamps, 1_500_000_001)
+        return stamps[:count], slots[:count]
+
+    rewritten(flown(), cut, summary={"stopped": "it was told to end"})
+    assert main(["replay", "new.mcap"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1] == "  the log does not have the whole run: it was told to end"
+    end = "up to t = 1.36666667 s, as far as the log goes"
+    assert lines[-1] == f"replayed 42 ticks, {end}: the same to the bit"
+
+
+@pytest.mark.parametrize(
+    "edit, words",
+    [
+        (without("/_replay/inputs/outside", 7), "lacks the outputs of 'outside' at t = 0.233333333 s"),
+        (without("/_replay/inputs/outside", 60), "lacks the outputs of 'outside' at t = 2 s"),
+    ],
+)
+def test_a_lack_of_what_came_from_outside_is_said(edit: Edit, words: str) -> None:
+    log = rewritten(flown(), edit)
+    with pytest.raises(QuadvisError, match=words):
+        replay(log)
+
+
+def test_a_log_of_an_earlier_version_says_what_it_lacks() -> None:
+    log = flown()
+    log.hidden = quadvis.output.recording.Recording()
+    words = "does not hold all outputs of 'outside', which come from outside; run the diagram again"
+    with pytest.raises(QuadvisError, match=words):
+        replay(log)
+    Path("flight.yaml").write_text(
+        TEXT.replace("  outside: {block: own.outside, rate: fast}\n", "").replace("outside.y", "0 m")
+    )
+    log = flown()
+    assert replay(log).same
+    log.metadata["clock"] = "real time"
+    with pytest.raises(QuadvisError, match="does not say which ticks the real-time run left out"):
+        replay(log)
+
+
+def test_with_a_replaced_parameter_what_came_from_outside_stays(capsys: pytest.CaptureFixture[str]) -> None:
+    flown()
+    assert main(["replay", "run.mcap", "--set", "filter.time_constant=0.1 s", "-o", "new.mcap"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "flight: seed 7, simulated, with filter.time_constant=0.1 s"
+    assert "replayed 61 ticks: 2 of 4 signals differ" in lines
+    old, new = read_log("run.mcap"), read_log("new.mcap")
+    assert new.complete and new.metadata["replay of"] == "run.mcap"
+    assert old["outside.y"].tobytes() == new["outside.y"].tobytes()
+    largest = np.abs(new["filter.y"] - old["filter.y"]).max()
+    assert any(line.split()[:1] == ["filter.y"] and f"by {largest:.3g} m" in line for line in lines)
+    assert replay(new).same  # the new log can be replayed in turn
+    with pytest.raises(DiagramError, match="no block 'fliter'"):
+        replay(old, settings=["fliter.time_constant=0.1 s"])
+
+
+def test_the_log_itself_is_not_written_over(capsys: pytest.CaptureFixture[str]) -> None:
+    flown()
+    before = Path("run.mcap").read_bytes()
+    assert main(["replay", "run.mcap", "-o", "run.mcap"]) == 2
+    assert "it is an input" in capsys.readouterr().err
+    assert Path("run.mcap").read_bytes() == before
+
+
+def test_parameters_that_were_tuned_are_tuned_again() -> None:
+    with quadvis.load("flight.yaml").start(log="run.mcap") as run:
+        run.advance("0.5 s")
+        run["filter.time_constant"] = "0.05 s"
+        run.advance("1 s")
+        run["noise.sigma"] = "0 m"
+        run["filter.time_constant"] = "1 s"
+        run.advance("0.5 s")
+    log = read_log("run.mcap")
+    assert [int(change["tick"]) for change in log.changes] == [15, 45, 45]
+    found = replay(log, output="new.mcap")
+    assert found.same and found.ticks == 60
+    assert read_log("new.mcap").changes == log.changes
+    log.changes.pop()
+    (first, *_) = replay(log).differences
+    assert (first.difference.signal, first.tick) == ("filter.y", 48)
+
+
+def test_files_must_be_what_they_were(tmp_path: Path) -> None:
+    hover = tmp_path / "hover"
+    (hover / "calib").mkdir(parents=True)
+    Path(hover / "own.yaml").write_text(
+        "quadvis: 1\nname: own\nbase: {file: quadvis:hover.yaml, variant: geometric}\n"
+    )
+    text = (ROOT / "diagrams/calib/camera.yaml").read_text()
+    camera = hover / "calib/camera.yaml"
+    camera.write_text(text)
+    settings = {"pose.calibration": str(camera)}
+    quadvis.load(hover / "own.yaml", settings=settings, stop_time=0.1).run(log="run.mcap")
+    assert replay("run.mcap").same
+    camera.write_text(text + "# a note\n")
+    with pytest.raises(DiagramError, match=r"calib/camera.yaml' is not what it was: its SHA-256 differs"):
+        replay("run.mcap")
+    camera.unlink()
+    with pytest.raises(
+        DiagramError, match=r"run.mcap: diagram:\d+:\d+: there is no file 'calib/camera.yaml'"
+    ) as error:
+        replay("run.mcap")
+    assert error.value.__notes__ == [
+        f"the log says that its diagram stood in '{hover}'; folder names another folder"
+    ]
+    (tmp_path / "moved/calib").mkdir(parents=True)
+    (tmp_path / "moved/calib/camera.yaml").write_text(text)
+    assert replay("run.mcap", folder="moved").same
+
+
+@pytest.mark.parametrize("ticks, turns", [(100, 3), pytest.param(1000, 10, marks=pytest.mark.slow)])
+def test_the_bits_do_not_depend_on_how_fast_it_goes(
+    ticks: int, turns: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each of many stamps is that of rows of three topics: ticks and order count, and no clock."""
+    text = TEXT.replace("30 Hz, slow: 10 Hz", "1 kHz, slow: 1 kHz").replace(
+        "stop_time: 2 s", f"stop_time: {(ticks - 1) / 1000} s"
+    )
+    Path("flight.yaml").write_text(text.replace("{every: {fast: 4}}", "{signals: [sum, filter, slow]}"))
+    log = flown()
+    names = ("sum.y", "filter.y", "slow.y")
+    assert len({log.stamps(name).tobytes() for name in names}) == 1 and len(log["slow.y"]) == ticks
+    seen = set()
+    for turn in range(turns):
+        monkeypatch.setattr("quadvis.run.loops.SLICE", (0.0, 0.001, 10.0)[turn % 3])
+        assert replay(log, output="new.mcap").same
+        new = read_log("new.mcap")
+        seen.add(hashlib.sha256(b"".join(new[name].tobytes() for name in names)).hexdigest())
+    assert len(seen) == 1
+
+
+def test_a_block_that_only_writes_does_not(capsys: pytest.CaptureFixture[str]) -> None:
+    pictures = ROOT / "diagrams/recordings/hand_held"
+    Path("film.yaml").write_text(
+        f"""\
+quadvis: 1
+name: film
+rates: {{film: 10 Hz}}
+stop_time: 0.2 s
+seed: 1
+blocks:
+  film: {{block: vision.image_folder, rate: film, with: {{folder: {pictures}}}}}
+  pictures: {{block: vision.frame_writer, rate: film, with: {{folder: out}}, in: {{frame: film.frame}}}}
+"""
+    )
+    quadvis.load("film.yaml").run(log="film.mcap")
+    for path in Path("out").iterdir():
+        path.unlink()
+    assert main(["replay", "film.mcap"]) == 0
+    assert "  not run, since they only write: pictures" in capsys.readouterr().out.splitlines()
+    assert list(Path("out").iterdir()) == []
+
+
+CAMERA = '''
+"""A camera of the world."""
+
+import numpy as np
+
+from quadvis.block import Block, Frame, Out
+
+
+class Camera(Block, numeric=False):
+    """Gives frames that nobody can predict."""
+
+    not_replayable = "it is a camera"
+
+    frame = Out("frame")
+    count = Out("int64")
+
+    def open(self):
+        self.random, self.number = np.random.default_rng(), 0
+
+    def output(self, time):
+        self.number += 1
+        pixels = self.random.integers(0, 256, (4, 4, 3), np.uint8)
+        return Frame(pixels, time, self.number), self.number
+'''
+LIGHT = '''
+"""How light a frame is."""
+
+from quadvis.block import Block, In, Out
+
+
+class Light(Block, numeric=False):
+    """Gives the mean of all pixels."""
+
+    frame = In("frame")
+    y = Out()
+
+    def output(self, frame):
+        return float(frame.pixels.mean())
+'''
+
+
+def test_a_block_that_takes_frames_from_outside_counts_as_outside() -> None:
+    Path("blocks/own/camera.py").write_text(CAMERA)
+    Path("blocks/own/light.py").write_text(LIGHT)
+    Path("film.yaml").write_text(
+        """\
+quadvis: 1
+name: film
+rates: {film: 10 Hz}
+stop_time: 1 s
+seed: 1
+blocks:
+  light: {block: own.light, rate: film, in: {frame: camera.frame}}
+  camera: {block: own.camera, rate: film}
+  smooth: {block: signal.low_pass, rate: film, in: {u: light.y}}
+log: {signals: [smooth]}
+"""
+    )
+    quadvis.load("film.yaml").run(log="film.mcap")
+    found = replay("film.mcap")
+    assert found.same and set(found.played) == {"camera", "light"}
+
+
+def test_a_log_without_rows_or_diagram_is_refused() -> None:
+    log = flown()
+    log.diagram = ""
+    with pytest.raises(QuadvisError, match="holds no diagram"):
+        replay(log)
+    empty = rewritten(flown(), lambda path, stamps, rows: (stamps[:0], rows[:0]), {"stopped": "early"})
+    with pytest.raises(QuadvisError, match="holds no row that a replay could repeat"):
+        replay(empty)
