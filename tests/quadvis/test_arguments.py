@@ -14,7 +14,7 @@ from quadvis.cli.options import parser
 from quadvis.errors import QuadvisError
 
 HELP = "see 'quadvis --help'"
-COMMANDS = "run, sweep, check, list, describe, analyse, draw, program, plot, schema, cache, new"
+COMMANDS = "run, replay, sweep, check, list, describe, analyse, draw, program, plot, schema, cache, new"
 
 
 @pytest.mark.parametrize(

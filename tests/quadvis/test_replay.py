@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import quadvis
 from quadvis import Log, read_log, replay
 from quadvis.cli import main
 from quadvis.errors import DiagramError, QuadvisError
-from quadvis.output.log import LogWriter
+from tests.quadvis.relogged import Edit, Rows, flipped, rewritten, without
 
 ROOT = Path(__file__).parents[2]
 TEXT = """\
@@ -57,9 +55,6 @@ class Outside(Block, numeric=False):
         return 0.1 * self.number, self.number % 2 == 0
 '''
 
-Rows = NDArray[np.int64]
-Edit = Callable[[str, Rows, Rows], tuple[Rows, Rows]]
-
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -74,39 +69,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def flown(log: str = "run.mcap", **more: Any) -> Log:
     quadvis.load("flight.yaml", **more).run(log=log)
     return read_log(log)
-
-
-def rewritten(log: Log, edit: Edit, summary: Mapping[str, str] | None = None, path: str = "new.mcap") -> Log:
-    """Write a log again, with the stamps and rows of each topic as ``edit`` returns them."""
-    blocks = [*log.blocks, *log.hidden.blocks]
-    with LogWriter(path, blocks, {**log.metadata, "diagram": log.diagram}) as writer:
-        for index, block in enumerate(blocks):
-            where = log.hidden if block.hidden else log
-            writer.write_rows(index, *edit(block.path, *where.arrays(block.path)))
-        writer.close(log.summary if summary is None else summary)
-    return read_log(path)
-
-
-def without(topic: str, *rows: int) -> Edit:
-    """Leave rows of a topic out."""
-
-    def edit(path: str, stamps: Rows, slots: Rows) -> tuple[Rows, Rows]:
-        some = np.array([row not in rows or path != topic for row in range(len(stamps))], bool)
-        return stamps[some], slots[some]
-
-    return edit
-
-
-def flipped(topic: str, row: int, slot: int) -> Edit:
-    """Flip the last bit of a value."""
-
-    def edit(path: str, stamps: Rows, slots: Rows) -> tuple[Rows, Rows]:
-        slots = slots.copy()
-        if path == topic:
-            slots[row, slot] ^= 1
-        return stamps, slots
-
-    return edit
 
 
 @pytest.mark.parametrize("engine", ["python", pytest.param("native", marks=pytest.mark.slow)])

@@ -1,0 +1,136 @@
+"""Real-time runs repeated from their logs: with what came from outside, and without the ticks left out."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import quadvis
+from quadvis import Log, read_log, replay
+from quadvis.api import load_text
+from quadvis.cli import main
+from quadvis.errors import QuadvisError
+from tests.processes import children, gone, wait_for
+from tests.quadvis.realtime.fakes import FakeClock, Paced
+from tests.quadvis.relogged import rewritten, without
+
+CALM = quadvis.RealTime(priority=0, poll="0 s")
+TEXT = """\
+quadvis: 1
+name: flight
+rates: {fast: 100 Hz, slow: {rate: 20 Hz, offset: 10 ms}}
+solver: {method: ode4, step: 5 ms}
+stop_time: 0.6 s
+seed: 7
+overload: {action: warn}
+blocks:
+  counter: {block: own.counter, rate: fast}
+  noise: {block: sources.noise, rate: fast, with: {sigma: 0.1 m}}
+  sum: {block: signal.sum, rate: fast, in: {a: noise.y, b: counter.y}}
+  integral: {block: signal.integrator, in: {u: {from: sum.y, across: hold}}}
+  delayed: {block: signal.gain, rate: slow, in: {u: {from: integral.y, across: delay}}}
+log: {every: {fast: 4}}
+"""
+COUNTER = '''
+"""A block that reads a clock, which never says the same twice, and sometimes too slowly."""
+
+import time as clock
+
+from quadvis.block import Block, Out
+
+
+class Counter(Block, numeric=False):
+    """Reads the time of the day."""
+
+    y = Out(unit="m")
+
+    def open(self):
+        self.count = 0
+
+    def read(self):
+        self.count += 1
+        self.now = clock.time_ns()
+        if self.count in (7, 8, 21):
+            clock.sleep(0.047)
+
+    def output(self):
+        return self.now % 1000 / 1000
+'''
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("flight.yaml").write_text(TEXT)
+    Path("blocks/own").mkdir(parents=True)
+    Path("blocks/own/counter.py").write_text(COUNTER)
+
+
+def left_out(log: Log) -> list[int]:
+    """Return the ticks that a run has left out."""
+    ticks = log.hidden.arrays("/_replay/left_out")[1].tolist() if log.hidden.names else []
+    return [tick for first, count in ticks for tick in range(first, first + count)]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="real time is Linux's")
+def test_a_run_with_overruns_is_the_same_to_the_bit() -> None:
+    result = quadvis.load("flight.yaml").run(log="run.mcap", real_time=CALM)
+    log = read_log("run.mcap")
+    assert result.flight is not None
+    missed = result.flight.shares[0].tasks[0].overruns  # of the continuous task, which is due at each tick
+    assert missed >= 3 * 8 and len(left_out(log)) == missed
+    assert len(set(log.hidden["_replay/inputs/counter.y"].tolist())) > 20
+    found = replay(log, output="new.mcap")
+    assert found.same and found.whole
+    assert (found.ticks, found.left_out, found.played) == (121 - missed, missed, ("counter",))
+    new = read_log("new.mcap")
+    assert left_out(new) == left_out(log)
+    assert replay(new).same
+    with pytest.raises(QuadvisError, match="lacks the outputs of 'counter' at t = "):
+        replay(rewritten(log, without("/_replay/left_out", 1)))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="real time is Linux's")
+def test_the_log_of_a_run_that_was_killed_is_the_same_as_far_as_it_goes(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    command = [sys.executable, "-m", "quadvis", "run", "flight.yaml", "--real-time", "--priority", "0"]
+    process = subprocess.Popen([*command, "--poll", "0", "--stop-time", "1000 s", "--log", "run.mcap"],
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+    )  # fmt: skip
+    path = Path("run.mcap")
+
+    def grown() -> bool:
+        log = read_log(path) if path.exists() and path.stat().st_size else None
+        return log is not None and "integral.y" in log.names and len(log["integral.y"]) > 60
+
+    wait_for(grown)
+    application = children(process)
+    os.kill(process.pid, signal.SIGKILL)
+    process.communicate()
+    assert all(wait_for(lambda pid=pid: gone(pid)) for pid in application)
+    assert not read_log(path).complete
+    assert main(["replay", "run.mcap"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "is cut short" in lines[1]
+    assert lines[-1].endswith("as far as the log goes: the same to the bit")
+    assert len(left_out(read_log(path))) >= 3 * 8
+
+
+def test_the_loop_notes_each_run_of_ticks_that_it_leaves_out() -> None:
+    clock = FakeClock({5: 10**7, 9: 35 * 10**6})
+    text = TEXT.replace("own.counter", "sources.sine").replace("b: counter.y", "b: 0 m")
+    paced = Paced(load_text(text), clock)
+    ran: list[int] = []
+    paced.engine.observe("continuous", ran.append)
+    paced.run(60)
+    found = np.array(paced.shared.left_out.take(last=True))
+    missed = [tick for first, count in found.tolist() for tick in range(first, first + count)]
+    assert len(found) == 2 and sorted(missed + ran) == list(range(60))
