@@ -96,6 +96,7 @@ class Block:
 
     interface: ClassVar[Interface]
     numeric: ClassVar[bool] = True
+    stepwise: ClassVar[bool] = False  # whether outputs change at ticks only, though they depend on the time
     not_replayable: ClassVar[str] = ""  # why a second run may differ from the first: "it reads a camera"
     not_restorable: ClassVar[str] = ""  # why it cannot return to a snapshot: "the model has no way back"
     harmless: ClassVar[str] = ""  # why its writes need no safe values: "a file moves nothing"

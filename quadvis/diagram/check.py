@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import cast
 
 from quadvis.block import Block
-from quadvis.diagram.draft import Draft, Key, Link, not_taken, unconnected
+from quadvis.diagram.draft import Draft, DraftWire, Key, not_taken, unconnected
 from quadvis.diagram.flow import Cases
 from quadvis.diagram.names import absent, remedy_for
 from quadvis.diagram.shape_flow import ShapeFlow
@@ -76,13 +76,13 @@ class WireCheck:
             self._report_loop(loop)
         return order
 
-    def _known(self, links: Sequence[Link]) -> list[Link]:
+    def _known(self, links: Sequence[DraftWire]) -> list[DraftWire]:
         return [link for link in links if link.key not in self.unknown]
 
     def _fault(self, draft: Draft, place: Place, problem: str, remedy: str = "") -> None:
         self.faults.add(place, problem, remedy, subject=f"block '{draft.path}'")
 
-    def _links(self) -> Iterator[Link]:
+    def _links(self) -> Iterator[DraftWire]:
         """Yield the wires whose two ports exist; the others are reported."""
         for draft in self.drafts.values():
             inputs = draft.interface.inputs
@@ -94,7 +94,7 @@ class WireCheck:
                     remedy = remedy_for(port, draft.connections, inputs)
                     self._fault(draft, connection.place, f"{draft.kind} has no input '{port}'", remedy)
                 elif isinstance(wire, Wire) and wire.block in self.drafts:
-                    link = Link(draft, port, connection, wire, inputs[port])
+                    link = DraftWire(draft, port, connection, wire, inputs[port])
                     if self._is_right_kind(link):
                         yield link
                     else:
@@ -112,7 +112,7 @@ class WireCheck:
             for port in absent(wanted, draft.connections, inputs):
                 self._fault(draft, draft.place, *unconnected(port, inputs[port]))
 
-    def _is_right_kind(self, link: Link) -> bool:
+    def _is_right_kind(self, link: DraftWire) -> bool:
         wire, wanted = link.wire, link.declared.signal.scalar
         outputs = self.drafts[wire.block].interface.outputs
         given = outputs[wire.port].signal.scalar
@@ -126,7 +126,7 @@ class WireCheck:
         self._fault(link.draft, link.connection.place, problem, remedy)
         return False
 
-    def _check_rates(self, links: Sequence[Link]) -> None:
+    def _check_rates(self, links: Sequence[DraftWire]) -> None:
         reported: set[Place] = set()  # one wire may lead to several blocks of a part
         for draft, port, connection, wire, _ in links:
             source = self.drafts[wire.block].task

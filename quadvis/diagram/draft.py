@@ -56,7 +56,7 @@ class Draft:
         return self.type.interface
 
 
-class Link(NamedTuple):
+class DraftWire(NamedTuple):
     """A wire whose two ports exist."""
 
     draft: Draft

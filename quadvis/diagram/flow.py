@@ -6,7 +6,7 @@ from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from heapq import heappop, heappush
 from typing import Any
 
-from quadvis.diagram.draft import Draft, Key, Link
+from quadvis.diagram.draft import Draft, DraftWire, Key
 from quadvis.errors import Faults, Place
 from quadvis.graph.graph import Node
 
@@ -24,7 +24,7 @@ class Flow:
     kept in ``cases``, which the variants of a diagram share. A case with a fault is never kept.
     """
 
-    def __init__(self, drafts: Mapping[str, Draft], nodes: Mapping[str, Node], links: Sequence[Link],
+    def __init__(self, drafts: Mapping[str, Draft], nodes: Mapping[str, Node], links: Sequence[DraftWire],
                  unknown: Collection[Key], faults: Faults, cases: Cases) -> None:  # fmt: skip
         self.drafts, self.nodes, self.faults, self.cases = drafts, nodes, faults, cases
         self.unknown = set(unknown)
@@ -34,11 +34,11 @@ class Flow:
         self._begun: set[str] = set()  # blocks that know some of their facts before the others
         # By reader and port, in the order of the names and ports: wires that still carry no fact, and those
         # of them that wait only for the other inputs of their block.
-        self._waiting: dict[str, dict[str, Link]] = {}
+        self._waiting: dict[str, dict[str, DraftWire]] = {}
         self._ready: dict[str, set[str]] = {path: set() for path in drafts}
         self._early: list[tuple[str, int, str]] = []  # a heap of the latter
-        self._from: dict[str, list[Link]] = {path: [] for path in drafts}
-        given: dict[str, dict[str, Link]] = {}
+        self._from: dict[str, list[DraftWire]] = {path: [] for path in drafts}
+        given: dict[str, dict[str, DraftWire]] = {}
         for link in links:
             given.setdefault(link.draft.path, {})[link.port] = link
         for path in sorted(given):
@@ -72,10 +72,10 @@ class Flow:
                 self.settle(path)
                 self._spread(path)
 
-    def _waits(self, link: Link) -> bool:
+    def _waits(self, link: DraftWire) -> bool:
         return link.port in self._waiting.get(link.draft.path, ())
 
-    def _first_early(self) -> Link | None:
+    def _first_early(self) -> DraftWire | None:
         """Return the first wire that waits only for the other inputs of its block."""
         while self._early:
             path, _, port = heappop(self._early)
@@ -91,7 +91,7 @@ class Flow:
         """
         number: dict[str, int] = {}
         lowest: dict[str, int] = {}
-        trail: list[tuple[str, Iterator[Link]]] = []
+        trail: list[tuple[str, Iterator[DraftWire]]] = []
 
         def enter(path: str) -> None:
             number[path] = lowest[path] = len(number)
@@ -150,7 +150,7 @@ class Flow:
         if case is not None and not self._faulty:
             self.cases[case] = self.found(path)
 
-    def _take(self, link: Link) -> None:
+    def _take(self, link: DraftWire) -> None:
         path = link.draft.path
         del self._waiting[path][link.port]
         if not self._waiting[path]:
@@ -171,11 +171,11 @@ class Flow:
         """Return the inputs of a block of which nothing is known."""
         return tuple([port for port in self.drafts[path].interface.inputs if (path, port) in self.unknown])
 
-    def knows(self, link: Link) -> bool:
+    def knows(self, link: DraftWire) -> bool:
         """Return whether the fact that a wire carries is known."""
         raise NotImplementedError
 
-    def case(self, path: str, links: Sequence[Link]) -> Hashable:
+    def case(self, path: str, links: Sequence[DraftWire]) -> Hashable:
         """Return all from which the facts of a block follow, besides its class, when it takes these wires."""
         raise NotImplementedError
 
@@ -187,7 +187,7 @@ class Flow:
         """Give a block the facts that were found for another one in the same case."""
         raise NotImplementedError
 
-    def take(self, link: Link) -> bool:
+    def take(self, link: DraftWire) -> bool:
         """Give it to the consumer; False if it does not fit, which is reported."""
         raise NotImplementedError
 

@@ -7,7 +7,7 @@ from collections.abc import Hashable, Sequence
 import numpy as np
 
 from quadvis.block import Shape, Sizes
-from quadvis.diagram.draft import Draft, Link, misfit
+from quadvis.diagram.draft import Draft, DraftWire, misfit
 from quadvis.diagram.flow import Flow
 from quadvis.diagram.values import shape_text
 from quadvis.errors import UNKNOWN
@@ -18,13 +18,13 @@ from quadvis.graph.names import index_text
 class ShapeFlow(Flow):
     """Shapes: fixes the symbolic sizes of every node."""
 
-    def knows(self, link: Link) -> bool:
+    def knows(self, link: DraftWire) -> bool:
         """Say whether the producer's sizes are fixed."""
         node = self.nodes[link.wire.block]
         shape = node.block.interface.outputs[link.wire.port].signal.shape
         return all(size in node.sizes for size in shape if isinstance(size, str))
 
-    def case(self, path: str, links: Sequence[Link]) -> Hashable:
+    def case(self, path: str, links: Sequence[DraftWire]) -> Hashable:
         """Return the shapes that come in and those of its constants; parameters have fixed some sizes."""
         draft = self.drafts[path]
         constants = [
@@ -40,7 +40,7 @@ class ShapeFlow(Flow):
             self.undecided(path),
         )
 
-    def _shape(self, link: Link) -> Shape | None:
+    def _shape(self, link: DraftWire) -> Shape | None:
         return self.nodes[link.wire.block].shape(link.wire.port) if self.knows(link) else None
 
     def found(self, path: str) -> Sizes:
@@ -51,7 +51,7 @@ class ShapeFlow(Flow):
         """Take these sizes."""
         self.nodes[path].sizes.update(found)
 
-    def take(self, link: Link) -> bool:
+    def take(self, link: DraftWire) -> bool:
         """Match the part that the index takes."""
         wire = link.wire
         shape = self.nodes[wire.block].shape(wire.port)

@@ -7,7 +7,7 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 
 from quadvis.block import Declared
 from quadvis.diagram.bindings import ONE, Bindings, variable_of
-from quadvis.diagram.draft import Key, Link
+from quadvis.diagram.draft import DraftWire, Key
 from quadvis.diagram.flow import Flow
 from quadvis.diagram.values import Bare, OpenUnits
 from quadvis.errors import UNKNOWN, Place, known
@@ -52,7 +52,7 @@ class UnitFlow(Flow):
             if not any(unit.variables for unit in units):
                 yield name, tuple([unit.reduced for unit in units])
 
-    def _of(self, link: Link) -> tuple[Unit, ...]:
+    def _of(self, link: DraftWire) -> tuple[Unit, ...]:
         wire = link.wire
         node = self.nodes[wire.block]
         shape = node.shape(wire.port)
@@ -61,7 +61,7 @@ class UnitFlow(Flow):
         assert part is not None, "the shapes have been checked"
         return units[part[0] : part[0] + math.prod(part[1])]
 
-    def case(self, path: str, links: Sequence[Link]) -> Hashable:
+    def case(self, path: str, links: Sequence[DraftWire]) -> Hashable:
         """Return the units that come in, and those of the values that are given."""
         return (
             self.drafts[path].block is UNKNOWN,
@@ -78,12 +78,12 @@ class UnitFlow(Flow):
         """Share these bindings."""
         self.bindings[path] = found
 
-    def knows(self, link: Link) -> bool:
+    def knows(self, link: DraftWire) -> bool:
         """Say whether the producer's variables are bound."""
         port = self.nodes[link.wire.block].block.interface.outputs[link.wire.port]
         return not self.bindings[link.wire.block].open([port])
 
-    def take(self, link: Link) -> bool:
+    def take(self, link: DraftWire) -> bool:
         """Match the units of the elements."""
         draft, units = link.draft, self._of(link)
         bindings = self.bindings[draft.path]

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from quadvis.diagram.draft import Draft, Key, Link
+from quadvis.diagram.draft import Draft, DraftWire, Key
 from quadvis.diagram.flow import Cases
 from quadvis.diagram.unit_flow import UnitFlow, words
 from quadvis.diagram.values import OpenUnits
@@ -40,7 +40,7 @@ class _Value(NamedTuple):
 def follow_units(
     drafts: Mapping[str, Draft],
     nodes: Mapping[str, Node],
-    links: Sequence[Link],
+    links: Sequence[DraftWire],
     unknown: Collection[Key],
     faults: Faults,
     cases: Cases,

@@ -268,12 +268,13 @@ def _moving(nodes: Sequence[Node]) -> set[str]:
 
     They are in the continuous task, and have continuous states, or follow time or another moving block. A
     block that has an ``update`` and passes its input on is a sampled one: its output stands still until the
-    next tick. So does that of a block which is not numeric, since it may reach outside.
+    next tick. So does that of a block which is not numeric, since it may reach outside, and of one that says
+    it is ``stepwise``.
     """
     found: set[str] = set()
     for node in nodes:
         interface = node.block.interface
-        if not node.task.continuous:
+        if not node.task.continuous or node.block.stepwise:
             continue
         follows = "time" in interface.arguments.get("output", ())
         if "update" not in interface.arguments:

@@ -45,7 +45,9 @@ class Wire:
     """The source of an input: a port of a block, or elements of it; and its crossing between rates.
 
     ``late`` and ``latched`` are what `with_transitions` adds where each task runs by itself: the value of one
-    of the producer's periods ago; a value that stands still until the reader is due again.
+    of the producer's periods ago; a value that stands still until the reader is due again. ``earlier`` marks
+    the wire from the sender of a link to its receiver, which uses only what was sent at earlier instants: it
+    asks for no order of execution and for no transition.
     """
 
     block: str
@@ -54,6 +56,7 @@ class Wire:
     crossing: str | None = None
     late: bool = False
     latched: bool = False
+    earlier: bool = False
 
     @property
     def source(self) -> str:
@@ -74,7 +77,11 @@ class Constant(NamedTuple):
 
 @dataclass
 class Node:
-    """One block of a checked diagram. ``sizes`` fixes its symbolic shapes."""
+    """One block of a checked diagram. ``sizes`` fixes its symbolic shapes.
+
+    ``computer`` is the one that runs it, "" if the diagram has no computers. ``origin`` says of a block that
+    the checks have added what it is; ``hidden`` ones are no business of logs and pictures.
+    """
 
     path: str
     kind: str
@@ -84,6 +91,9 @@ class Node:
     sizes: Sizes = field(default_factory=dict)
     units: dict[str, tuple[Unit, ...]] = field(default_factory=dict)  # of the outputs, element by element
     stream: str = ""  # the name of its noise; its path if empty
+    computer: str = ""
+    origin: str = ""
+    hidden: bool = False
 
     def shape(self, port: str) -> Shape:
         """Return the shape of an input, output or state."""
@@ -138,6 +148,15 @@ class Graph:
             return self.step
         times = [time for task in self.tasks for time in (task.period, task.offset) if time]
         return common_divisor(times) if times else Fraction(1)
+
+    def part_of(self, computer: str) -> Graph:
+        """Return the graph of what one computer runs.
+
+        Of the wires of links, those from another computer lead out of it: their senders are there.
+        """
+        nodes = [node for node in self.nodes if node.computer == computer]
+        step = self.step if any(node.task.continuous for node in nodes) else None
+        return Graph(self.name, nodes, self.solver, step, self.tasking)
 
     def ticks(self, time: Fraction) -> int:
         """Return a time as a number of base ticks; ValueError if it is not a whole one."""

@@ -48,5 +48,5 @@ def execution_order(nodes: Sequence[Node]) -> tuple[list[Node], list[list[tuple[
 def _needs(node: Node) -> Iterator[tuple[str, str]]:
     """Yield what must be computed before this block: its feedthrough inputs and where they come from."""
     for port, wire in node.wires(node.block.interface.feedthrough):
-        if not wire.delayed:
+        if not (wire.delayed or wire.earlier):
             yield port, wire.block

@@ -22,7 +22,7 @@ def with_transitions(nodes: Iterable[Node]) -> None:
     for node in nodes:
         for port, wire in list(node.wires()):
             producer, reader = tasks.get(wire.block, node.task), node.task
-            if producer != reader:
+            if producer != reader and not wire.earlier:
                 late = not wire.delayed and rank(producer) > rank(reader)
                 through = (late or wire.delayed) and _falls_on(producer, reader)
                 node.inputs[port] = replace(wire, late=late, latched=not through)

@@ -1,0 +1,1 @@
+"""Links between computers: messages, frames, carriers, and their twins in a simulation."""

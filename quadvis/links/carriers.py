@@ -1,0 +1,135 @@
+"""Carriers: how the records of a link travel. Each end is opened once, and never waits after that."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Protocol
+
+from quadvis.links.frame import Arrival, Decoder, encode
+from quadvis.links.link import MEMORY, SERIAL, Link
+from quadvis.links.mailbox import Mailbox
+from quadvis.links.serial_line import SerialLine
+from quadvis.links.udp import UdpSocket
+
+
+class Carrier(Protocol):
+    """One end of a link.
+
+    ``notes`` says in words what a user should know of the end, such as what a driver has refused.
+    """
+
+    notes: tuple[str, ...]
+
+    @property
+    def lost(self) -> int:
+        """How many frames did not come whole."""
+
+    @property
+    def refused(self) -> int:
+        """How many pieces between two ends were no whole frames."""
+
+    def send(self, stamp: int, payload: bytes) -> None:
+        """Send a message of an instant (ns)."""
+
+    def receive(self, before: int) -> Arrival | None:
+        """Return the newest message that has come and was sent before an instant; None if it is not new."""
+
+    def close(self) -> None:
+        """Release the end."""
+
+
+class Line(Protocol):
+    """Something that takes and gives bytes, and never waits."""
+
+    def write(self, data: bytes) -> bool:
+        """Hand over a frame; return whether it was taken."""
+
+    def read(self) -> Iterator[bytes]:
+        """Yield the bytes that have come."""
+
+    def close(self) -> None:
+        """Release the line."""
+
+
+class MemoryCarrier:
+    """A mailbox in memory that both ends share; only the newest message counts, so none is lost."""
+
+    lost = refused = 0
+    notes: tuple[str, ...] = ()
+
+    def __init__(self, link: Link, words: Any) -> None:
+        self._mailbox = Mailbox(words, link.message.room(link.room), link.records)
+        self._seen = -1
+
+    def send(self, stamp: int, payload: bytes) -> None:
+        """Leave a message; ValueError if it has no room."""
+        self._mailbox.put(stamp, payload)
+
+    def receive(self, before: int) -> Arrival | None:
+        """Return the newest message from before an instant, if it is new."""
+        found = self._mailbox.newest(before, self._seen)
+        if found is not None:
+            self._seen = found.stamp
+        return found
+
+    def close(self) -> None:
+        """Leave the memory to whoever has made it."""
+
+
+class FrameCarrier:
+    """Frames on a line of bytes."""
+
+    def __init__(self, link: Link, line: Line, notes: tuple[str, ...] = ()) -> None:
+        self._message, self._line, self.notes = link.message, line, notes
+        self._decoder = Decoder(link.message)
+        self._sequence = 0
+        self._waiting: list[Arrival] = []  # whole, and sent too late for the last tick
+
+    @property
+    def lost(self) -> int:
+        """How many frames did not come whole."""
+        return self._decoder.lost
+
+    @property
+    def refused(self) -> int:
+        """How many pieces between two ends were no whole frames."""
+        return self._decoder.refused
+
+    def send(self, stamp: int, payload: bytes) -> None:
+        """Send a frame; one that the line does not take is missed by the receiver."""
+        self._line.write(encode(self._message, self._sequence, stamp, payload))
+        self._sequence += 1
+
+    def receive(self, before: int) -> Arrival | None:
+        """Return the newest whole frame from before an instant, if it is new."""
+        for data in self._line.read():
+            self._waiting += self._decoder.take(data)
+        ready = [arrival for arrival in self._waiting if arrival.stamp < before]
+        if not ready:
+            return None
+        del self._waiting[: len(ready)]  # stamps only rise
+        return ready[-1]
+
+    def close(self) -> None:
+        """Close the line."""
+        self._line.close()
+
+
+def open_sender(link: Link, resource: Any) -> Carrier:
+    """Open the sending end of a link; `LinkNeeds` says what ``resource`` is. QuadvisError if it fails."""
+    return _opened(link, resource, listens=False)
+
+
+def open_receiver(link: Link, resource: Any) -> Carrier:
+    """Open the receiving end of a link likewise."""
+    return _opened(link, resource, listens=True)
+
+
+def _opened(link: Link, resource: Any, *, listens: bool) -> Carrier:
+    if link.via == MEMORY:
+        return MemoryCarrier(link, resource)
+    if link.via == SERIAL:
+        line = SerialLine(resource, link.baud)
+        slow = f"'{resource}' hands bytes on when it likes: its driver knows no low latency"
+        return FrameCarrier(link, line, () if line.low_latency else (slow,))
+    return FrameCarrier(link, UdpSocket(resource, listens=listens))

@@ -1,0 +1,110 @@
+"""Links: what carries the wires from one computer to another, and what it needs of whoever starts both."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+
+from quadvis.links.frame import longest
+from quadvis.links.mailbox import Mailbox
+from quadvis.links.message import Message
+
+MEMORY, SERIAL, UDP = CARRIERS = ("memory", "serial", "udp")
+BITS = 10  # of a byte on a serial line: a start bit, eight data bits, a stop bit
+PICTURE = (1080, 1920)  # px, height and width of the largest picture that has room without a `room`
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """What carries signals of one task of one computer to another computer.
+
+    ``period`` is that of the sender's task, ``read_period`` that of the receiver's (s). ``jitter`` (s),
+    ``loss`` (share of frames) and ``flips`` (share of bits) hold in a simulation alone. ``ports`` are the
+    serial ports of sender and receiver, "" for the ends of a cable. ``address`` is where the receiver
+    listens, "" for any free place of this machine. ``declared`` is False if no diagram names the link.
+    """
+
+    name: str
+    source: str
+    target: str
+    via: str
+    task: str
+    period: Fraction
+    read_period: Fraction
+    message: Message
+    baud: int = 0
+    jitter: float = 0.0
+    loss: float = 0.0
+    flips: float = 0.0
+    ports: tuple[str, str] = ("", "")
+    address: str = ""
+    room: tuple[int, int] = PICTURE
+    declared: bool = True
+
+    @property
+    def bytes(self) -> int:
+        """Length of a frame on a line, or of a record in memory without its pixels."""
+        return self.message.size if self.via == MEMORY else longest(self.message)
+
+    @property
+    def latency(self) -> float:
+        """Time (s) that a frame takes on a line."""
+        return self.bytes * BITS / self.baud if self.baud else 0.0
+
+    @property
+    def share(self) -> float:
+        """The part of the line's time that its frames take; 0 for other carriers."""
+        return self.latency / float(self.period)
+
+    @property
+    def spoilt(self) -> float:
+        """The share of frames in which a bit is flipped."""
+        return -math.expm1(8 * self.bytes * math.log1p(-self.flips)) if self.flips < 1.0 else 1.0
+
+    @property
+    def needs(self) -> LinkNeeds:
+        """What both ends need before they can be opened."""
+        words = 0
+        if self.via == MEMORY:
+            words = Mailbox.size(self.message.room(self.room), self.records)
+        return LinkNeeds(
+            self.name, self.source, self.target, self.via, words, self.baud, self.ports, self.address
+        )
+
+    @property
+    def records(self) -> int:
+        """The number of records in memory: those of one period of the reader, and some to be late."""
+        return min(math.ceil(self.read_period / self.period), 60) + 4
+
+    def facts(self) -> str:
+        """Return its load in words."""
+        rate = f"{float(1 / self.period):g} a second"
+        if self.via == MEMORY:
+            pictures = " and pictures" if self.message.has_pictures else ""
+            return f"{self.bytes} bytes{pictures} in memory, {rate}"
+        found = f"{self.bytes} bytes a frame, {rate}"
+        return f"{found}: {100 * self.share:.2g} % of {self.baud} baud" if self.baud else f"{found}, over UDP"
+
+
+@dataclass(frozen=True)
+class LinkNeeds:
+    """The resources of a link: who starts the processes of both computers makes them and hands them on.
+
+    Which one depends on ``via``; each end is opened with it by `carriers.open_sender`, `open_receiver`:
+
+    memory: ``words`` words of 8 bytes that both processes share, all 0 at the beginning; both ends get them.
+    serial: the path of a port for each end: that of ``ports`` (sender, receiver), or where this is "" an end
+    of a pair of ptys whose bytes are paced at ``baud``.
+    udp: the address (host, port) at which the receiver listens, for both ends: ``address`` as "host:port", or
+    if this is "" any free port of 127.0.0.1.
+    """
+
+    link: str
+    source: str
+    target: str
+    via: str
+    words: int = 0
+    baud: int = 0
+    ports: tuple[str, str] = ("", "")
+    address: str = ""
