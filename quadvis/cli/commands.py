@@ -165,12 +165,14 @@ def check(options: argparse.Namespace) -> int:
         return error.exit_code
     _print_warnings(diagram, options)
     tasks = ", ".join(task.name for task in diagram.graph.tasks)
-    count = len(diagram.graph.nodes)
+    count = sum(not node.origin for node in diagram.graph.nodes)
+    links = {link.name: link.facts() for link in diagram.links}
     if options.json:
-        found = {"ok": True, "diagram": diagram.name, "blocks": count, "hash": diagram.hash}
+        found = {"ok": True, "diagram": diagram.name, "blocks": count, "hash": diagram.hash, "links": links}
         _print_json(found | {"warnings": _plain_faults(diagram.warnings)})
     else:
         print(f"{options.file}: {count} blocks in {tasks}: no fault")
+        print("".join(f"  link {name}: {facts}\n" for name, facts in links.items()), end="")
     return 0
 
 

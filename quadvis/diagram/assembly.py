@@ -10,7 +10,7 @@ from quadvis.block import Out
 from quadvis.diagram.build import Builder, Made
 from quadvis.diagram.check import WireCheck
 from quadvis.diagram.diagram import Diagram
-from quadvis.diagram.doubts import warn_parameters, warn_rates
+from quadvis.diagram.doubts import warn_network, warn_parameters, warn_rates
 from quadvis.diagram.expand import Expansion, Kept
 from quadvis.diagram.flow import Cases
 from quadvis.diagram.group_files import GroupFiles
@@ -18,8 +18,11 @@ from quadvis.diagram.keys import RUN_SECTIONS
 from quadvis.diagram.loader import read_group, read_part
 from quadvis.diagram.outputs import check_writers
 from quadvis.diagram.parts import Parts
+from quadvis.diagram.routing import Network
+from quadvis.diagram.sections.computers import COMPUTERS
 from quadvis.diagram.sections.context import Context
 from quadvis.diagram.sections.files import FILES, check_files
+from quadvis.diagram.sections.links import LINKS
 from quadvis.diagram.sections.seed import SEED
 from quadvis.diagram.sections.solver import SOLVER
 from quadvis.diagram.sections.stop_time import STOP_TIME
@@ -37,6 +40,7 @@ from quadvis.errors.caller import as_given
 from quadvis.graph.graph import Graph
 from quadvis.graph.names import wire_text
 from quadvis.library.catalogue import Catalogue, OwnBlocks
+from quadvis.links.endpoints import links_of
 
 
 class Assembly:
@@ -79,7 +83,9 @@ class Assembly:
         builder = Builder(spec, expansion, wiring, self.made, faults)
         drafts = builder.drafts()
         step = builder.step if known(builder.step) else None
-        nodes = WireCheck(drafts, faults, self.cases, spec[TASKING]).run()
+        names = {*expansion.blocks, *expansion.root.children}
+        network = Network(spec[COMPUTERS], spec[LINKS], expansion.root.params, names)
+        nodes = WireCheck(drafts, faults, self.cases, network, spec[TASKING]).run()
         graph = Graph(spec.name, nodes, spec[SOLVER].method, step, spec[TASKING])
         stop = _stop_time(spec, stop_time, faults)
         if known(builder.step):
@@ -91,16 +97,18 @@ class Assembly:
         self._warned = len(files)
         if not self.variants:
             self.warn_unused()
+            warn_network(spec, graph, faults)
         written = spec[STOP_TIME]
         context = Context(
-            wiring, graph, stop, written is not None and known(written) and stop < written, faults
-        )
+            wiring, graph, stop, written is not None and known(written) and stop < written, faults,
+            frozenset(spec[LINKS]),
+        )  # fmt: skip
         for section in RUN_SECTIONS:
             with faults.about(section.key):
                 context.values[section] = section.read(spec.nodes.get(section.key), context)
         check_files(spec[FILES], faults)
         seed = spec[SEED] if seed is None else _seed(seed, faults)
-        listing = tuple(draft.path for draft in drafts)
+        listing = (*(draft.path for draft in drafts), *(link.name for link in links_of(graph)))
         sources = (*spec.paths, *self.parts.files, *self.groups.files, *self._params)
         check_writers(drafts, sources, faults)
         ports = {name: wire_text(source) for name, source in wiring.ports()}

@@ -12,6 +12,7 @@ from quadvis.diagram.draft import Connection, Draft, unconnected
 from quadvis.diagram.expand import Expansion
 from quadvis.diagram.names import absent, remedy_for
 from quadvis.diagram.scope import FlatBlock
+from quadvis.diagram.sections.computers import COMPUTERS
 from quadvis.diagram.sections.ports import PORTS
 from quadvis.diagram.sections.rates import RATES
 from quadvis.diagram.sections.solver import SOLVER
@@ -101,7 +102,7 @@ class Builder:
         connections = dict(self._connections(flat, flat.kind))
         return Draft(
             flat.path, flat.spec.place, flat.spec.kind, flat.kind, block, task, connections, flat.places,
-            units, flat.parameters, flat.stream, flat.spec.inherits,
+            units, flat.parameters, flat.stream, flat.spec.inherits, self._computer(flat),
         )  # fmt: skip
 
     def _choose_step(self) -> Fraction | Unknown | None:
@@ -155,6 +156,23 @@ class Builder:
             remedy = suggestion(name, [*self.spec[RATES], CONTINUOUS]) if self.spec[RATES] else ""
             self.faults.add(place, f"there is no rate '{name}'", remedy or "declare it under 'rates'")
         return self.tasks.get(name, UNKNOWN)
+
+    def _computer(self, flat: FlatBlock) -> str | Unknown:
+        """Return the computer that runs a block; "" if the diagram has none."""
+        computers = self.spec[COMPUTERS]
+        if flat.at is None:
+            if computers:
+                place = list(flat.around)[-1].place
+                self.faults.add(place, "key 'at' is missing", f"choose from {', '.join(computers)}")
+            return UNKNOWN if computers else ""
+        if flat.at is UNKNOWN:
+            return UNKNOWN
+        name, place = flat.at
+        if name not in computers:
+            remedy = suggestion(name, computers) if computers else ""
+            self.faults.add(place, f"there is no computer '{name}'", remedy or "declare it under 'computers'")
+            return UNKNOWN
+        return name
 
     def _build(
         self, flat: FlatBlock, kind: type[Block], task: Task | Unknown
@@ -256,7 +274,12 @@ class Builder:
                     yield port, Connection(source.place, UNKNOWN)
             else:
                 wire = source.source if isinstance(source.source, Wire) else UNKNOWN
-                yield port, Connection(source.place, wire, across=source.across)
+                yield (
+                    port,
+                    Connection(
+                        source.place, wire, across=source.across, over=source.over, initial=source.initial
+                    ),
+                )
 
     def _report_open(self, found: OpenInput, reader: In) -> None:
         """Report an input of a part, unless a misspelt one was meant to be it."""

@@ -13,7 +13,9 @@ from quadvis.block import Block
 from quadvis.diagram.draft import Draft, DraftWire, Key, not_taken, unconnected
 from quadvis.diagram.flow import Cases
 from quadvis.diagram.names import absent, remedy_for
+from quadvis.diagram.routing import Network, Routing, crosses
 from quadvis.diagram.shape_flow import ShapeFlow
+from quadvis.diagram.times import rate_text
 from quadvis.diagram.unit_repair import follow_units
 from quadvis.diagram.values import shape_text
 from quadvis.errors import UNKNOWN, Faults, Place, known
@@ -27,9 +29,16 @@ _ANY_TASK = Task("unknown", Fraction(1))  # a node needs one; no check looks at 
 class WireCheck:
     """Checks the wires between drafts, and turns them into the nodes of a graph."""
 
-    def __init__(self, drafts: Sequence[Draft], faults: Faults, cases: Cases, tasking: str = SINGLE) -> None:
+    def __init__(
+        self,
+        drafts: Sequence[Draft],
+        faults: Faults,
+        cases: Cases,
+        network: Network,
+        tasking: str = SINGLE,
+    ) -> None:
         self.drafts = {draft.path: draft for draft in drafts}
-        self.faults, self.cases, self.tasking = faults, cases, tasking
+        self.faults, self.cases, self.network, self.tasking = faults, cases, network, tasking
         self.unknown: set[Key] = set()  # inputs of which nothing is known
         self.nodes = {draft.path: self._node(draft) for draft in drafts}
 
@@ -46,7 +55,8 @@ class WireCheck:
         task = draft.task if known(draft.task) else _ANY_TASK
         # Of a block whose parameters are unknown only the declarations are looked at, which its class has.
         block = draft.block if known(draft.block) else cast(Block, draft.type)
-        node = Node(draft.path, draft.kind, block, task, inputs, stream=draft.stream)
+        computer = draft.computer if known(draft.computer) else ""
+        node = Node(draft.path, draft.kind, block, task, inputs, stream=draft.stream, computer=computer)
         for name, param in interface.params.items() if known(draft.block) else ():
             shape = getattr(getattr(draft.block, name), "shape", ())
             if param.signal.scalar != "str" and not param.signal.unify(shape, node.sizes):
@@ -66,15 +76,23 @@ class WireCheck:
         units = follow_units(
             self.drafts, self.nodes, self._known(links), self.unknown, self.faults, self.cases
         )
-        for path, port in units.unknown | {link.key for link in links if link.connection.across is UNKNOWN}:
+        unknown = units.unknown | {link.key for link in links if link.connection.across is UNKNOWN}
+        for path, port in unknown:
             # A loop through such a wire would be reported twice.
             self.nodes[path].inputs.pop(port, None)
+        whole = {link.key for link in links if self._is_whole(link)} - unknown - self.unknown
+        Routing(self.drafts, self.nodes, self.network, self.faults).run(links, whole)
         if self.tasking == MULTI:
             with_transitions(self.nodes.values())
         order, loops = execution_order(list(self.nodes.values()))
         for loop in loops:
             self._report_loop(loop)
         return order
+
+    def _is_whole(self, link: DraftWire) -> bool:
+        """Say whether all is known of the signal that a wire carries."""
+        wire = link.wire
+        return known(self.drafts[wire.block].block) and wire.port in self.nodes[wire.block].units
 
     def _known(self, links: Sequence[DraftWire]) -> list[DraftWire]:
         return [link for link in links if link.key not in self.unknown]
@@ -128,11 +146,14 @@ class WireCheck:
 
     def _check_rates(self, links: Sequence[DraftWire]) -> None:
         reported: set[Place] = set()  # one wire may lead to several blocks of a part
-        for draft, port, connection, wire, _ in links:
+        for link in links:
+            draft, port, connection, wire, _ = link
             source = self.drafts[wire.block].task
             across = connection.across
             if draft.task is UNKNOWN or source is UNKNOWN or across is UNKNOWN or draft.task == source:
                 continue
+            if crosses(self.drafts, link):
+                continue  # a link gives the newest value that has come, whatever the rates
             problem, remedy = crossing_fault(source, draft.task, wire.crossing)
             if problem and connection.place not in reported:
                 reported.add(connection.place)
@@ -168,10 +189,3 @@ def crossing_fault(source: Task, target: Task, crossing: str | None) -> tuple[st
     if crossing == "hold" and fitting == "sample" and source.period != target.period:
         return "'across: hold' is for a slower producer", "write 'across: sample'"
     return "", ""
-
-
-def rate_text(task: Task) -> str:
-    """Return a task's name and rate as a message shows them."""
-    frequency = 1 / task.period
-    rate = f"{frequency} Hz" if frequency.denominator == 1 else f"{float(task.period):g} s"
-    return f"{task.name}, {rate}"

@@ -14,6 +14,7 @@ from quadvis.diagram.keys import SECTIONS
 from quadvis.diagram.loop_requirements import LoopRequirement
 from quadvis.diagram.requirements import Entry, Expectation
 from quadvis.diagram.sections.analyse import ANALYSE, Questions
+from quadvis.diagram.sections.computers import COMPUTERS
 from quadvis.diagram.sections.expect import EXPECT
 from quadvis.diagram.sections.log import LOG
 from quadvis.diagram.sections.overload import OVERLOAD, OverloadLimits
@@ -21,8 +22,10 @@ from quadvis.diagram.sections.section import Values
 from quadvis.diagram.sections.summary import SUMMARY
 from quadvis.diagram.settings import ParameterFile
 from quadvis.document import dump_yaml
-from quadvis.errors import Doubt
+from quadvis.errors import Doubt, known
 from quadvis.graph.graph import Graph
+from quadvis.links.endpoints import links_of
+from quadvis.links.link import Link
 from quadvis.machine.files import reading
 
 
@@ -122,6 +125,17 @@ class Diagram:
     def overload(self) -> OverloadLimits:
         """How many overruns a real-time run may have."""
         return self.values[OVERLOAD]
+
+    @property
+    def links(self) -> Sequence[Link]:
+        """What carries wires between its computers."""
+        return links_of(self.graph)
+
+    def overload_of(self, computer: str) -> OverloadLimits:
+        """How many overruns the tasks of one computer may have."""
+        spec = self.values[COMPUTERS].get(computer)
+        own = spec.overload if spec is not None and known(spec) else None
+        return self.overload if own is None else own
 
     def logs(self, path: str) -> bool:
         """Whether a block's outputs are logged."""

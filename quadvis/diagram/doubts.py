@@ -6,6 +6,8 @@ from collections.abc import Iterator
 
 from quadvis.diagram.parts import Parts
 from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec
+from quadvis.diagram.sections.computers import COMPUTERS
+from quadvis.diagram.sections.links import LINKS
 from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.rates import RATES
 from quadvis.diagram.sections.variants import VARIANTS
@@ -13,6 +15,8 @@ from quadvis.diagram.spec import FileSpec
 from quadvis.diagram.values import named_parameters
 from quadvis.document import YamlNode
 from quadvis.errors import Faults, known
+from quadvis.graph.graph import Graph
+from quadvis.links.endpoints import links_of
 
 
 def _blocks(spec: FileSpec) -> Iterator[BlockSpec]:
@@ -31,12 +35,33 @@ def warn_parameters(spec: FileSpec, faults: Faults) -> None:
         inputs = block.inputs if block.inputs is not None and known(block.inputs) else {}
         parameters = block.parameters if known(block.parameters) else {}
         sources = (given.source for given in inputs.values())
-        for node in (*parameters.values(), *block.groups, *sources):
+        initials = (given.initial for given in inputs.values())
+        for node in (*parameters.values(), *block.groups, *sources, *initials):
             if isinstance(node, YamlNode):
                 used |= named_parameters(node)
+    for link in spec[LINKS].values():
+        for node in link.fields.values() if known(link) else ():
+            used |= named_parameters(node)
     for name, value in spec[PARAMS].items():
         if name not in used and known(value) and value.file == spec.place.file:
             faults.warn(value.place, f"parameter '{name}' is not used", f"write '${name}' where it belongs")
+
+
+def warn_network(spec: FileSpec, graph: Graph, faults: Faults) -> None:
+    """Warn of links that carry nothing, and of computers on which no block runs."""
+    if faults:
+        return  # what is wrong may use any of them
+    carrying, used = {link.name for link in links_of(graph)}, {node.computer for node in graph.nodes}
+    for name, link in spec[LINKS].items():
+        if known(link) and name not in carrying:
+            ends = f"from '{link.source[0]}' to '{link.target[0]}'"
+            faults.warn(
+                link.place, f"link '{name}' carries nothing", f"leave it out, or wire something {ends}"
+            )
+    for name, computer in spec[COMPUTERS].items():
+        if known(computer) and name not in used:
+            remedy = f"leave it out, or write 'at: {name}' in a block"
+            faults.warn(computer.place, f"no block runs on the computer '{name}'", remedy)
 
 
 def warn_rates(spec: FileSpec, parts: Parts, faults: Faults) -> None:

@@ -24,6 +24,8 @@ class Connection:
     source: Wire | Constant | Unknown
     units: OpenUnits = ()  # of a constant, where the declaration leaves them open
     across: Place | Unknown | None = None  # where the crossing is written
+    over: YamlNode | None = None  # the link that carries it
+    initial: YamlNode | None = None  # its value before the first message
 
 
 @dataclass
@@ -42,6 +44,7 @@ class Draft:
     given: Mapping[str, YamlNode | Unknown] = field(default_factory=dict)  # their values as written
     stream: str = ""  # the name of its noise
     inherits: bool = False  # whether the inputs are those of the block that it replaces
+    computer: str | Unknown = ""
 
     def origin(self, name: str) -> Place:
         """Return where the value of a parameter or constant is written."""

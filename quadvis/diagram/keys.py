@@ -7,11 +7,13 @@ from typing import Any
 from quadvis.diagram.sections.analyse import ANALYSE
 from quadvis.diagram.sections.base import BASE, WITHOUT
 from quadvis.diagram.sections.blocks import BLOCKS
+from quadvis.diagram.sections.computers import COMPUTERS
 from quadvis.diagram.sections.context import RunSection
 from quadvis.diagram.sections.expect import EXPECT
 from quadvis.diagram.sections.figures import FIGURES
 from quadvis.diagram.sections.files import FILES
 from quadvis.diagram.sections.header import DOC, FORMAT, NAME
+from quadvis.diagram.sections.links import LINKS
 from quadvis.diagram.sections.log import LOG
 from quadvis.diagram.sections.overload import OVERLOAD
 from quadvis.diagram.sections.params import PARAMS
@@ -26,8 +28,8 @@ from quadvis.diagram.sections.tasking import TASKING
 from quadvis.diagram.sections.variants import VARIANTS
 
 FILE_SECTIONS: tuple[FileSection[Any], ...] = (
-    FORMAT, NAME, DOC, BASE, WITHOUT, PARAMS, RATES, SOLVER, TASKING, STOP_TIME, SEED, OVERLOAD, FILES,
-    BLOCKS, VARIANTS, PORTS,
+    FORMAT, NAME, DOC, BASE, WITHOUT, PARAMS, RATES, SOLVER, TASKING, STOP_TIME, SEED, OVERLOAD, COMPUTERS,
+    LINKS, FILES, BLOCKS, VARIANTS, PORTS,
 )  # fmt: skip
 RUN_SECTIONS: tuple[RunSection[Any], ...] = (LOG, ANALYSE, EXPECT, SUMMARY, FIGURES)  # `expect` names cuts
 SECTIONS: tuple[Section[Any], ...] = (*FILE_SECTIONS, *RUN_SECTIONS)

@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
-from quadvis.diagram.check import rate_text
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.sections.block_text import constant_text
+from quadvis.diagram.times import rate_text
 from quadvis.graph.graph import Constant, Node, Wire
 from quadvis.graph.names import wire_text
+from quadvis.links.link import Link
+from quadvis.links.twin import ReceiverTwin
 from quadvis.output.draw import DrawnBlock, DrawnWire, draw
 
 
 def draw_diagram(diagram: Diagram) -> str:
     """Return a picture of a diagram as SVG."""
-    nodes = [diagram.graph[path] for path in diagram.listing]
     blocks, wires, constants = [], [], {}
-    for node in nodes:
+    for path in diagram.listing:
+        node = diagram.graph[path]
+        twin = node.block
+        if isinstance(twin, ReceiverTwin):
+            # Its sender is left out: a link takes the signals and gives them on the other side.
+            signals = twin.link.message.signals
+            names, kind = tuple(signal.name for signal in signals), _kind(twin.link)
+            blocks.append(DrawnBlock(path, kind, names, tuple(twin.interface.outputs), node.task.name))
+            wires += [DrawnWire(signal.source, path, signal.name) for signal in signals]
+            continue
         interface = node.block.interface
         shown = [port for port in interface.inputs if _is_drawn(node, port)]
         drawn = DrawnBlock(node.path, node.kind, tuple(shown), tuple(interface.outputs), node.task.name)
@@ -27,6 +37,12 @@ def draw_diagram(diagram: Diagram) -> str:
                 constants[node.path, port] = constant_text(node, port, source.value)
     tasks = {task.name: rate_text(task) for task in diagram.graph.tasks}
     return draw(diagram.name, blocks, wires, constants, tasks)
+
+
+def _kind(link: Link) -> str:
+    """Return what a link says of itself in its box."""
+    speed = f", {link.baud} baud" if link.baud else ""
+    return f"{link.source} to {link.target}: {link.via}{speed}"
 
 
 def _is_drawn(node: Node, port: str) -> bool:

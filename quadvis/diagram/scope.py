@@ -58,6 +58,11 @@ class FlatBlock:
         return next((spec.rate for spec in self.around if spec.rate is not None), None)
 
     @cached_property
+    def at(self) -> tuple[str, Place] | Unknown | None:
+        """The computer that runs the block, its own or that of the nearest part around it that has one."""
+        return next((spec.at for spec in self.around if spec.at is not None), None)
+
+    @cached_property
     def stream(self) -> str:
         """The name of the block's noise: its path, unless it or a part around it has a stream of its own."""
         inside = ""

@@ -75,11 +75,11 @@ def _fitting(spec: FileSpec, variant: str, faults: Faults) -> Iterator[tuple[str
 
 
 def in_slot(base: BlockSpec, block: BlockSpec) -> BlockSpec:
-    """Return the block for a slot: without wires or rate of its own it has those of the block before it."""
+    """Return the block for a slot: without wires, rate or computer of its own it has those before it."""
     if block.inputs is None:
         block = block._replace(inputs=base.inputs, inherits=True)
     slot = base.slot if block.slot is None else block.slot
-    return block._replace(slot=slot, rate=block.rate or base.rate)
+    return block._replace(slot=slot, rate=block.rate or base.rate, at=block.at or base.at)
 
 
 class StandIn(NamedTuple):

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from fractions import Fraction
 
-from quadvis.diagram.check import rate_text
 from quadvis.diagram.sections.rates import RATES
 from quadvis.diagram.sections.solver import SOLVER
 from quadvis.diagram.spec import FileSpec
-from quadvis.diagram.times import time_text
+from quadvis.diagram.times import rate_text, time_text
 from quadvis.errors import UNKNOWN, Faults, Place, known
 from quadvis.graph.graph import Task, common_divisor, rate_monotonic
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 from quadvis.document import YamlNode, YamlScalar
+from quadvis.graph.graph import Task
 from quadvis.units import Unit, format_quantity, split_quantity
 
 SECOND = Unit.parse("s")
@@ -46,3 +47,10 @@ def time_text(time: Fraction) -> str:
     """Return a time for people, exactly: a decimal number if it is one."""
     is_decimal = (10**12 * time).denominator == 1
     return format_quantity(float(time), SECOND, 12) if is_decimal else f"{time} s"
+
+
+def rate_text(task: Task) -> str:
+    """Return a task's name and rate as a message shows them."""
+    frequency = 1 / task.period
+    rate = f"{frequency} Hz" if frequency.denominator == 1 else f"{float(task.period):g} s"
+    return f"{task.name}, {rate}"

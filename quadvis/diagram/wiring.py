@@ -29,11 +29,16 @@ class OpenInput(NamedTuple):
 
 
 class Source(NamedTuple):
-    """The source of an input, and the place of the word for its crossing between rates."""
+    """The source of an input, and the place of the word for its crossing between rates.
+
+    ``over`` is the link that carries it to another computer, ``initial`` its value there at first.
+    """
 
     place: Place
     source: Wire | YamlNode | OpenInput | Unknown
     across: Place | Unknown | None = None
+    over: YamlNode | None = None
+    initial: YamlNode | None = None
 
 
 class Wiring:
@@ -138,11 +143,20 @@ class Wiring:
         if isinstance(given.source, YamlNode):
             return Source(given.place, substitute(given.source, scope.params, self.faults))
         found = self.find(scope, given.source)
-        if not isinstance(found.source, Wire) or given.across is None:
+        if not isinstance(found.source, Wire):
+            return found
+        if given.over is not None:
+            found = found._replace(over=given.over)
+        if given.initial is not None:
+            initial = substitute(given.initial, scope.params, self.faults)
+            found = found._replace(initial=initial if known(initial) else None)
+        if given.across is None:
             return found
         if given.across is UNKNOWN:
             return found._replace(across=UNKNOWN)
-        return Source(found.place, replace(found.source, crossing=given.across), given.across_place)
+        assert isinstance(found.source, Wire)
+        wire = replace(found.source, crossing=given.across)
+        return found._replace(source=wire, across=given.across_place)
 
     def _inside(self, scope: Scope, reference: Reference) -> Source:
         if scope.parent is None:
@@ -215,7 +229,7 @@ class Wiring:
             problem = "the signal is an element or a run already, it cannot take a second index"
             self.faults.add(place, problem, "write one index")
             return Source(place, UNKNOWN)
-        return Source(place, replace(found.source, index=reference.index), found.across)
+        return found._replace(place=place, source=replace(found.source, index=reference.index))
 
 
 def _owner(scope: Scope, name: str) -> tuple[Scope, str]:

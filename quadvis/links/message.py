@@ -29,7 +29,8 @@ CHANNELS = 3
 class MessageSignal(NamedTuple):
     """One signal of a message: its name there, the output that it comes from, and what it is.
 
-    ``nan`` says that NaN means "missing"; ``initial`` is its value (of the shape) before the first message.
+    ``nan`` says that NaN means "missing"; ``initial`` is its value (of the shape) before the first message,
+    and ``given`` says whether a wire has asked for it.
     """
 
     name: str
@@ -40,6 +41,7 @@ class MessageSignal(NamedTuple):
     units: tuple[Unit, ...]
     nan: bool
     initial: Any
+    given: bool = False
 
     @property
     def source(self) -> str:

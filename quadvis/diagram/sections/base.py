@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from quadvis.diagram.sections.blocks import BLOCKS
+from quadvis.diagram.sections.computers import COMPUTERS
 from quadvis.diagram.sections.forms import TEXT, Schema, closed, list_of
+from quadvis.diagram.sections.links import LINKS
 from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.rates import RATES
 from quadvis.diagram.sections.section import FileSection, Section
@@ -15,7 +17,7 @@ from quadvis.document import YamlMap, YamlNode
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown
 
 BASE_KEYS = ("file", "variant")
-MERGED: tuple[Section[Any], ...] = (PARAMS, RATES, BLOCKS, VARIANTS, SUMMARY)
+MERGED: tuple[Section[Any], ...] = (PARAMS, RATES, COMPUTERS, LINKS, BLOCKS, VARIANTS, SUMMARY)
 """The sections whose entries have names. They are merged with those of the base, name by name."""
 WITHOUT_KEYS = tuple(section.key for section in MERGED)
 
@@ -65,7 +67,8 @@ class WithoutSection(FileSection[Without]):
 
     key = "without"
     words = (
-        "names that are taken away from the base: `{blocks: [names], variants: [names], summary: [labels]}`"
+        "names that are taken away from the base: `{blocks: [names], variants: [names], summary: [labels]}`; "
+        "so with `params`, `rates`, `computers`, `links`"
     )
 
     def read(self, node: YamlNode | None, faults: Faults) -> Without:

@@ -11,8 +11,8 @@ from quadvis.diagram.sections.forms import CONSTANT, NAME, SIGNAL, TEXT, VALUES,
 from quadvis.graph.graph import CONTINUOUS, CROSSINGS
 from quadvis.library.describe import default_text, first_line
 
-BLOCK_KEYS = ("block", "part", "rate", "slot", "stream", GROUP_KEY, "with", "in")
-WIRE_KEYS = ("from", "across")
+BLOCK_KEYS = ("block", "part", "rate", "at", "slot", "stream", GROUP_KEY, "with", "in")
+WIRE_KEYS = ("from", "across", "over", "initial")
 GROUP_NAME: Schema = {"type": "string", "pattern": r"^\$[A-Za-z_][A-Za-z0-9_]*$"}
 LIBRARY_BLOCK: Schema = {
     "type": "string",
@@ -23,9 +23,13 @@ LIBRARY_BLOCK: Schema = {
 
 def block_definitions(blocks: Mapping[str, type[Block]]) -> dict[str, Schema]:
     """Return the forms of an input, of any block, and of each block by its name."""
-    wire = {"from": ref("signal"), "across": {"oneOf": [
+    wire: dict[str, Schema] = {"from": ref("signal"), "across": {"oneOf": [
         {"const": name, "description": words} for name, words in CROSSINGS.items()
     ]}}  # fmt: skip
+    wire |= {
+        "over": {**TEXT, "description": "the link that carries it to another computer"},
+        "initial": {**ref("value"), "description": "its value there before the first message"},
+    }
     return {
         "input": {"anyOf": [SIGNAL, CONSTANT, *VALUES[1:], closed(WIRE_KEYS, wire, ["from"])]},
         "block": _any_block(blocks),
@@ -42,6 +46,7 @@ def _any_block(blocks: Mapping[str, type[Block]]) -> Schema:
         "block": {"anyOf": [*known, LIBRARY_BLOCK]},
         "part": {**TEXT, "description": "file of a subsystem, relative to this one"},
         "rate": {**TEXT, "description": f"one of the diagram's rates, or '{CONTINUOUS}'"},
+        "at": {**TEXT, "description": "the computer that runs it, or its inner blocks"},
         "slot": {"type": "boolean", "description": "variants may put another block here"},
         "stream": {**NAME, **TEXT, "description": "name of its noise in place of its path"},
         GROUP_KEY: {

@@ -22,12 +22,14 @@ INSIDE = "in"  # the name of a part's inputs for its blocks
 
 
 class InputSpec(NamedTuple):
-    """The source of an input: a signal or a constant, and how the wire crosses between rates."""
+    """The source of an input: a signal or a constant, and how it crosses between rates and computers."""
 
     place: Place
     source: Reference | YamlNode | Unknown
     across: str | Unknown | None = None
     across_place: Place | None = None
+    over: YamlNode | None = None
+    initial: YamlNode | None = None
 
 
 class BlockSpec(NamedTuple):
@@ -42,6 +44,7 @@ class BlockSpec(NamedTuple):
     parameter_places: dict[str, Place]
     groups: tuple[YamlNode, ...] = ()  # from which it takes parameters: `$name`
     rate: tuple[str, Place] | Unknown | None = None
+    at: tuple[str, Place] | Unknown | None = None  # the computer that runs it, or its inner blocks
     slot: Place | Unknown | None = None
     inputs: dict[str, InputSpec] | Unknown | None = None  # None: no 'in' was written
     stream: tuple[str, Place] | None = None  # the name of its noise, or of that of its inner blocks
@@ -72,7 +75,8 @@ def read_block(name: str, place: Place, node: YamlNode, faults: Faults) -> Block
         kind,
         kinds[0].place,
         is_part="part" in fields,
-        rate=faults.read(_read_rate, fields["rate"]) if "rate" in fields else None,
+        rate=faults.read(_read_name, fields["rate"]) if "rate" in fields else None,
+        at=faults.read(_read_name, fields["at"]) if "at" in fields else None,
         slot=_read_slot(fields["slot"], faults) if "slot" in fields else None,
         parameters=UNKNOWN if given is UNKNOWN or "with" in doubled else given.values if given else {},
         parameter_places=_places(given) if given is not None and known(given) else {},
@@ -82,7 +86,7 @@ def read_block(name: str, place: Place, node: YamlNode, faults: Faults) -> Block
     )
 
 
-def _read_rate(node: YamlNode) -> tuple[str, Place]:
+def _read_name(node: YamlNode) -> tuple[str, Place]:
     return node.text(), node.place
 
 
@@ -126,8 +130,9 @@ def _read_input(node: YamlNode, faults: Faults) -> InputSpec:
         if across is not None:
             crossing: str | Unknown | None = faults.read(across.choice, CROSSINGS)
         else:
-            crossing = UNKNOWN if len(node) > 1 else None  # under a key that is wrong
-        return InputSpec(node.place, source, crossing, across.place if across is not None else None)
+            crossing = UNKNOWN if not {*node} <= {*WIRE_KEYS} else None  # under a key that is wrong
+        place = across.place if across is not None else None
+        return InputSpec(node.place, source, crossing, place, node.get("over"), node.get("initial"))
     if isinstance(node, YamlScalar) and is_reference(node.value):
         return InputSpec(node.place, read_reference(node, faults))
     return InputSpec(node.place, node)
@@ -178,7 +183,12 @@ class BlocksSection(FileSection[Blocks]):
 
     def resolved(self, diagram: Checked) -> Any:
         """Return all blocks, with every parameter."""
-        return {node.path: resolved_block(node, diagram.path.parent) for node in diagram.graph.nodes}
+        nodes = {node.path: node for node in diagram.graph.nodes}
+        return {
+            path: resolved_block(node, diagram.path.parent, nodes)
+            for path, node in nodes.items()
+            if not node.origin
+        }
 
 
 BLOCKS = BlocksSection()

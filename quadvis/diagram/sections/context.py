@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Set
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -15,9 +15,10 @@ from quadvis.diagram.times import time_text
 from quadvis.diagram.values import substitute
 from quadvis.diagram.wiring import OpenInput, Wiring
 from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar
-from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known
+from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known, suggestion
 from quadvis.graph.graph import Graph, Node, Wire
 from quadvis.graph.names import wire_text
+from quadvis.links.insertion import RECEIVER
 
 
 @dataclass
@@ -33,14 +34,15 @@ class Context:
     stop: Fraction
     shortened: bool
     faults: Faults
+    declared: Set[str] = frozenset()  # the names of links in the diagram
     values: Values = field(default_factory=Values)
     # What stands for each name by its place: the full name of a signal, the value of a parameter.
     meant: dict[Place, Any] = field(default_factory=dict)
 
     @cached_property
     def nodes(self) -> Mapping[str, Node]:
-        """The blocks by path."""
-        return {node.path: node for node in self.graph.nodes}
+        """The blocks and links by path."""
+        return {node.path: node for node in self.graph.nodes if not node.hidden}
 
     @property
     def is_whole(self) -> bool:
@@ -54,6 +56,8 @@ class Context:
 
     def source(self, reference: Reference) -> Wire | Unknown:
         """Return the output behind a name."""
+        if reference.block in self.links:
+            return self._of_link(reference)
         source = self.wiring.find(self.wiring.expansion.root, reference).source
         if isinstance(source, YamlNode):
             self.faults.add(reference.place, "this is a constant, not a signal", "name an output of a block")
@@ -64,6 +68,27 @@ class Context:
             return UNKNOWN
         self.meant[reference.place] = wire_text(source)
         return source
+
+    @property
+    def links(self) -> Set[str]:
+        """The names of links, also of those that carry nothing."""
+        return self.declared | {path for path, node in self.nodes.items() if node.origin == RECEIVER}
+
+    def _of_link(self, reference: Reference) -> Wire | Unknown:
+        """Return an output of a link."""
+        node = self.nodes.get(reference.block)
+        if node is None or reference.port not in node.block.interface.outputs:
+            if node is not None:
+                problem = f"link '{reference.block}' has no output '{reference.port}'"
+                remedy = suggestion(reference.port, node.block.interface.outputs)
+            else:
+                problem, remedy = f"link '{reference.block}' carries nothing", "name another signal"
+            if not self.faults:  # else what it carries may be unknown
+                self.faults.add(reference.place, problem, remedy)
+            return UNKNOWN
+        wire = Wire(reference.block, reference.port, reference.index)
+        self.meant[reference.place] = wire_text(wire)
+        return wire
 
     def filled(self, fields: YamlMap, keys: Collection[str]) -> YamlMap:
         """Return a map with ``$name`` and ``$name[2]`` under these keys replaced by what they name.

@@ -31,8 +31,8 @@ class VariantsSection(FileSection[Variants]):
     key = "variants"
     words = (
         "`name: {slots: {block: {...}}}`: other blocks for those marked `slot: true`, which give the outputs "
-        "that are read; `base: other` takes those of another variant first; `in` and `rate`, if left out, "
-        "are those of the block replaced"
+        "that are read; `base: other` takes those of another variant first; `in`, `rate` and `at`, if left "
+        "out, are those of the block replaced"
     )
 
     def read(self, node: YamlNode | None, faults: Faults) -> Variants:
