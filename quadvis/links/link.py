@@ -84,7 +84,7 @@ class Link:
             pictures = " and pictures" if self.message.has_pictures else ""
             return f"{self.bytes} bytes{pictures} in memory, {rate}"
         found = f"{self.bytes} bytes a frame, {rate}"
-        return f"{found}: {100 * self.share:.2g} % of {self.baud} baud" if self.baud else f"{found}, over UDP"
+        return f"{found}: {100 * self.share:.3g} % of {self.baud} baud" if self.baud else f"{found}, over UDP"
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,8 @@
 The sender keeps the last whole frames, with the instants at which they come; the receiver gives the newest
 that has come by now and was sent before now, to the nanosecond. A frame waits until the one before it is
 through, takes 10 bits a byte, and comes up to ``jitter`` later; it never overtakes another one. A frame that
-is lost or spoilt takes its time, too. Entry n stands at place n modulo the number of places, of which there
-are more than frames can be on their way.
+is lost or spoilt takes its time, too. The newest entry stands at place 0, the one before it at place 1; there
+are more places than frames can be on their way. So nothing rotates, and a steady loop is one for an analysis.
 
 The classes are made as text, since compiled methods must name their arguments; equal messages share one.
 """
@@ -53,22 +53,20 @@ def arrival(self: Any, time: Any) -> Any:
 
 
 def newest(whole: Any, stamps: Any, arrivals: Any, time: Any) -> Any:
-    """Return the number of the newest entry that has come and was sent before now; -1 if there is none."""
-    now, room = nanoseconds(time), stamps.size
-    entry = whole - 1
-    while entry >= 0 and not (stamps[entry % room] < now and reached(time, arrivals[entry % room])):
-        entry -= 1
-    return entry
+    """Return the place of the newest entry that has come and was sent before now; -1 if there is none."""
+    now = nanoseconds(time)
+    for place in range(min(whole, stamps.size)):
+        if stamps[place] < now and reached(time, arrivals[place]):
+            return place
+    return -1
 
 
 def come(count: Any, arrivals: Any, time: Any) -> Any:
-    """Return how many of so many instants have been reached; the last of them stand in ``arrivals``."""
-    room = arrivals.size
-    left = min(count, room)
-    while left > 0 and not reached(time, arrivals[(count - 1) % room]):
-        count -= 1
-        left -= 1
-    return count
+    """Return how many of so many instants have been reached; ``arrivals`` has the latest of them first."""
+    place = 0
+    while place < min(count, arrivals.size) and not reached(time, arrivals[place]):
+        place += 1
+    return count - place
 
 
 class SenderTwin(Block, numeric=False):
@@ -197,7 +195,7 @@ _SCOPE = {
     "NO_FRAME": NO_FRAME, "SPOILT": SPOILT, "WHOLE": WHOLE, "arrival": arrival, "come": come, "draw": draw,
     "nanoseconds": nanoseconds, "newest": newest,
 }  # fmt: skip
-_LOCAL = {"at", "comes", "entry", "stamp", "max"}
+_LOCAL = {"at", "comes", "stamp", "max"}
 _PREFIXES = ("ring_", "kept_", "initial_")
 
 
@@ -232,27 +230,26 @@ def _start(self: Any) -> None:
 
 
 def _output_text(shapes: Sequence[_Shape], places: int) -> Iterator[str]:
+    rings = _rings(shapes, places)
+    frames = [shape for shape in shapes if shape.scalar == FRAME]
     yield f"def output(self, {', '.join(shape.name for shape in shapes)}, time):"
     yield "    whole, spoilt, comes = self.entries, self.wrong, arrival(self, time)"
-    yield f"    at = whole % {places}"
-    for name, kind in _common(places):
-        if kind.endswith("]"):
-            yield f"    {name} = self.kept_{name}.copy()"
-    for shape in shapes:
-        if shape.scalar != FRAME:
-            yield f"    ring_{shape.name} = self.kept_{shape.name}.copy()"
-    for shape in shapes:
-        for place, (name, _) in enumerate(shape.ring(places) if shape.scalar == FRAME else ()):
-            now = f"self.fate == WHOLE and at == {place}"
-            yield f"    {name} = {shape.name} if {now} else self.kept_{shape.name}[{place}]"
+    yield "    spoilt_at = self.kept_spoilt_at.copy()"
+    for ring, kept, _ in rings:
+        yield f"    {ring} = {kept}.copy()"
+    for shape in frames:
+        yield f"    {', '.join(name for name, _ in shape.ring(places))} = self.kept_{shape.name}"
     yield "    if self.fate == WHOLE:"
-    yield "        stamps[at], arrivals[at], gaps[at] = nanoseconds(time), comes, self.sent - whole"
-    for shape in shapes:
-        if shape.scalar != FRAME:
-            yield f"        ring_{shape.name}[at] = {shape.name}"
+    for ring, kept, value in rings:
+        yield f"        {ring}[1:] = {kept}[:-1]"
+        yield f"        {ring}[0] = {value}"
+    for shape in frames:
+        names = [name for name, _ in shape.ring(places)]
+        yield f"        {', '.join(names)} = {', '.join((shape.name, *names[:-1]))}"
     yield "        whole += 1"
     yield "    elif self.fate == SPOILT:"
-    yield f"        spoilt_at[spoilt % {places}] = comes"
+    yield "        spoilt_at[1:] = self.kept_spoilt_at[:-1]"
+    yield "        spoilt_at[0] = comes"
     yield "        spoilt += 1"
     found = [name for name, _ in _common(places)]
     found += [name for shape in shapes for name, _ in shape.ring(places)]
@@ -261,22 +258,34 @@ def _output_text(shapes: Sequence[_Shape], places: int) -> Iterator[str]:
 
 def _update_text(shapes: Sequence[_Shape], places: int) -> Iterator[str]:
     yield f"def update(self, {', '.join(shape.name for shape in shapes)}, time):"
-    yield "    comes = arrival(self, time)"
+    yield "    comes, whole = arrival(self, time), self.entries"
     yield "    if self.fate == WHOLE:"
-    yield f"        at = self.entries % {places}"
-    yield "        self.kept_stamps[at] = nanoseconds(time)"
-    yield "        self.kept_arrivals[at] = comes"
-    yield "        self.kept_gaps[at] = self.sent - self.entries"
+    for _, kept, value in _rings(shapes, places):
+        yield f"        {kept}[1:] = {kept}[:-1].copy()"
+        yield f"        {kept}[0] = {value}"
     for shape in shapes:
-        yield f"        self.kept_{shape.name}[at] = {shape.name}"
+        if shape.scalar == FRAME:
+            yield f"        self.kept_{shape.name} = ({shape.name}, *self.kept_{shape.name}[:-1])"
     yield "        self.entries += 1"
     yield "    elif self.fate == SPOILT:"
-    yield f"        self.kept_spoilt_at[self.wrong % {places}] = comes"
+    yield "        self.kept_spoilt_at[1:] = self.kept_spoilt_at[:-1].copy()"
+    yield "        self.kept_spoilt_at[0] = comes"
     yield "        self.wrong += 1"
     yield "    self.through = max(time, self.through) + self.latency"
     yield "    self.last = comes"
     yield "    self.sent += 1"
     yield "    draw(self)"
+
+
+def _rings(shapes: Sequence[_Shape], places: int) -> list[tuple[str, str, str]]:
+    """Return what is kept of each entry: the variable, the state, and the new value in terms of a method."""
+    found = [
+        ("stamps", "self.kept_stamps", "nanoseconds(time)"),
+        ("arrivals", "self.kept_arrivals", "comes"),
+        ("gaps", "self.kept_gaps", "self.sent - whole"),
+    ]
+    plain = [shape.name for shape in shapes if shape.scalar != FRAME]
+    return found + [(f"ring_{name}", f"self.kept_{name}", name) for name in plain]
 
 
 @functools.cache
@@ -298,8 +307,7 @@ def _receive_text(shapes: Sequence[_Shape], places: int) -> Iterator[str]:
     names = [name for name, _ in _common(places)]
     names += [name for shape in shapes for name, _ in shape.ring(places)]
     yield f"def output(self, {', '.join(names)}, time):"
-    yield "    entry = newest(whole, stamps, arrivals, time)"
-    yield f"    at = entry % {places}"
+    yield "    at = newest(whole, stamps, arrivals, time)"
     for shape in shapes:
         name = shape.name
         if shape.scalar == FRAME:
@@ -309,7 +317,7 @@ def _receive_text(shapes: Sequence[_Shape], places: int) -> Iterator[str]:
         else:
             yield f"    {name} = self.{_initial(name)}"
     yield "    stamp, lost = 0, 0"
-    yield "    if entry >= 0:"
+    yield "    if at >= 0:"
     yield "        stamp, lost = stamps[at], gaps[at]"
     for shape in shapes:
         name = shape.name

@@ -43,11 +43,15 @@ class UdpSocket:
 
     def write(self, data: bytes) -> bool:
         """Send a datagram; return False if the system does not take it now."""
-        try:
-            self._socket.send(data)
-        except OSError:  # no room, no route, or nobody listens yet
-            return False
-        return True
+        for _ in range(2):
+            try:
+                self._socket.send(data)
+            except ConnectionRefusedError:  # an earlier one found nobody; this one was not sent
+                continue
+            except OSError:  # no room, or no route
+                return False
+            return True
+        return False
 
     def read(self) -> Iterator[bytes]:
         """Yield the datagrams that have come, at most 256 of them."""

@@ -112,10 +112,9 @@ def link_values(
     for key, node in spec.fields.items():
         value = substitute(node, params, faults)
         read = faults.read(_READERS[key], value) if known(value) else UNKNOWN
-        if not known(read):
-            return UNKNOWN
-        found["ports" if key == "port" else key] = read
-    return found
+        if known(read):
+            found["ports" if key == "port" else key] = read
+    return found if len(found) == len(spec.fields) else UNKNOWN
 
 
 def _baud(node: YamlNode) -> int:

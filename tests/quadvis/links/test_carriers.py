@@ -1,0 +1,169 @@
+"""Carriers: bytes through ptys and datagrams, without waiting, and ports that are nobody else's."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from quadvis.errors import QuadvisError
+from quadvis.links.carriers import open_receiver, open_sender
+from quadvis.links.link import MEMORY, UDP
+from quadvis.links.serial_line import SerialLine
+from quadvis.links.udp import UdpSocket
+
+from .networks import made_link, task
+
+LINK = made_link(task("slow", "1/10"), task("fast", "1/20"))
+PAYLOAD = LINK.message.pack((3, 1.5, True, (1.0, -1.0), (True, False, True)))
+PATIENCE = 30.0  # s, for a machine that has other things to do
+
+
+@pytest.fixture
+def ends() -> Iterator[tuple[int, int, str]]:
+    """A pty: its master, its slave, and the path of the slave."""
+    master, slave = os.openpty()
+    os.set_blocking(master, False)
+    yield master, slave, os.ttyname(slave)
+    for descriptor in (master, slave):
+        os.close(descriptor)
+
+
+def until(read: Any) -> Any:
+    """Return the first result that is not empty."""
+    begin = time.monotonic()
+    while time.monotonic() < begin + PATIENCE:
+        found = read()
+        if found:
+            return found
+        time.sleep(0.001)
+    raise AssertionError("nothing came")
+
+
+def test_a_serial_sender_and_receiver_meet_on_a_line(ends: tuple[int, int, str]) -> None:
+    master, _, path = ends
+    sender = open_sender(LINK, path)
+    sender.send(100, PAYLOAD)
+    sender.send(200, PAYLOAD)
+    data = b""
+    while len(data) < 2 * LINK.bytes:
+        data += until(lambda: os.read(master, 4096) if _ready(master) else b"")
+    sender.close()
+    receiver = open_receiver(LINK, path)
+    assert receiver.receive(1000) is None
+    os.write(master, data)
+    assert until(lambda: receiver.receive(200)) == (100, PAYLOAD)
+    assert receiver.receive(200) is None  # the later one waits until its time is past
+    assert receiver.receive(201) == (200, PAYLOAD)
+    os.write(master, data[5:])
+    assert receiver.receive(10**9) is None
+    until(lambda: (receiver.receive(10**9), receiver.refused)[1])
+    assert (receiver.lost, receiver.refused) == (0, 1)
+    receiver.close()
+
+
+def _ready(descriptor: int) -> bool:
+    import select
+
+    return bool(select.select([descriptor], [], [], 0)[0])
+
+
+def test_all_bytes_pass_a_line_unchanged(ends: tuple[int, int, str]) -> None:
+    master, _, path = ends
+    line, every = SerialLine(path, 115200), bytes(range(256)) * 4
+    assert line.write(every)
+    found = b""
+    while len(found) < len(every):
+        found += until(lambda: os.read(master, 4096) if _ready(master) else b"")
+    assert found == every
+    os.write(master, every)
+    found = b""
+    while len(found) < len(every):
+        found += until(lambda: b"".join(line.read()))
+    assert found == every
+    line.close()
+
+
+def test_a_full_line_takes_no_half_frames_and_nobody_waits(ends: tuple[int, int, str]) -> None:
+    master, _, path = ends
+    line, frame = SerialLine(path, 115200), b"x" * 999 + b"\0"
+    taken = [line.write(frame) for _ in range(1000)]
+    assert taken[0] and not taken[-1]
+    found = b""
+    while len(found) < 1000 * sum(taken):
+        found += until(lambda: os.read(master, 65536) if _ready(master) else b"")
+        line.write(b"")
+    assert found == frame * sum(taken)
+    line.close()
+
+
+def test_a_line_belongs_to_one(ends: tuple[int, int, str]) -> None:
+    path = ends[2]
+    line = SerialLine(path, 115200)
+    with pytest.raises(QuadvisError, match="cannot open the serial port"):
+        SerialLine(path, 115200)
+    line.close()
+    SerialLine(path, 115200).close()
+
+
+def test_a_line_that_another_program_has_locked_is_left_alone(ends: tuple[int, int, str]) -> None:
+    _, slave, path = ends
+    fcntl.flock(slave, fcntl.LOCK_EX)
+    with pytest.raises(QuadvisError, match="cannot open the serial port"):
+        SerialLine(path, 115200)
+    fcntl.flock(slave, fcntl.LOCK_UN)
+
+
+def test_a_port_that_does_not_exist_is_refused_in_a_sentence() -> None:
+    with pytest.raises(QuadvisError, match="cannot open the serial port '/dev/none': .*no such file"):
+        SerialLine("/dev/none", 115200)
+
+
+def test_a_pty_knows_no_low_latency_and_the_receiver_says_so(ends: tuple[int, int, str]) -> None:
+    receiver = open_receiver(LINK, ends[2])
+    assert len(receiver.notes) == 1 and "low latency" in receiver.notes[0]
+    receiver.close()
+
+
+def test_datagrams_pass_from_one_end_to_the_other() -> None:
+    link = made_link(task("slow", "1/10"), task("fast", "1/20"), via=UDP, baud=0)
+    socket = UdpSocket(("127.0.0.1", 0), listens=True)
+    address = socket.address
+    socket.close()
+    sender = open_sender(link, address)
+    sender.send(1, PAYLOAD)  # nobody listens yet
+    receiver = open_receiver(link, address)
+    assert receiver.receive(10**9) is None
+    for stamp in (2, 3):
+        sender.send(stamp, PAYLOAD)
+    assert until(lambda: receiver.receive(3)) == (2, PAYLOAD)
+    assert until(lambda: receiver.receive(4)) == (3, PAYLOAD)
+    assert receiver.lost == 1
+    for end in (sender, receiver):
+        end.close()
+
+
+def test_an_address_that_is_in_use_or_unknown_is_refused_in_a_sentence() -> None:
+    socket = UdpSocket(("127.0.0.1", 0), listens=True)
+    with pytest.raises(QuadvisError, match="cannot listen at '127.0.0.1:"):
+        UdpSocket(socket.address, listens=True)
+    socket.close()
+    with pytest.raises(QuadvisError, match="cannot listen at '192.0.2.1:5005'"):
+        UdpSocket(("192.0.2.1", 5005), listens=True)
+
+
+def test_memory_gives_what_is_newest() -> None:
+    link = made_link(task("slow", "1/10"), task("fast", "1/20"), via=MEMORY, baud=0)
+    words = memoryview(bytearray(8 * link.needs.words))
+    sender, receiver = open_sender(link, words), open_receiver(link, words)
+    assert receiver.receive(100) is None
+    for stamp in (1, 2, 3):
+        sender.send(stamp, PAYLOAD)
+    assert receiver.receive(3) == (2, PAYLOAD)
+    assert receiver.receive(3) is None
+    assert receiver.receive(4) == (3, PAYLOAD)
+    assert (receiver.lost, receiver.refused) == (0, 0)
