@@ -20,6 +20,7 @@ from quadvis.analysis.progress import announce
 from quadvis.analysis.state import Columns, find_state, slope, stacked
 from quadvis.diagram.sections.analyse import Cut
 from quadvis.engine.engine import Engine
+from quadvis.graph.devices import refuse_devices
 from quadvis.graph.graph import Graph
 from quadvis.native.choice import AUTO, choose, use
 
@@ -60,6 +61,7 @@ def linearised(graph: Graph, cuts: Sequence[Cut], at: float, engine: str = AUTO)
     if no steady state is near, if the loop is not smooth there, if a cut is not on the loop, or if the graph
     has neither a loop nor a state.
     """
+    refuse_devices(graph)
     try:
         return _linearised(graph, cuts, at, engine)
     except Unsettled:

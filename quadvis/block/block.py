@@ -19,7 +19,6 @@ from quadvis.block.declare import Declared, Derived, In, Out, Param, ParameterEr
 from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.machine.inputs import file_digest, read_once
 from quadvis.machine.source_line import file_of, source_line
-from quadvis.units import Unit
 
 OWN_MODULES = "quadvis_own_blocks."  # prefix of the names of modules that come with a diagram
 METHODS = ("start", "read", "output", "write", "update", "deriv")
@@ -300,8 +299,3 @@ def _safe(
             remedy = f"declare safe_{name} = Safe('{name}'), or say in 'harmless' why it needs none"
             raise TypeError(sentence(problem, remedy))
     return safe
-
-
-def units_of(declared: Declared, count: int) -> tuple[Unit, ...]:
-    """Return one unit per element of a port with ``count`` elements; a single unit holds for all elements."""
-    return declared.units * count if len(declared.units) == 1 else declared.units

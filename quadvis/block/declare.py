@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+import re
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -14,6 +15,9 @@ from numpy.typing import NDArray
 from quadvis.block.signals import SCALARS, SignalType
 from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.units import parse_units
+
+PORT_WANTED = "the path of a port, such as /dev/ttyUSB0, or pty:NAME"
+PORT = re.compile(r"pty:[A-Za-z_]\w*|(?!pty:).+")
 
 
 class ParameterError(QuadvisError):
@@ -114,10 +118,11 @@ class Random(State):
 class Param(Declared):
     """A parameter with type, unit and bounds (``min``/``max`` inclusive, ``above``/``below`` exclusive).
 
-    A diagram must give a parameter that has no default. With ``choices`` the value is one of these names;
-    the methods see the index of the name. With ``tune=True`` the value may change between ticks of a run.
-    A value of type ``file`` is a path relative to the diagram. It names a file or folder that the block
-    reads, or writes if ``writes=True``.
+    A diagram must give a parameter that has no default. With ``choices`` the value is one of these names; the
+    methods see the index of the name. With ``tune=True`` the value may change between ticks of a run. A value
+    of type ``file`` is a path relative to the diagram. It names a file or folder that the block reads, or
+    writes if ``writes=True``. A value of type ``port`` is the path of a serial port, or ``pty:NAME``: one end
+    of a cable that a real-time run makes.
     """
 
     def __init__(
@@ -138,7 +143,8 @@ class Param(Declared):
         self.writes = writes
         self.default, self.choices, self.tune = default, choices, tune
         self.min, self.max, self.above, self.below = min, max, above, below
-        self.is_file, self.is_text = type == "file", type in ("str", "file")
+        self.is_file, self.is_port = type == "file", type == "port"
+        self.is_text = type in ("str", "file", "port")
         super().__init__("int64" if choices or self.is_text else type, unit, doc=doc)
         if self.is_text:
             self.type, self.signal = type, SignalType("str", ())
@@ -162,6 +168,8 @@ class Param(Declared):
         if self.is_text:
             if not isinstance(value, str):
                 raise ParameterError(self.name, f"{self.name} must be a text, got {value!r}")
+            if self.is_port and not PORT.fullmatch(value):
+                raise ParameterError(self.name, f"{self.name} must be {PORT_WANTED}, got {value!r}")
             return value
         if type(value) is float and self._takes_number and not math.isnan(value):
             self._check_range(value)
@@ -207,6 +215,8 @@ class Param(Declared):
         """Describe a right value in words."""
         if self.choices:
             return "one of " + ", ".join(self.choices)
+        if self.is_file or self.is_port:
+            return "a path" if self.is_file else PORT_WANTED
         one, many = _WORDS[self.signal.scalar]
         unit = "" if self.unit == "1" else f" in {self.unit}"
         if self.signal.shape == ("*",):
@@ -214,11 +224,10 @@ class Param(Declared):
         return f"{_shape_text(self.signal.shape)}, {many}{unit}" if self.signal.shape else f"{one}{unit}"
 
 
-class Safe(Param):
-    """A safe value: the value that ``write`` gets at every end of a run in place of one of the inputs.
+class FixedInput(Param):
+    """A value that ``write`` gets in place of one of the inputs.
 
-    A safe value has the type and unit of that input, and no default: only the author of a diagram knows
-    what is safe for a device.
+    It has the type and unit of that input, and no default: only the author of a diagram knows the device.
     """
 
     def __init__(self, input: str, *, doc: str = "") -> None:
@@ -228,6 +237,14 @@ class Safe(Param):
     def stand_for(self, port: In) -> None:
         """Take the type and unit of the input."""
         self.type, self.unit, self.signal, self.units = port.type, port.unit, port.signal, port.units
+
+
+class Safe(FixedInput):
+    """The value of an input at every end of a run."""
+
+
+class Initial(FixedInput):
+    """The value of an input of an output device before its first command."""
 
 
 _WORDS = {

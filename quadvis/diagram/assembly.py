@@ -9,6 +9,7 @@ from types import MappingProxyType
 from quadvis.block import Out
 from quadvis.diagram.build import Builder, Made
 from quadvis.diagram.check import WireCheck
+from quadvis.diagram.devices import check_devices
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.doubts import warn_network, warn_parameters, warn_rates
 from quadvis.diagram.expand import Expansion, Kept
@@ -111,6 +112,7 @@ class Assembly:
         listing = (*(draft.path for draft in drafts), *(link.name for link in links_of(graph)))
         sources = (*spec.paths, *self.parts.files, *self.groups.files, *self._params)
         check_writers(drafts, sources, faults)
+        check_devices(drafts, faults)
         ports = {name: wire_text(source) for name, source in wiring.ports()}
         return Diagram(
             spec.name, spec.path, variant, graph, stop, seed, spec.values | context.values, listing,

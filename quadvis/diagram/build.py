@@ -202,8 +202,8 @@ class Builder:
         missing = [name for name in kind.interface.required if name not in flat.parameters]
         whole &= not missing
         for name in absent(missing, flat.parameters, declared) if known(flat.spec.parameters) else ():
-            wanted = "a path" if declared[name].is_file else declared[name].wanted()
-            self.faults.add(flat.spec.place, f"parameter '{name}' is missing", f"give {wanted} under 'with'")
+            remedy = f"give {declared[name].wanted()} under 'with'"
+            self.faults.add(flat.spec.place, f"parameter '{name}' is missing", remedy)
         block = self._construct(flat, kind, values, period) if whole else UNKNOWN
         if known(block):
             self.made.setdefault(flat.path, []).append(Made(kind, flat.parameters, period, block, units))

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import TAGS, Block, Declared, In, Out, Param, Safe, State
+from quadvis.block import CABLE, TAGS, Block, Declared, Device, FixedInput, In, Out, Output, Param, State
 from quadvis.library.catalogue import Catalogue
 from quadvis.machine.columns import table
 
@@ -53,7 +53,14 @@ def _tags(block: type[Block]) -> dict[str, str]:
     """Return what makes the block unlike others, in words, and why."""
     tags = {tag.replace("_", " "): reason for tag in TAGS if (reason := getattr(block, tag))}
     names = block.ports_from()
-    return tags | ({"ports": f"they depend on {', '.join(names)}"} if names else {})
+    tags |= {"ports": f"they depend on {', '.join(names)}"} if names else {}
+    return tags | ({"device": _device(block)} if issubclass(block, Device) else {})
+
+
+def _device(block: type[Device]) -> str:
+    """Say what a device does with its port."""
+    rate = f", a frame every '{block.rate}'" if issubclass(block, Output) else ""
+    return f"{'output' if rate else 'input'} by the port of '{block.port_parameter}', {block.line}{rate}"
 
 
 def _input_row(port: In, direct: bool) -> tuple[str, ...]:
@@ -76,7 +83,9 @@ def _param_row(param: Param) -> tuple[str, ...]:
     if len(choices) > MANY:  # they go into the column that wraps
         choices, doc = f"{len(param.choices)} choices", f"{doc}: {', '.join(param.choices)}"
     words = [choices, bounds(param), "tunable" if param.tune else ""]
-    words += [f"safe value of {param.input}"] if isinstance(param, Safe) else []
+    words += (
+        [f"{type(param).__name__.lower()} value of {param.input}"] if isinstance(param, FixedInput) else []
+    )
     kind = "" if param.choices else _kind(param)
     return param.name, kind, _short(given), "; ".join(filter(None, words)), doc
 
@@ -112,8 +121,8 @@ def example(name: str, block: type[Block]) -> list[str]:
 
 
 def _sample(param: Param) -> str:
-    if param.is_file:
-        return "path"
+    if param.is_file or param.is_port:
+        return f"{CABLE}name" if param.is_port else "path"
     return param.choices[0] if param.choices else "..."
 
 

@@ -20,6 +20,7 @@ from quadvis.engine.clock import Clock
 from quadvis.engine.engine import Engine, Snapshot
 from quadvis.engine.tuning import Change
 from quadvis.errors import Faults, Place, QuadvisError, known, quoted, sentence, suggestion
+from quadvis.graph.devices import refuse_devices
 from quadvis.graph.graph import Node
 from quadvis.graph.names import read_name
 from quadvis.run.row_tap import RowTap, Taker
@@ -40,6 +41,7 @@ class LiveRun:
     """
 
     def __init__(self, diagram: Diagram, clock: Clock | None = None, log: str | Path | None = None) -> None:
+        refuse_devices(diagram.graph)
         self.diagram = diagram
         self._log = log
         self._writer: LogWriter | None = None

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from quadvis.engine.engine import Engine
 from quadvis.engine.taps import Tap
 from quadvis.engine.tuning import Change
+from quadvis.errors.caller import as_given
+from quadvis.graph.devices import refuse_devices
 from quadvis.graph.graph import Node
 from quadvis.native.choice import Announce, Choice, choose, use
 from quadvis.output.kept import RowJudge
@@ -76,6 +78,7 @@ class Simulated:
     computers: Sequence[str] = ()
 
     def __init__(self, diagram: Diagram, engine: str, announce: Announce | None) -> None:
+        refuse_devices(diagram.graph, as_given("add --real-time", "give real_time=RealTime()"))
         self._engine = Engine(diagram.graph, diagram.seed)
         self._ticks = diagram.ticks
         self._choice = choose(self._engine, self._ticks, engine, announce)

@@ -18,6 +18,7 @@ from quadvis.diagram.settings import Files, Given, value_text
 from quadvis.engine.engine import Engine
 from quadvis.errors import QuadvisError, quoted
 from quadvis.errors.caller import as_given
+from quadvis.graph.devices import refuse_devices
 from quadvis.library.catalogue import OwnBlocks
 from quadvis.machine.files import PLOT, Claim, check_output
 from quadvis.native.choice import AUTO, Announce, choose
@@ -78,6 +79,7 @@ def sweep(
     target = Path(output) if output else None
     if plot is not None:
         check_output(plot, PLOT, grid.inputs)
+    refuse_devices(diagram.graph)
     found = quantities(diagram)
     chosen = choose(Engine(diagram.graph), diagram.ticks * len(places), engine, announce).engine
     several = any(axis.name in (VARIANT, PARAMS) for axis in axes)  # block types may differ from run to run

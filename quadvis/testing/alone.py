@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import functools
+import os
 from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
-import numpy as np
-
-from quadvis.block import Block, Sizes
+from quadvis.block import CABLE, Block, Input, Sizes
 from quadvis.engine.engine import Engine
 from quadvis.graph.graph import Constant, Graph, Node, Task
 
@@ -27,13 +27,13 @@ def alone(
     task = Task("alone", period, continuous=bool(block.interface.continuous))
     constants = {name: Constant(value) for name, value in inputs.items()}
     node = Node(ALONE, type(block).__name__, block, task, dict(constants), sizes)
-    return Engine(Graph("alone", [node], solver, period if task.continuous else None), seed)
+    made = Engine(Graph("alone", [node], solver, period if task.continuous else None), seed)
+    if isinstance(block, Input) and block.port_given.startswith(CABLE):
+        made.bound(ALONE).actual_port = _silent_port()
+    return made
 
 
-def parameter_sizes(block: Block) -> Sizes:
-    """Return the symbolic sizes that a block's parameters fix."""
-    sizes: Sizes = {}
-    for param in block.interface.params.values():
-        if not param.is_text:
-            param.signal.unify(np.shape(getattr(block, param.name)), sizes)
-    return sizes
+@functools.cache
+def _silent_port() -> str:
+    """Return a port to which nothing ever comes, in the place of a cable."""
+    return os.ttyname(os.openpty()[1])

@@ -17,6 +17,7 @@ from typing import Any
 
 from quadvis.block import Block
 from quadvis.testing.checks.compiled import compiles
+from quadvis.testing.checks.devices import frames_follow_from_commands, outlives_hostile_bytes
 from quadvis.testing.checks.form import all_declarations_used, documented, one_block_in_its_module, tested
 from quadvis.testing.checks.parameters import refuses_bad_parameters, refuses_before_a_run
 from quadvis.testing.checks.returned import returns_what_it_declares
@@ -101,6 +102,8 @@ CHECKS: dict[str, Callable[[Subject], None]] = {
         work_is_of_one_tick,
         repeats_after_restore,
         outlives_hostile_stamps,
+        frames_follow_from_commands,
+        outlives_hostile_bytes,
         returns_what_it_declares,
         compiles,
     )

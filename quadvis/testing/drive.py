@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block
+from quadvis.block import Block, parameter_sizes
 from quadvis.engine.engine import Engine
 from quadvis.engine.memory import Slot
 from quadvis.native.choice import PYTHON, choose, use
-from quadvis.testing.alone import ALONE, alone, parameter_sizes
+from quadvis.testing.alone import ALONE, alone
 from quadvis.units import parse_period
 
 
@@ -63,7 +63,7 @@ def drive(
         value = inputs.get(name, port.default)
         if value is None:
             raise TypeError(f"{type(block).__name__} needs its input '{name}'")
-        series[name] = _series(name, port.signal, value, sizes, steps)
+        series[name] = series_of(name, port.signal, value, sizes)
     counts = {len(values) for values, constant in series.values() if not constant}
     if len(counts) > 1 or (not counts and steps is None):
         raise TypeError("inputs must have one length, or give steps")
@@ -77,7 +77,7 @@ def drive(
     return _drive(made, series, count)
 
 
-def _series(name: str, signal: Any, value: Any, sizes: dict[str, Any], steps: int | None) -> tuple[Any, bool]:
+def series_of(name: str, signal: Any, value: Any, sizes: dict[str, Any]) -> tuple[Any, bool]:
     """Return the values of an input, and whether they are one constant value."""
     if signal.scalar == "frame":
         return (value, False) if isinstance(value, list | tuple) else ([value], True)

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, Frame, In, Param, ParameterError, Shape, Sizes
+from quadvis.block import Block, Frame, In, Param, ParameterError, Shape, Sizes, parameter_sizes
 from quadvis.engine.engine import Engine
 from quadvis.engine.interpreter import Call
 from quadvis.engine.layout import TIME, Placed
 from quadvis.engine.memory import SLOT, Memory, Slot
-from quadvis.testing.alone import ALONE, alone, parameter_sizes
+from quadvis.testing.alone import ALONE, alone
 
 STEPS = 16
 PERIOD = Fraction(1, 10)
@@ -151,8 +151,9 @@ def extreme_rigs(subject: Subject) -> Iterator[tuple[str, Any, Rig]]:
         for name, param in params.items()
         if param.signal.shape == ("*",) and name not in subject.given
     }
+    sizes = parameter_sizes(subject.make())
     for name, param in params.items():
-        for value in () if param.is_text or param.choices else _extremes(param):
+        for value in () if param.is_text or param.choices else _extremes(param, sizes):
             try:
                 block = subject.make(**arrays | {name: value})
             except ParameterError:
@@ -160,7 +161,7 @@ def extreme_rigs(subject: Subject) -> Iterator[tuple[str, Any, Rig]]:
             yield name, value, _rig(subject, block, {"*": ()}, False)
 
 
-def _extremes(param: Param) -> Iterator[Any]:
+def _extremes(param: Param, sizes: Sizes) -> Iterator[Any]:
     """Yield values at the bounds of a parameter, and values far beyond any that a person would choose."""
     bounds = [bound for bound in (param.min, param.max) if bound is not None]
     bounds += [
@@ -170,7 +171,7 @@ def _extremes(param: Param) -> Iterator[Any]:
     ]
     whole = param.signal.scalar == "int64"
     numbers = [0, 1, -1, 10**6, 2**62] if whole else [0.0, 1e-300, 1e-9, 1.0, -1.0, 1e3, 1e9, -1e9, 1e300]
-    shape = param.signal.resolve({})
+    shape = param.signal.resolve(sizes | {"*": ()})
     for number in dict.fromkeys((*bounds, *numbers)):
         yield np.full(shape, number).tolist()
 

@@ -60,6 +60,12 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
         "times": [0.0, 0.35, 1.0],
         "values": [[1.0, 2.0], [3.0, -1.0], [0.0, 0.0]],
         "during": [[0.3, 0.6]],
+        "port": "pty:line",
+        "channels": [1, 3, 2],
+        "lowest": [-1.0, 0.0, 1.0],
+        "highest": [1.0, 1.0, -1.0],
+        "initial": [0.0, 0.0, 0.5],
+        "safe": [0.0, 0.0, 0.0],
         "model": str(ROOT / "diagrams" / "models" / "rotorcraft.xml"),
     }
     required = [key for key, param in block.interface.params.items() if param.required]

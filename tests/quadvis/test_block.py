@@ -237,7 +237,7 @@ def test_a_parameter_without_default_must_be_given() -> None:
         path = Param(type="file", doc="path")
 
     assert Needy.interface.params["path"].required
-    with pytest.raises(ParameterError, match="parameter 'path' is missing; give a text"):
+    with pytest.raises(ParameterError, match="parameter 'path' is missing; give a path"):
         Needy()
 
 

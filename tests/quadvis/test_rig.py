@@ -2,8 +2,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, ParameterError, State
-from quadvis.testing.alone import alone, parameter_sizes
+from quadvis.block import Block, In, Out, Param, ParameterError, State, parameter_sizes
+from quadvis.testing.alone import alone
 from quadvis.testing.rig import STEPS, VECTOR, Rig, Subject, rigs
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from quadvis.block import Block
+from quadvis.block import Block, Device
 from quadvis.native.source import names_in
 from quadvis.testing.rig import Subject
 
@@ -55,6 +55,8 @@ def all_declarations_used(subject: Subject) -> None:
     functions = [value for kind in classes for value in vars(kind).values() if inspect.isfunction(value)]
     names = {name for function in _reached(functions) for name in _named(function.__code__)}
     names |= {item.name for item in interface.safe.values()}  # `Block.write_safe` uses them
+    if issubclass(subject.block, Device):
+        names |= subject.block.used_outside()
     groups = (interface.params, interface.derived, interface.states, interface.work)
     idle = [name for group in groups for name in group if name not in names]
     assert not idle, f"no method uses {', '.join(idle)}; take it away"

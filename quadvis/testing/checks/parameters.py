@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Param, ParameterError
+from quadvis.block import CABLE, Param, ParameterError
 from quadvis.errors import QuadvisError
 from quadvis.testing.rig import Subject, extreme_rigs
 
@@ -37,6 +37,8 @@ def _refusal(subject: Subject, name: str, value: Any) -> ParameterError | None:
 
 def _bad_values(param: Param) -> Iterator[Any]:
     yield 1.0 if param.is_text else "no such choice"
+    if param.is_port:
+        yield CABLE
     if param.is_text or param.choices:
         return
     shape = param.signal.resolve({})
