@@ -17,6 +17,7 @@ from quadvis.diagram.sections.analyse import ANALYSE, Questions
 from quadvis.diagram.sections.computers import COMPUTERS
 from quadvis.diagram.sections.expect import EXPECT
 from quadvis.diagram.sections.log import LOG
+from quadvis.diagram.sections.on_host_loss import ON_HOST_LOSS
 from quadvis.diagram.sections.overload import OVERLOAD, OverloadLimits
 from quadvis.diagram.sections.section import Values
 from quadvis.diagram.sections.summary import SUMMARY
@@ -136,6 +137,11 @@ class Diagram:
         spec = self.values[COMPUTERS].get(computer)
         own = spec.overload if spec is not None and known(spec) else None
         return self.overload if own is None else own
+
+    @property
+    def on_host_loss(self) -> str:
+        """What a real-time run does when the process is lost that has started it."""
+        return self.values[ON_HOST_LOSS]
 
     def logs(self, path: str) -> bool:
         """Whether a block's outputs are logged."""

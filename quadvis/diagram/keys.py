@@ -15,6 +15,7 @@ from quadvis.diagram.sections.files import FILES
 from quadvis.diagram.sections.header import DOC, FORMAT, NAME
 from quadvis.diagram.sections.links import LINKS
 from quadvis.diagram.sections.log import LOG
+from quadvis.diagram.sections.on_host_loss import ON_HOST_LOSS
 from quadvis.diagram.sections.overload import OVERLOAD
 from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.ports import PORTS
@@ -28,8 +29,8 @@ from quadvis.diagram.sections.tasking import TASKING
 from quadvis.diagram.sections.variants import VARIANTS
 
 FILE_SECTIONS: tuple[FileSection[Any], ...] = (
-    FORMAT, NAME, DOC, BASE, WITHOUT, PARAMS, RATES, SOLVER, TASKING, STOP_TIME, SEED, OVERLOAD, COMPUTERS,
-    LINKS, FILES, BLOCKS, VARIANTS, PORTS,
+    FORMAT, NAME, DOC, BASE, WITHOUT, PARAMS, RATES, SOLVER, TASKING, STOP_TIME, SEED, OVERLOAD, ON_HOST_LOSS,
+    COMPUTERS, LINKS, FILES, BLOCKS, VARIANTS, PORTS,
 )  # fmt: skip
 RUN_SECTIONS: tuple[RunSection[Any], ...] = (LOG, ANALYSE, EXPECT, SUMMARY, FIGURES)  # `expect` names cuts
 SECTIONS: tuple[Section[Any], ...] = (*FILE_SECTIONS, *RUN_SECTIONS)

@@ -22,6 +22,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from quadvis.diagram.load import load_text
+from quadvis.diagram.sections.on_host_loss import CONTINUE
 from quadvis.engine.engine import Engine
 from quadvis.errors import QuadvisError, RunError
 from quadvis.errors.caller import IS_COMMAND
@@ -30,6 +31,7 @@ from quadvis.machine.interrupts import leave_to_parent
 from quadvis.native.choice import Choice, choose, use
 from quadvis.realtime import control
 from quadvis.realtime.control import SharedMemory
+from quadvis.realtime.devices import PortBindings
 from quadvis.realtime.options import RealTime
 from quadvis.realtime.overload import OverloadWatch
 from quadvis.realtime.pacer import Ended, Pacer
@@ -59,6 +61,7 @@ class Setup:
     streams: tuple[RowStream, ...]
     words: Any
     link: Connection
+    devices: PortBindings
 
 
 @dataclass(frozen=True)
@@ -139,6 +142,7 @@ class _Application:
         self._signals = _Signals(self._shared.control)
         self._engine: Engine | None = None
         self._start = 0
+        self.goes_on_alone = False  # true from the start of a run that may lose its supervisor
 
     def run(self) -> None:
         """Run to the stop time."""
@@ -155,6 +159,7 @@ class _Application:
             lambda instant: sleeper.until(self._start + instant),
         )
         engine = self._engine = Engine(diagram.graph, diagram.seed, pacer)
+        setup.devices.bind(engine)
         choice = choose(engine, diagram.ticks, setup.engine, setup.link.send)
         use(engine, choice)
         for stream, ring in zip(setup.streams, shared.rings, strict=True):
@@ -162,16 +167,22 @@ class _Application:
         with ExitStack() as stack:
             stack.enter_context(diagram.guarded())
             stack.enter_context(engine)
-            stack.callback(self._signals.close)
+            stack.callback(self._leave)
             grants = ask_all(setup.wishes)
             sleeper.polled = _polled(setup.wishes, schedule, sleeper)
             grants.granted.append(f"polling {sleeper.polled / 1e3:.0f} us")
             setup.link.send(Ready(grants, Choice(choice.engine, choice.reason)))
             self._start = setup.link.recv()  # all applications begin at one instant
             shared.control[control.START] = self._start
+            self.goes_on_alone = diagram.on_host_loss == CONTINUE
             self._signals.looping = True
             engine.run(diagram.ticks)
             pacer.finish()
+
+    def _leave(self) -> None:
+        """Let the guardian know that no step follows, and nothing interrupt the closing of the blocks."""
+        self._shared.control[control.LEFT] = 1
+        self._signals.close()
 
     def ended_early(self, error: BaseException) -> Ending:
         """Return the ending of a run that was asked to end."""
@@ -187,7 +198,7 @@ def perform(setup: Setup) -> None:
     application = _Application(setup)
     os.setsid()  # no terminal stops it (Ctrl-Z) or kills it
     leave_to_parent()
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=_end_with_parent, args=(application,), daemon=True).start()
     IS_COMMAND.set(setup.is_command)
     try:
         application.run()
@@ -217,11 +228,13 @@ def _running(error: BaseException, engine: Engine) -> str:
     return found
 
 
-def _end_with_parent() -> None:
-    """End this process when its supervisor has ended: orderly if possible."""
+def _end_with_parent(application: _Application) -> None:
+    """End this process when its supervisor has ended, unless its run may go on: orderly if possible."""
     parent = parent_process()
     if parent is not None:
         parent.join()
+        if application.goes_on_alone:
+            return
         for _ in range(2):
             os.kill(os.getpid(), signal.SIGTERM)
             time.sleep(GRACE)

@@ -1,4 +1,4 @@
-"""The words by which the loop and its supervisor know of each other, and the whole of their shared memory.
+"""The words by which loop, supervisor and guardian know of each other, and the whole of their shared memory.
 
 Each word has one writer. A word is 8 bytes and is read and written whole.
 """
@@ -18,6 +18,7 @@ BEGUN = (
 )
 DONE = 3  # by the loop: the number of steps
 END = 4  # by either: not 0 if the run is to end before its next step
+LEFT = 5  # by the loop: not 0 once it runs no more steps
 WORDS = 8
 LEFT_OUT = (
     4096,

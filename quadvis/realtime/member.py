@@ -19,10 +19,12 @@ from quadvis.native.choice import Announce
 from quadvis.realtime import control, times
 from quadvis.realtime.application import Ending, Ready, Setup, perform
 from quadvis.realtime.control import SharedMemory
+from quadvis.realtime.devices import PortBindings, guards_all
 from quadvis.realtime.flight import Share
+from quadvis.realtime.heartbeat import Patience
 from quadvis.realtime.options import RealTime
 from quadvis.realtime.ring import RecordRing, Words
-from quadvis.realtime.schedule import NANOSECONDS
+from quadvis.realtime.schedule import NANOSECONDS, Schedule
 from quadvis.realtime.streams import RowStream, streams_of
 from quadvis.realtime.times import TaskTimes
 
@@ -50,6 +52,7 @@ class Member:
         engine: str,
         taps: Sequence[Tap],
         left_out: LeftOut,
+        devices: PortBindings,
         announce: Announce,
     ) -> None:
         self.computer, self._part, self._announce = computer, part, announce
@@ -65,8 +68,9 @@ class Member:
         self._link, self._theirs = context.Pipe()
         setup = Setup(
             diagram.resolved, str(diagram.path.parent), diagram.path.name, diagram.own_blocks,
-            IS_COMMAND.get(), computer, engine, wishes, count, streams, words, self._theirs,
+            IS_COMMAND.get(), computer, engine, wishes, count, streams, words, self._theirs, devices,
         )  # fmt: skip
+        self.patience = Patience.of(computer, words, Schedule.of(part), diagram.overload)
         name = f"application {computer}".rstrip()
         self.process: BaseProcess = context.Process(target=perform, args=(setup,), name=name)
         self._listening = True
@@ -115,6 +119,16 @@ class Member:
         if self.ending is None:
             return not self.process.is_alive()
         return bool(self.ending.reason)
+
+    @property
+    def ended_silently(self) -> bool:
+        """True if the application has ended without a word, and so perhaps without its safe values."""
+        return self.ending is None and self.process.exitcode is not None
+
+    @property
+    def is_guarded(self) -> bool:
+        """True if the guardian has all outputs of the application."""
+        return guards_all(self._part)
 
     def ask(self) -> None:
         """Ask for the end of the run before its next step."""

@@ -14,6 +14,7 @@ from quadvis.machine.interrupts import held_back
 from quadvis.machine.processes import launching
 from quadvis.native.choice import Announce
 from quadvis.realtime.application import GRACE
+from quadvis.realtime.devices import Devices
 from quadvis.realtime.flight import Flight
 from quadvis.realtime.member import LeftOut, Member
 from quadvis.realtime.options import RealTime
@@ -49,8 +50,8 @@ def supervise(
     try:
         return supervisor.follow(tend)
     except BaseException as error:
-        if supervisor.end():
-            error.add_note(UNSAFE)
+        for note in supervisor.end():
+            error.add_note(note)
         raise
 
 
@@ -65,22 +66,29 @@ class _Supervisor:
         announce: Announce,
     ) -> None:
         context = multiprocessing.get_context("spawn")
+        self._announce = announce
+        self._devices = Devices(context, diagram.graph, diagram.on_host_loss, wishes.priority)
         self._members = []
         for computer, part in {"": diagram.graph}.items():
             own = [tap for tap in taps if tap.block in part]
+            bindings = self._devices.bindings
             self._members.append(
-                Member(context, diagram, computer, part, wishes, engine, own, left_out, announce)
+                Member(context, diagram, computer, part, wishes, engine, own, left_out, bindings, announce)
             )
         self._begun = False
 
     def follow(self, tend: Callable[[float, float], None]) -> Flight:
         """Start the applications and hand rows on until they have ended; an error if this is too early."""
+        self._devices.start([member.patience for member in self._members], self._announce)
         with launching():
             for member in self._members:
                 member.start()
+                self._devices.watch(member.process.pid or 0)
         while any(member.process.is_alive() for member in self._members):
-            wait([source for member in self._alive for source in member.sources], LOOK)
+            sources = [source for member in self._alive for source in member.sources]
+            wait([*sources, *self._devices.sources], LOOK)
             self._look()
+            self._devices.check(max(moments) if (moments := self._moments) else None)
             if not self._begun and all(member.ready for member in self._members):
                 self._begin()
             running = [member for member in self._members if member.running]
@@ -90,6 +98,8 @@ class _Supervisor:
                 member.warn()
                 self._check_step(member)
         self._look(last=True)
+        if unsafe := self._devices.close():
+            raise RunError("; ".join(unsafe))
         first = self._members[0]
         tend(min(member.time for member in self._members), first.now)
         for member in self._members:
@@ -98,9 +108,10 @@ class _Supervisor:
             tuple(member.share() for member in self._members), sum(member.lost for member in self._members)
         )
 
-    def end(self) -> bool:
-        """End all applications, orderly if possible; return whether one has ended without a word."""
+    def end(self) -> list[str]:
+        """End all processes, orderly if possible; return what may be unsafe then, in sentences."""
         with held_back():
+            self._devices.make_safe()
             for member in self._members:
                 member.ask()
             for request in ("terminate", "terminate", "kill"):
@@ -112,7 +123,13 @@ class _Supervisor:
             for member in self._members:
                 member.listen()
                 member.take(last=True)
-        return any(member.ending is None and member.process.exitcode is not None for member in self._members)
+            unsafe = self._devices.close()
+        silent = [member for member in self._members if member.ended_silently]
+        return [*unsafe, *([UNSAFE] if not all(member.is_guarded for member in silent) else [])]
+
+    @property
+    def _moments(self) -> list[float]:
+        return [member.moment for member in self._members if member.moment is not None]
 
     @property
     def _alive(self) -> list[Member]:

@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from quadvis.testing.drive import Driven, drive
 
 if TYPE_CHECKING:
     from quadvis.testing.conformance import Subject, check_block
+    from quadvis.testing.drive_output import DrivenOutput, drive_output
 
-__all__ = ["Driven", "Subject", "check_block", "drive"]
+__all__ = ["Driven", "DrivenOutput", "Subject", "check_block", "drive", "drive_output"]
+
+# Imported when they are first used: a test that only drives a block needs neither suite nor processes.
+LATER = {
+    "Subject": "conformance",
+    "check_block": "conformance",
+    "DrivenOutput": "drive_output",
+    "drive_output": "drive_output",
+}
 
 
 def __getattr__(name: str) -> Any:
-    """Import the conformance suite when it is first used; a test that only drives a block needs no suite."""
-    if name not in ("Subject", "check_block"):
+    """Import what is used."""
+    if name not in LATER:
         raise AttributeError(f"module 'quadvis.testing' has no attribute '{name}'")
-    from quadvis.testing import conformance
-
-    return getattr(conformance, name)
+    found = getattr(import_module(f"quadvis.testing.{LATER[name]}"), name)
+    globals()[name] = found  # in the place of the module of the same name, which the import has put there
+    return found

@@ -1,0 +1,130 @@
+"""The devices of a real-time run: their cables, their guardian, and what binds blocks to them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnContext
+from typing import Any
+
+from quadvis.block import CABLE, Block, Device, Input, Output
+from quadvis.engine.engine import Engine
+from quadvis.graph.devices import devices
+from quadvis.graph.graph import Graph
+from quadvis.native.choice import Announce
+from quadvis.realtime.cables import Cable, Cables
+from quadvis.realtime.guard import Guard
+from quadvis.realtime.guardian import mailboxes, words_for
+from quadvis.realtime.heartbeat import Patience
+from quadvis.realtime.outlet import OutputPort
+from quadvis.realtime.schedule import NANOSECONDS
+
+
+@dataclass(frozen=True)
+class PortBindings:
+    """What the devices of an application need: the guardian's words, the mailbox of each output, by path.
+
+    ``ports`` are the paths of the ptys of those inputs that are at the end of a cable.
+    """
+
+    words: Any = None
+    boxes: Mapping[str, int] = field(default_factory=dict)
+    ports: Mapping[str, str] = field(default_factory=dict)
+
+    def bind(self, engine: Engine) -> None:
+        """Bind the devices of an engine, before it opens them."""
+        boxes = mailboxes(self.words) if self.boxes else []
+        for path, device in devices(engine.graph):
+            block = engine.bound(path)
+            if isinstance(device, Output):
+                block.deliver = boxes[self.boxes[path]].put
+            elif path in self.ports:
+                block.actual_port = self.ports[path]
+
+
+class Devices:
+    """The ports of a graph, from `start` to `close`; a graph without devices has no process for them."""
+
+    def __init__(self, context: SpawnContext, graph: Graph, on_host_loss: str, priority: int) -> None:
+        self._context, self._on_host_loss, self._priority = context, on_host_loss, priority
+        self._outputs = {path: device for path, device in devices(graph) if isinstance(device, Output)}
+        self._inputs = {path: device for path, device in devices(graph) if isinstance(device, Input)}
+        words = context.RawArray("q", words_for(len(self._outputs))) if self._outputs else None
+        boxes = {path: number for number, path in enumerate(self._outputs)}
+        self._ports: dict[str, str] = {}  # filled when the cables are made
+        self.bindings = PortBindings(words, boxes, self._ports)
+        lines = {device.port_given: device.settings for device in self._all() if _on_cable(device)}
+        cables = [Cable(port, line) for port, line in lines.items()]
+        self._cables = Cables(context, cables, priority) if cables else None
+        self._guard: Guard | None = None
+
+    def start(self, patiences: Sequence[Patience], announce: Announce) -> None:
+        """Make the cables, and let all output ports have their initial frames; RunError if one refuses."""
+        if self._cables is not None:
+            self._cables.start()
+            for path, device in self._inputs.items():
+                if _on_cable(device):
+                    self._ports[path] = self._cables.ends[device.port_given].b
+        if self._outputs:
+            ports = [self._output_port(path, device) for path, device in self._outputs.items()]
+            self._guard = Guard(
+                self._context, ports, self.bindings.words, patiences, self._on_host_loss, self._priority
+            )
+            self._guard.start(announce)
+            if self._cables is not None:
+                self._cables.watch(self._guard.process.pid or 0)
+
+    def watch(self, process: int) -> None:
+        """Let guardian and cables watch an application."""
+        for each in (self._guard, self._cables):
+            if each is not None:
+                each.watch(process)
+
+    @property
+    def sources(self) -> list[Connection | int]:
+        """What becomes ready when the guardian says something, or has ended."""
+        return self._guard.sources if self._guard is not None else []
+
+    def check(self, moment: float | None) -> None:
+        """Raise RunError if a port is lost, a loop hangs, or the guardian itself is lost."""
+        if self._guard is not None:
+            self._guard.check(moment)
+
+    def make_safe(self) -> None:
+        """Let all ports have safe frames from now on."""
+        if self._guard is not None:
+            self._guard.make_safe()
+
+    def close(self) -> list[str]:
+        """End everything; a sentence for each port that may be without its safe frames."""
+        unsafe = self._guard.close() if self._guard is not None else []
+        if self._cables is not None:
+            self._cables.close()
+        return unsafe
+
+    def _all(self) -> Iterator[Device]:
+        yield from self._outputs.values()
+        yield from self._inputs.values()
+
+    def _output_port(self, path: str, device: Output) -> OutputPort:
+        port = device.port_given
+        if self._cables is not None and _on_cable(device):
+            port = self._cables.ends[port].a
+        interval = round(device.interval * NANOSECONDS)
+        initial, safe = device.initial_frame(), device.safe_frame()
+        return OutputPort(path, port, device.settings, interval, initial, safe)
+
+
+def guards_all(part: Graph) -> bool:
+    """Return whether a graph has output devices, and besides them nothing that needs safe values."""
+    writers = [
+        node.block
+        for node in part.nodes
+        if "write" in node.block.interface.arguments or type(node.block).write_safe is not Block.write_safe
+    ]
+    return bool(writers) and all(isinstance(block, Output) or block.harmless for block in writers)
+
+
+def _on_cable(device: Device) -> bool:
+    return device.port_given.startswith(CABLE)

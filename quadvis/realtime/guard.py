@@ -1,0 +1,141 @@
+"""The guardian as its supervisor has it: started before the applications, ended after all of them."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnContext
+from multiprocessing.process import BaseProcess
+from typing import Any
+
+from quadvis.errors import RunError
+from quadvis.machine.processes import launching
+from quadvis.machine.serial_port import PortError
+from quadvis.native.choice import Announce
+from quadvis.realtime.guardian import (
+    Alarm,
+    GuardianSetup,
+    Guarding,
+    Order,
+    Watch,
+    guard,
+    looked,
+)
+from quadvis.realtime.heartbeat import Patience
+from quadvis.realtime.outlet import Outlet, OutputPort
+from quadvis.realtime.schedule import NANOSECONDS
+
+START = 10.0  # s that the guardian has to open its ports
+SILENT = 3.0  # s without a look at the loops, after which it counts as hanging
+END = 3.0  # s that it has to send its last safe frames
+LOST = Alarm("the guardian of the outputs has been lost")
+
+
+class Guard:
+    """Starts the guardian, tells it whom to watch and what to send, and hears its alarms.
+
+    ``words`` (a RawArray of `words_for` words) hold the mailboxes of `quadvis.realtime.guardian.mailboxes`,
+    in the order of ``ports``: whoever gives commands puts frames there.
+    """
+
+    def __init__(
+        self,
+        context: SpawnContext,
+        ports: Sequence[OutputPort],
+        words: Any,
+        patiences: Sequence[Patience],
+        on_host_loss: str,
+        priority: int,
+    ) -> None:
+        self.ports = tuple(ports)
+        self._looked = looked(words)
+        self._link, self._theirs = context.Pipe()
+        setup = GuardianSetup(
+            self.ports, words, tuple(patiences), self._theirs, os.getpid(), on_host_loss, priority
+        )
+        self.process: BaseProcess = context.Process(target=guard, args=(setup,), name="guardian")
+        self._started = self._lost = False
+
+    def start(self, announce: Announce) -> None:
+        """Start it, and wait until all ports have their initial frames; RunError if a port refuses."""
+        with launching():
+            self.process.start()
+        self._started = True
+        self._theirs.close()
+        until = time.monotonic() + START
+        while time.monotonic() < until:
+            if self._link.poll(START):
+                said = self._receive()
+                if isinstance(said, Guarding):
+                    announce(f"real time, guardian: {said.grants}")
+                    return
+                self._raise(said)
+        raise RunError(f"the guardian was not ready after {START:g} s")
+
+    def watch(self, process: int) -> None:
+        """Let it watch an application: when that ends, safe frames are sent."""
+        self._say(Watch(process))
+
+    def make_safe(self) -> None:
+        """Let it send safe frames at once, and from now on."""
+        self._say(Order.SAFE)
+
+    @property
+    def sources(self) -> list[Connection | int]:
+        """What becomes ready when it says something, or has ended."""
+        return [self.process.sentinel, self._link]
+
+    def check(self, moment: float | None = None) -> None:
+        """Raise RunError, with a time of the run (s), if it has raised an alarm, has ended, or hangs."""
+        if not self._lost and self._link.poll():
+            self._raise(self._receive(), moment)
+        silent = (time.monotonic_ns() - self._looked[0]) / NANOSECONDS
+        if self._lost or not self.process.is_alive() or silent > SILENT:
+            self._lost = True
+            self._raise(LOST, moment)
+
+    def close(self) -> list[str]:
+        """Let it send its last safe frames and end; a sentence for each block whose port may not have them.
+
+        If it was lost, this process sends them in its place.
+        """
+        if not self._started:
+            return []
+        self._started = False
+        self._say(Order.CLOSE)
+        self.process.join(0 if self._lost else END)
+        if self.process.exitcode == 0:
+            return []
+        self.process.kill()
+        self.process.join()
+        return [sentence for port in self.ports for sentence in _in_its_place(port)]
+
+    def _receive(self) -> Any:
+        try:
+            return self._link.recv()
+        except (EOFError, OSError):
+            self._lost = True
+            return LOST
+
+    def _raise(self, said: Alarm, moment: float | None = None) -> None:
+        raise RunError(said.reason, block=said.block, time=moment)
+
+    def _say(self, what: Any) -> None:
+        with suppress(OSError):
+            self._link.send(what)
+
+
+def _in_its_place(port: OutputPort) -> list[str]:
+    """Send a safe frame in the guardian's place; return what went wrong."""
+    outlet = Outlet(port, lambda: None)
+    try:
+        outlet.open()
+        outlet.serve(time.monotonic_ns(), safe=True)
+    except PortError as error:
+        return [f"block '{port.block}': its safe values could not be sent: {error}"]
+    finally:
+        outlet.close()
+    return []

@@ -1,0 +1,250 @@
+"""The guardian: the process that owns the output ports of a real-time run.
+
+It knows no block, only a table of ports and frames. It sends the initial frames as soon as the ports are
+open, then the newest frame that each mailbox holds. Once something ends (an application that dies or hangs,
+the request to end, an order of the supervisor, the supervisor's death, a port that is lost) it sends the safe
+frames and nothing else, until the supervisor has ended everything, or until nobody lives whom it works for.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from enum import Enum
+from multiprocessing.connection import Connection
+from typing import Any
+
+from quadvis.diagram.sections.on_host_loss import SAFE
+from quadvis.machine.interrupts import leave_to_parent
+from quadvis.machine.serial_port import PortError
+from quadvis.realtime.heartbeat import Heartbeat, Patience, Sign
+from quadvis.realtime.lives import Lives
+from quadvis.realtime.mailbox import Mailbox
+from quadvis.realtime.options import HIGHEST, RealTime
+from quadvis.realtime.outlet import Outlet, OutputPort
+from quadvis.realtime.schedule import NANOSECONDS
+from quadvis.realtime.system import Grants, ask_all
+
+LONGEST_LOOK, SHORTEST_LOOK = 10_000_000, 1_000_000  # ns between two looks at the loops
+LOOKS = 8  # at a loop in the time that it is allowed to be silent
+FAREWELL = 3  # safe frames at least, before the ports are closed
+LAST = NANOSECONDS  # ns that these may take
+
+
+@dataclass(frozen=True)
+class GuardianSetup:
+    """What the guardian needs: ``words`` has a mailbox for each of the ``ports``, in their order.
+
+    ``supervisor`` is the process that started it, ``on_host_loss`` what its death means, ``priority`` that of
+    the loops (0: none).
+    """
+
+    ports: tuple[OutputPort, ...]
+    words: Any
+    patiences: tuple[Patience, ...]
+    link: Connection
+    supervisor: int
+    on_host_loss: str
+    priority: int
+
+
+class Order(Enum):
+    """What the supervisor asks for."""
+
+    SAFE = "send safe frames from now on"
+    CLOSE = "close the ports: everything else has ended"
+
+
+@dataclass(frozen=True)
+class Watch:
+    """The supervisor names an application, as a process."""
+
+    process: int
+
+
+@dataclass(frozen=True)
+class Guarding:
+    """The ports are open and have their initial frames; what the system has granted."""
+
+    grants: Grants
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """Why the guardian has begun to send safe frames, if the supervisor cannot know: of a block, or none."""
+
+    reason: str
+    block: str = ""
+
+
+def mailboxes(words: Any) -> list[Mailbox]:
+    """Return the mailboxes that words hold."""
+    view = memoryview(words).cast("B").cast("q")
+    starts = range(0, len(view) - len(view) % Mailbox.SIZE, Mailbox.SIZE)
+    return [Mailbox(view[start : start + Mailbox.SIZE]) for start in starts]
+
+
+def looked(words: Any) -> Any:
+    """Return the word after the mailboxes: when the guardian last looked at the loops (ns)."""
+    return memoryview(words).cast("B").cast("q")[-1:]
+
+
+def words_for(ports: int) -> int:
+    """Return the number of words of the guardian of so many ports."""
+    return ports * Mailbox.SIZE + 1
+
+
+class Guardian:
+    """The work of the guardian's process, look by look."""
+
+    def __init__(self, setup: GuardianSetup) -> None:
+        self._setup, self._link = setup, setup.link
+        boxes = mailboxes(setup.words)
+        self._outlets = [Outlet(port, box.take) for port, box in zip(setup.ports, boxes, strict=True)]
+        self._looked = looked(setup.words)
+        self._hearts = [Heartbeat(patience, time.monotonic_ns) for patience in setup.patiences]
+        self._supervisor, self._applications = Lives(), Lives()
+        self._supervisor.watch(setup.supervisor)
+        shortest = min([patience.allowed // LOOKS for patience in setup.patiences], default=LONGEST_LOOK)
+        self._look_every = min(max(shortest, SHORTEST_LOOK), LONGEST_LOOK)
+        self.safe = self._paused = False
+        self._closing = 0  # the instant at which it was told to close
+        self._listening = True
+        self.told_to_end = False
+
+    def open(self) -> bool:
+        """Open all ports; if one refuses, the others have their safe frames before this is reported."""
+        refused = []
+        for outlet in self._outlets:
+            try:
+                outlet.open()
+            except PortError as error:
+                refused.append((outlet, error))
+        for outlet, refusal in refused:
+            self._fail(outlet, refusal)
+        return not refused
+
+    def run(self) -> None:
+        """Serve the ports until nobody needs them any more."""
+        while not self._finished:
+            self.look()
+            self._wait()
+        self._finish()
+
+    def _finish(self) -> None:
+        """Close all ports."""
+        for outlet in self._outlets:
+            outlet.close()
+
+    def look(self) -> None:
+        """Look at everything once, and send what is due."""
+        self._listen()
+        self._watch()
+        now = time.monotonic_ns()
+        self._looked[0] = now
+        for outlet in self._outlets:
+            try:
+                outlet.serve(now, safe=self.safe or self._paused)
+            except PortError as error:
+                self._fail(outlet, error)
+
+    @property
+    def _finished(self) -> bool:
+        now = time.monotonic_ns()
+        orphaned = self._supervisor.any_ended and self._applications.all_ended
+        if orphaned or (self.told_to_end and self._applications.all_ended):
+            self._make_safe()
+            self._closing = self._closing or now
+        if not self._closing:
+            return False
+        served = all(not outlet.is_open or outlet.safe_frames >= FAREWELL for outlet in self._outlets)
+        return served or now - self._closing > LAST
+
+    def _watch(self) -> None:
+        """Look at the loops and at the lives of everybody."""
+        self._supervisor.look()
+        self._applications.look()
+        host_lost = self._supervisor.any_ended and self._setup.on_host_loss == SAFE
+        if self._applications.any_ended or host_lost:
+            self._make_safe()
+        if self.told_to_end and not self.safe:
+            self._make_safe(Alarm("the guardian was told to end"))
+        signs = [(heart.look(), heart) for heart in self._hearts] if not self.safe else []
+        if any(sign is Sign.ENDS for sign, _ in signs):
+            self._make_safe()
+        for sign, heart in signs:
+            if sign is Sign.HANGS and not self.safe:
+                self._make_safe(Alarm(heart.complaint))
+        paused = any(sign is Sign.PAUSES for sign, _ in signs)
+        if paused and not self._paused:
+            self._hurry()
+        self._paused = paused
+
+    def _listen(self) -> None:
+        """Take what the supervisor says."""
+        try:
+            while self._listening and self._link.poll():
+                said = self._link.recv()
+                if isinstance(said, Watch):
+                    self._applications.watch(said.process)
+                else:
+                    self._make_safe()
+                    if said is Order.CLOSE:
+                        self._closing = time.monotonic_ns()
+        except (EOFError, OSError):
+            self._listening = False
+
+    def _make_safe(self, alarm: Alarm | None = None) -> None:
+        """Send safe frames at once, and from now on."""
+        if not self.safe:
+            self.safe = True
+            self._hurry()
+            for outlet in self._outlets:
+                with suppress(PortError):  # the next frame meets it again, and reports it
+                    outlet.serve(time.monotonic_ns(), safe=True)
+        if alarm is not None:
+            with suppress(OSError):  # the supervisor may have ended
+                self._link.send(alarm)
+
+    def _hurry(self) -> None:
+        now = time.monotonic_ns()
+        for outlet in self._outlets:
+            outlet.hurry(now)
+
+    def _fail(self, outlet: Outlet, error: PortError) -> None:
+        """Give up a port, and report it once the others are safe."""
+        outlet.close()
+        self._make_safe(Alarm(str(error), outlet.port.block))
+
+    def _wait(self) -> None:
+        """Sleep until a frame is due, a look is due, or something happens."""
+        now = time.monotonic_ns()
+        due = min([outlet.due for outlet in self._outlets if outlet.is_open], default=now + LONGEST_LOOK)
+        until = min(due, now + self._look_every)
+        sources: list[Any] = [*self._supervisor.descriptors, *self._applications.descriptors]
+        sources += [self._link] if self._listening else []
+        select.select(sources, [], [], max(0, until - now) / NANOSECONDS)
+
+
+def guard(setup: GuardianSetup) -> None:
+    """Be the guardian: the whole life of its process."""
+    os.setsid()  # no terminal stops it (Ctrl-Z) or kills it
+    leave_to_parent()
+    guardian = Guardian(setup)
+
+    def end(*_: object) -> None:
+        guardian.told_to_end = True
+
+    signal.signal(signal.SIGTERM, end)
+    # Above the loops, so that one that hangs cannot keep it from the processor.
+    priority = min(HIGHEST, setup.priority + 1) if setup.priority else 0
+    grants = ask_all(RealTime(priority=priority))
+    opened = guardian.open()
+    guardian.look()
+    if opened:
+        setup.link.send(Guarding(grants))
+    guardian.run()

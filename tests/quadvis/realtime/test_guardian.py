@@ -1,0 +1,246 @@
+"""The guardian, look by look: what makes it send safe frames, and to whom."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from multiprocessing import Pipe
+from typing import Any
+
+import numpy as np
+import pytest
+
+from quadvis.diagram.sections.on_host_loss import CONTINUE, SAFE, STOP
+from quadvis.machine.serial_port import Line
+from quadvis.realtime import control
+from quadvis.realtime.guardian import Alarm, Guardian, GuardianSetup, Order, Watch, mailboxes, words_for
+from quadvis.realtime.heartbeat import Patience
+from quadvis.realtime.outlet import OutputPort
+from tests.processes import wait_for
+from tests.quadvis.realtime.ptys import Pty, ptys
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="ports are Linux's")
+
+MS = 10**6
+LINE = Line(10**6)
+
+
+class Rig:
+    """A guardian of two ports in this process, a loop's words, and small processes for it to watch."""
+
+    def __init__(self, lines: list[Pty], on_host_loss: str = SAFE, lasting: bool = True) -> None:
+        self.ptys = lines
+        self.control = np.zeros(control.WORDS, np.int64)
+        self.words = np.zeros(words_for(len(lines)), np.int64)
+        self.link, theirs = Pipe()
+        self.started: list[subprocess.Popen[bytes]] = []
+        self.supervisor = self.process()
+        ports = [
+            OutputPort(f"out{number}", line.path, LINE, 5 * MS, b"first", b"safe!")
+            for number, line in enumerate(lines)
+        ]
+        patience = Patience("", self.control, 50 * MS, lasting=lasting)
+        setup = GuardianSetup(
+            tuple(ports), self.words, (patience,), theirs, self.supervisor.pid, on_host_loss, 0
+        )
+        self.guardian = Guardian(setup)
+        self.boxes = mailboxes(self.words)
+
+    def process(self) -> subprocess.Popen[bytes]:
+        """Start a process that does nothing."""
+        self.started.append(subprocess.Popen(["sleep", "1000"]))
+        return self.started[-1]
+
+    def until(self, condition: Any) -> None:
+        """Look again and again until something is the case."""
+
+        def look() -> bool:
+            self.guardian.look()
+            return bool(condition())
+
+        wait_for(look)
+
+    def until_wire(self, *frames: bytes) -> None:
+        """Look until the newest bytes of each port are its frame, twice."""
+        for line, frame in zip(self.ptys, frames, strict=True):
+            self.until(lambda line=line, frame=frame: line.read().endswith(2 * frame))
+
+    def follow(self) -> None:
+        """Let a watched application command both ports."""
+        self.application = self.process()
+        self.link.send(Watch(self.application.pid))
+        for box in self.boxes:
+            box.put(b"going")
+        self.until_wire(b"going", b"going")
+        assert not self.guardian.safe
+
+    def alarms(self) -> list[Alarm]:
+        """Return the alarms that were raised."""
+        found = []
+        while self.link.poll():
+            found.append(self.link.recv())
+        return found
+
+    def stays_safe(self) -> None:
+        """Check that both ports have safe frames, and no others after them, whatever the loop does."""
+        self.until_wire(b"safe!", b"safe!")
+        for box in self.boxes:
+            box.put(b"again")
+        before = [len(line.read()) for line in self.ptys]
+        self.until(
+            lambda: all(len(line.read()) > at + 20 for line, at in zip(self.ptys, before, strict=True))
+        )
+        for line, at in zip(self.ptys, before, strict=True):
+            assert set(line.read()[at:]) == set(b"safe!")
+
+
+@pytest.fixture
+def rig() -> Iterator[Any]:
+    with ptys(2) as lines:
+        made: list[Rig] = []
+
+        def make(**given: Any) -> Rig:
+            made.append(Rig(lines, **given))
+            assert made[0].guardian.open()
+            return made[0]
+
+        yield make
+        for each in made:
+            for process in each.started:
+                process.kill()
+                process.wait()
+            each.guardian._finish()
+
+
+def test_ports_have_the_initial_frame_then_each_its_own_commands(rig: Any) -> None:
+    made = rig()
+    made.until_wire(b"first", b"first")
+    made.boxes[1].put(b"other")
+    made.until_wire(b"first", b"other")
+    assert made.alarms() == []
+
+
+def kill(made: Rig) -> None:
+    made.application.kill()
+
+
+def order(made: Rig) -> None:
+    made.link.send(Order.SAFE)
+
+
+def end(made: Rig) -> None:
+    made.control[control.END] = 1
+
+
+def leave(made: Rig) -> None:
+    made.control[control.LEFT] = 1
+
+
+def lose_host(made: Rig) -> None:
+    made.supervisor.kill()
+
+
+@pytest.mark.parametrize("cause", [kill, order, end, leave, lose_host])
+def test_every_end_makes_all_ports_safe_for_ever(rig: Any, cause: Any) -> None:
+    made = rig()
+    made.follow()
+    cause(made)
+    made.stays_safe()
+    assert made.alarms() == []  # the supervisor knows
+
+
+def hang(made: Rig) -> None:
+    made.control[control.START] = time.monotonic_ns() - 60 * MS
+    made.control[control.BEGUN] = 1 * MS
+
+
+def test_a_step_that_hangs_makes_all_ports_safe_and_raises_an_alarm(rig: Any) -> None:
+    made = rig()
+    made.follow()
+    hang(made)
+    made.stays_safe()
+    made.control[control.BEGUN] = 0
+    made.control[control.DONE] = 7
+    made.stays_safe()
+    assert made.alarms() == [Alarm("the loop has given no sign of life for 0.05 s")]
+
+
+def test_where_overruns_only_warn_a_loop_that_goes_on_is_followed_again(rig: Any) -> None:
+    made = rig(lasting=False)
+    made.follow()
+    hang(made)
+    made.until_wire(b"safe!", b"safe!")
+    made.control[control.START] = time.monotonic_ns() + 10**15  # the loop is well from now on
+    made.control[control.BEGUN] = 0
+    for box in made.boxes:
+        box.put(b"again")
+    made.until_wire(b"again", b"again")
+    assert made.alarms() == []
+
+
+@pytest.mark.parametrize("word", [CONTINUE, STOP, SAFE])
+def test_the_death_of_the_host_means_what_the_diagram_says(rig: Any, word: str) -> None:
+    made = rig(on_host_loss=word)
+    made.follow()
+    made.supervisor.kill()
+    made.until(lambda: made.guardian._supervisor.any_ended)
+    made.guardian.look()
+    assert made.guardian.safe == (word == SAFE)
+    made.application.kill()
+    made.stays_safe()
+
+
+def test_a_port_that_is_unplugged_makes_the_others_safe_and_is_reported(rig: Any) -> None:
+    made = rig()
+    made.follow()
+    made.ptys[0].unplug()
+    made.until(lambda: made.ptys[1].read().endswith(2 * b"safe!"))
+    (alarm,) = made.alarms()
+    assert alarm.block == "out0"
+    assert alarm.reason == f"{made.ptys[0].path}: the port is gone: input/output error"
+
+
+def test_a_port_that_is_missing_makes_those_safe_that_could_be_opened() -> None:
+    with ptys(1) as (line,):
+        missing = Pty()
+        missing.close()
+        made = Rig([missing, line])
+        assert not made.guardian.open()
+        made.until(lambda: line.read().endswith(2 * b"safe!"))
+        (alarm,) = made.alarms()
+        assert (alarm.block, "is missing" in alarm.reason) == ("out0", True)
+        made.supervisor.kill()
+        made.supervisor.wait()
+
+
+def test_it_closes_the_ports_when_everything_else_has_ended(rig: Any) -> None:
+    made = rig()
+    made.follow()
+    made.link.send(Order.CLOSE)
+    made.guardian.run()
+    assert all(line.read().endswith(3 * b"safe!") for line in made.ptys)
+    for line in made.ptys:
+        os.close(os.open(line.path, os.O_RDWR | os.O_NOCTTY))
+
+
+def test_it_ends_by_itself_when_nobody_lives_whom_it_works_for(rig: Any) -> None:
+    made = rig(on_host_loss=CONTINUE)
+    made.follow()
+    for process in made.started:
+        process.kill()
+    made.guardian.run()
+    assert all(line.read().endswith(3 * b"safe!") for line in made.ptys)
+
+
+def test_asked_to_end_it_stays_until_its_applications_have_ended(rig: Any) -> None:
+    made = rig()
+    made.follow()
+    made.guardian.told_to_end = True
+    made.stays_safe()
+    assert made.alarms() == [Alarm("the guardian was told to end")]
+    assert not made.guardian._finished
+    made.application.kill()
+    made.guardian.run()
