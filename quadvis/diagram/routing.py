@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from quadvis.block import NO_FRAME
 from quadvis.diagram.draft import Draft, DraftWire
 from quadvis.diagram.sections.computers import Computers
 from quadvis.diagram.sections.links import Links, LinkSpec, link_values
@@ -268,7 +269,7 @@ class Routing:
                 if wire.connection.initial is not None:
                     problem, remedy = "a picture has no initial value", "leave 'initial' out"
                     self._add(wire, wire.connection.initial.place, problem, remedy)
-            return MessageSignal(name, node.path, port, scalar, (), units, nan, None)
+            return MessageSignal(name, node.path, port, scalar, (), units, nan, NO_FRAME)
         usual = math.nan if nan and scalar == "float64" else 0
         value = np.full(shape, usual, scalar)
         said: dict[int, tuple[Any, Place]] = {}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Protocol
 
+from quadvis.errors import QuadvisError, sentence
 from quadvis.links.frame import Arrival, Decoder, encode
 from quadvis.links.link import MEMORY, SERIAL, Link
 from quadvis.links.mailbox import Mailbox
@@ -59,10 +60,17 @@ class MemoryCarrier:
 
     def __init__(self, link: Link, words: Any) -> None:
         self._mailbox = Mailbox(words, link.message.room(link.room), link.records)
+        self._name, self._largest = link.name, link.room
         self._seen = -1
 
     def send(self, stamp: int, payload: bytes) -> None:
-        """Leave a message; ValueError if it has no room."""
+        """Leave a message; QuadvisError if its pictures have no room."""
+        if len(payload) > self._mailbox.room:
+            height, width = self._largest
+            problem = (
+                f"link '{self._name}' has room for pictures of {height} x {width} px, and these are larger"
+            )
+            raise QuadvisError(sentence(problem, "declare the link with another 'room'"))
         self._mailbox.put(stamp, payload)
 
     def receive(self, before: int) -> Arrival | None:

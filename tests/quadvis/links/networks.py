@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, State
+from quadvis.block import NO_FRAME, Block, Frame, In, Out, State
 from quadvis.engine.engine import Engine
 from quadvis.graph.graph import SINGLE, Graph, Node, Task, Wire
 from quadvis.graph.order import execution_order
 from quadvis.links.insertion import insert, signal_names
-from quadvis.links.link import SERIAL, Link
+from quadvis.links.link import MEMORY, SERIAL, Link
 from quadvis.links.message import Message, MessageSignal
 from quadvis.units import Unit
 
@@ -55,6 +55,53 @@ class Sum(Block):
 
     def update(self, half):
         self.total = self.total + half
+
+
+class Film(Block, numeric=False):
+    """Gives a picture at each tick, of which every pixel is its number."""
+
+    frame = Out("frame")
+    ticks = State("int64")
+
+    def output(self):
+        pixels = np.full((4, 6, 3), self.ticks % 256, np.uint8)
+        return Frame(pixels, self.ticks / 10, self.ticks + 1)
+
+    def update(self):
+        self.ticks += 1
+
+
+class Look(Block, numeric=False):
+    """Says what it sees: the number, the stamp, a pixel, 0 before the first picture."""
+
+    frame = In("frame")
+    seen = Out("float64[3]", nan=True)
+
+    def output(self, frame):
+        pixel = float(frame.pixels[-1, -1, -1]) if frame.pixels.size else 0.0
+        return np.array([frame.sequence, frame.stamp, pixel])
+
+
+def film(source: Task, reader: Task) -> Graph:
+    """Return a graph in which pictures travel over a link."""
+    signals = (MessageSignal("frame", "source", "frame", "frame", (), (ONE,), False, NO_FRAME),)
+    link = Link(
+        "line",
+        "near",
+        "far",
+        MEMORY,
+        source.name,
+        source.period,
+        reader.period,
+        Message(signals),
+        room=(4, 6),
+    )
+    nodes = {
+        "source": Node("source", "test", Film(), source, {}, units={"frame": (ONE,)}, computer="near"),
+        "reader": Node("reader", "test", Look(), reader, {"frame": Wire("source", "frame")}, computer="far"),
+    }
+    insert(nodes, link, [("reader", "frame")])
+    return Graph("test", execution_order(list(nodes.values()))[0])
 
 
 INITIAL = {"count": 0, "half": 0.0, "odd": False, "pair": np.array([0.25, 0.5]), "flags": np.zeros(3, bool)}

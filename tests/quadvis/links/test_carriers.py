@@ -119,7 +119,7 @@ def test_a_line_that_another_program_has_locked_is_left_alone(ends: tuple[int, i
 
 
 def test_a_port_that_does_not_exist_is_refused_in_a_sentence() -> None:
-    with pytest.raises(QuadvisError, match="cannot open the serial port '/dev/none': .*no such file"):
+    with pytest.raises(QuadvisError, match=r"cannot open the serial port '/dev/none': .*no such file"):
         SerialLine("/dev/none", 115200)
 
 
@@ -149,10 +149,10 @@ def test_datagrams_pass_from_one_end_to_the_other() -> None:
 
 def test_an_address_that_is_in_use_or_unknown_is_refused_in_a_sentence() -> None:
     socket = UdpSocket(("127.0.0.1", 0), listens=True)
-    with pytest.raises(QuadvisError, match="cannot listen at '127.0.0.1:"):
+    with pytest.raises(QuadvisError, match=r"cannot listen at '127\.0\.0\.1:"):
         UdpSocket(socket.address, listens=True)
     socket.close()
-    with pytest.raises(QuadvisError, match="cannot listen at '192.0.2.1:5005'"):
+    with pytest.raises(QuadvisError, match=r"cannot listen at '192\.0\.2\.1:5005'"):
         UdpSocket(("192.0.2.1", 5005), listens=True)
 
 

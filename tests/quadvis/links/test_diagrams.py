@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import astuple
+from fractions import Fraction
+from pathlib import Path
+
 import numpy as np
 import pytest
+import yaml
 
-from quadvis.api import Diagram, load_text
+from quadvis.api import Diagram, load, load_text
+from quadvis.links.endpoints import links_of
 
-# A double integrator under sampled gains; WORLD and TARGET say where its blocks are, NEAR and BACK how they meet.
+# A double integrator under sampled gains; WORLD and TARGET stand where a block says who runs it.
 LOOP = """
 quadvis: 1
 name: loop
@@ -18,8 +24,10 @@ NETWORK
 blocks:
   speed: {block: signal.integrator, rate: continuous, WORLD in: {u: {from: FORCE, across: hold}}}
   place: {block: signal.integrator, rate: continuous, WORLD with: {initial: 0.5 m}, in: {u: speed.y}}
-  spring: {block: signal.gain, rate: fast, TARGET with: {factor: 2 1/s^2}, in: {u: {from: PLACE, across: sample}}}
-  damper: {block: signal.gain, rate: fast, TARGET with: {factor: 1.5 1/s}, in: {u: {from: SPEED, across: sample}}}
+  spring:
+    {block: signal.gain, rate: fast, TARGET with: {factor: 2 1/s^2}, in: {u: {from: PLACE, across: sample}}}
+  damper:
+    {block: signal.gain, rate: fast, TARGET with: {factor: 1.5 1/s}, in: {u: {from: SPEED, across: sample}}}
   both: {block: signal.sum, rate: fast, TARGET in: {a: spring.y, b: damper.y}}
   push: {block: signal.gain, rate: fast, TARGET with: {factor: -1}, in: {u: both.y}}
 DELAYS
@@ -27,16 +35,14 @@ analyse:
   cuts: {push: push.y}
 """
 COMPUTERS = "computers: {world: {}, target: {}}\n"
+ENDS = (("force", "push", "hold"), ("place", "place", "sample"), ("speed", "speed", "sample"))
 DELAYS = "".join(
     f"""
   one_{name}: {{block: signal.stack, rate: step, in: {{a: {{from: {source}.y, across: {across}}}}}}}
-  late_{name}: {{block: signal.transport_delay, rate: step, with: {{delay: {name}_DELAY}}, in: {{u: one_{name}.y}}}}
+  late_{name}:
+    {{block: signal.transport_delay, rate: step, with: {{delay: {name}_DELAY}}, in: {{u: one_{name}.y}}}}
 """
-    for name, source, across in (
-        ("force", "push", "hold"),
-        ("place", "place", "sample"),
-        ("speed", "speed", "sample"),
-    )
+    for name, source, across in ENDS
 )
 
 
@@ -50,13 +56,10 @@ def linked(links: str = "", extra: str = "") -> Diagram:
 def delayed(force: str, place: str) -> Diagram:
     """Return the loop on one computer, with delays in the place of links."""
     text = LOOP.replace("NETWORK", "").replace("WORLD", "").replace("TARGET", "")
-    delays = DELAYS.replace("force_DELAY", force).replace("place_DELAY", place).replace("speed_DELAY", place)
-    text = (
-        text.replace("FORCE", '"late_force.y[0]"')
-        .replace("PLACE", '"late_place.y[0]"')
-        .replace("SPEED", '"late_speed.y[0]"')
-    )
-    return load_text(text.replace("DELAYS", delays))
+    for name, _, _ in ENDS:
+        text = text.replace(name.upper(), f'"late_{name}.y[0]"')
+    delays = DELAYS.replace("force_DELAY", force).replace("place_DELAY", place)
+    return load_text(text.replace("DELAYS", delays.replace("speed_DELAY", place)))
 
 
 SERIAL = """
@@ -64,8 +67,8 @@ links:
   up: {from: world, to: target, via: serial, baud: 38400}
   down: {from: target, to: world, via: serial, baud: 9600}
 """
-# A message to the target has 33 bytes: it takes 8.6 ms, and is read at the next tick of 50 ms after it came. A
-# message to the world has 25 bytes: it takes 26 ms, and is read at the next step of 10 ms.
+# A message to the target has 33 bytes and takes 8.6 ms, so that of 10 ms ago has come at each tick of 50 ms. A
+# message to the world has 25 bytes, takes 26 ms, and is read at the next step of 10 ms.
 CASES = [("", "10 ms", "10 ms"), (SERIAL, "30 ms", "10 ms")]
 
 
@@ -76,4 +79,134 @@ def test_a_link_is_a_delay_in_a_run_and_in_an_analysis(links: str, force: str, p
     for signal in ("place.y", "speed.y", "push.y"):
         np.testing.assert_array_equal(first[signal], second[signal])
     found, wanted = (diagram.analyse().loops["push"].margins for diagram in (one, other))
-    print(found, wanted)
+    np.testing.assert_allclose(astuple(found), astuple(wanted), rtol=1e-9)
+
+
+ONE_LINK = """
+quadvis: 1
+name: one
+rates: {slow: 10 Hz}
+stop_time: 20 s
+computers: {near: {}, far: {}}
+links: {line: {from: near, to: far, via: serial, baud: 9600, loss: 10 %, jitter: 50 ms, flips: 1e-3}}
+blocks:
+  wave: {block: sources.sine, rate: slow, at: near}
+  read: {block: signal.gain, rate: slow, at: far, in: {u: wave.y}}
+"""
+
+
+def test_machine_code_gives_the_same_bits() -> None:
+    diagram = load_text(ONE_LINK)
+    one, other = diagram.run(engine="python"), diagram.run(engine="native")
+    assert one["line.lost"][-1] > one["line.refused"][-1] > 0
+    for signal in one:
+        np.testing.assert_array_equal(one[signal], other[signal])
+
+
+@pytest.mark.slow
+def test_machine_code_gives_the_same_bits_of_a_loop() -> None:
+    diagram = linked(SERIAL.replace("9600}", "9600, loss: 10 %, jitter: 5 ms, flips: 1e-4}"))
+    one, other = diagram.run(engine="python"), diagram.run(engine="native")
+    assert one["down.lost"][-1] > 0 and one["down.refused"][-1] > 0
+    for signal in one:
+        np.testing.assert_array_equal(one[signal], other[signal])
+
+
+def test_the_order_of_the_blocks_in_the_file_changes_nothing() -> None:
+    diagram = linked(SERIAL)
+    plain = yaml.safe_load(diagram.resolved)
+    plain["blocks"] = dict(reversed(plain["blocks"].items()))
+    plain["links"] = dict(reversed(plain["links"].items()))
+    del plain["log"]
+    one, other = diagram.run(), load_text(yaml.safe_dump(plain, sort_keys=False)).run()
+    assert sorted(one) == sorted(other)
+    for signal in one:
+        np.testing.assert_array_equal(one[signal], other[signal])
+
+
+def test_a_diagram_written_out_has_its_computers_and_links_and_is_itself_again() -> None:
+    text = SERIAL.replace("9600}", "9600, loss: 10 %, jitter: 5 ms, flips: 1e-4, port: /dev/ttyS7}")
+    diagram = linked(text)
+    again = load_text(diagram.resolved)
+    assert again.hash == diagram.hash and again.resolved == diagram.resolved
+    plain = yaml.safe_load(diagram.resolved)
+    assert plain["computers"] == {"world": {}, "target": {}}
+    assert plain["links"]["down"] == {
+        "from": "target", "to": "world", "via": "serial", "baud": 9600, "jitter": "0.005 s", "loss": 0.1,
+        "flips": 1e-4,
+        "port": {"from": "/dev/ttyS7", "to": "/dev/ttyS7"},
+    }  # fmt: skip
+    assert plain["blocks"]["spring"]["in"] == {"u": {"from": "place.y", "across": "sample", "over": "up"}}
+    assert set(plain["blocks"]) == {"speed", "place", "spring", "damper", "both", "push"}
+    assert plain["log"]["signals"] and "up/sender" not in plain["log"]["signals"]
+    hashes = {linked(change).hash for change in ("", SERIAL, text, SERIAL.replace("9600", "19200"))}
+    assert len(hashes) == 4
+
+
+def test_each_part_has_its_blocks_and_its_ends_of_links() -> None:
+    graph = linked(SERIAL).graph
+    assert {node.path for node in graph.part_of("world").nodes} == {"speed", "place", "up/sender", "down"}
+    assert {node.path for node in graph.part_of("target").nodes} == {
+        "spring", "damper", "both", "push", "down/sender", "up",
+    }  # fmt: skip
+    assert graph.part_of("target").tick == Fraction(1, 20)
+    assert graph.part_of("world").tick == Fraction(1, 100)
+    assert [link.name for link in links_of(graph.part_of("world"))] == ["down", "up"]
+
+
+def test_the_names_of_signals_in_a_link_can_be_logged_judged_and_drawn() -> None:
+    diagram = linked(SERIAL, "expect: [{signal: down.age, below: 90 ms}, {signal: up.place_y, within: 1 m}]")
+    result = diagram.run()
+    assert [verdict.met for verdict in result.outcome.verdicts] == [True, True]
+    assert result["down.age"].max() == pytest.approx(0.07)
+    drawn = diagram.draw()
+    for text in ("down", "target to world: serial, 9600 baud", "place_y", "refused"):
+        assert f">{text}</text>" in drawn
+    assert "sender" not in drawn
+
+
+def test_first_values_hold_until_the_first_message() -> None:
+    text = """
+quadvis: 1
+name: first
+rates: {slow: 10 Hz}
+stop_time: 0.3 s
+computers: {near: {}, far: {}}
+blocks:
+  three: {block: sources.constant, rate: slow, at: near, with: {value: {value: [1, 2, 3], unit: m}}}
+  whole: {block: signal.gain, rate: slow, at: far, in: {u: {from: three.y, initial: [1 cm, 2 cm, 3 cm]}}}
+  one: {block: signal.gain, rate: slow, at: far, in: {u: {from: "three.y[1]", initial: 2 cm}}}
+"""
+    diagram = load_text(text)
+    result = diagram.run()
+    np.testing.assert_allclose(result["whole.y"], [[0.01, 0.02, 0.03], [1, 2, 3], [1, 2, 3], [1, 2, 3]])
+    np.testing.assert_allclose(result["one.y"], [0.02, 2, 2, 2])
+    inputs = yaml.safe_load(diagram.resolved)["blocks"]["one"]["in"]["u"]
+    assert inputs == {"from": "three.y[1]", "initial": "0.02 m"}
+    assert load_text(diagram.resolved).hash == diagram.hash
+
+
+def test_a_link_that_carries_nothing_and_an_idle_computer_are_warned_of(tmp_path: Path) -> None:
+    links = (
+        "links: {up: {from: world, to: target, via: serial, baud: 115200}, spare: {from: target, to: spare}}"
+    )
+    text = LOOP.replace("NETWORK", COMPUTERS.replace("}}", "}, spare: {}}") + links).replace("DELAYS", "")
+    text = text.replace("WORLD", "at: world,").replace("TARGET", "at: target,")
+    text = text.replace("FORCE", "push.y").replace("PLACE", "place.y").replace("SPEED", "speed.y")
+    (tmp_path / "loop.yaml").write_text(text)
+    diagram = load(tmp_path / "loop.yaml")
+    assert {doubt.problem for doubt in diagram.warnings} > {
+        "no block runs on the computer 'spare'",
+        "link 'spare' carries nothing",
+    }
+
+
+def test_a_computer_may_have_limits_of_its_own() -> None:
+    text = "overload: {max: 7}\n" + LOOP.replace(
+        "NETWORK", "computers: {world: {overload: {max: 2}}, target: {}}"
+    )
+    text = text.replace("DELAYS", "").replace("WORLD", "at: world,").replace("TARGET", "at: target,")
+    diagram = load_text(
+        text.replace("FORCE", "push.y").replace("PLACE", "place.y").replace("SPEED", "speed.y")
+    )
+    assert (diagram.overload_of("world").max, diagram.overload_of("target").max) == (2, 7)

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from quadvis.engine.engine import Engine
-from quadvis.graph.graph import Task
-from quadvis.links.endpoints import close_all, live, open_carriers
+from quadvis.errors import QuadvisError, RunError
+from quadvis.graph.graph import Graph, Task
+from quadvis.links.carriers import open_sender
+from quadvis.links.endpoints import close_all, links_of, live, open_carriers
 from quadvis.links.link import MEMORY, UDP, Link
+from quadvis.links.mailbox import Mailbox
 from quadvis.links.udp import UdpSocket
 
-from .networks import made_link, network, rows, task
+from .networks import PORTS, film, made_link, network, task
 
+Read = Callable[[Engine], Any]
 FAST, SLOW, LATE = task("fast", "1/20"), task("slow", "1/10"), task("late", "1/10", "1/50")
 
 
@@ -36,30 +43,46 @@ def resources(link: Link) -> tuple[Any, Any]:
     return address, address
 
 
-def in_step(link: Link, source: Task, reader: Task, ticks: int) -> list[tuple[float, ...]]:
-    """Run both computers' parts by turns, in the order of real time; return the receiver's rows."""
-    graph = network(link, source, reader)
+def in_step(graph: Graph, source: Task, reader: Task, ticks: int, read: Read) -> list[Any]:
+    """Run both computers' parts by turns; return what ``read`` finds at each of the reader's ticks.
+
+    The sender is always ahead by one tick of the reader, so that messages come too early, not too late.
+    """
+    link = links_of(graph)[0]
     with ExitStack() as stack:
-        near, far = resources(link)
         engines = []
-        for computer, resource in (("near", near), ("far", far)):
+        for computer, resource in zip(("near", "far"), resources(link), strict=True):
             part = graph.part_of(computer)
             carriers = open_carriers(part, {link.name: resource})
             stack.callback(close_all, carriers.values())
-            engines.append(Engine(live(part, carriers)))
+            engines.append(stack.enter_context(Engine(live(part, carriers))))
         sending, reading = engines
-        found: list[tuple[float, ...]] = []
-        stack.enter_context(sending)
-
-        def keep_up(tick: int) -> None:
-            """Let the sender do all that it does up to the reader's tick, even a little more than in time."""
-            while sending.tick * sending.period <= tick * reading.period:
+        found: list[Any] = []
+        reading.observe(reader.name, lambda tick: found.append(read(reading)))
+        for tick in range(ticks):
+            while sending.tick * sending.period <= (tick + 1) * reading.period:
                 sending.run(1)
-
-        keep_up(0)
-        reading.observe(reader.name, lambda tick: keep_up(tick + 1))
-        found = rows(reading, ticks, link.name)
+            reading.run(1)
     return found
+
+
+def in_one(graph: Graph, reader: Task, count: int, read: Read) -> list[Any]:
+    """Return the same of the simulation."""
+    engine = Engine(graph)
+    found: list[Any] = []
+    engine.observe(reader.name, lambda tick: found.append(read(engine)))
+    with engine:
+        while len(found) < count:
+            engine.run(1)
+    return found
+
+
+def all_ports(engine: Engine) -> list[Any]:
+    return [np.asarray(engine.read("line", port)).tolist() for port in PORTS]
+
+
+def seen(engine: Engine) -> list[Any]:
+    return [repr(number) for number in engine.read("reader", "seen").tolist()]
 
 
 @pytest.mark.parametrize(
@@ -67,10 +90,45 @@ def in_step(link: Link, source: Task, reader: Task, ticks: int) -> list[tuple[fl
 )
 @pytest.mark.parametrize("via", [MEMORY, UDP])
 def test_two_processes_see_what_the_simulation_sees(via: str, source: Task, reader: Task) -> None:
-    link = made_link(source, reader, via=via, baud=0)
-    simulated = Engine(network(link, source, reader))
-    count = 12
-    live_rows = in_step(link, source, reader, count)
-    twin_rows = {row[0]: row for row in rows(simulated, 200)}
-    assert live_rows == [twin_rows[row[0]] for row in live_rows]
-    assert any(row[1] for row in live_rows)
+    graph = network(made_link(source, reader, via=via, baud=0), source, reader)
+    found = in_step(graph, source, reader, 12, all_ports)
+    assert found == in_one(graph, reader, 12, all_ports)
+    assert found[-1][0] > 0
+
+
+@pytest.mark.parametrize(("source", "reader"), [(SLOW, FAST), (FAST, SLOW)], ids=lambda each: each.name)
+def test_pictures_travel_in_memory(source: Task, reader: Task) -> None:
+    graph = film(source, reader)
+    found = in_step(graph, source, reader, 12, seen)
+    assert found == in_one(graph, reader, 12, seen)
+    assert found[0] == ["0.0", "nan", "0.0"] and float(found[-1][0]) > 4
+
+
+def test_a_picture_that_is_too_large_stops_the_sender_in_a_sentence() -> None:
+    graph = film(SLOW, FAST)
+    link = replace(links_of(graph)[0], room=(4, 5))
+    part = graph.part_of("near")
+    carriers = {"line": open_carriers(part, {"line": bytearray(8 * links_of(graph)[0].needs.words)})["line"]}
+    small = {"line": open_sender(link, bytearray(8 * link.needs.words))}
+    with Engine(live(part, carriers)) as engine:
+        engine.run(1)
+    with (
+        pytest.raises(RunError, match="has room for pictures of 4 x 5 px"),
+        Engine(live(part, small)) as engine,
+    ):
+        engine.run(1)
+
+
+def test_none_stays_open_if_one_end_cannot_be_opened() -> None:
+    graph = network(made_link(SLOW, FAST), SLOW, FAST)
+    with pytest.raises(QuadvisError, match="cannot open the serial port"):
+        open_carriers(graph.part_of("near"), {"line": "/dev/none"})
+
+
+def test_the_needs_of_a_link_say_what_both_ends_want() -> None:
+    memory = made_link(FAST, SLOW, via=MEMORY, baud=0).needs
+    assert memory.words == Mailbox.size(36, 6) and (memory.source, memory.target) == ("near", "far")
+    serial = made_link(FAST, SLOW, ports=("/dev/a", "/dev/b")).needs
+    assert (serial.words, serial.baud, serial.ports) == (0, 9600, ("/dev/a", "/dev/b"))
+    udp = made_link(FAST, SLOW, via=UDP, baud=0, address="192.0.2.1:5005").needs
+    assert (udp.via, udp.address) == (UDP, "192.0.2.1:5005")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -34,8 +35,8 @@ def test_stuffed_bytes_have_no_zeros_and_come_back(data: bytes) -> None:
 @pytest.mark.parametrize(
     ("data", "coded"),
     [
-        ("00", "01 01"), ("00 00", "01 01 01"), ("00 11 00", "01 02 11 01"), ("11 22 00 33", "03 11 22 02 33"),
-        ("11 22 33 44", "05 11 22 33 44"), ("11 00 00 00", "02 11 01 01 01"),
+        ("00", "01 01"), ("00 00", "01 01 01"), ("00 11 00", "01 02 11 01"),
+        ("11 22 00 33", "03 11 22 02 33"), ("11 22 33 44", "05 11 22 33 44"), ("11 00 00 00", "02 11 01 01 01"),
     ],
 )  # fmt: skip
 def test_the_published_examples(data: str, coded: str) -> None:
@@ -44,7 +45,7 @@ def test_the_published_examples(data: str, coded: str) -> None:
 
 def chopped(data: bytes, cuts: list[int]) -> list[bytes]:
     places = [0, *sorted(cut % (len(data) + 1) for cut in cuts), len(data)]
-    return [data[start:end] for start, end in zip(places, places[1:], strict=False)]
+    return [data[start:end] for start, end in pairwise(places)]
 
 
 @given(
@@ -151,7 +152,7 @@ def damaged(data: bytes, share: float, random: np.random.Generator) -> bytes:
 
 
 def through_damage(frames: int, seed: int) -> None:
-    """Send frames through a line that spoils 1 % of the bytes; nothing wrong is accepted, most are delivered."""
+    """Send frames through a line that spoils 1 % of the bytes: nothing wrong is accepted, most come."""
     random = np.random.default_rng(seed)
     decoder, delivered, wrong = Decoder(ONE), 0, 0
     for begin in range(0, frames, 10_000):
