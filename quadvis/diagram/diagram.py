@@ -14,7 +14,7 @@ from quadvis.diagram.keys import SECTIONS
 from quadvis.diagram.loop_requirements import LoopRequirement
 from quadvis.diagram.requirements import Entry, Expectation
 from quadvis.diagram.sections.analyse import ANALYSE, Questions
-from quadvis.diagram.sections.computers import COMPUTERS
+from quadvis.diagram.sections.computers import COMPUTERS, ComputerSpec
 from quadvis.diagram.sections.expect import EXPECT
 from quadvis.diagram.sections.log import LOG
 from quadvis.diagram.sections.on_host_loss import ON_HOST_LOSS
@@ -132,11 +132,15 @@ class Diagram:
         """What carries wires between its computers."""
         return links_of(self.graph)
 
+    def computer(self, name: str) -> ComputerSpec | None:
+        """Return what it says of one of its computers; None if it says nothing."""
+        spec = self.values[COMPUTERS].get(name)
+        return spec if spec is not None and known(spec) else None
+
     def overload_of(self, computer: str) -> OverloadLimits:
         """How many overruns the tasks of one computer may have."""
-        spec = self.values[COMPUTERS].get(computer)
-        own = spec.overload if spec is not None and known(spec) else None
-        return self.overload if own is None else own
+        spec = self.computer(computer)
+        return self.overload if spec is None or spec.overload is None else spec.overload
 
     @property
     def on_host_loss(self) -> str:

@@ -149,14 +149,18 @@ class Graph:
         times = [time for task in self.tasks for time in (task.period, task.offset) if time]
         return common_divisor(times) if times else Fraction(1)
 
+    @cached_property
+    def computers(self) -> tuple[str, ...]:
+        """The computers that run it, in the order of execution; ("",) if the diagram has none."""
+        return tuple(dict.fromkeys(node.computer for node in self.nodes))
+
     def part_of(self, computer: str) -> Graph:
-        """Return the graph of what one computer runs.
+        """Return the graph of what one computer runs, with the base tick of the whole.
 
         Of the wires of links, those from another computer lead out of it: their senders are there.
         """
         nodes = [node for node in self.nodes if node.computer == computer]
-        step = self.step if any(node.task.continuous for node in nodes) else None
-        return Graph(self.name, nodes, self.solver, step, self.tasking)
+        return Graph(self.name, nodes, self.solver, self.tick, self.tasking)
 
     def ticks(self, time: Fraction) -> int:
         """Return a time as a number of base ticks; ValueError if it is not a whole one."""

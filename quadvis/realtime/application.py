@@ -15,6 +15,7 @@ import signal
 import threading
 import time
 import traceback
+from collections.abc import Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from multiprocessing import parent_process
@@ -26,6 +27,7 @@ from quadvis.diagram.sections.on_host_loss import CONTINUE
 from quadvis.engine.engine import Engine
 from quadvis.errors import QuadvisError, RunError
 from quadvis.errors.caller import IS_COMMAND
+from quadvis.links.endpoints import close_all, live, open_carriers
 from quadvis.machine.failures import surroundings
 from quadvis.machine.interrupts import leave_to_parent
 from quadvis.native.choice import Choice, choose, use
@@ -46,7 +48,8 @@ GRACE = 2.0  # s that a step has to end, once it was asked to
 class Setup:
     """What an application needs: a resolved diagram, how to run it, what it shares with its supervisor.
 
-    ``computer`` is the one whose blocks it runs, "" in a diagram without computers.
+    ``computer`` is the one whose blocks it runs, "" in a diagram without computers. ``lines`` has what the
+    ends of its links are opened with, by the names of the links.
     """
 
     text: str
@@ -62,6 +65,7 @@ class Setup:
     words: Any
     link: Connection
     devices: PortBindings
+    lines: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -148,8 +152,9 @@ class _Application:
         """Run to the stop time."""
         setup, shared = self._setup, self._shared
         diagram = load_text(setup.text, setup.folder, setup.name, setup.own_blocks)
-        schedule = Schedule.of(diagram.graph)
-        watch = OverloadWatch([task.name for task in diagram.graph.tasks], diagram.overload)
+        part = diagram.graph.part_of(setup.computer)
+        schedule = Schedule.of(part)
+        watch = OverloadWatch([task.name for task in part.tasks], diagram.overload_of(setup.computer))
         sleeper = Sleeper()
         pacer = Pacer(
             schedule,
@@ -158,19 +163,22 @@ class _Application:
             lambda: time.monotonic_ns() - self._start,
             lambda instant: sleeper.until(self._start + instant),
         )
-        engine = self._engine = Engine(diagram.graph, diagram.seed, pacer)
-        setup.devices.bind(engine)
-        choice = choose(engine, diagram.ticks, setup.engine, setup.link.send)
-        use(engine, choice)
-        for stream, ring in zip(setup.streams, shared.rings, strict=True):
-            engine.observe(stream.task, stream.put_into(ring, engine), stream.every)
         with ExitStack() as stack:
+            carriers = open_carriers(part, setup.lines)
+            stack.callback(close_all, carriers.values())
+            engine = self._engine = Engine(live(part, carriers), diagram.seed, pacer)
+            setup.devices.bind(engine)
+            choice = choose(engine, diagram.ticks, setup.engine, setup.link.send)
+            use(engine, choice)
+            for stream, ring in zip(setup.streams, shared.rings, strict=True):
+                engine.observe(stream.task, stream.put_into(ring, engine), stream.every)
             stack.enter_context(diagram.guarded())
             stack.enter_context(engine)
             stack.callback(self._leave)
             grants = ask_all(setup.wishes)
             sleeper.polled = _polled(setup.wishes, schedule, sleeper)
             grants.granted.append(f"polling {sleeper.polled / 1e3:.0f} us")
+            grants.refused += [note for carrier in carriers.values() for note in carrier.notes]
             setup.link.send(Ready(grants, Choice(choice.engine, choice.reason)))
             self._start = setup.link.recv()  # all applications begin at one instant
             shared.control[control.START] = self._start

@@ -101,7 +101,7 @@ class Cables:
     """The process of the cables, as the supervisor has it.
 
     ``ends`` are there after `start`. It ends when it is told to, or when neither the supervisor nor any
-    watched process lives.
+    watched process lives. Without cables there is no process.
     """
 
     def __init__(self, context: SpawnContext, cables: Sequence[Cable], priority: int) -> None:
@@ -113,6 +113,8 @@ class Cables:
 
     def start(self) -> None:
         """Make the cables."""
+        if not self._cables:
+            return
         with launching():
             self.process.start()
         self._theirs.close()
@@ -126,6 +128,8 @@ class Cables:
 
     def watch(self, process: int) -> None:
         """Let it go on as long as this process lives."""
+        if not self._cables:
+            return
         with suppress(OSError):
             self._link.send(process)
 

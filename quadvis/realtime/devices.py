@@ -1,4 +1,4 @@
-"""The devices of a real-time run: their cables, their guardian, and what binds blocks to them."""
+"""The devices of a real-time run: their guardian, and what binds blocks to them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from quadvis.engine.engine import Engine
 from quadvis.graph.devices import devices
 from quadvis.graph.graph import Graph
 from quadvis.native.choice import Announce
-from quadvis.realtime.cables import Cable, Cables
+from quadvis.realtime.cables import Cable, Ends
 from quadvis.realtime.guard import Guard
 from quadvis.realtime.guardian import mailboxes, words_for
 from quadvis.realtime.heartbeat import Patience
@@ -55,31 +55,32 @@ class Devices:
         self._ports: dict[str, str] = {}  # filled when the cables are made
         self.bindings = PortBindings(words, boxes, self._ports)
         lines = {device.port_given: device.settings for device in self._all() if _on_cable(device)}
-        cables = [Cable(port, line) for port, line in lines.items()]
-        self._cables = Cables(context, cables, priority) if cables else None
+        self.cables = [Cable(port, line) for port, line in lines.items()]
         self._guard: Guard | None = None
 
-    def start(self, patiences: Sequence[Patience], announce: Announce) -> None:
-        """Make the cables, and let all output ports have their initial frames; RunError if one refuses."""
-        if self._cables is not None:
-            self._cables.start()
-            for path, device in self._inputs.items():
-                if _on_cable(device):
-                    self._ports[path] = self._cables.ends[device.port_given].b
-        if self._outputs:
-            ports = [self._output_port(path, device) for path, device in self._outputs.items()]
-            self._guard = Guard(
-                self._context, ports, self.bindings.words, patiences, self._on_host_loss, self._priority
-            )
-            self._guard.start(announce)
-            if self._cables is not None:
-                self._cables.watch(self._guard.process.pid or 0)
+    def start(
+        self, ends: Mapping[str, Ends], patiences: Sequence[Patience], announce: Announce
+    ) -> int | None:
+        """Let all output ports have their initial frames; RunError if one refuses.
+
+        ``ends`` are those of its `cables`. Return the guardian's process, if there is one.
+        """
+        for path, device in self._inputs.items():
+            if _on_cable(device):
+                self._ports[path] = ends[device.port_given].b
+        if not self._outputs:
+            return None
+        ports = [self._output_port(path, device, ends) for path, device in self._outputs.items()]
+        self._guard = Guard(
+            self._context, ports, self.bindings.words, patiences, self._on_host_loss, self._priority
+        )
+        self._guard.start(announce)
+        return self._guard.process.pid
 
     def watch(self, process: int) -> None:
-        """Let guardian and cables watch an application."""
-        for each in (self._guard, self._cables):
-            if each is not None:
-                each.watch(process)
+        """Let the guardian watch an application."""
+        if self._guard is not None:
+            self._guard.watch(process)
 
     @property
     def sources(self) -> list[Connection | int]:
@@ -98,19 +99,14 @@ class Devices:
 
     def close(self) -> list[str]:
         """End everything; a sentence for each port that may be without its safe frames."""
-        unsafe = self._guard.close() if self._guard is not None else []
-        if self._cables is not None:
-            self._cables.close()
-        return unsafe
+        return self._guard.close() if self._guard is not None else []
 
     def _all(self) -> Iterator[Device]:
         yield from self._outputs.values()
         yield from self._inputs.values()
 
-    def _output_port(self, path: str, device: Output) -> OutputPort:
-        port = device.port_given
-        if self._cables is not None and _on_cable(device):
-            port = self._cables.ends[port].a
+    def _output_port(self, path: str, device: Output, ends: Mapping[str, Ends]) -> OutputPort:
+        port = ends[device.port_given].a if _on_cable(device) else device.port_given
         interval = round(device.interval * NANOSECONDS)
         initial, safe = device.initial_frame(), device.safe_frame()
         return OutputPort(path, port, device.settings, interval, initial, safe)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
 from multiprocessing.process import BaseProcess
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from quadvis.diagram.sections.overload import WARN
 from quadvis.engine.taps import Tap
@@ -57,7 +57,8 @@ class Member:
     ) -> None:
         self.computer, self._part, self._announce = computer, part, announce
         self._left_out = left_out
-        self._limits = diagram.overload
+        self._limits = diagram.overload_of(computer)
+        self._lines: dict[str, Any] = {}  # what it opens the ends of its links with
         self._streams = streams_of(part, taps)
         streams = tuple(stream for stream, _ in self._streams)
         rings = [stream.ring for stream in streams]
@@ -69,8 +70,9 @@ class Member:
         setup = Setup(
             diagram.resolved, str(diagram.path.parent), diagram.path.name, diagram.own_blocks,
             IS_COMMAND.get(), computer, engine, wishes, count, streams, words, self._theirs, devices,
+            self._lines,
         )  # fmt: skip
-        self.patience = Patience.of(computer, words, Schedule.of(part), diagram.overload)
+        self.patience = Patience.of(computer, words, Schedule.of(part), self._limits)
         name = f"application {computer}".rstrip()
         self.process: BaseProcess = context.Process(target=perform, args=(setup,), name=name)
         self._listening = True
@@ -78,10 +80,15 @@ class Member:
         self.ending: Ending | None = None
         self._warned, self._overruns = 0.0, [0] * count
 
-    def start(self) -> None:
-        """Start the process; it gets ready to run, and waits."""
+    def start(self, lines: Mapping[str, Any]) -> int:
+        """Start the process, which gets ready to run and waits; return its number.
+
+        ``lines`` has what it opens the ends of its links with.
+        """
+        self._lines.update(lines)
         self.process.start()
         self._theirs.close()
+        return self.process.pid or 0
 
     def begin(self, instant: int) -> None:
         """Let the application run from an instant (ns) of the monotonic clock on."""

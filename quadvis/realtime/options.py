@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
+from typing import TypeVar
 
+from quadvis.diagram.sections.computers import AUTO, ComputerSpec
 from quadvis.diagram.times import read_duration
 from quadvis.document import YamlScalar
 from quadvis.errors import QuadvisError
@@ -12,8 +14,9 @@ from quadvis.errors.caller import as_given
 from quadvis.graph.graph import SINGLE, Graph
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
 
-AUTO = "auto"
+PRIORITY = 80
 HIGHEST = 99  # priority
+T = TypeVar("T")
 BUSIEST = 0.9  # share of a period; near 0.95 Linux halts real-time programs for 50 ms in every second
 
 
@@ -24,26 +27,36 @@ class RealTime:
     ``cpu`` is the processor to stay on. ``priority`` is that of SCHED_FIFO, 1 to 99; 0 asks for no priority.
     ``poll`` is the time before each deadline in which the loop does not sleep, but looks at the clock: a
     time such as "60 us", or ``auto``: as long as the system needs to wake the loop, measured at the start, at
-    most a tenth of the shortest period.
+    most a tenth of the shortest period. What is None is as the diagram says of the computer, or else any
+    processor, a priority of 80, and ``auto``.
     """
 
     cpu: int | None = None
-    priority: int = 80
-    poll: str = AUTO
+    priority: int | None = None
+    poll: str | None = None
 
     def __post_init__(self) -> None:
-        if not 0 <= self.priority <= HIGHEST:
+        if self.priority is not None and not 0 <= self.priority <= HIGHEST:
             option = as_given("--priority", "priority")
             raise QuadvisError(f"{option} must be from 1 to {HIGHEST}, or 0 for none, not {self.priority}")
         if self.cpu is not None and self.cpu < 0:
             raise QuadvisError(f"{as_given('--cpu', 'cpu')} must be the number of a processor, 0 or more")
         self.polled()
 
+    def on(self, computer: ComputerSpec | None) -> RealTime:
+        """Return what holds on a computer, with what its diagram says of it where this says nothing."""
+        said = RealTime() if computer is None else RealTime(computer.cpu, computer.priority, computer.poll)
+        return RealTime(
+            _first(self.cpu, said.cpu),
+            _first(self.priority, said.priority, PRIORITY),
+            _first(self.poll, said.poll, AUTO),
+        )
+
     def polled(self) -> int | None:
         """Return the time to poll (ns); None if it is to be measured."""
-        if self.poll == AUTO:
+        if self.poll in (None, AUTO):
             return None
-        time = read_duration(YamlScalar(self.poll, False, as_given("--poll", "poll"), 0, 0))
+        time = read_duration(YamlScalar(str(self.poll), False, as_given("--poll", "poll"), 0, 0))
         return int(time * NANOSECONDS)
 
     def check(self, graph: Graph) -> None:
@@ -59,3 +72,8 @@ class RealTime:
             raise QuadvisError(
                 f"{problem} of {period / 1e6:g} ms: Linux would halt the loop again and again; poll less"
             )
+
+
+def _first(*values: T | None) -> T | None:
+    """Return the first value that is not None, if there is one."""
+    return next((value for value in values if value is not None), None)

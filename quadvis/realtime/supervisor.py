@@ -14,8 +14,10 @@ from quadvis.machine.interrupts import held_back
 from quadvis.machine.processes import launching
 from quadvis.native.choice import Announce
 from quadvis.realtime.application import GRACE
+from quadvis.realtime.cables import Cables
 from quadvis.realtime.devices import Devices
 from quadvis.realtime.flight import Flight
+from quadvis.realtime.lines import Lines
 from quadvis.realtime.member import LeftOut, Member
 from quadvis.realtime.options import RealTime
 
@@ -67,23 +69,24 @@ class _Supervisor:
     ) -> None:
         context = multiprocessing.get_context("spawn")
         self._announce = announce
-        self._devices = Devices(context, diagram.graph, diagram.on_host_loss, wishes.priority)
+        priority = wishes.on(None).priority or 0
+        self._devices = Devices(context, diagram.graph, diagram.on_host_loss, priority)
+        self._lines = Lines(context, diagram.links)
+        self._cables = Cables(context, [*self._devices.cables, *self._lines.cables], priority)
         self._members = []
-        for computer, part in {"": diagram.graph}.items():
+        for computer in diagram.graph.computers:
+            part = diagram.graph.part_of(computer)
             own = [tap for tap in taps if tap.block in part]
+            asked = wishes.on(diagram.computer(computer))
             bindings = self._devices.bindings
             self._members.append(
-                Member(context, diagram, computer, part, wishes, engine, own, left_out, bindings, announce)
+                Member(context, diagram, computer, part, asked, engine, own, left_out, bindings, announce)
             )
         self._begun = False
 
     def follow(self, tend: Callable[[float, float], None]) -> Flight:
         """Start the applications and hand rows on until they have ended; an error if this is too early."""
-        self._devices.start([member.patience for member in self._members], self._announce)
-        with launching():
-            for member in self._members:
-                member.start()
-                self._devices.watch(member.process.pid or 0)
+        self._start()
         while any(member.process.is_alive() for member in self._members):
             sources = [source for member in self._alive for source in member.sources]
             wait([*sources, *self._devices.sources], LOOK)
@@ -98,7 +101,7 @@ class _Supervisor:
                 member.warn()
                 self._check_step(member)
         self._look(last=True)
-        if unsafe := self._devices.close():
+        if unsafe := self._close():
             raise RunError("; ".join(unsafe))
         first = self._members[0]
         tend(min(member.time for member in self._members), first.now)
@@ -123,9 +126,30 @@ class _Supervisor:
             for member in self._members:
                 member.listen()
                 member.take(last=True)
-            unsafe = self._devices.close()
+            unsafe = self._close()
         silent = [member for member in self._members if member.ended_silently]
         return [*unsafe, *([UNSAFE] if not all(member.is_guarded for member in silent) else [])]
+
+    def _start(self) -> None:
+        """Start all processes, those first on which others depend."""
+        self._cables.start()
+        self._lines.lay(self._cables.ends)
+        guardian = self._devices.start(
+            self._cables.ends, [member.patience for member in self._members], self._announce
+        )
+        if guardian is not None:
+            self._cables.watch(guardian)
+        with launching():
+            for member in self._members:
+                process = member.start(self._lines.of(member.computer))
+                self._devices.watch(process)
+                self._cables.watch(process)
+
+    def _close(self) -> list[str]:
+        """End what the applications needed; return a sentence for each port that may be unsafe."""
+        unsafe = self._devices.close()
+        self._cables.close()
+        return unsafe
 
     @property
     def _moments(self) -> list[float]:

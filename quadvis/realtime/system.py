@@ -56,8 +56,9 @@ def ask_all(wishes: RealTime) -> Grants:
     gc.collect()
     gc.freeze()
     gc.disable()
-    if wishes.priority:
-        grants.ask(f"SCHED_FIFO {wishes.priority}", lambda: _priority(wishes.priority))
+    priority = wishes.priority
+    if priority:
+        grants.ask(f"SCHED_FIFO {priority}", lambda: _priority(priority))
     cpu = wishes.cpu
     if cpu is not None:
         grants.ask(f"cpu {cpu}", lambda: _processor(cpu))

@@ -70,7 +70,7 @@ class LiveRun:
         """Return the log, to which all rows and changes go from now on."""
         from quadvis.output.log import LogWriter  # only a run with a log waits for this import
 
-        logged = [*signals_of(self.diagram), *inputs_of(self.diagram)]
+        logged = [*signals_of(self.diagram), *inputs_of(self.diagram, [self.diagram.graph])]
         writer = LogWriter(path, [each.block for each in logged], metadata(self.diagram))
         for index, each in enumerate(logged):
             taker = Taker(partial(writer.write, index), partial(writer.write_rows, index))

@@ -15,7 +15,8 @@ from quadvis.engine.taps import Tap
 from quadvis.engine.tuning import Change
 from quadvis.errors.caller import as_given
 from quadvis.graph.devices import refuse_devices
-from quadvis.graph.graph import Node
+from quadvis.graph.graph import Graph, Node
+from quadvis.links.endpoints import live_parts
 from quadvis.native.choice import Announce, Choice, choose, use
 from quadvis.output.kept import RowJudge
 from quadvis.run.row_tap import PacedTap, RowTap
@@ -56,12 +57,17 @@ class Takers(NamedTuple):
 class RunLoop(Protocol):
     """The ticks of a run, ready to begin.
 
-    ``clock`` is ``SIMULATED`` or ``REAL_TIME``. ``computers`` are those that may leave ticks out.
+    ``clock`` is ``SIMULATED`` or ``REAL_TIME``. ``graphs`` are those that run side by side. ``computers`` are
+    those that may leave ticks out.
     """
 
     @property
     def clock(self) -> str:
         """Return it."""
+
+    @property
+    def graphs(self) -> Sequence[Graph]:
+        """Return them."""
 
     @property
     def computers(self) -> Sequence[str]:
@@ -78,6 +84,7 @@ class Simulated:
     computers: Sequence[str] = ()
 
     def __init__(self, diagram: Diagram, engine: str, announce: Announce | None) -> None:
+        self.graphs: Sequence[Graph] = [diagram.graph]
         refuse_devices(diagram.graph, as_given("add --real-time", "give real_time=RealTime()"))
         self._engine = Engine(diagram.graph, diagram.seed)
         self._ticks = diagram.ticks
@@ -95,14 +102,17 @@ class Simulated:
 
 
 class Paced:
-    """Each tick at its time, in a process of its own; QuadvisError if the diagram cannot run so."""
+    """Each tick at its time, each computer in a process of its own; QuadvisError if that cannot be."""
 
     clock = REAL_TIME
 
     def __init__(self, diagram: Diagram, engine: str, announce: Announce | None, wishes: RealTime) -> None:
-        wishes.check(diagram.graph)
+        parts = live_parts(diagram.graph)
+        for computer, part in parts.items():
+            wishes.on(diagram.computer(computer)).check(part)
         self._diagram, self._engine, self._announce, self._wishes = diagram, engine, announce, wishes
-        self.computers: Sequence[str] = ("",)
+        self.computers: Sequence[str] = [*parts]
+        self.graphs: Sequence[Graph] = [*parts.values()]
 
     def run(self, takers: Takers, stack: ExitStack) -> tuple[Choice, Flight]:
         """Run to the end."""

@@ -14,6 +14,7 @@ from quadvis.diagram.diagram import Diagram
 from quadvis.engine.tuning import Change
 from quadvis.errors import QuadvisError, quoted
 from quadvis.graph.graph import Graph, Node
+from quadvis.links.endpoints import live_parts
 from quadvis.output.log_reader import Log
 from quadvis.output.recording import Recording, Slots
 from quadvis.output.stretch import NANOSECONDS
@@ -37,7 +38,11 @@ class RecordedRun:
         self._log, self._diagram = log, diagram
         self.clock = log.metadata.get("clock", SIMULATED)
         self.whole = log.complete and not {"stopped", "lost"} & log.summary.keys() and not _lost_rows(log)
-        self.parts = [RecordedPart(log, diagram, "", diagram.graph, self.clock == REAL_TIME)]
+        is_paced = self.clock == REAL_TIME
+        graphs = live_parts(diagram.graph) if is_paced else {"": diagram.graph}
+        self.parts = [
+            RecordedPart(log, diagram, computer, graph, is_paced) for computer, graph in graphs.items()
+        ]
 
     @cached_property
     def ticks(self) -> int:
@@ -73,6 +78,11 @@ class RecordedPart:
             problem = f"the log '{self._log.path}' does not say which ticks the real-time run left out"
             raise QuadvisError(f"{problem}: it is of an earlier quadvis; {AGAIN}")
         return self._log.hidden.arrays(topic)[1].reshape(-1, 2)
+
+    @cached_property
+    def played(self) -> frozenset[str]:
+        """The paths of the blocks that reach outside, which a replay does not run."""
+        return frozenset(node.path for node in outside(self.graph))
 
     def missed(self, end: int) -> int:
         """Return how many ticks before ``end`` were left out."""

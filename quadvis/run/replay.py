@@ -90,7 +90,7 @@ def replay(
         RowComparison(log, part, each, run.ticks)
         for part in run.parts
         for each in signals_of(diagram)
-        if each.node.path in part.graph and each.node not in outside(part.graph)
+        if each.node.path in part.graph and each.node.path not in part.played
     ]
     loop = _Repeated(run, diagram, engine, announce)
     new = None if output is None else Path(output)
@@ -146,6 +146,7 @@ class _Repeated:
 
     def __init__(self, run: RecordedRun, diagram: Diagram, engine: str, announce: Announce | None) -> None:
         self.clock, self._run, self._diagram = run.clock, run, diagram
+        self.graphs = [part.graph for part in run.parts]
         self.computers = [part.computer for part in run.parts] if run.clock == REAL_TIME else []
         self._engines = [self._engine(part) for part in run.parts]
         self._choice, *_ = choices = [choose(made, run.ticks, engine, announce) for made in self._engines]

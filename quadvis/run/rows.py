@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from quadvis.diagram.diagram import Diagram
-from quadvis.graph.graph import Node
+from quadvis.graph.graph import Graph, Node
 from quadvis.output.recording import RecordedBlock, RecordedPort
 from quadvis.run.outside import outside
 
@@ -32,11 +33,15 @@ def signals_of(diagram: Diagram) -> list[RecordedNode]:
     ]
 
 
-def inputs_of(diagram: Diagram) -> list[RecordedNode]:
-    """Return what a log holds besides: blocks that reach outside and whose rows are not all logged."""
+def inputs_of(diagram: Diagram, graphs: Iterable[Graph]) -> list[RecordedNode]:
+    """Return what a log holds besides: blocks that reach outside and whose rows are not all logged.
+
+    ``graphs`` are those that run: the whole in a simulation, in real time each computer's part.
+    """
     return [
         RecordedNode(node, RecordedBlock(input_topic(node.path), ports(node), node.task.name, True), 1)
-        for node in outside(diagram.graph)
+        for graph in graphs
+        for node in outside(graph)
         if ports(node) and not all_logged(diagram, node.path)
     ]
 

@@ -80,7 +80,7 @@ def recorded(
     patterns = ((ALL,) if log is None else ()) if keep is None else tuple(keep)
     signals = RunSignals([each.block for each in signals_logged], diagram.ports, patterns)
     judging = Judging(diagram.summary, diagram.expectations)
-    logged = [*signals_logged, *(inputs_of(diagram) if log is not None else ())]
+    logged = [*signals_logged, *(inputs_of(diagram, loop.graphs) if log is not None else ())]
     wall, cpu = time.perf_counter(), _processor_time()
     with ExitStack() as stack:
         stack.enter_context(diagram.guarded(log))

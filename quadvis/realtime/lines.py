@@ -1,0 +1,71 @@
+"""What the links of a real-time run need: shared words, ends of cables, addresses of this machine."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Mapping, Sequence
+from multiprocessing.context import SpawnContext
+from typing import Any
+
+from quadvis.links.link import MEMORY, SERIAL, Link
+from quadvis.machine.serial_port import Line
+from quadvis.realtime.cables import Cable, Ends
+
+LOCAL = "127.0.0.1"
+
+
+class Lines:
+    """The resources of links, from the ends of their `cables` on.
+
+    ``sending`` and ``receiving`` have what each end of a link is opened with, by the link's name; they are
+    complete after `lay`.
+    """
+
+    def __init__(self, context: SpawnContext, links: Sequence[Link]) -> None:
+        self._links = links
+        self.sending: dict[str, Any] = {}
+        self.receiving: dict[str, Any] = {}
+        for link in links:
+            if link.via == MEMORY:
+                words = context.RawArray("q", link.needs.words)
+                self.sending[link.name] = self.receiving[link.name] = words
+
+    @property
+    def cables(self) -> list[Cable]:
+        """The cables to be made: one for each serial link of which an end has no port."""
+        return [
+            Cable(_cable(link), Line(link.baud))
+            for link in self._links
+            if link.via == SERIAL and not all(link.ports)
+        ]
+
+    def lay(self, ends: Mapping[str, Ends]) -> None:
+        """Take the ends of the cables, and choose the addresses that nobody has named."""
+        for link in self._links:
+            if link.via == SERIAL:
+                made = ends.get(_cable(link), Ends("", ""))
+                self.sending[link.name] = link.ports[0] or made.a
+                self.receiving[link.name] = link.ports[1] or made.b
+            elif link.via != MEMORY:
+                self.sending[link.name] = self.receiving[link.name] = _address(link.address)
+
+    def of(self, computer: str) -> dict[str, Any]:
+        """Return what one computer opens the ends of its links with."""
+        found = {link.name: self.sending[link.name] for link in self._links if link.source == computer}
+        return found | {
+            link.name: self.receiving[link.name] for link in self._links if link.target == computer
+        }
+
+
+def _cable(link: Link) -> str:
+    return f"link {link.name}"
+
+
+def _address(written: str) -> tuple[str, int]:
+    """Return a host and a port; those of a free place of this machine if none are written."""
+    if written:
+        host, _, port = written.rpartition(":")
+        return host.strip("[]"), int(port)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind((LOCAL, 0))
+        return LOCAL, int(free.getsockname()[1])
