@@ -80,7 +80,8 @@ def _checked(parser: Parser, words: Sequence[str]) -> list[str]:
         else:
             found += _option(parser, word, waiting)
     needed = [place for place in parser.places if place.nargs is None]
-    further = [place for place in parser.places if place.nargs == "*"] * (len(placed) - len(needed))
+    further = [place for place in parser.places if place.nargs == "?"]
+    further += [place for place in parser.places if place.nargs == "*"] * (len(placed) - len(needed))
     for place, word in zip([*needed, *further], placed, strict=False):
         if place.choices is not None and word not in place.choices:
             remedy = suggestion(word, map(str, place.choices))
@@ -89,7 +90,9 @@ def _checked(parser: Parser, words: Sequence[str]) -> list[str]:
         missing = " and ".join(_name(place) for place in needed[len(placed) :])
         raise QuadvisError(f"{missing} is missing; write {_usage(parser)}")
     if len(placed) > len(needed) + len(further):
-        raise QuadvisError(f"{quoted(placed[len(needed)])} is one too many; write {_usage(parser)}")
+        raise QuadvisError(
+            f"{quoted(placed[len(needed) + len(further)])} is one too many; write {_usage(parser)}"
+        )
     return [*found, "--", *placed] if placed else found
 
 
@@ -107,6 +110,13 @@ def _option(parser: Parser, word: str, waiting: list[str]) -> list[str]:
         if equals:
             raise QuadvisError(f"{name} takes no value; leave {quoted(value)} out")
         return [name]
+    if isinstance(action.nargs, int):
+        values = [value] if equals else []
+        while len(values) < action.nargs and waiting and not waiting[0].startswith("-"):
+            values.append(waiting.pop(0))
+        if len(values) < action.nargs:
+            raise QuadvisError(f"{name} needs {action.nargs} values; write {name} {_name(action)}")
+        return [action.option_strings[0], *values]
     if not equals and waiting and waiting[0].partition("=")[0] not in (*HELP, *parser.options):
         equals, value = "=", waiting.pop(0)
     if not equals or value == "--":
@@ -127,9 +137,18 @@ def _check_value(action: argparse.Action, name: str, value: str) -> None:
 
 
 def _name(action: argparse.Action) -> str:
-    return action.metavar if isinstance(action.metavar, str) else action.dest.upper()
+    if isinstance(action.metavar, tuple):
+        return " ".join(action.metavar)
+    return action.metavar or action.dest.upper()
 
 
 def _usage(parser: Parser) -> str:
-    places = ("|".join(map(str, place.choices)) if place.choices else _name(place) for place in parser.places)
+    places = (
+        "|".join(map(str, place.choices))
+        if place.choices
+        else f"[{_name(place)}]"
+        if place.nargs == "?"
+        else _name(place)
+        for place in parser.places
+    )
     return f"'{' '.join([parser.prog, *places])}'"

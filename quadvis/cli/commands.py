@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 SCHEMA = Kind("the schema", (b"{",), rb'"\$schema"')
 FAILED = 1
+NO_VARIANT = "none"
 
 
 def _load(options: argparse.Namespace, **more: Any) -> Any:
@@ -238,6 +239,21 @@ def describe(options: argparse.Namespace) -> int:
     else:
         print(description(options.block, block, _width()))
     return 0
+
+
+def diff(options: argparse.Namespace) -> int:
+    """Print the difference of two diagrams or runs; 1 if there is one."""
+    from quadvis.diff.difference import diff as compare
+    from quadvis.diff.report import DiffReport
+    from quadvis.machine.status_line import shows_colours
+
+    first, second = (None if name == NO_VARIANT else name for name in options.variants or [NO_VARIANT] * 2)
+    found = compare(options.old, options.new, variants=(first, second), own_blocks=_own_blocks(options))
+    if options.json:
+        _print_json(found.as_data())
+    else:
+        print("\n".join(DiffReport(found, shows_colours(sys.stdout)).lines()))
+    return 0 if found.same else FAILED
 
 
 def analyse(options: argparse.Namespace) -> int:

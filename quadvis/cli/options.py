@@ -43,6 +43,15 @@ processes. Wall times do, so it has them only with --timings.
 Exit code: 0 all runs passed, 1 a run did not, 2 bad input; 130, 129 or 143 interrupted, hung up or ended
 (finished runs are in the table)."""
 
+DIFF_HELP = """\
+A and B are diagrams or logs. Diagrams are compared as they run: parts expanded, every parameter given. Two
+logs are compared signal by signal as well, at the times that both have.
+--json prints one object: old, new, same, facts (of the runs), sections: {key: [{name, kind, old, new}]},
+blocks: [{block, kind, old, new (their classes), changes: [{name, kind, old, new}]}], same_blocks;
+signals (null unless both are logs): {compared, different: [{signal, unit, element, values, largest, rows,
+different_rows, time_s}], only_old, only_new, unlike: [{signal, what}]}. A kind is added, removed or changed.
+Exit code: 0 the same, 1 different, 2 bad input."""
+
 ANALYSE_HELP = """\
 Noise is removed, Newton's method finds a steady state nearby, and the loop is linearised there;
 a sampled loop is lifted over one hyperperiod. All signals of a cut are opened together.
@@ -122,6 +131,9 @@ def parser() -> Parser:
     )
     program = add("program", commands.program, "print what is called at which ticks, and in which order")
     _diagram_options(program)
+    _diff_options(
+        add("diff", commands.diff, "print what differs between two diagrams, variants or logs", DIFF_HELP)
+    )
     plot = add("plot", commands.plot, "draw the figures that a log's diagram declares, as PNG")
     plot.add_argument("log", metavar="LOG")
     plot.add_argument("--output", "-o", metavar="FOLDER", help="default: beside the log")
@@ -144,6 +156,15 @@ def _replay_options(parser: Parser) -> None:
     parser.add_argument("--output", "-o", metavar="NEWLOG", help="write a log of the replay; default: none")
     _engine_option(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object instead of the report")
+    _own_block_option(parser)
+
+
+def _diff_options(parser: Parser) -> None:
+    parser.add_argument("old", metavar="A", help="a diagram or a log")
+    parser.add_argument("new", metavar="B", nargs="?", help="another one; default: A in another variant")
+    words = "the variant of A, and that of B; 'none' is the diagram without one"
+    parser.add_argument("--variants", nargs=2, metavar=("X", "Y"), help=words)
+    parser.add_argument("--json", action="store_true", help="print one JSON object instead of the text")
     _own_block_option(parser)
 
 

@@ -66,6 +66,11 @@ class StatusLine:
             self.shown = False
 
 
+def shows_colours(stream: TextIO) -> bool:
+    """Return whether a text may have colours there: on a terminal, unless NO_COLOR is set."""
+    return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+
 def _open_terminal(stream: TextIO) -> int | None:
     """Open the terminal behind a stream again for writing without waiting; None if this is impossible."""
     try:

@@ -14,7 +14,7 @@ from quadvis.cli.options import parser
 from quadvis.errors import QuadvisError
 
 HELP = "see 'quadvis --help'"
-COMMANDS = "run, replay, sweep, check, list, describe, analyse, draw, program, plot, schema, cache, new"
+COMMANDS = "run, replay, sweep, check, list, describe, analyse, draw, program, diff, plot, schema, cache, new"
 
 
 @pytest.mark.parametrize(
@@ -119,5 +119,5 @@ def test_every_option_is_known_to_the_sentences() -> None:
         assert declared - {"-h", "--help"} == set(command.options)
         plain = [action for action in command._actions if not action.option_strings]
         assert plain == command.places
-        assert all(action.nargs in (None, 0) for action in command._actions)
+        assert all(action.nargs in (None, 0, 2, "?") for action in command._actions)
         assert not any(isinstance(action, argparse._SubParsersAction) for action in plain)

@@ -1,0 +1,1 @@
+"""The difference of two diagrams or of two runs, in words."""
