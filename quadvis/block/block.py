@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, TypeVar
 
+import numpy as np
+
 from quadvis.block.declare import Declared, Derived, In, Out, Param, ParameterError, Random, Safe, State, Work
 from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.machine.inputs import file_digest, read_once
@@ -124,10 +126,14 @@ class Block:
         of a method then stands for all inputs, in the order of ``ports``.
         """
         names = cls.ports_from()
-        if not names or cls.made_for is not None:
+        if not names:
             return cls
         declared = cls.interface.params
         given = {name: declared[name].given(parameters.get(name)) for name in names}
+        if cls.made_for is not None:
+            same = all(np.array_equal(given[name], cls.made_for[name]) for name in names)
+            base: type[Block] = cls.__mro__[1]
+            return cls if same else base.with_ports(parameters)
         try:
             ports = getattr(cls, PORTS)(**given)
         except QuadvisError:

@@ -173,6 +173,17 @@ class Recording:
         """Return the times (s) of a signal's N rows."""
         return self.stamps(name) / 1e9
 
+    def port(self, name: str) -> RecordedPort:
+        """Return the type, shape and unit of a signal, or of the elements of it that an index names."""
+        _, _, port, index = self._find(name)
+        if not index:
+            return port
+        units = port.unit.split(" ")
+        each = np.array(units if len(units) > 1 else units * port.size, object).reshape(port.shape)[index]
+        chosen = [each] if isinstance(each, str) else each.ravel().tolist()
+        unit = chosen[0] if len(set(chosen)) == 1 else " ".join(chosen)
+        return port._replace(shape=np.shape(each), unit=unit)
+
     def rate(self, name: str) -> str:
         """Return the name of the rate of a signal's block; "" if it is not known."""
         return self.blocks[self._find(name)[0]].rate

@@ -11,6 +11,8 @@ import pytest
 
 from quadvis.block import Frame
 from quadvis.library.catalogue import Catalogue
+from quadvis.output.log import LogWriter
+from quadvis.output.recording import RecordedBlock, RecordedPort
 from quadvis.testing import drive
 from quadvis.testing.conformance import CHECKS, Subject
 from quadvis_blocks.vision.rendered_camera import RenderedCamera
@@ -72,6 +74,8 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
     if {"file", "folder"} & {*required}:  # few blocks read or write files, and all tests come by here
         folder = request.getfixturevalue("tmp_path")
         values |= {"folder": str(_pictures(folder)), "file": str(_video(folder / "video.avi"))}
+    if name == "sources.recording":
+        values |= {"file": str(_log(folder / "run.mcap")), "signal": "eyes.centres"}
     given = {key: values[key] for key in required}
     if "latency" in block.interface.params:
         given["latency"] = 0.15
@@ -99,6 +103,14 @@ def _video(path: Path) -> Path:
     for number in range(5):
         writer.write(np.full((48, 64, 3), 40 * number, np.uint8))
     writer.release()
+    return path
+
+
+def _log(path: Path) -> Path:
+    block = RecordedBlock("/eyes", (RecordedPort("centres", shape=(4, 2), unit="px"),))
+    with LogWriter(path, [block], {}) as writer:
+        for number in range(5):
+            writer.write(0, number * 10**8, np.full(8, 1.5 * number).tobytes())
     return path
 
 
