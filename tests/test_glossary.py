@@ -17,6 +17,7 @@ ROOMS = sorted(path.parent.name for path in (ROOT / "quadvis").glob("*/__init__.
 TWICE = {
     "Constant": "the block sources.constant; in a graph, the value of an input without a wire",
     "Diagram": "the checked diagram; the same with methods that run it, which quadvis.load returns",
+    "Recording": "the block sources.recording; recorded signals in memory",
     "Table": "the block sources.table; the table of a sweep, which quadvis.sweep returns",
 }
 # Rooms whose tables follow the order of the steps, and name further modules in a second column.

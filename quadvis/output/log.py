@@ -4,7 +4,8 @@ Messages are `ros2msg`/CDR, so PlotJuggler, Foxglove, rosbags, Rerun and `ros2 b
 A block's outputs lie side by side in the engine's memory as little-endian 8-byte slots, which is what CDR
 wants after its four header bytes: a row is that header and a slice of memory.
 
-The file begins with the resolved diagram (attachment `diagram.yaml`) and the facts of the run (metadata
+The file begins with the resolved diagram (attachment `diagram.yaml`), the SHA-256 of files that blocks read
+while they run (attachment `files.json`, if there are any), and the facts of the run (metadata
 record `quadvis`). It ends with the outcome (record `summary`) and the indexes. The log of a killed run lacks
 this end; `log_reader` does not need it.
 """
@@ -35,7 +36,7 @@ AROUND = message_size(0) + 16  # bytes that the format puts around a row and int
 LARGEST = 1 << 20  # bytes of a chunk: readers hold several in memory
 PATIENCE = 2.0  # s that a run waits for a slow disk in total, before rows are left out
 FORMAT = "1"
-DIAGRAM, METADATA, SUMMARY = "diagram.yaml", "quadvis", "summary"
+DIAGRAM, FILES, METADATA, SUMMARY = "diagram.yaml", "files.json", "quadvis", "summary"
 CHANGES = "changes"  # the name of the records of parameters that were tuned
 HIDDEN = "hidden"  # key of a channel that is no signal of the diagram: it serves to replay the run
 PORTS = "ports"  # key of the facts of a run: the sources of the ports of parts, as JSON
@@ -57,6 +58,7 @@ class LogWriter:
     ) -> None:
         """Begin a file in place of any older one; `metadata["diagram"]` is the text of the resolved diagram.
 
+        `metadata["files"]`, if it is there, has the SHA-256 of files by name, as JSON.
         RunError if this beginning cannot be written.
         """
         definitions = [message_definition(block) for block in blocks]
@@ -72,6 +74,9 @@ class LogWriter:
         facts = dict(metadata)
         self._file = McapWriter(self._sink, "ros2", f"quadvis {facts.get('quadvis', '')}".strip())
         self._file.add_attachment(DIAGRAM, "application/yaml", facts.pop("diagram", "").encode())
+        files = facts.pop("files", "")
+        if files:
+            self._file.add_attachment(FILES, "application/json", files.encode())
         self._file.add_metadata(METADATA, {"format": FORMAT, **facts})
         names = _message_names(block.path for block in blocks)
         self._ids = list(map(self._describe, blocks, names, definitions))

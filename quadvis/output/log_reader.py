@@ -11,7 +11,7 @@ from pathlib import Path
 from quadvis.errors import QuadvisError, quoted
 from quadvis.machine.inputs import read_input
 from quadvis.output import mcap_records as mcap
-from quadvis.output.log import CHANGES, DIAGRAM, HIDDEN, METADATA, SUMMARY, ports_of
+from quadvis.output.log import CHANGES, DIAGRAM, FILES, HIDDEN, METADATA, SUMMARY, ports_of
 from quadvis.output.mcap_messages import CDR
 from quadvis.output.recording import SLOT_TYPES, RecordedBlock, RecordedPort, Recording
 
@@ -27,7 +27,8 @@ class Log(Recording):
     `diagram` is the resolved diagram's text, `metadata` the facts of the run, `summary` its outcome.
     `complete` is False if the run was killed, if the file is damaged, or if the diagram is not the one that
     ran; then `damage` says so in a sentence. `end` is the time (s) of the last row, None without rows.
-    `hidden` are the rows that only a replay needs, `changes` the facts of parameters that were tuned.
+    `hidden` are the rows that only a replay needs, `changes` the facts of parameters that were tuned, `files`
+    the SHA-256 of the files that blocks read while they ran, by name.
     """
 
     def __init__(self, path: Path) -> None:
@@ -39,6 +40,7 @@ class Log(Recording):
         self.summary: dict[str, str] = {}
         self.hidden = Recording()
         self.changes: list[dict[str, str]] = []
+        self.files: dict[str, str] = {}
         self.damage = ""
         self.end: float | None = None
         self._ids: dict[int, tuple[Recording, int]] = {}  # the recording of a channel, and the block in it
@@ -67,6 +69,8 @@ class Log(Recording):
         elif isinstance(record, mcap.AttachmentRecord):
             if record.name == DIAGRAM:
                 self.diagram = record.data[:LONGEST_DIAGRAM].decode(errors="replace")
+            elif record.name == FILES:
+                self.files = _texts(record.data)
         elif record.name == METADATA:
             self.metadata = record.entries
             self.ports = ports_of(record.entries)
@@ -127,6 +131,15 @@ def log_facts(path: str | Path) -> dict[str, str]:
         record for record in records if isinstance(record, mcap.MetadataRecord) and record.name == METADATA
     )
     return next((record.entries for record in facts), {})
+
+
+def _texts(data: bytes) -> dict[str, str]:
+    """Return texts by name from JSON; {} if they are damaged."""
+    try:
+        found = json.loads(data)
+    except (ValueError, RecursionError):
+        return {}
+    return {str(name): str(text) for name, text in found.items()} if isinstance(found, dict) else {}
 
 
 def _block(path: str, described: Mapping[str, str]) -> RecordedBlock:

@@ -23,6 +23,7 @@ from quadvis.errors import Faults, Place, QuadvisError, known, quoted, sentence,
 from quadvis.graph.devices import refuse_devices
 from quadvis.graph.graph import Node
 from quadvis.graph.names import read_name
+from quadvis.run.played_files import files_text, played_files
 from quadvis.run.row_tap import RowTap, Taker
 from quadvis.run.rows import inputs_of, signals_of
 from quadvis.run.session import metadata
@@ -71,7 +72,8 @@ class LiveRun:
         from quadvis.output.log import LogWriter  # only a run with a log waits for this import
 
         logged = [*signals_of(self.diagram), *inputs_of(self.diagram, [self.diagram.graph])]
-        writer = LogWriter(path, [each.block for each in logged], metadata(self.diagram))
+        about = metadata(self.diagram) | {"files": files_text(played_files(self.diagram))}
+        writer = LogWriter(path, [each.block for each in logged], about)
         for index, each in enumerate(logged):
             taker = Taker(partial(writer.write, index), partial(writer.write_rows, index))
             self._engine.attach(RowTap(each.node.path, each.every, self._engine.period, [taker]))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from quadvis.block import NO_FRAME, Block
 from quadvis.engine.tuning import Change
+from quadvis.errors import QuadvisError, quoted
 from quadvis.graph.graph import Graph, Node
 from quadvis.output.recording import Slots
 from quadvis.run.outside import outside
@@ -24,9 +25,15 @@ Whole = NDArray[np.int64]
 def with_playback(graph: Graph, rows: Mapping[str, Slots]) -> Graph:
     """Return a graph in which the blocks that reach outside do nothing but give rows, by their path.
 
-    Each gives its rows (N, slots) in their order, one at each of its ticks.
+    Each gives its rows (N, slots) in their order, one at each of its ticks. QuadvisError if one of them has
+    outputs between its ticks as well.
     """
-    replaced = {node.path: _played(node, rows.get(node.path)) for node in outside(graph)}
+    replaced = {}
+    for node in outside(graph):
+        if node.task.continuous and (node.block.numeric or node.block.interface.continuous):
+            problem = f"block {quoted(node.path)} reaches outside and moves between two ticks"
+            raise QuadvisError(f"{problem}, which no log holds; give it a rate, or say numeric=False")
+        replaced[node.path] = _played(node, rows.get(node.path))
     nodes = [replace(node, block=replaced.get(node.path, node.block)) for node in graph.nodes]
     return replace(graph, nodes=nodes)
 

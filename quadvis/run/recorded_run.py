@@ -77,7 +77,8 @@ class RecordedPart:
         if not has(self._log.hidden, topic):
             problem = f"the log '{self._log.path}' does not say which ticks the real-time run left out"
             raise QuadvisError(f"{problem}: it is of an earlier quadvis; {AGAIN}")
-        return self._log.hidden.arrays(topic)[1].reshape(-1, 2)
+        found = self._log.hidden.arrays(topic)[1].reshape(-1, 2)
+        return found[np.argsort(found[:, 0], kind="stable")]
 
     @cached_property
     def played(self) -> frozenset[str]:

@@ -18,6 +18,7 @@ from quadvis.output.log_reader import Log, read_log
 from quadvis.run.loops import REAL_TIME, Progress, Takers, advance, paced_taps
 from quadvis.run.outside import outside
 from quadvis.run.playback import RecordedClock, with_playback
+from quadvis.run.played_files import check_played_files
 from quadvis.run.recorded_run import RecordedPart, RecordedRun
 from quadvis.run.row_comparison import FoundDifference, Lack, RowComparison
 from quadvis.run.rows import signals_of
@@ -85,6 +86,7 @@ def replay(
     if not log.diagram:
         raise QuadvisError(f"the log '{log.path}' holds no diagram, so nothing can be run again")
     diagram = _loaded(log, folder, own_blocks, settings)
+    check_played_files(diagram, log.files)
     run = RecordedRun(log, diagram)
     comparisons = [
         RowComparison(log, part, each, run.ticks)

@@ -22,6 +22,7 @@ from quadvis.native.choice import AUTO, Announce
 from quadvis.output.kept import ALL, RowJudge, RunSignals
 from quadvis.output.recording import RecordedBlock
 from quadvis.run.loops import SIMULATED, Paced, Progress, RunLoop, Simulated, Taken, Takers
+from quadvis.run.played_files import files_text, played_files
 from quadvis.run.result import Result
 from quadvis.run.row_tap import RowTap, Taker, stamps_of
 from quadvis.run.rows import inputs_of, left_out, signals_of
@@ -87,7 +88,11 @@ def recorded(
         writer = None
         if log is not None:
             blocks = [*(each.block for each in logged), *map(left_out, loop.computers)]
-            about = metadata(diagram, loop.clock) | dict(facts or {})
+            about = (
+                metadata(diagram, loop.clock)
+                | {"files": files_text(played_files(diagram))}
+                | dict(facts or {})
+            )
             writer = stack.enter_context(_writer(log, blocks, about))
         taken = []
         for index, each in enumerate(logged):

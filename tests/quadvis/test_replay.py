@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -276,6 +278,39 @@ def test_the_bits_do_not_depend_on_how_fast_it_goes(
     assert len(seen) == 1
 
 
+def test_recorded_pictures_must_be_what_they_were(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "diagrams/recordings/hand_held", "film/pictures")
+    Path("film/film.yaml").write_text(
+        """\
+quadvis: 1
+name: film
+rates: {film: 10 Hz}
+stop_time: 0.2 s
+seed: 1
+blocks:
+  film: {block: vision.image_folder, rate: film, with: {folder: pictures}}
+"""
+    )
+    quadvis.load("film/film.yaml").run(log="film.mcap")
+    names = sorted(f"pictures/{path.name}" for path in Path("film/pictures").iterdir())
+    assert sorted(read_log("film.mcap").files) == names
+    shutil.copytree("film", "moved")  # with other times of change
+    os.utime(f"moved/{names[0]}", (1, 1))
+    assert replay("film.mcap", folder="moved").same
+    first, second, third = (Path("moved") / name for name in names[:3])
+    third.with_stem("x").write_bytes(first.read_bytes())
+    first.write_bytes(second.read_bytes())
+    second.unlink()
+    words = [
+        f"file '{names[0]}' is not what it was: its SHA-256 differs",
+        f"there is no file '{names[1]}'",
+        f"file 'pictures/x{third.suffix}' is new",
+    ]
+    with pytest.raises(QuadvisError) as caught:
+        replay("film.mcap", folder="moved")
+    assert str(caught.value) == f"the run cannot be repeated: {'; '.join(words)}"
+
+
 def test_a_block_that_only_writes_does_not(capsys: pytest.CaptureFixture[str]) -> None:
     pictures = ROOT / "diagrams/recordings/hand_held"
     Path("film.yaml").write_text(
@@ -359,6 +394,20 @@ log: {signals: [smooth]}
     quadvis.load("film.yaml").run(log="film.mcap")
     found = replay("film.mcap")
     assert found.same and set(found.played) == {"camera", "light"}
+
+
+def test_what_no_log_holds_between_ticks_is_refused() -> None:
+    block = Path("blocks/own/outside.py")
+    text = block.read_text().replace(", numeric=False", "").replace("def read(self)", "def open(self)")
+    block.write_text(text)
+    Path("flight.yaml").write_text(
+        TEXT.replace("outside, rate: fast", "outside, rate: continuous")
+        .replace("seed: 7", "seed: 7\nsolver: {method: ode4, step: 1/60 s}")
+        .replace("outside.y}", "{from: outside.y, across: sample}}")
+    )
+    flown()
+    with pytest.raises(QuadvisError, match="block 'outside' reaches outside and moves between two ticks"):
+        replay("run.mcap")
 
 
 def test_a_log_without_rows_or_diagram_is_refused() -> None:
