@@ -135,8 +135,17 @@ class DiffReport:
             yield f"  and {len(signals.different) - SHOWN} more; --json lists all"
         for name, what in signals.unlike:
             yield f"  {self._painted('~', YELLOW)} {name}: {what}"
-        yield from (self._painted(f"  - {name}", RED) for name in signals.only_old)
-        yield from (self._painted(f"  + {name}", GREEN) for name in signals.only_new)
+        for names, sign, colour in ((signals.only_old, "-", RED), (signals.only_new, "+", GREEN)):
+            shown = [name for name in names if name.rpartition(".")[0] not in self._single]
+            yield from (self._painted(f"  {sign} {name}", colour) for name in shown)
+            if len(shown) < len(names):
+                what = f"{counted(len(names) - len(shown), 'signal')} of the blocks above"
+                yield self._painted(f"  {sign} {what}", colour)
+
+    @property
+    def _single(self) -> set[str]:
+        """The blocks that only one side has."""
+        return {block.path for block in self._found.diagram.blocks if block.kind != CHANGED}
 
     def _painted(self, text: str, colour: str) -> str:
         return f"{colour}{text}{PLAIN}" if self._colour and text else text

@@ -58,7 +58,8 @@ class RunLoop(Protocol):
     """The ticks of a run, ready to begin.
 
     ``clock`` is ``SIMULATED`` or ``REAL_TIME``. ``graphs`` are those that run side by side. ``computers`` are
-    those that may leave ticks out.
+    those that may leave ticks out. ``early``
+    says why it ends before the stop time; "" if it does not.
     """
 
     @property
@@ -73,6 +74,10 @@ class RunLoop(Protocol):
     def computers(self) -> Sequence[str]:
         """Return them."""
 
+    @property
+    def early(self) -> str:
+        """Return it."""
+
     def run(self, takers: Takers, stack: ExitStack) -> tuple[Choice, Flight | None]:
         """Run to the end; what is opened is closed with the stack."""
 
@@ -80,7 +85,7 @@ class RunLoop(Protocol):
 class Simulated:
     """All ticks at once."""
 
-    clock = SIMULATED
+    clock, early = SIMULATED, ""
     computers: Sequence[str] = ()
 
     def __init__(self, diagram: Diagram, engine: str, announce: Announce | None) -> None:
@@ -104,7 +109,7 @@ class Simulated:
 class Paced:
     """Each tick at its time, each computer in a process of its own; QuadvisError if that cannot be."""
 
-    clock = REAL_TIME
+    clock, early = REAL_TIME, ""
 
     def __init__(self, diagram: Diagram, engine: str, announce: Announce | None, wishes: RealTime) -> None:
         parts = live_parts(diagram.graph)

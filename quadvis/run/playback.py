@@ -33,13 +33,12 @@ def with_playback(graph: Graph, rows: Mapping[str, Slots]) -> Graph:
         if node.task.continuous and (node.block.numeric or node.block.interface.continuous):
             problem = f"block {quoted(node.path)} reaches outside and moves between two ticks"
             raise QuadvisError(f"{problem}, which no log holds; give it a rate, or say numeric=False")
-        replaced[node.path] = _played(node, rows.get(node.path))
-    nodes = [replace(node, block=replaced.get(node.path, node.block)) for node in graph.nodes]
-    return replace(graph, nodes=nodes)
+        replaced[node.path] = replace(node, block=_played(node, rows.get(node.path)), inputs={})
+    return replace(graph, nodes=[replaced.get(node.path, node) for node in graph.nodes])
 
 
 class _Playback(Block, numeric=False):
-    """In place of a block that reaches outside: it has the same ports, and opens nothing."""
+    """In place of a block that reaches outside: it has the same outputs, no inputs, and opens nothing."""
 
     _rows: ClassVar[Callable[[], Iterator[Any]]] = staticmethod(
         lambda: iter(())
@@ -53,7 +52,7 @@ class _Playback(Block, numeric=False):
 def _played(node: Node, rows: Slots | None) -> Block:
     """Return the block that stands in for that of a node."""
     block, interface = node.block, node.block.interface
-    members: dict[str, Any] = {**interface.inputs, **interface.outputs, "__module__": __name__}
+    members: dict[str, Any] = {**interface.outputs, "__module__": __name__}
     if interface.outputs:
         members["_rows"] = staticmethod(lambda: _outputs(node, rows))
         members["output"] = lambda self: next(self._next)

@@ -60,6 +60,11 @@ class RecordedRun:
         last = _tick_of(max(ends), self._diagram.graph.tick) + 1
         return min(part.known_to(last) for part in self.parts)
 
+    @property
+    def end(self) -> float:
+        """The time of its last tick (s)."""
+        return float((self.ticks - 1) * self._diagram.graph.tick)
+
 
 class RecordedPart:
     """What a log holds of one computer; ``computer`` is "" in a diagram without computers.

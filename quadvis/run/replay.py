@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from quadvis.diagram.load import load_text
 from quadvis.engine.engine import Engine
 from quadvis.engine.tuning import Change
-from quadvis.errors import DiagramError, QuadvisError
+from quadvis.errors import DiagramError, QuadvisError, RunError
 from quadvis.errors.caller import as_given
 from quadvis.machine.files import reading
 from quadvis.native.choice import AUTO, Announce, Choice, choose, use
@@ -113,7 +113,7 @@ def replay(
         whole=run.whole,
         ticks=run.ticks * len(run.parts) - left_out,
         left_out=left_out,
-        time=float((run.ticks - 1) * diagram.graph.tick),
+        time=run.end,
         played=tuple(node.path for node in away if node.block.interface.outputs),
         idle=tuple(node.path for node in away if not node.block.interface.outputs),
         signals=sum(len(comparison.ports) for comparison in comparisons),
@@ -149,6 +149,7 @@ class _Repeated:
     def __init__(self, run: RecordedRun, diagram: Diagram, engine: str, announce: Announce | None) -> None:
         self.clock, self._run, self._diagram = run.clock, run, diagram
         self.graphs = [part.graph for part in run.parts]
+        self.early = "" if run.whole else "the log that was replayed goes no further"
         self.computers = [part.computer for part in run.parts] if run.clock == REAL_TIME else []
         self._engines = [self._engine(part) for part in run.parts]
         self._choice, *_ = choices = [choose(made, run.ticks, engine, announce) for made in self._engines]
@@ -177,7 +178,11 @@ class _Repeated:
                 takers.left_out(part.computer, part.left_out)
             engine.tuning.noted = takers.changed
             stack.enter_context(engine)
-        advance(self._engines, self._run.ticks, takers.tend)
+        try:
+            advance(self._engines, self._run.ticks, takers.tend)
+        except RunError as error:
+            if self._run.whole or error.time != self._run.end:
+                raise  # else it is how the recorded run has ended, too
         for each in paced:
             each.end(self._run.ticks)
         return self._choice, None

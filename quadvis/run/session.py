@@ -122,7 +122,7 @@ def recorded(
             row.judge.flush()
         outcome = judging.outcome()
         if writer:
-            writer.close(_closing(outcome, flight))
+            writer.close({"stopped": loop.early} if loop.early else _closing(outcome, flight))
             signals.written(writer.path, writer.loss)
     wall, cpu = time.perf_counter() - wall, _processor_time() - cpu
     lost = writer.loss if writer else ""

@@ -15,7 +15,7 @@ import pytest
 import quadvis
 from quadvis import Log, read_log, replay
 from quadvis.cli import main
-from quadvis.errors import DiagramError, QuadvisError
+from quadvis.errors import DiagramError, QuadvisError, RunError
 from tests.quadvis.relogged import Edit, Rows, flipped, rewritten, without
 
 ROOT = Path(__file__).parents[2]
@@ -151,11 +151,13 @@ def test_a_log_that_is_cut_is_replayed_as_far_as_it_goes(capsys: pytest.CaptureF
         return stamps[:count], slots[:count]
 
     rewritten(flown(), cut, summary={"stopped": "it was told to end"})
-    assert main(["replay", "new.mcap"]) == 0
+    assert main(["replay", "new.mcap", "-o", "again.mcap"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[1] == "  the log does not have the whole run: it was told to end"
     end = "up to t = 1.36666667 s, as far as the log goes"
-    assert lines[-1] == f"replayed 42 ticks, {end}: the same to the bit"
+    assert lines[-2] == f"replayed 42 ticks, {end}: the same to the bit"
+    again = replay("again.mcap")
+    assert again.same and not again.whole and again.ticks == 42
 
 
 @pytest.mark.parametrize(
@@ -374,6 +376,27 @@ class Light(Block, numeric=False):
 '''
 
 
+FAILING = '''
+"""A block that fails."""
+
+from quadvis.block import Block, Out, Param
+
+
+class Failing(Block):
+    """Fails when it is updated after an instant."""
+
+    begin = Param(1.0, unit="s")
+    y = Out()
+
+    def output(self):
+        return self.begin
+
+    def update(self, time):
+        if time > self.begin:
+            raise ValueError("no such luck")
+'''
+
+
 def test_a_block_that_takes_frames_from_outside_counts_as_outside() -> None:
     Path("blocks/own/camera.py").write_text(CAMERA)
     Path("blocks/own/light.py").write_text(LIGHT)
@@ -394,6 +417,18 @@ log: {signals: [smooth]}
     quadvis.load("film.yaml").run(log="film.mcap")
     found = replay("film.mcap")
     assert found.same and set(found.played) == {"camera", "light"}
+
+
+def test_a_run_that_failed_is_the_same_up_to_its_end() -> None:
+    Path("blocks/own/failing.py").write_text(FAILING)
+    Path("flight.yaml").write_text(TEXT.replace("log:", "  failing: {block: own.failing, rate: fast}\nlog:"))
+    with pytest.raises(RunError, match="no such luck"):
+        flown()
+    found = replay("run.mcap", output="new.mcap")
+    assert found.same and not found.whole and found.time == pytest.approx(1 + 1 / 30)
+    assert read_log("new.mcap").complete
+    with pytest.raises(RunError, match="no such luck"):
+        replay("run.mcap", settings=["failing.begin=0.5 s"])
 
 
 def test_what_no_log_holds_between_ticks_is_refused() -> None:
