@@ -115,3 +115,21 @@ def test_the_program_is_printed(capsys: pytest.CaptureFixture[str], tmp_path: Pa
     assert lines[0].startswith("live: base tick 100 ms, ode4, single tasking, 3 blocks")
     assert any(line.split() == ["output", "1", "law", "ramp.y", "->", "y"] for line in lines)
     assert any(line.strip().startswith("law.factor") for line in lines)
+
+
+def test_a_run_by_hand_writes_the_log_of_a_whole_run(tmp_path: Path) -> None:
+    whole = load_text(TEXT).run()
+    with load_text(TEXT).start(log=tmp_path / "run.mcap") as run:
+        run.advance("0.5 s")
+        with pytest.raises(QuadvisError, match="a run that writes a log cannot go back"):
+            run.restore(run.snapshot())
+        run.advance("0.6 s")
+    log = quadvis.read_log(tmp_path / "run.mcap")
+    assert log.complete and "stopped" not in log.summary
+    assert all(log[name].tobytes() == whole[name].tobytes() for name in whole)
+
+
+def test_the_log_of_a_run_that_was_ended_early_says_so(tmp_path: Path) -> None:
+    with load_text(TEXT).start(log=tmp_path / "run.mcap") as run:
+        run.advance("0.5 s")
+    assert quadvis.read_log(tmp_path / "run.mcap").summary == {"stopped": "it was ended at t = 0.5 s"}
