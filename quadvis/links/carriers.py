@@ -39,7 +39,7 @@ class Carrier(Protocol):
         """Release the end."""
 
 
-class Line(Protocol):
+class ByteLine(Protocol):
     """Something that takes and gives bytes, and never waits."""
 
     def write(self, data: bytes) -> bool:
@@ -87,7 +87,7 @@ class MemoryCarrier:
 class FrameCarrier:
     """Frames on a line of bytes."""
 
-    def __init__(self, link: Link, line: Line, notes: tuple[str, ...] = ()) -> None:
+    def __init__(self, link: Link, line: ByteLine, notes: tuple[str, ...] = ()) -> None:
         self._message, self._line, self.notes = link.message, line, notes
         self._decoder = Decoder(link.message)
         self._sequence = 0
@@ -139,5 +139,6 @@ def _opened(link: Link, resource: Any, *, listens: bool) -> Carrier:
     if link.via == SERIAL:
         line = SerialLine(resource, link.baud)
         slow = f"'{resource}' hands bytes on when it likes: its driver knows no low latency"
-        return FrameCarrier(link, line, () if line.low_latency else (slow,))
+        is_cable = not link.ports[listens]
+        return FrameCarrier(link, line, () if line.low_latency or is_cable else (slow,))
     return FrameCarrier(link, UdpSocket(resource, listens=listens))

@@ -15,7 +15,7 @@ from quadvis.graph.graph import Graph
 from quadvis.native.choice import Announce
 from quadvis.realtime.cables import Cable, Ends
 from quadvis.realtime.guard import Guard
-from quadvis.realtime.guardian import mailboxes, words_for
+from quadvis.realtime.guardian import outboxes, words_for
 from quadvis.realtime.heartbeat import Patience
 from quadvis.realtime.outlet import OutputPort
 from quadvis.realtime.schedule import NANOSECONDS
@@ -23,7 +23,7 @@ from quadvis.realtime.schedule import NANOSECONDS
 
 @dataclass(frozen=True)
 class PortBindings:
-    """What the devices of an application need: the guardian's words, the mailbox of each output, by path.
+    """What the devices of an application need: the guardian's words, the outbox of each output, by path.
 
     ``ports`` are the paths of the ptys of those inputs that are at the end of a cable.
     """
@@ -34,7 +34,7 @@ class PortBindings:
 
     def bind(self, engine: Engine) -> None:
         """Bind the devices of an engine, before it opens them."""
-        boxes = mailboxes(self.words) if self.boxes else []
+        boxes = outboxes(self.words) if self.boxes else []
         for path, device in devices(engine.graph):
             block = engine.bound(path)
             if isinstance(device, Output):

@@ -37,7 +37,7 @@ LOST = Alarm("the guardian of the outputs has been lost")
 class Guard:
     """Starts the guardian, tells it whom to watch and what to send, and hears its alarms.
 
-    ``words`` (a RawArray of `words_for` words) hold the mailboxes of `quadvis.realtime.guardian.mailboxes`,
+    ``words`` (a RawArray of `words_for` words) hold the outboxes of `quadvis.realtime.guardian.outboxes`,
     in the order of ``ports``: whoever gives commands puts frames there.
     """
 

@@ -1,7 +1,7 @@
 """The guardian: the process that owns the output ports of a real-time run.
 
 It knows no block, only a table of ports and frames. It sends the initial frames as soon as the ports are
-open, then the newest frame that each mailbox holds. Once something ends (an application that dies or hangs,
+open, then the newest frame that each outbox holds. Once something ends (an application that dies or hangs,
 the request to end, an order of the supervisor, the supervisor's death, a port that is lost) it sends the safe
 frames and nothing else, until the supervisor has ended everything, or until nobody lives whom it works for.
 """
@@ -23,8 +23,8 @@ from quadvis.machine.interrupts import leave_to_parent
 from quadvis.machine.serial_port import PortError
 from quadvis.realtime.heartbeat import Heartbeat, Patience, Sign
 from quadvis.realtime.lives import Lives
-from quadvis.realtime.mailbox import Mailbox
 from quadvis.realtime.options import HIGHEST, RealTime
+from quadvis.realtime.outbox import Outbox
 from quadvis.realtime.outlet import Outlet, OutputPort
 from quadvis.realtime.schedule import NANOSECONDS
 from quadvis.realtime.system import Grants, ask_all
@@ -37,7 +37,7 @@ LAST = NANOSECONDS  # ns that these may take
 
 @dataclass(frozen=True)
 class GuardianSetup:
-    """What the guardian needs: ``words`` has a mailbox for each of the ``ports``, in their order.
+    """What the guardian needs: ``words`` has an outbox for each of the ``ports``, in their order.
 
     ``supervisor`` is the process that started it, ``on_host_loss`` what its death means, ``priority`` that of
     the loops (0: none).
@@ -81,21 +81,21 @@ class Alarm:
     block: str = ""
 
 
-def mailboxes(words: Any) -> list[Mailbox]:
-    """Return the mailboxes that words hold."""
+def outboxes(words: Any) -> list[Outbox]:
+    """Return the outboxes that words hold."""
     view = memoryview(words).cast("B").cast("q")
-    starts = range(0, len(view) - len(view) % Mailbox.SIZE, Mailbox.SIZE)
-    return [Mailbox(view[start : start + Mailbox.SIZE]) for start in starts]
+    starts = range(0, len(view) - len(view) % Outbox.SIZE, Outbox.SIZE)
+    return [Outbox(view[start : start + Outbox.SIZE]) for start in starts]
 
 
 def looked(words: Any) -> Any:
-    """Return the word after the mailboxes: when the guardian last looked at the loops (ns)."""
+    """Return the word after the outboxes: when the guardian last looked at the loops (ns)."""
     return memoryview(words).cast("B").cast("q")[-1:]
 
 
 def words_for(ports: int) -> int:
     """Return the number of words of the guardian of so many ports."""
-    return ports * Mailbox.SIZE + 1
+    return ports * Outbox.SIZE + 1
 
 
 class Guardian:
@@ -103,7 +103,7 @@ class Guardian:
 
     def __init__(self, setup: GuardianSetup) -> None:
         self._setup, self._link = setup, setup.link
-        boxes = mailboxes(setup.words)
+        boxes = outboxes(setup.words)
         self._outlets = [Outlet(port, box.take) for port, box in zip(setup.ports, boxes, strict=True)]
         self._looked = looked(setup.words)
         self._hearts = [Heartbeat(patience, time.monotonic_ns) for patience in setup.patiences]

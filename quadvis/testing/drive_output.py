@@ -18,7 +18,7 @@ from quadvis.block import Output, parameter_sizes
 from quadvis.block.device import checked_frame
 from quadvis.diagram.sections.on_host_loss import SAFE
 from quadvis.realtime.guard import Guard
-from quadvis.realtime.guardian import mailboxes, words_for
+from quadvis.realtime.guardian import outboxes, words_for
 from quadvis.realtime.outlet import OutputPort
 from quadvis.realtime.schedule import NANOSECONDS
 from quadvis.testing.drive import series_of
@@ -55,7 +55,7 @@ def drive_output(block: Output, **inputs: Any) -> DrivenOutput:
             guard.start(lambda _: None)
             guard.watch(sender.pid)
             initial = reader.whole(port.initial)
-            (box,) = mailboxes(words)
+            (box,) = outboxes(words)
             read = []
             for frame in frames:
                 box.put(frame)

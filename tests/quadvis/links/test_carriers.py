@@ -6,6 +6,7 @@ import fcntl
 import os
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -124,8 +125,10 @@ def test_a_port_that_does_not_exist_is_refused_in_a_sentence() -> None:
 
 
 def test_a_pty_knows_no_low_latency_and_the_receiver_says_so(ends: tuple[int, int, str]) -> None:
-    receiver = open_receiver(LINK, ends[2])
+    receiver = open_receiver(replace(LINK, ports=("", ends[2])), ends[2])
     assert len(receiver.notes) == 1 and "low latency" in receiver.notes[0]
+    receiver.close()
+    assert open_receiver(LINK, ends[2]).notes == ()  # of a cable nobody expects it
     receiver.close()
 
 

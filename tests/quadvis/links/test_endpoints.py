@@ -59,8 +59,9 @@ def in_step(graph: Graph, source: Task, reader: Task, ticks: int, read: Read) ->
         sending, reading = engines
         found: list[Any] = []
         reading.observe(reader.name, lambda tick: found.append(read(reading)))
-        for tick in range(ticks):
-            while sending.tick * sending.period <= (tick + 1) * reading.period:
+        while len(found) < ticks:
+            ahead = (reading.tick + 1) * reading.period + max(source.period, reader.period)
+            while sending.tick * sending.period <= ahead:
                 sending.run(1)
             reading.run(1)
     return found

@@ -36,7 +36,8 @@ def test_stuffed_bytes_have_no_zeros_and_come_back(data: bytes) -> None:
     ("data", "coded"),
     [
         ("00", "01 01"), ("00 00", "01 01 01"), ("00 11 00", "01 02 11 01"),
-        ("11 22 00 33", "03 11 22 02 33"), ("11 22 33 44", "05 11 22 33 44"), ("11 00 00 00", "02 11 01 01 01"),
+        ("11 22 00 33", "03 11 22 02 33"), ("11 22 33 44", "05 11 22 33 44"),
+        ("11 00 00 00", "02 11 01 01 01"),
     ],
 )  # fmt: skip
 def test_the_published_examples(data: str, coded: str) -> None:

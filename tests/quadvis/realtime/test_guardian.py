@@ -16,7 +16,7 @@ import pytest
 from quadvis.diagram.sections.on_host_loss import CONTINUE, SAFE, STOP
 from quadvis.machine.serial_port import Line
 from quadvis.realtime import control
-from quadvis.realtime.guardian import Alarm, Guardian, GuardianSetup, Order, Watch, mailboxes, words_for
+from quadvis.realtime.guardian import Alarm, Guardian, GuardianSetup, Order, Watch, outboxes, words_for
 from quadvis.realtime.heartbeat import Patience
 from quadvis.realtime.outlet import OutputPort
 from tests.processes import wait_for
@@ -47,7 +47,7 @@ class Rig:
             tuple(ports), self.words, (patience,), theirs, self.supervisor.pid, on_host_loss, 0
         )
         self.guardian = Guardian(setup)
-        self.boxes = mailboxes(self.words)
+        self.boxes = outboxes(self.words)
 
     def process(self) -> subprocess.Popen[bytes]:
         """Start a process that does nothing."""

@@ -83,7 +83,7 @@ def test_why_there_is_no_priority(
 ) -> None:
     refuse(monkeypatch, "sched_setscheduler", number)
     capabilities(monkeypatch, *held)
-    assert ask_all(RealTime()).refused == [f"SCHED_FIFO 80 ({why})"]
+    assert ask_all(RealTime().on(None)).refused == [f"SCHED_FIFO 80 ({why})"]
 
 
 def test_why_a_processor_is_not_the_loops(asked: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -99,7 +99,7 @@ def test_memory_is_locked_only_if_the_limit_leaves_room_for_more(
     capabilities(monkeypatch)
     monkeypatch.setattr(system, "_memory_in_use", lambda: 100 << 20)
     monkeypatch.setattr(resource, "getrlimit", lambda which: (int(times * (100 << 20)), 1 << 40))
-    grants = ask_all(RealTime())
+    grants = ask_all(RealTime().on(None))
     assert (("mlockall", 3) in asked) == locked
     size = f"it is {times * 100:.0f} MB, and 100 MB are in use"
     why = f"needs CAP_IPC_LOCK, or a limit memlock of 4 times what is in use; {size}"

@@ -1,4 +1,4 @@
-"""The mailbox between an application and the guardian."""
+"""The outbox between an application and the guardian."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadvis.block.device import LONGEST
-from quadvis.realtime.mailbox import BYTES, CHECK, HEAD, LENGTH, ROOM, SLOT, Mailbox
+from quadvis.realtime.outbox import BYTES, CHECK, HEAD, LENGTH, ROOM, SLOT, Outbox
 
 
 def words() -> memoryview:
-    return memoryview(np.zeros(Mailbox.SIZE, np.int64)).cast("B").cast("q")
+    return memoryview(np.zeros(Outbox.SIZE, np.int64)).cast("B").cast("q")
 
 
 def test_the_newest_frame_is_taken_once() -> None:
     shared = words()
-    writer, reader = Mailbox(shared), Mailbox(shared)
+    writer, reader = Outbox(shared), Outbox(shared)
     assert reader.take() is None
     writer.put(b"one")
     writer.put(b"two")
@@ -35,7 +35,7 @@ def test_the_newest_frame_is_taken_once() -> None:
 @given(st.lists(st.binary(min_size=1, max_size=LONGEST), min_size=1, max_size=9))
 def test_frames_of_any_length_pass_whole(frames: list[bytes]) -> None:
     shared = words()
-    writer, reader = Mailbox(shared), Mailbox(shared)
+    writer, reader = Outbox(shared), Outbox(shared)
     for frame in frames:
         writer.put(frame)
         assert reader.take() == frame
@@ -44,7 +44,7 @@ def test_frames_of_any_length_pass_whole(frames: list[bytes]) -> None:
 @pytest.mark.parametrize("steps", range(4))
 def test_a_writer_that_is_killed_in_the_middle_leaves_the_frame_before(steps: int) -> None:
     shared = words()
-    writer, reader = Mailbox(shared), Mailbox(shared)
+    writer, reader = Outbox(shared), Outbox(shared)
     writer.put(b"whole")
     at, frame = HEAD + 2 * ROOM, b"partial"
     raw = shared.cast("B")
@@ -55,13 +55,13 @@ def test_a_writer_that_is_killed_in_the_middle_leaves_the_frame_before(steps: in
     ][:steps]:
         store()
     assert reader.take() == b"whole"
-    Mailbox(shared).put(b"next")
+    Outbox(shared).put(b"next")
     assert reader.take() == b"next"
 
 
 def test_a_number_that_is_seen_before_its_bytes_gives_no_frame_yet() -> None:
     shared = words()
-    writer, reader = Mailbox(shared), Mailbox(shared)
+    writer, reader = Outbox(shared), Outbox(shared)
     writer.put(b"before")
     assert reader.take() == b"before"
     shared[0] += 1
@@ -73,7 +73,7 @@ def test_a_number_that_is_seen_before_its_bytes_gives_no_frame_yet() -> None:
 
 
 def write_for_ever(shared: Any) -> None:
-    box, number = Mailbox(memoryview(shared).cast("B").cast("q")), 0
+    box, number = Outbox(memoryview(shared).cast("B").cast("q")), 0
     while True:
         number += 1
         box.put(bytes([number % 256]) * 200)
@@ -82,8 +82,8 @@ def write_for_ever(shared: Any) -> None:
 @pytest.mark.slow
 def test_frames_stay_whole_while_writers_are_killed_and_replaced() -> None:
     context = multiprocessing.get_context("spawn")
-    shared = context.RawArray("q", Mailbox.SIZE)
-    reader, taken = Mailbox(memoryview(shared).cast("B").cast("q")), 0
+    shared = context.RawArray("q", Outbox.SIZE)
+    reader, taken = Outbox(memoryview(shared).cast("B").cast("q")), 0
     for kill in 3 * (signal.SIGKILL,):
         process = context.Process(target=write_for_ever, args=(shared,))
         process.start()

@@ -1,4 +1,4 @@
-"""A mailbox in shared memory: one process puts frames, another takes the newest whole one; nobody waits."""
+"""An outbox in shared memory: one process puts frames, another takes the newest whole one; nobody waits."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LENGTH, CHECK, BYTES = range(3)  # words of a buffer
 ROOM = BYTES + LONGEST // SLOT
 
 
-class Mailbox:
+class Outbox:
     """Holds the newest frame. Both processes make one over the same words, which are 0 at the beginning.
 
     A frame counts from the moment when its number is written, so a writer that is killed in the middle leaves
