@@ -15,7 +15,7 @@ from quadvis.graph.graph import Graph
 from quadvis.native.choice import Announce
 from quadvis.realtime.cables import Cable, Ends
 from quadvis.realtime.guard import Guard
-from quadvis.realtime.guardian import outboxes, words_for
+from quadvis.realtime.guardian import Alarm, outboxes, words_for
 from quadvis.realtime.heartbeat import Patience
 from quadvis.realtime.outlet import OutputPort
 from quadvis.realtime.schedule import NANOSECONDS
@@ -87,10 +87,9 @@ class Devices:
         """What becomes ready when the guardian says something, or has ended."""
         return self._guard.sources if self._guard is not None else []
 
-    def check(self, moment: float | None) -> None:
-        """Raise RunError if a port is lost, a loop hangs, or the guardian itself is lost."""
-        if self._guard is not None:
-            self._guard.check(moment)
+    def alarm(self) -> Alarm | None:
+        """Return what is wrong, if a port is lost, a loop hangs, or the guardian itself is lost."""
+        return self._guard.alarm() if self._guard is not None else None
 
     def make_safe(self) -> None:
         """Let all ports have safe frames from now on."""

@@ -72,7 +72,7 @@ class Guard:
                 if isinstance(said, Guarding):
                     announce(f"real time, guardian: {said.grants}")
                     return
-                self._raise(said)
+                raise RunError(said.reason, block=said.block)
         raise RunError(f"the guardian was not ready after {START:g} s")
 
     def watch(self, process: int) -> None:
@@ -88,14 +88,14 @@ class Guard:
         """What becomes ready when it says something, or has ended."""
         return [self.process.sentinel, self._link]
 
-    def check(self, moment: float | None = None) -> None:
-        """Raise RunError, with a time of the run (s), if it has raised an alarm, has ended, or hangs."""
+    def alarm(self) -> Alarm | None:
+        """Return the alarm that it has raised, or that it has ended or hangs; None if all is well."""
         if not self._lost and self._link.poll():
-            self._raise(self._receive(), moment)
+            raised: Alarm = self._receive()
+            return raised
         silent = (time.monotonic_ns() - self._looked[0]) / NANOSECONDS
-        if self._lost or not self.process.is_alive() or silent > SILENT:
-            self._lost = True
-            self._raise(LOST, moment)
+        self._lost = self._lost or not self.process.is_alive() or silent > SILENT
+        return LOST if self._lost else None
 
     def close(self) -> list[str]:
         """Let it send its last safe frames and end; a sentence for each block whose port may not have them.
@@ -119,9 +119,6 @@ class Guard:
         except (EOFError, OSError):
             self._lost = True
             return LOST
-
-    def _raise(self, said: Alarm, moment: float | None = None) -> None:
-        raise RunError(said.reason, block=said.block, time=moment)
 
     def _say(self, what: Any) -> None:
         with suppress(OSError):

@@ -83,6 +83,7 @@ class _Supervisor:
                 Member(context, diagram, computer, part, asked, engine, own, left_out, bindings, announce)
             )
         self._begun = False
+        self._unsafe: list[str] = []  # what may be without its safe values, in sentences
 
     def follow(self, tend: Callable[[float, float], None]) -> Flight:
         """Start the applications and hand rows on until they have ended; an error if this is too early."""
@@ -91,7 +92,8 @@ class _Supervisor:
             sources = [source for member in self._alive for source in member.sources]
             wait([*sources, *self._devices.sources], LOOK)
             self._look()
-            self._devices.check(max(moments) if (moments := self._moments) else None)
+            if alarm := self._devices.alarm():
+                raise self._stopped(alarm.reason, alarm.block)
             if not self._begun and all(member.ready for member in self._members):
                 self._begin()
             running = [member for member in self._members if member.running]
@@ -126,9 +128,9 @@ class _Supervisor:
             for member in self._members:
                 member.listen()
                 member.take(last=True)
-            unsafe = self._close()
+            self._unsafe += self._close()
         silent = [member for member in self._members if member.ended_silently]
-        return [*unsafe, *([UNSAFE] if not all(member.is_guarded for member in silent) else [])]
+        return [*self._unsafe, *([UNSAFE] if not all(member.is_guarded for member in silent) else [])]
 
     def _start(self) -> None:
         """Start all processes, those first on which others depend."""
@@ -151,9 +153,16 @@ class _Supervisor:
         self._cables.close()
         return unsafe
 
-    @property
-    def _moments(self) -> list[float]:
-        return [member.moment for member in self._members if member.moment is not None]
+    def _stopped(self, reason: str, block: str = "") -> RunError:
+        """End all applications; return the error of a run that must not go on.
+
+        Its block is the one that is given, or that in which an application had to be interrupted.
+        """
+        moments = [member.moment for member in self._members if member.moment is not None]
+        self.end()
+        interrupted = [member.ending.block for member in self._members if member.ending]
+        block = block or next(filter(None, interrupted), "")
+        return RunError(reason, block=block, time=max(moments, default=None))
 
     @property
     def _alive(self) -> list[Member]:
@@ -185,10 +194,7 @@ class _Supervisor:
         longest = member.hangs(HANG)
         if not longest:
             return
-        moment = member.time
-        self.end()
-        block = member.ending.block if member.ending else ""
-        raise RunError(f"the step has not ended after {longest:g} s", block=block, time=moment)
+        raise self._stopped(f"the step has not ended after {longest:g} s")
 
 
 def _nothing(_: str) -> None:

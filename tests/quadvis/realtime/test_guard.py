@@ -1,0 +1,78 @@
+"""The guardian as its supervisor has it: started, asked, lost, replaced."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+from typing import Any
+
+import pytest
+
+from quadvis.diagram.sections.on_host_loss import SAFE
+from quadvis.errors import RunError
+from quadvis.machine.serial_port import Line
+from quadvis.realtime.guard import LOST, Guard
+from quadvis.realtime.guardian import mailboxes, words_for
+from quadvis.realtime.outlet import OutputPort
+from tests.processes import wait_for
+from tests.quadvis.realtime.ptys import Pty, ptys
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="ports are Linux's")
+
+
+def guard_of(*lines: Pty) -> tuple[Guard, Any]:
+    """Return a guardian that is not started yet, and its words."""
+    context = multiprocessing.get_context("spawn")
+    words = context.RawArray("q", words_for(len(lines)))
+    ports = [
+        OutputPort(f"out{number}", line.path, Line(10**6), 5_000_000, b"first", b"safe!")
+        for number, line in enumerate(lines)
+    ]
+    return Guard(context, ports, words, [], SAFE, 0), words
+
+
+def test_frames_come_from_its_own_process_until_it_is_closed() -> None:
+    with ptys(1) as (line,):
+        guard, words = guard_of(line)
+        said: list[str] = []
+        guard.start(said.append)
+        assert said[0].startswith("real time, guardian: ")
+        line.wait_for(b"first")
+        mailboxes(words)[0].put(b"going")
+        line.wait_for(b"going")
+        assert guard.alarm() is None
+        guard.make_safe()
+        line.wait_for(b"safe!")
+        assert (guard.close(), guard.process.exitcode) == ([], 0)
+        assert line.read().endswith(3 * b"safe!")
+        assert guard.close() == []
+
+
+@pytest.mark.slow
+def test_a_guardian_that_is_lost_is_replaced_by_the_supervisor_port_by_port() -> None:
+    with ptys(2) as (line, other):
+        guard, _ = guard_of(line, other)
+        guard.start(lambda _: None)
+        other.wait_for(b"first")
+        assert guard.process.pid is not None
+        os.kill(guard.process.pid, signal.SIGKILL)
+        guard.process.join()
+        other.unplug()
+        assert wait_for(guard.alarm) == LOST
+        (unsafe,) = guard.close()
+        assert unsafe.startswith("block 'out1': its safe values could not be sent: ")
+        assert line.read().endswith(b"safe!")
+
+
+@pytest.mark.slow
+def test_a_port_that_refuses_is_the_error_of_the_start() -> None:
+    with ptys(1) as (line,):
+        missing = Pty()
+        missing.close()
+        guard, _ = guard_of(line, missing)
+        with pytest.raises(RunError, match=r"block 'out1': port '/dev/pts/\d+' is missing"):
+            guard.start(lambda _: None)
+        line.wait_for(b"safe!")
+        assert guard.close() == []
