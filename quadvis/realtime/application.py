@@ -34,6 +34,7 @@ from quadvis.native.choice import Choice, choose, use
 from quadvis.realtime import control
 from quadvis.realtime.control import SharedMemory
 from quadvis.realtime.devices import PortBindings
+from quadvis.realtime.lifeline import Lifeline
 from quadvis.realtime.options import RealTime
 from quadvis.realtime.overload import OverloadWatch
 from quadvis.realtime.pacer import Ended, Pacer
@@ -179,6 +180,7 @@ class _Application:
             sleeper.polled = _polled(setup.wishes, schedule, sleeper)
             grants.granted.append(f"polling {sleeper.polled / 1e3:.0f} us")
             grants.refused += [note for carrier in carriers.values() for note in carrier.notes]
+            Lifeline(shared.control[control.LIFELINE]).hold()
             setup.link.send(Ready(grants, Choice(choice.engine, choice.reason)))
             self._start = setup.link.recv()  # all applications begin at one instant
             shared.control[control.START] = self._start

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from quadvis.realtime import times
+from quadvis.realtime import lifeline, times
 from quadvis.realtime.ring import RecordRing
 
 START = 0  # by the loop: the instant of the start on the monotonic clock (ns); 0 before
@@ -19,7 +19,8 @@ BEGUN = (
 DONE = 3  # by the loop: the number of steps
 END = 4  # by either: not 0 if the run is to end before its next step
 LEFT = 5  # by the loop: not 0 once it runs no more steps
-WORDS = 8
+LIFELINE = slice(8, 8 + lifeline.SIZE)  # of the loop's thread
+WORDS = LIFELINE.stop
 LEFT_OUT = (
     4096,
     2,

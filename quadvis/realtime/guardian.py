@@ -23,7 +23,7 @@ from quadvis.machine.interrupts import leave_to_parent
 from quadvis.machine.serial_port import PortError
 from quadvis.realtime.heartbeat import Heartbeat, Patience, Sign
 from quadvis.realtime.lives import Lives
-from quadvis.realtime.options import HIGHEST, RealTime
+from quadvis.realtime.options import RealTime
 from quadvis.realtime.outbox import Outbox
 from quadvis.realtime.outlet import Outlet, OutputPort
 from quadvis.realtime.schedule import NANOSECONDS
@@ -39,8 +39,8 @@ LAST = NANOSECONDS  # ns that these may take
 class GuardianSetup:
     """What the guardian needs: ``words`` has an outbox for each of the ``ports``, in their order.
 
-    ``supervisor`` is the process that started it, ``on_host_loss`` what its death means, ``priority`` that of
-    the loops (0: none).
+    ``supervisor`` is the process that started it, ``on_host_loss`` what its death means, ``priority`` its
+    own (0: none).
     """
 
     ports: tuple[OutputPort, ...]
@@ -173,6 +173,8 @@ class Guardian:
             self._make_safe()
         if self.told_to_end and not self.safe:
             self._make_safe(Alarm("the guardian was told to end"))
+        for heart in self._hearts:
+            heart.hold_on(self._setup.priority)
         signs = [(heart.look(), heart) for heart in self._hearts] if not self.safe else []
         if any(sign is Sign.ENDS for sign, _ in signs):
             self._make_safe()
@@ -226,6 +228,7 @@ class Guardian:
         due = min([outlet.due for outlet in self._outlets if outlet.is_open], default=now + LONGEST_LOOK)
         until = min(due, now + self._look_every)
         sources: list[Any] = [*self._supervisor.descriptors, *self._applications.descriptors]
+        sources += [descriptor for heart in self._hearts for descriptor in heart.descriptors]
         sources += [self._link] if self._listening else []
         select.select(sources, [], [], max(0, until - now) / NANOSECONDS)
 
@@ -240,9 +243,7 @@ def guard(setup: GuardianSetup) -> None:
         guardian.told_to_end = True
 
     signal.signal(signal.SIGTERM, end)
-    # Above the loops, so that one that hangs cannot keep it from the processor.
-    priority = min(HIGHEST, setup.priority + 1) if setup.priority else 0
-    grants = ask_all(RealTime(priority=priority))
+    grants = ask_all(RealTime(priority=setup.priority))
     opened = guardian.open()
     guardian.look()
     if opened:

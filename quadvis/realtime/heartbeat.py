@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
@@ -9,7 +11,9 @@ from typing import Any
 
 from quadvis.diagram.sections.overload import STOP, OverloadLimits
 from quadvis.realtime import control
+from quadvis.realtime.lifeline import Lifeline
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
+from quadvis.realtime.system import raise_thread
 
 
 @dataclass(frozen=True)
@@ -54,12 +58,27 @@ class Heartbeat:
         self.patience, self._now = patience, now
         self._control = memoryview(patience.words).cast("B").cast("q")
         self._done, self._seen = 0, 0
+        self._has_died = False
+        self._cut = -1  # a descriptor that becomes readable when the loop's thread has ended
+
+    def hold_on(self, priority: int) -> None:
+        """Take the lifeline of a loop that has started: its end is then seen in the moment of its death."""
+        if self._cut < 0 and self._control[control.START]:
+            self._cut = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
+            threading.Thread(target=self._wait_for_end, args=(priority,), daemon=True).start()
+
+    def _wait_for_end(self, priority: int) -> None:
+        if priority:
+            raise_thread(priority)
+        Lifeline(self._control[control.LIFELINE]).wait()
+        self._has_died = True
+        os.eventfd_write(self._cut, 1)
 
     def look(self) -> Sign:
         """Return what the loop does."""
         words, now = self._control, self._now()
         start, begun, done = words[control.START], words[control.BEGUN], words[control.DONE]
-        if words[control.END] or words[control.LEFT]:
+        if words[control.END] or words[control.LEFT] or self._has_died:
             return Sign.ENDS
         if not start:
             return Sign.WELL
@@ -69,6 +88,11 @@ class Heartbeat:
         if now - last <= self.patience.allowed:
             return Sign.WELL
         return Sign.HANGS if self.patience.lasting and now - start > self.patience.startup else Sign.PAUSES
+
+    @property
+    def descriptors(self) -> list[int]:
+        """What becomes readable when the loop dies, for ``select``."""
+        return [self._cut] if self._cut >= 0 and not self._has_died else []
 
     @property
     def complaint(self) -> str:

@@ -22,6 +22,7 @@ from quadvis.realtime.control import SharedMemory
 from quadvis.realtime.devices import PortBindings, guards_all
 from quadvis.realtime.flight import Share
 from quadvis.realtime.heartbeat import Patience
+from quadvis.realtime.lifeline import Lifeline
 from quadvis.realtime.options import RealTime
 from quadvis.realtime.ring import RecordRing, Words
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
@@ -66,6 +67,7 @@ class Member:
         words = context.RawArray("q", SharedMemory.size(count, rings))
         self._shared = SharedMemory(words, count, rings)
         self._control = self._shared.control
+        Lifeline(self._control[control.LIFELINE]).make()
         self._link, self._theirs = context.Pipe()
         setup = Setup(
             diagram.resolved, str(diagram.path.parent), diagram.path.name, diagram.own_blocks,

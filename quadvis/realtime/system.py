@@ -58,7 +58,7 @@ def ask_all(wishes: RealTime) -> Grants:
     gc.disable()
     priority = wishes.priority
     if priority:
-        grants.ask(f"SCHED_FIFO {priority}", lambda: _priority(priority))
+        grants.ask(f"SCHED_FIFO {priority}", lambda: raise_thread(priority))
     cpu = wishes.cpu
     if cpu is not None:
         grants.ask(f"cpu {cpu}", lambda: _processor(cpu))
@@ -68,7 +68,8 @@ def ask_all(wishes: RealTime) -> Grants:
     return grants
 
 
-def _priority(priority: int) -> str:
+def raise_thread(priority: int) -> str:
+    """Ask for a real-time priority of the calling thread; return why it is not granted, or ""."""
     try:
         # Threads and processes that blocks begin later do not inherit the priority.
         policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK

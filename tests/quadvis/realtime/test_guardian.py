@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from multiprocessing import Pipe
@@ -18,6 +19,7 @@ from quadvis.machine.serial_port import Line
 from quadvis.realtime import control
 from quadvis.realtime.guardian import Alarm, Guardian, GuardianSetup, Order, Watch, outboxes, words_for
 from quadvis.realtime.heartbeat import Patience
+from quadvis.realtime.lifeline import Lifeline
 from quadvis.realtime.outlet import OutputPort
 from tests.processes import wait_for
 from tests.quadvis.realtime.ptys import Pty, ptys
@@ -34,6 +36,10 @@ class Rig:
     def __init__(self, lines: list[Pty], on_host_loss: str = SAFE, lasting: bool = True) -> None:
         self.ptys = lines
         self.control = np.zeros(control.WORDS, np.int64)
+        self.loop_ends = threading.Event()
+        held = threading.Event()
+        threading.Thread(target=self.live, args=(held,), daemon=True).start()
+        held.wait()
         self.words = np.zeros(words_for(len(lines)), np.int64)
         self.link, theirs = Pipe()
         self.started: list[subprocess.Popen[bytes]] = []
@@ -48,6 +54,14 @@ class Rig:
         )
         self.guardian = Guardian(setup)
         self.boxes = outboxes(self.words)
+
+    def live(self, held: threading.Event) -> None:
+        """Be the thread of the loop."""
+        line = Lifeline(self.control[control.LIFELINE])
+        line.make()
+        line.hold()
+        held.set()
+        self.loop_ends.wait()
 
     def process(self) -> subprocess.Popen[bytes]:
         """Start a process that does nothing."""
@@ -127,6 +141,11 @@ def kill(made: Rig) -> None:
     made.application.kill()
 
 
+def end_thread(made: Rig) -> None:
+    made.control[control.START] = time.monotonic_ns() + 10**15
+    made.loop_ends.set()
+
+
 def order(made: Rig) -> None:
     made.link.send(Order.SAFE)
 
@@ -143,7 +162,7 @@ def lose_host(made: Rig) -> None:
     made.supervisor.kill()
 
 
-@pytest.mark.parametrize("cause", [kill, order, end, leave, lose_host])
+@pytest.mark.parametrize("cause", [kill, end_thread, order, end, leave, lose_host])
 def test_every_end_makes_all_ports_safe_for_ever(rig: Any, cause: Any) -> None:
     made = rig()
     made.follow()
