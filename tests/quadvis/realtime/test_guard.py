@@ -14,7 +14,7 @@ from quadvis.diagram.sections.on_host_loss import SAFE
 from quadvis.errors import RunError
 from quadvis.machine.serial_port import Line
 from quadvis.realtime.guard import LOST, Guard
-from quadvis.realtime.guardian import mailboxes, words_for
+from quadvis.realtime.guardian import outboxes, words_for
 from quadvis.realtime.outlet import OutputPort
 from tests.processes import wait_for
 from tests.quadvis.realtime.ptys import Pty, ptys
@@ -40,7 +40,7 @@ def test_frames_come_from_its_own_process_until_it_is_closed() -> None:
         guard.start(said.append)
         assert said[0].startswith("real time, guardian: ")
         line.wait_for(b"first")
-        mailboxes(words)[0].put(b"going")
+        outboxes(words)[0].put(b"going")
         line.wait_for(b"going")
         assert guard.alarm() is None
         guard.make_safe()
