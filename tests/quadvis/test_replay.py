@@ -5,70 +5,23 @@ from __future__ import annotations
 import hashlib
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import quadvis
-from quadvis import Log, read_log, replay
+from quadvis import read_log, replay
 from quadvis.cli import main
-from quadvis.errors import DiagramError, QuadvisError, RunError
-from tests.quadvis.relogged import Edit, Rows, flipped, rewritten, without
+from quadvis.errors import DiagramError, QuadvisError
+from tests.quadvis.relogged import TEXT, Edit, Rows, flipped, flown, rewritten, without, write_flight
 
 ROOT = Path(__file__).parents[2]
-TEXT = """\
-quadvis: 1
-name: flight
-rates: {fast: 30 Hz, slow: 10 Hz}
-stop_time: 2 s
-seed: 7
-blocks:
-  noise: {block: sources.noise, rate: fast, with: {sigma: 0.1 m}}
-  outside: {block: own.outside, rate: fast}
-  sum: {block: signal.sum, rate: fast, in: {a: noise.y, b: outside.y}}
-  filter: {block: signal.low_pass, rate: fast, with: {time_constant: 0.2 s}, in: {u: sum.y}}
-  slow: {block: signal.gain, rate: slow, with: {factor: 2}, in: {u: {from: filter.y, across: sample}}}
-log: {every: {fast: 4}}
-"""
-OUTSIDE = '''
-"""A block that reads what the world says."""
-
-from pathlib import Path
-
-from quadvis.block import Block, Out
-
-
-class Outside(Block, numeric=False):
-    """Reads a number from the file 'world', and adds one to it."""
-
-    not_replayable = "it reads the world"
-
-    y = Out(unit="m", nan=True)
-    even = Out("bool")
-
-    def read(self):
-        self.number = int(Path("world").read_text())
-        Path("world").write_text(str(self.number + 1))
-
-    def output(self):
-        return 0.1 * self.number, self.number % 2 == 0
-'''
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("flight.yaml").write_text(TEXT)
-    Path("blocks/own").mkdir(parents=True)
-    Path("blocks/own/outside.py").write_text(OUTSIDE)
-    Path("world").write_text("5")
-    return tmp_path
-
-
-def flown(log: str = "run.mcap", **more: Any) -> Log:
-    quadvis.load("flight.yaml", **more).run(log=log)
-    return read_log(log)
+    write_flight()
 
 
 @pytest.mark.parametrize("engine", ["python", pytest.param("native", marks=pytest.mark.slow)])
@@ -250,27 +203,6 @@ def test_the_bits_do_not_depend_on_how_fast_it_goes(
     assert len(seen) == 1
 
 
-FAILING = '''
-"""A block that fails."""
-
-from quadvis.block import Block, Out, Param
-
-
-class Failing(Block):
-    """Fails when it is updated after an instant."""
-
-    begin = Param(1.0, unit="s")
-    y = Out()
-
-    def output(self):
-        return self.begin
-
-    def update(self, time):
-        if time > self.begin:
-            raise ValueError("no such luck")
-'''
-
-
 @pytest.mark.parametrize(
     "change",
     [{"tick": "1"}, {"tick": "soon", "block": "noise", "parameter": "sigma", "value": "1"},
@@ -283,32 +215,6 @@ def test_a_change_that_says_nothing_is_refused(change: dict[str, str]) -> None:
         QuadvisError, match="describes a change of a parameter in a way that this quadvis does"
     ):
         replay(log)
-
-
-def test_a_run_that_failed_is_the_same_up_to_its_end() -> None:
-    Path("blocks/own/failing.py").write_text(FAILING)
-    Path("flight.yaml").write_text(TEXT.replace("log:", "  failing: {block: own.failing, rate: fast}\nlog:"))
-    with pytest.raises(RunError, match="no such luck"):
-        flown()
-    found = replay("run.mcap", output="new.mcap")
-    assert found.same and not found.whole and found.time == pytest.approx(1 + 1 / 30)
-    assert read_log("new.mcap").complete
-    with pytest.raises(RunError, match="no such luck"):
-        replay("run.mcap", settings=["failing.begin=0.5 s"])
-
-
-def test_what_no_log_holds_between_ticks_is_refused() -> None:
-    block = Path("blocks/own/outside.py")
-    text = block.read_text().replace(", numeric=False", "").replace("def read(self)", "def open(self)")
-    block.write_text(text)
-    Path("flight.yaml").write_text(
-        TEXT.replace("outside, rate: fast", "outside, rate: continuous")
-        .replace("seed: 7", "seed: 7\nsolver: {method: ode4, step: 1/60 s}")
-        .replace("outside.y}", "{from: outside.y, across: sample}}")
-    )
-    flown()
-    with pytest.raises(QuadvisError, match="block 'outside' reaches outside and moves between two ticks"):
-        replay("run.mcap")
 
 
 def test_a_log_without_rows_or_diagram_is_refused() -> None:
