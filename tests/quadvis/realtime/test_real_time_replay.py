@@ -20,6 +20,7 @@ from tests.processes import children, gone, wait_for
 from tests.quadvis.realtime.fakes import FakeClock, Paced
 from tests.quadvis.relogged import rewritten, without
 
+FAR = {"integral": "far", "delayed": "far"}
 CALM = quadvis.RealTime(priority=0, poll="0 s")
 TEXT = """\
 quadvis: 1
@@ -94,6 +95,25 @@ def test_a_run_with_overruns_is_the_same_to_the_bit() -> None:
     assert replay(new).same
     with pytest.raises(QuadvisError, match="lacks the outputs of 'counter' at t = "):
         replay(rewritten(log, without("/_replay/left_out", 1)))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="real time is Linux's")
+@pytest.mark.parametrize("via", ["memory", "serial, baud: 230400"])
+def test_two_computers_are_the_same_to_the_bit(via: str) -> None:
+    """What a link brings depends on the moment; a replay has it from the log."""
+    link = f"links: {{line: {{from: near, to: far, via: {via}}}}}"
+    text = TEXT.replace("seed: 7", f"seed: 7\ncomputers: {{near: {{}}, far: {{}}}}\n{link}")
+    for block, computer in {"counter": "near", "noise": "near", "sum": "near"}.items() | FAR.items():
+        text = text.replace(f"  {block}: {{", f"  {block}: {{at: {computer}, ")
+    Path("flight.yaml").write_text(text.replace(", across: hold", ""))
+    result = quadvis.load("flight.yaml").run(log="run.mcap", real_time=CALM)
+    assert result.flight is not None
+    missed = {share.computer: share.tasks[0].overruns for share in result.flight.shares}
+    assert missed["near"] >= 3 * 4
+    found = replay("run.mcap")
+    assert found.same and set(found.played) == {"counter", "line"}
+    assert found.left_out >= sum(missed.values())
 
 
 @pytest.mark.slow
