@@ -150,6 +150,7 @@ def sweep(options: argparse.Namespace) -> int:
 
 def check(options: argparse.Namespace) -> int:
     """Report all faults of a diagram; 2 if any are found."""
+    from quadvis.analysis.ages import worst_ages
     from quadvis.diagram.load import check as check_diagram
     from quadvis.errors import DiagramError
 
@@ -168,12 +169,15 @@ def check(options: argparse.Namespace) -> int:
     tasks = ", ".join(task.name for task in diagram.graph.tasks)
     count = sum(not node.origin for node in diagram.graph.nodes)
     links = {link.name: link.facts() for link in diagram.links}
+    ages = worst_ages(diagram)
     if options.json:
         found = {"ok": True, "diagram": diagram.name, "blocks": count, "hash": diagram.hash, "links": links}
+        found |= {"ages": {age.text: age.greatest for age in ages}}
         _print_json(found | {"warnings": _plain_faults(diagram.warnings)})
     else:
         print(f"{options.file}: {count} blocks in {tasks}: no fault")
-        print("".join(f"  link {name}: {facts}\n" for name, facts in links.items()), end="")
+        lines = [*(f"link {name}: {facts}" for name, facts in links.items()), *map(str, ages)]
+        print("".join(f"  {line}\n" for line in lines), end="")
     return 0
 
 

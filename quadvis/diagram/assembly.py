@@ -7,6 +7,7 @@ from fractions import Fraction
 from types import MappingProxyType
 
 from quadvis.block import Out
+from quadvis.diagram.ages import read_routes
 from quadvis.diagram.build import Builder, Made
 from quadvis.diagram.check import WireCheck
 from quadvis.diagram.devices import check_devices
@@ -22,6 +23,7 @@ from quadvis.diagram.parts import Parts
 from quadvis.diagram.routing import Network
 from quadvis.diagram.sections.computers import COMPUTERS
 from quadvis.diagram.sections.context import Context
+from quadvis.diagram.sections.expect import EXPECT
 from quadvis.diagram.sections.files import FILES, check_files
 from quadvis.diagram.sections.links import LINKS
 from quadvis.diagram.sections.seed import SEED
@@ -86,7 +88,9 @@ class Assembly:
         step = builder.step if known(builder.step) else None
         names = {*expansion.blocks, *expansion.root.children}
         network = Network(spec[COMPUTERS], spec[LINKS], expansion.root.params, names)
-        nodes = WireCheck(drafts, faults, self.cases, network, spec[TASKING]).run()
+        with faults.about(EXPECT.key):
+            routes = read_routes(spec.nodes.get(EXPECT.key), wiring, faults)
+        nodes = WireCheck(drafts, faults, self.cases, network, routes, spec[TASKING]).run()
         graph = Graph(spec.name, nodes, spec[SOLVER].method, step, spec[TASKING])
         stop = _stop_time(spec, stop_time, faults)
         if known(builder.step):

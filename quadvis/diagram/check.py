@@ -10,6 +10,7 @@ from fractions import Fraction
 from typing import cast
 
 from quadvis.block import Block
+from quadvis.diagram.ages import AgePaths, AgeRoute
 from quadvis.diagram.draft import Draft, DraftWire, Key, not_taken, unconnected
 from quadvis.diagram.flow import Cases
 from quadvis.diagram.names import absent, remedy_for
@@ -35,10 +36,12 @@ class WireCheck:
         faults: Faults,
         cases: Cases,
         network: Network,
+        routes: Sequence[AgeRoute] = (),
         tasking: str = SINGLE,
     ) -> None:
         self.drafts = {draft.path: draft for draft in drafts}
-        self.faults, self.cases, self.network, self.tasking = faults, cases, network, tasking
+        self.faults, self.cases, self.network = faults, cases, network
+        self.routes, self.tasking = routes, tasking
         self.unknown: set[Key] = set()  # inputs of which nothing is known
         self.nodes = {draft.path: self._node(draft) for draft in drafts}
 
@@ -81,7 +84,9 @@ class WireCheck:
             # A loop through such a wire would be reported twice.
             self.nodes[path].inputs.pop(port, None)
         whole = {link.key for link in links if self._is_whole(link)} - unknown - self.unknown
-        Routing(self.drafts, self.nodes, self.network, self.faults).run(links, whole)
+        ages = AgePaths(self.drafts, self.nodes, self.faults)
+        ages.add(self.routes)
+        Routing(self.drafts, self.nodes, self.network, self.faults).run(links, whole, ages.shadows)
         if self.tasking == MULTI:
             with_transitions(self.nodes.values())
         order, loops = execution_order(list(self.nodes.values()))

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from quadvis.block import NO_FRAME
-from quadvis.diagram.draft import Draft, DraftWire
+from quadvis.diagram.draft import Draft, DraftWire, Key
 from quadvis.diagram.sections.computers import Computers
 from quadvis.diagram.sections.links import Links, LinkSpec, link_values
 from quadvis.diagram.times import rate_text
@@ -59,10 +60,16 @@ class Routing:
         self.drafts, self.nodes, self.network, self.faults = drafts, nodes, network, faults
         self._specs: dict[str, LinkSpec] = {}
 
-    def run(self, wires: Sequence[DraftWire], whole: Collection[tuple[str, str]]) -> None:
+    def run(
+        self,
+        wires: Sequence[DraftWire],
+        whole: Collection[Key],
+        shadows: Mapping[Key, Sequence[DraftWire]] = MappingProxyType({}),
+    ) -> None:
         """Put those wires of which all is known (``whole``) on links; the others lead nowhere.
 
-        A wire between computers breaks a loop, whatever is wrong with it.
+        A wire between computers breaks a loop, whatever is wrong with it. ``shadows`` are further wires that
+        go the way of others, by the keys of those.
         """
         self._check_specs()
         between = [wire for wire in wires if crosses(self.drafts, wire)]
@@ -70,15 +77,18 @@ class Routing:
         hops = [self._hop(wire) for wire in between if wire.key in whole]
         chosen = self._chosen([hop for hop in hops if known(hop)])
         put = set()
-        for name, mine in chosen.items():
+        for name, named in chosen.items():
+            beside = [hop._replace(wire=wire) for hop in named for wire in shadows.get(hop.wire.key, ())]
+            mine = [*named, *(hop._replace(is_picture=False) for hop in beside)]
             link = self._link(name, mine)
             if known(link):
                 keys = [hop.wire.key for hop in mine]
                 insert(self.nodes, link, keys)
                 put.update(keys)
         for wire in between:
-            if wire.key not in put:
-                self.nodes[wire.draft.path].inputs.pop(wire.port, None)
+            for each in (wire, *shadows.get(wire.key, ())):
+                if each.key not in put:
+                    self.nodes[each.draft.path].inputs.pop(each.port, None)
 
     def _check_specs(self) -> None:
         computers = self.network.computers

@@ -56,8 +56,8 @@ class Context:
 
     def source(self, reference: Reference) -> Wire | Unknown:
         """Return the output behind a name."""
-        if reference.block in self.links:
-            return self._of_link(reference)
+        if reference.block in self.added:
+            return self._of_added(reference)
         source = self.wiring.find(self.wiring.expansion.root, reference).source
         if isinstance(source, YamlNode):
             self.faults.add(reference.place, "this is a constant, not a signal", "name an output of a block")
@@ -70,16 +70,17 @@ class Context:
         return source
 
     @property
-    def links(self) -> Set[str]:
-        """The names of links, also of those that carry nothing."""
-        return self.declared | {path for path, node in self.nodes.items() if node.origin == RECEIVER}
+    def added(self) -> Set[str]:
+        """The names of links, also of those that carry nothing, and of what measures ages."""
+        return self.declared | {path for path, node in self.nodes.items() if node.origin}
 
-    def _of_link(self, reference: Reference) -> Wire | Unknown:
-        """Return an output of a link."""
+    def _of_added(self, reference: Reference) -> Wire | Unknown:
+        """Return an output of a link, or of what measures an age."""
         node = self.nodes.get(reference.block)
         if node is None or reference.port not in node.block.interface.outputs:
             if node is not None:
-                problem = f"link '{reference.block}' has no output '{reference.port}'"
+                word = "link" if node.origin == RECEIVER else "age"
+                problem = f"{word} '{reference.block}' has no output '{reference.port}'"
                 remedy = suggestion(reference.port, node.block.interface.outputs)
             else:
                 problem, remedy = f"link '{reference.block}' carries nothing", "name another signal"

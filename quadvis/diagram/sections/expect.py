@@ -6,15 +6,18 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from quadvis.diagram.ages import KEY, SECOND, read_route
 from quadvis.diagram.loop_requirements import MARGINS, LoopRequirement
 from quadvis.diagram.requirements import EXPECTATIONS, Expectation
 from quadvis.diagram.sections.context import Context, RunSection
 from quadvis.diagram.sections.expect_loop import DIRECTIONS, read_limit, read_margin
 from quadvis.diagram.sections.forms import QUANTITY, SIGNAL, TEXT, Schema, closed, list_of, ref
 from quadvis.diagram.sections.section import Checked
-from quadvis.diagram.sections.signals import STRETCH_KEYS, Asked, read_stretch
+from quadvis.diagram.sections.signals import STRETCH_KEYS, Asked, check_signal, in_stretch, read_stretch
 from quadvis.document import YamlMap, YamlNode
-from quadvis.errors import UNKNOWN, closest
+from quadvis.errors import UNKNOWN, closest, known
+from quadvis.graph.graph import Wire
+from quadvis.links.stamps import AGE
 from quadvis.output.statistics import COUNT
 from quadvis.units import Unit, split_quantity
 
@@ -24,6 +27,7 @@ FORMS: Mapping[str, tuple[str, ...]] = {
     "signal": (*STRETCH_KEYS, *EXPECTATIONS),
     "margin": tuple(MARGINS),
     "limit": DIRECTIONS,
+    KEY: ("after", "before", "below"),
 }
 
 
@@ -40,7 +44,8 @@ class Expect(RunSection[Expected]):
     key = "expect"
     words = (
         "requirements: `{signal, after, before, of}` with one of `within`, `rms`, `below`, `above`, `count`, "
-        "`at_least`; `{margin: cut}` with `gain`, `phase`, `delay`; `{limit, above}`, see below"
+        "`at_least`; `{age: [stamp, block], below}`; `{margin: cut}` with `gain`, `phase`, `delay`; "
+        "`{limit, above}`, see below"
     )
 
     def read(self, node: YamlNode | None, context: Context) -> Expected:
@@ -52,9 +57,10 @@ class Expect(RunSection[Expected]):
         for entry in entries:
             form = _form(entry)
             fields = context.faults.collect(entry.fields, (form,), FORMS[form], context.faults)
-            if form == "signal":
+            if form in ("signal", KEY):
                 of_run.append(entry)
-                found += _read(fields, context) if fields is not None else ()
+                read = _read if form == "signal" else _read_age
+                found += read(fields, context) if fields is not None else ()
             elif fields is not None and form in fields:
                 loop += (read_margin if form == "margin" else read_limit)(fields, context)
         written = [context.written(entry) for entry in of_run]
@@ -75,6 +81,11 @@ class Expect(RunSection[Expected]):
         }
         of = {
             "signal": {"signal": SIGNAL, **stretch, **kinds},
+            KEY: {
+                KEY: list_of(TEXT, "a stamp, and the block that acts on what was measured then"),
+                **{key: QUANTITY for key in STRETCH_KEYS[:2]},
+                "below": {**QUANTITY, "description": "less than this age at each tick of the block"},
+            },
             "margin": {"margin": {**TEXT, "description": "a cut under `analyse`"}, **margins},
             "limit": {
                 "limit": {**TEXT, "description": "a limit under `analyse`"},
@@ -122,6 +133,28 @@ def _read(fields: YamlMap, context: Context) -> Iterator[Expectation]:
             shown = _written_unit(fields[kind]) or found.selection.shown
             selection = found.selection if is_count else replace(found.selection, shown=shown)
             yield Expectation(selection, kind, limit)
+
+
+def _read_age(fields: YamlMap, context: Context) -> Iterator[Expectation]:
+    """Read ``{age: [eyes.stamp, outputs.sent], below: 250 ms}``."""
+    faults = context.faults
+    if "below" not in fields:
+        faults.add(fields.place, "nothing is expected of the age", "add 'below: 250 ms'")
+    route = read_route(fields[KEY], context.wiring, faults) if KEY in fields else UNKNOWN
+    if route is UNKNOWN:
+        return
+    for name, text in zip(fields[KEY].items(), route.written, strict=True):
+        context.meant[name.place] = text
+    fields = context.filled(fields, FORMS[KEY])
+    limit = faults.collect(fields["below"].quantity, SECOND, bare=False) if "below" in fields else None
+    if route.path not in context.nodes:
+        return  # why it cannot be measured has been reported
+    signal = check_signal(fields[KEY], Wire(route.path, AGE), context)
+    found = in_stretch(signal, fields, context)
+    if limit is not None and known(found):
+        text = f"age of {route.written[0]} at {route.written[1]}"
+        shown = _written_unit(fields["below"]) or SECOND
+        yield Expectation(replace(found.selection, text=text, shown=shown), "below", limit)
 
 
 def _written_unit(node: YamlNode) -> Unit | None:

@@ -11,6 +11,7 @@ from quadvis.diagram.sections.forms import TEXT, Schema, closed, list_of, map_of
 from quadvis.diagram.sections.section import Checked
 from quadvis.document import YamlNode
 from quadvis.errors import suggestion
+from quadvis.links.stamps import METER
 
 LOG_KEYS = ("signals", "every")
 
@@ -41,7 +42,10 @@ class LogSection(RunSection[Logged]):
         patterns = faults.collect(fields["signals"].items) if "signals" in fields else None
         if patterns is not None:
             wanted = {path for pattern in patterns for path in _matching(pattern, context)}
-            found.paths = [path for path in context.nodes if path in wanted]
+            # What measures an age is there to be judged.
+            found.paths = [
+                path for path, node in context.nodes.items() if path in wanted or node.origin == METER
+            ]
         tasks = {node.task.name for node in context.nodes.values()}
         every = faults.collect(fields["every"].mapping) if "every" in fields else None
         for key, value in every.pairs() if every is not None else []:

@@ -90,6 +90,11 @@ def read_stretch(fields: YamlMap, context: Context) -> Signal | Unknown:
     """Return the signal of an expectation or of a line of the summary, over its stretch of the run."""
     fields = context.filled(fields, STRETCH_KEYS)
     found = read_signal(fields["signal"], context) if "signal" in fields else UNKNOWN
+    return in_stretch(found, fields, context)
+
+
+def in_stretch(found: Signal | Unknown, fields: YamlMap, context: Context) -> Signal | Unknown:
+    """Return a signal over the stretch of the run that some fields state."""
     after, before = (
         context.faults.collect(read_duration, fields[name]) if name in fields else None
         for name in STRETCH_KEYS[:2]
