@@ -9,7 +9,7 @@ from quadvis.errors import RunError, sentence
 from quadvis.realtime import control, times
 from quadvis.realtime.control import SharedMemory
 from quadvis.realtime.overload import OverloadWatch
-from quadvis.realtime.ring import SLOT
+from quadvis.realtime.ring import put_pair
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
 from quadvis.units import Unit, format_quantity
 
@@ -44,7 +44,7 @@ class Pacer:
         self._now, self._sleep = now, sleep
         self._control: Any = shared.control
         self._tasks: list[Any] = shared.tasks
-        self._left_out = shared.left_out
+        self._left_out = shared.left_out.words
         for words in self._tasks:
             times.clear(words)
         self._rhythms = list(enumerate(schedule.rhythms))
@@ -110,7 +110,7 @@ class Pacer:
     def _skip(self, tick: int, stop: int, instant: int) -> None:
         """Note that the ticks from ``tick`` to ``stop`` are left out, and count the overruns."""
         if any(rhythm.due_in(tick, stop) for _, rhythm in self._rhythms):
-            self._left_out.put(tick, memoryview((stop - tick).to_bytes(SLOT, "little")), (slice(0, SLOT),))
+            put_pair(self._left_out, control.LEFT_OUT[0], tick, stop - tick)
         for task, rhythm in self._rhythms:
             count = rhythm.due_in(tick, stop)
             if count:

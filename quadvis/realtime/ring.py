@@ -34,6 +34,11 @@ class RecordRing:
         return HEAD + room * width
 
     @property
+    def words(self) -> Any:
+        """Its words."""
+        return self._words
+
+    @property
     def lost(self) -> int:
         """How many records found no room."""
         return int(self._words[LOST])
@@ -66,3 +71,17 @@ class RecordRing:
         found = self._records[places]
         self._taken = self._words[TAKEN] = until
         return found
+
+
+def put_pair(words: Any, room: int, first: int, second: int) -> None:
+    """Add a record of two words to a ring as `RecordRing.put` does, in operations that machine code has, too.
+
+    A producer that adds records so does not add any by the method.
+    """
+    done = words[PUT]
+    if done - words[TAKEN] >= room:
+        words[LOST] += 1
+        return
+    at = HEAD + done % room * 2
+    words[at], words[at + 1] = first, second
+    words[PUT] = done + 1

@@ -93,8 +93,11 @@ def test_a_run_with_overruns_is_the_same_to_the_bit() -> None:
     new = read_log("new.mcap")
     assert left_out(new) == left_out(log)
     assert replay(new).same
+    longest = int(
+        log.hidden.arrays("/_replay/left_out")[1][:, 1].argmax()
+    )  # others may lie between two ticks
     with pytest.raises(QuadvisError, match="lacks the outputs of 'counter' at t = "):
-        replay(rewritten(log, without("/_replay/left_out", 1)))
+        replay(rewritten(log, without("/_replay/left_out", longest)))
 
 
 @pytest.mark.slow
