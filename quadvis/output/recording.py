@@ -133,6 +133,7 @@ class Recording:
         """Begin without rows."""
         self.blocks: list[RecordedBlock] = []
         self.ports = ports
+        self._places: dict[str, int] = {}  # of the blocks, by path
         self._rows: list[Rows] = []
         self._signals: dict[str, tuple[int, int, RecordedPort]] = {}
         for block in blocks:
@@ -141,6 +142,7 @@ class Recording:
     def add(self, block: RecordedBlock) -> None:
         """Add a block whose rows will follow."""
         index, start = len(self.blocks), 0
+        self._places.setdefault(block.path, index)
         self.blocks.append(block)
         self._rows.append(Rows(block))
         for port in block.ports:
@@ -211,10 +213,13 @@ class Recording:
 
     def arrays(self, path: str) -> tuple[NDArray[np.int64], Slots]:
         """Return the stamps (ns) and the rows of a block by its path; none if the recording lacks it."""
-        for index, block in enumerate(self.blocks):
-            if block.path == path:
-                return self._arrays(index)
-        return np.zeros(0, np.int64), np.zeros((0, 0), np.int64)
+        if path not in self._places:
+            return np.zeros(0, np.int64), np.zeros((0, 0), np.int64)
+        return self._arrays(self._places[path])
+
+    def block(self, path: str) -> RecordedBlock | None:
+        """Return a block by its path; None if the recording lacks it."""
+        return self.blocks[self._places[path]] if path in self._places else None
 
     def _arrays(self, block: int) -> tuple[NDArray[np.int64], Slots]:
         """Return the stamps and the rows of a block."""

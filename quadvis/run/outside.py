@@ -16,13 +16,10 @@ from quadvis.graph.graph import Graph, Node
 def outside(graph: Graph) -> list[Node]:
     """Return the nodes of a graph that reach outside, in the order of execution."""
     found = {node.path for node in graph.nodes if _reaches_outside(node.block)}
-    waiting = [graph[path] for path in found]
-    while waiting:
-        source = waiting.pop()
-        for node in graph.nodes:
-            if node.path not in found and source.path in _cameras(node, graph):
-                found.add(node.path)
-                waiting.append(node)
+    new = found
+    while new:
+        new = {node.path for node in graph.nodes if not new.isdisjoint(_cameras(node, graph))} - found
+        found |= new
     return [node for node in graph.nodes if node.path in found]
 
 

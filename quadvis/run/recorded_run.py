@@ -16,7 +16,7 @@ from quadvis.errors import QuadvisError, quoted
 from quadvis.graph.graph import Graph, Node
 from quadvis.links.endpoints import live_parts
 from quadvis.output.log_reader import Log
-from quadvis.output.recording import Recording, Slots
+from quadvis.output.recording import RecordedBlock, Slots
 from quadvis.output.stretch import NANOSECONDS
 from quadvis.run.loops import REAL_TIME, SIMULATED
 from quadvis.run.outside import outside
@@ -79,7 +79,7 @@ class RecordedPart:
 
     def _left_out(self) -> Whole:
         topic = left_out(self.computer).path
-        if not has(self._log.hidden, topic):
+        if self._log.hidden.block(topic) is None:
             problem = f"the log '{self._log.path}' does not say which ticks the real-time run left out"
             raise QuadvisError(f"{problem}: it is of an earlier quadvis; {AGAIN}")
         found = self._log.hidden.arrays(topic)[1].reshape(-1, 2)
@@ -135,10 +135,11 @@ class RecordedPart:
         """Return the stamps and the rows of a block that reaches outside."""
         visible = all_logged(self._diagram, node.path)
         where, topic = (self._log, f"/{node.path}") if visible else (self._log.hidden, input_topic(node.path))
-        if not has(where, topic):
+        block = where.block(topic)
+        if block is None:
             problem = f"the log '{self._log.path}' does not hold all outputs of {quoted(node.path)}"
             raise QuadvisError(f"{problem}, which come from outside; {AGAIN}")
-        check_ports(self._log, where, topic, node)
+        check_ports(self._log, block, node)
         return where.arrays(topic)
 
     def changes(self) -> list[Change]:
@@ -154,18 +155,12 @@ class RecordedPart:
         return [change for change in found if change.path in self.graph]
 
 
-def check_ports(log: Log, where: Recording, topic: str, node: Node) -> None:
+def check_ports(log: Log, block: RecordedBlock, node: Node) -> None:
     """Refuse rows of a block that has other outputs now."""
-    block = next(block for block in where.blocks if block.path == topic)
     now, then = ([port[:3] for port in found] for found in (ports(node), block.ports))
     if now != then:
         problem = f"in the log '{log.path}' {quoted(node.path)} has other outputs than the block has now"
         raise QuadvisError(f"{problem}; replay it with quadvis {log.metadata.get('quadvis', '')}".rstrip())
-
-
-def has(recording: Recording, topic: str) -> bool:
-    """Whether a recording has a topic."""
-    return any(block.path == topic for block in recording.blocks)
 
 
 def _lost_rows(log: Log) -> bool:

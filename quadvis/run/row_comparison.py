@@ -11,7 +11,7 @@ from quadvis.engine.taps import Tap
 from quadvis.output.comparison import BlockComparison, SignalDifference
 from quadvis.output.log_reader import Log
 from quadvis.output.recording import Slots
-from quadvis.run.recorded_run import RecordedPart, check_ports, has
+from quadvis.run.recorded_run import RecordedPart, check_ports
 from quadvis.run.row_tap import stamps_of
 from quadvis.run.rows import RecordedNode
 
@@ -44,8 +44,9 @@ class RowComparison(Tap):
         """Begin, with the rows of ``log`` for the ticks before ``end``."""
         self.block, self.every, self.ports = recorded.node.path, recorded.every, recorded.block.ports
         topic = recorded.block.path
-        if has(log, topic):
-            check_ports(log, log, topic, recorded.node)
+        there = log.block(topic)
+        if there is not None:
+            check_ports(log, there, recorded.node)
             self._stamps, self._old = log.arrays(topic)
         else:
             self._stamps, self._old = np.zeros(0, np.int64), np.zeros((0, recorded.block.size // 8), np.int64)
