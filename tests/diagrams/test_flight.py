@@ -1,17 +1,10 @@
-"""The hover on three computers: simulated with its links, and on the bench, where each computer is a process."""
+"""The hover on three computers: simulated with its links, and on the bench, a process for each computer."""
 
 from __future__ import annotations
 
-import json
-import sys
-from pathlib import Path
-from typing import Any
-
-import numpy as np
 import pytest
 
 import quadvis
-from quadvis.output.log_reader import read_log
 from tests.diagrams.golden import DIAGRAMS, ON_DEVICES
 
 FLIGHT = DIAGRAMS / "flight.yaml"
