@@ -18,6 +18,7 @@ from quadvis.machine.garbage import collected_from_now_on
 from quadvis.machine.shipped import PREFIX, named_file
 
 if TYPE_CHECKING:
+    from quadvis.graph.graph import Graph
     from quadvis.library.catalogue import Catalogue, OwnBlocks
     from quadvis.realtime.options import RealTime
 
@@ -62,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
         with ProgressLine(diagram.duration) as progress:
             result = run_diagram(
                 diagram, log=log, progress=progress, keep=(), engine=options.engine, announce=progress.say,
-                real_time=real_time,
+                real_time=real_time, profile=options.profile is not None,
             )  # fmt: skip
     except (RunError, KeyboardInterrupt):
         if log is not None and log.is_file():
@@ -77,8 +78,13 @@ def run(options: argparse.Namespace) -> int:
             print(f"log: {log}")
     if result.lost:
         print(f"{result.lost}; the run itself is judged in full", file=sys.stderr)
-    if result.flight and result.flight.loss:
-        print(result.flight.loss, file=sys.stderr)
+    if options.profile:
+        from quadvis.run.trace import write_trace
+
+        write_trace(options.profile, result.profiles)
+        print(f"trace: {options.profile}", file=sys.stderr)
+    for complaint in result.flight.complaints if result.flight else ():
+        print(complaint, file=sys.stderr)
     return 0 if result.passed and not result.lost else FAILED
 
 
@@ -148,6 +154,15 @@ def sweep(options: argparse.Namespace) -> int:
     return 0 if table.passed else FAILED
 
 
+def _hold_ups(graph: Graph) -> list[str]:
+    """Return which tasks can hold each other up in real time, if each runs by itself."""
+    from quadvis.graph.graph import MULTI
+    from quadvis.realtime.hold_ups import hold_ups
+
+    python = {node.path for node in graph.nodes if not node.block.numeric}
+    return hold_ups(graph, python) if graph.tasking == MULTI else []
+
+
 def check(options: argparse.Namespace) -> int:
     """Report all faults of a diagram; 2 if any are found."""
     from quadvis.analysis.ages import worst_ages
@@ -177,7 +192,9 @@ def check(options: argparse.Namespace) -> int:
     else:
         print(f"{options.file}: {count} blocks in {tasks}: no fault")
         lines = [*(f"link {name}: {facts}" for name, facts in links.items()), *map(str, ages)]
-        print("".join(f"  {line}\n" for line in lines), end="")
+        lines += _hold_ups(diagram.graph)
+        print("".join(f"  {line}
+" for line in lines), end="")
     return 0
 
 

@@ -13,7 +13,8 @@ JSON_HELP = """\
 --json prints one object: diagram, variant, params, hash, seed, passed, duration_s, wall_s, cpu_s,
 engine, real_time_factor, log, lost (what the log lacks, and why);
 real_time (null for a simulation): {lost_rows, computers: [{computer (null if the diagram names none), engine,
-granted, not_granted, tasks: {name: {period_s, steps, overruns,
+granted, not_granted, unsafe (why its outputs were made safe, or null),
+tasks: {name: {period_s, steps, overruns,
 lateness and execution: {min_s, mean_s, max_s, p99_s, p99.9_s}}}}]};
 summary: {label: {signal, unit, and the statistics by name, final of a vector as a list}};
 expect: [{expectation, signal, kind, unit, limit, found, met, lack (why the run cannot be judged)}];
@@ -90,6 +91,8 @@ def parser() -> Parser:
     )
     _engine_option(run)
     _real_time_options(run)
+    words = "time every call of a block; write a trace for Perfetto or chrome://tracing there, '' for none"
+    run.add_argument("--profile", metavar="PATH.json", help=words)
     run.add_argument("--json", action="store_true", help="print one JSON object instead of the summary")
     _replay_options(add("replay", commands.replay, "repeat a run from its log, to the bit", REPLAY_HELP))
     _sweep_options(add("sweep", commands.sweep, "run a diagram at every point of a grid", SWEEP_HELP))

@@ -26,6 +26,7 @@ from quadvis.diagram.sections.context import Context
 from quadvis.diagram.sections.expect import EXPECT
 from quadvis.diagram.sections.files import FILES, check_files
 from quadvis.diagram.sections.links import LINKS
+from quadvis.diagram.sections.overload import OVERLOAD, warn_tasks
 from quadvis.diagram.sections.seed import SEED
 from quadvis.diagram.sections.solver import SOLVER
 from quadvis.diagram.sections.stop_time import STOP_TIME
@@ -103,6 +104,8 @@ class Assembly:
         if not self.variants:
             self.warn_unused()
             warn_network(spec, graph, faults)
+            if expansion.is_whole:
+                warn_tasks(spec[OVERLOAD], graph, faults)
         written = spec[STOP_TIME]
         context = Context(
             wiring, graph, stop, written is not None and known(written) and stop < written, faults,

@@ -10,12 +10,14 @@ from typing import Any, Self
 import numpy as np
 
 from quadvis.engine.clock import Clock, Unpaced
-from quadvis.engine.interpreter import Call, Executor, Interpreter
+from quadvis.engine.interpreter import Call, Executor, Interpreter, Stop
 from quadvis.engine.memory import Memory, Slot
+from quadvis.engine.profile import Profile, ProfileReport, Timed
 from quadvis.engine.program import Program, make_program
 from quadvis.engine.stops import cannot, explained
-from quadvis.engine.taps import Observer, Tap
+from quadvis.engine.taps import MachineCall, Observer, Tap
 from quadvis.engine.tuning import Tuning
+from quadvis.errors import QuadvisError
 from quadvis.graph.graph import Constant, Graph
 from quadvis.machine.garbage import uncollected
 
@@ -120,16 +122,23 @@ class Engine:
         """Run with another executor from the next tick on; it works over the interpreter's memory."""
         self._executor = make(self._interpreter)
 
+    def prepare(self) -> None:
+        """Do now what would take time at the first tick."""
+        self._executor.prepare()
+
     def attach(self, tap: Tap) -> None:
         """Have a block's rows taken from now on."""
         self._executor.attach(tap)
 
-    def observe(self, task: str, call: Callable[[int], None], every: int = 1) -> Observer:
+    def observe(
+        self, task: str, call: Callable[[int], None], every: int = 1, machine: MachineCall | None = None
+    ) -> Observer:
         """Call ``call(tick)`` at a task's first and then every so many of its ticks, until it is detached.
 
-        It is called when the outputs are there and before the updates, as taps are.
+        It is called when the outputs are there and before the updates, as taps are. ``machine`` does the same
+        as machine code.
         """
-        observer = Observer(task, every, call)
+        observer = Observer(task, every, call, machine)
         self._executor.attach(observer)
         return observer
 
@@ -147,7 +156,40 @@ class Engine:
             self.tuning.apply(self.tick)
             stop = self._executor.run(due.stop)
             if stop is not None:
-                raise explained(stop, self.graph, self.program, self.memory) from stop.error
+                raise self.explained(stop) from stop.error
+
+    def explained(self, stop: Stop) -> QuadvisError:
+        """Return the error that a stop of an executor means, to be raised."""
+        return explained(stop, self.graph, self.program, self.memory)
+
+    def hold_safe(self) -> None:
+        """Write the safe values of all blocks, and let no block write any more; everything else goes on."""
+        for number in reversed(self._ready):
+            self._guarded(number, "write_safe")
+        self._executor.leave_writes()
+
+    def measure(self) -> None:
+        """Time every call of a block, from the first tick on; before another executor is chosen."""
+        self._interpreter.measure()
+
+    def profile(self) -> ProfileReport:
+        """Return the times of the calls."""
+        methods: list[Timed] = []
+        calls: list[tuple[int, int, int]] = []
+        for profile in self._interpreter.profiles:
+            places: dict[tuple[int, str], int] = {}
+            for block, method, count, total, least, most in profile:
+                placed = self.program.blocks[block]
+                places[block, method] = len(methods)
+                methods.append(
+                    Timed(placed.path, method, placed.task, count, total / 1e9, least / 1e9, most / 1e9)
+                )
+            calls += [(places[call[:2]], *call[2:]) for call in profile.calls()]
+        first = min((begin for _, begin, _ in calls), default=0)
+        shifted = sorted((begin - first, number, taken) for number, begin, taken in calls)
+        return ProfileReport(
+            tuple(methods), tuple((number, begin, taken) for begin, number, taken in shifted), Profile.cost()
+        )
 
     def snapshot(self) -> Snapshot:
         """Return the whole state between two ticks."""

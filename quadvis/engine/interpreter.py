@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from math import isnan
 from typing import Any, NamedTuple, Protocol
@@ -13,9 +14,10 @@ from numpy.typing import NDArray
 from quadvis.block import NO_FRAME, Block
 from quadvis.engine.layout import TIME
 from quadvis.engine.memory import SLOT, Memory
+from quadvis.engine.profile import Profile
 from quadvis.engine.program import COPY, Op, Program, TaskProgram
 from quadvis.engine.solver import Solver, Vector
-from quadvis.engine.taps import Observer, Tap
+from quadvis.engine.taps import MachineCall, Observer, Tap
 
 Call = Callable[[], None]
 NOT_FINITE_OUTPUT = "output"
@@ -40,14 +42,27 @@ class Executor(Protocol):
     memory: Memory
     tick: int  # the next to run
 
+    def prepare(self) -> None:
+        """Do now what would take time at the first tick."""
+
     def run(self, until: int) -> Stop | None:
         """Run all ticks before ``until``; None if nothing failed."""
 
     def attach(self, observer: Tap | Observer) -> None:
         """Have rows taken from now on, or something done at the ticks of a task."""
 
+    def leave_writes(self) -> None:
+        """Hand nothing to the world outside any more."""
+
     def detach(self, observer: Tap | Observer) -> None:
         """End what `attach` has begun."""
+
+
+class Handover(NamedTuple):
+    """What a task does for others once its outputs are there; ``machine`` does the same as machine code."""
+
+    call: Call
+    machine: MachineCall | None = None
 
 
 @dataclass
@@ -78,9 +93,17 @@ class Interpreter:
             self.memory.bind(block, placed.record, placed.position, placed.frames)
             for block, placed in zip(blocks, program.blocks, strict=True)
         ]
-        self.tick = 0
         self._calls: dict[Op, Call] = {}
         self._owners: dict[int, int] = {}  # the block of a call, by the call's identity
+        self.handover: Handover | None = None
+        self.profile: Profile | None = None
+        self.profiles: list[Profile] = []  # its own, and those of its parts
+        self._bind()
+
+    def _bind(self) -> None:
+        """Make ready to run the program from its first tick on."""
+        program = self.program
+        self.tick = 0
         self._derivatives = [self.call(op) for op in program.derivatives]
         self._minor = [self.call(op) for op in program.minor]
         self._states = np.array(program.states, np.intp)
@@ -90,6 +113,26 @@ class Interpreter:
         self.observers: list[Tap | Observer] = []
         self._rhythms = [(task.every, task.offset) for task in program.tasks]
         self._moments: dict[tuple[bool, ...], _Moment] = {}
+        self._writes = True
+
+    def part(self, name: str, handover: Handover | None = None) -> Interpreter:
+        """Return an interpreter for the thread of one task, over the same memory.
+
+        ``handover`` is called at each tick when the outputs are there.
+        """
+        made = copy(self)
+        made.program, made.handover = self.program.part(name), handover
+        if self.profile is not None:
+            made.measure()
+        made._bind()
+        return made
+
+    def measure(self) -> None:
+        """Time every call of a block from now on."""
+        self.profile = Profile()
+        self.profiles.append(self.profile)
+        self._calls, self._owners = {}, {}
+        self._bind()
 
     def call(self, op: Op) -> Call:
         """Return the function that runs an operation: one call over the memory."""
@@ -98,6 +141,8 @@ class Interpreter:
                 made = self.memory.copy(op.sources[0], op.targets[0])
             else:
                 made = self.memory.call(getattr(self.selves[op.block], op.method), op.sources, op.targets)
+            if self.profile is not None and op.block >= 0:
+                made = self.profile.timed(made, op.block, op.method)
             self._calls[op] = made
             self._owners[id(made)] = op.block
         return self._calls[op]
@@ -115,25 +160,32 @@ class Interpreter:
             self._rhythms.append(rhythm)
         self._moments.clear()
 
+    def leave_writes(self) -> None:
+        """Hand nothing to the world outside any more."""
+        self._writes = False
+        self._moments.clear()
+
     def rhythm(self, observer: Tap | Observer) -> tuple[int, int]:
         """Return after how many ticks an observer is due again, and its first tick."""
         name = observer.task if isinstance(observer, Observer) else self.program[observer.block].task
         task = self.program.task(name)
         return task.every * observer.every, task.offset
 
+    def prepare(self) -> None:
+        """Make the calls of the first tick."""
+        self._moment()
+
     def run(self, until: int) -> Stop | None:
         """Run all ticks before ``until``; None if nothing failed."""
         floats, raw = self.memory.floats, self.memory.raw
         clock = raw.cast("d")  # one element costs a third of a numpy array's
-        rhythms = self._rhythms
         period, denominator = self.program.period.as_integer_ratio()
         continuous = self._states.size > 0
         while self.tick < until:
             tick = self.tick
-            due = tuple([(tick - offset) % every == 0 and tick >= offset for every, offset in rhythms])
-            moment = self._moments.get(due) or self._prepare(due)
+            moment = self._moment()
             # An exact product, so that time has no drift; the quotient of integers is rounded once.
-            clock[TIME.position] = tick * period / denominator
+            clock[self.program.time.position] = tick * period / denominator
             call = None
             try:
                 for call in moment.before:
@@ -160,6 +212,12 @@ class Interpreter:
             self.tick = tick + 1
         return None
 
+    def _moment(self) -> _Moment:
+        """Return the calls of the next tick."""
+        tick = self.tick
+        due = tuple([(tick - offset) % every == 0 and tick >= offset for every, offset in self._rhythms])
+        return self._moments.get(due) or self._prepare(due)
+
     def _stop(self, call: Call | None, error: Exception) -> Stop:
         return Stop(self.tick, (self._owners[id(call)],), error)
 
@@ -169,8 +227,8 @@ class Interpreter:
         finite = np.array([position for task in tasks for position in task.finite], np.intp)
         attached = [observer for observer in self.observers if self.rhythm(observer) in rhythms]
         made = _Moment(
-            self._due_calls("before", tasks),
-            self._due_calls("write", tasks),
+            self._due_calls("before", tasks) + ([self.handover.call] if self.handover else []),
+            self._due_calls("write", tasks) if self._writes else [],
             self._due_calls("update", tasks),
             finite,
             np.zeros(finite.size),

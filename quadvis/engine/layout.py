@@ -1,7 +1,8 @@
 """Where everything lies: every signal, constant, delayed value and block in one run of 8-byte slots.
 
-In slots: time | signals, task by task (the continuous one first), block by block | constants | delayed
-signals | slopes | one record per block. A block's outputs lie side by side: a row of the log is one slice.
+In slots: time | signals, task by task (the continuous one first), block by block | times of tasks that run
+by themselves | constants | delayed signals | slopes | one record per block. A block's outputs lie side by
+side: a row of the log is one slice.
 Frames lie in a list beside it, and so do frames that a block keeps as states.
 """
 
@@ -13,7 +14,7 @@ from functools import cached_property
 
 from quadvis.block import Block, Shape
 from quadvis.engine.memory import SLOT, Record, Slot
-from quadvis.graph.graph import Constant, Graph, Node, Task, Wire, selected
+from quadvis.graph.graph import MULTI, Constant, Graph, Node, Task, Wire, selected
 
 TIME = Slot("float64", (), 0)
 
@@ -81,6 +82,7 @@ class Placed:
 class Layout:
     """Gives every block of a graph its places, in the order of execution: ``blocks``.
 
+    ``times`` are the slots of time of those tasks that do not have `TIME`.
     ``delays`` and ``latches`` are copies from slot to slot between an output and its readers, by the task at
     whose ticks they are made: the producer's for a delay, the reader's for a latch.
     """
@@ -89,8 +91,11 @@ class Layout:
         self._graph = graph
         self.size, self.frames = 1, 0
         self._records: dict[Hashable, Record] = {}
-        self.continuous = 1  # the slot at which the continuous task's signals end
+        self.continuous = self.size  # the slot at which the continuous task's signals end
         self._outputs = self._signals()
+        # With tasks that run each by itself, all but the fastest have a time of their own.
+        own = graph.tasks[1:] if graph.tasking == MULTI else ()
+        self.times = {task.name: self._room("float64", ()) for task in own}
         self._constants = {
             (node.path, port): self._take(node, port)
             for node in graph.nodes

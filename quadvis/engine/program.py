@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple
@@ -44,7 +44,8 @@ class TaskProgram(NamedTuple):
     period ago, made before any block runs. ``latches``: copies of what faster tasks gave, made once those are
     through, where each task runs by itself. ``reads``: blocks fetch what the world outside offers.
     ``outputs``: the blocks compute. ``finite``: the slots that must hold finite numbers then. ``writes``:
-    blocks hand their inputs to the world outside. ``updates``: the blocks change their states.
+    blocks hand their inputs to the world outside. ``updates``: the blocks change their states. ``time`` is
+    where the blocks read the time of the tick; one of the latches copies it, where it is the task's own.
     """
 
     name: str
@@ -59,6 +60,7 @@ class TaskProgram(NamedTuple):
     writes: tuple[Op, ...]
     updates: tuple[Op, ...]
     finite: tuple[int, ...]
+    time: Slot = TIME
 
     @property
     def phases(self) -> dict[str, tuple[Op, ...]]:
@@ -85,7 +87,8 @@ class Program:
     beginning: parameters, initial states, constants, random streams. ``held`` is the number of slots that
     minor steps write over: time and the signals of the continuous task. ``states`` are the slots of the
     continuous states, ``slopes`` those of their derivatives, in one order. ``derivatives`` are the calls that
-    give them; ``minor`` are the outputs on which they depend and which move between two ticks.
+    give them; ``minor`` are the outputs on which they depend and which move between two ticks. A tick begins
+    with its time in ``time``.
     """
 
     name: str
@@ -102,6 +105,7 @@ class Program:
     derivatives: tuple[Op, ...]
     minor: tuple[Op, ...]
     tunables: tuple[Tunable, ...]
+    time: Slot = TIME
 
     @cached_property
     def _numbers(self) -> dict[str, int]:
@@ -139,6 +143,19 @@ class Program:
             found += [*_in_order(group, "read"), *_in_order(group, "output")]
         return tuple(found)
 
+    def part(self, name: str) -> Program:
+        """Return what the thread of one task runs.
+
+        The delays and latches of all but the fastest are left to those who dispatch them.
+        """
+        task = self.task(name)
+        if task == self.tasks[0]:
+            return replace(self, tasks=(task,))
+        alone = task._replace(delays=(), latches=())
+        return replace(
+            self, tasks=(alone,), held=0, states=(), slopes=(), derivatives=(), minor=(), time=task.time
+        )
+
     @cached_property
     def hash(self) -> str:
         """The SHA-256 of everything in the program."""
@@ -150,13 +167,13 @@ def make_program(graph: Graph, seed: int) -> Program:
     """Lay out memory and list the calls of every task; states hold their initial values, seeded."""
     layout = Layout(graph)
     blocks = layout.blocks
-    calls = _calls(graph, blocks)
+    calls = _calls(graph, blocks, layout.times)
     numbers: dict[str, list[int]] = {task.name: [] for task in graph.tasks}
     for number, block in enumerate(blocks):
         numbers[block.task].append(number)
     tasks = []
     for task in graph.tasks:
-        mine = numbers[task.name]
+        mine, time = numbers[task.name], layout.times.get(task.name, TIME)
         read, output, write, update = (
             tuple(calls[phase][number] for number in mine if number in calls[phase]) for phase in PHASES
         )
@@ -168,12 +185,13 @@ def make_program(graph: Graph, seed: int) -> Program:
                 graph.ticks(task.offset),
                 task.continuous,
                 _copies(layout.delays.get(task.name, {})),
-                _copies(layout.latches.get(task.name, {})),
+                (*_copies({TIME: time} if time != TIME else {}), *_copies(layout.latches.get(task.name, {}))),
                 read,
                 output,
                 write,
                 update,
                 tuple(position for number in mine for position in _finite(blocks[number])),
+                time,
             )
         )
     states = [(block.field(name), slope) for block in blocks for name, slope in block.slopes.items()]
@@ -204,14 +222,15 @@ def _copies(slots: Mapping[Slot, Slot]) -> tuple[Op, ...]:
     return tuple(Op(NO_BLOCK, COPY, (source,), (target,)) for source, target in slots.items())
 
 
-def _calls(graph: Graph, blocks: Sequence[Placed]) -> dict[str, dict[int, Op]]:
+def _calls(graph: Graph, blocks: Sequence[Placed], times: Mapping[str, Slot]) -> dict[str, dict[int, Op]]:
     """Return the calls of each method by the number of the block."""
     found: dict[str, dict[int, Op]] = {method: {} for method in (*PHASES, "deriv")}
     for number, (node, block) in enumerate(zip(graph.nodes, blocks, strict=True)):
         targets = {"output": tuple(block.outputs.values()), "deriv": tuple(block.slopes.values())}
         for method, names in node.block.interface.arguments.items():
             if method in found:
-                sources = tuple([TIME if name == "time" else block.inputs[name] for name in names])
+                time = times.get(block.task, TIME)
+                sources = tuple([time if name == "time" else block.inputs[name] for name in names])
                 found[method][number] = Op(number, method, sources, targets.get(method, ()))
     return found
 

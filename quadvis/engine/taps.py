@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,9 +30,24 @@ class Tap(ABC):
             self.take(tick, memoryview(row).cast("B"))
 
 
+class MachineCall(NamedTuple):
+    """The machine code of an observer, ``int32 f(int64 *places)``: its address, and the addresses it takes.
+
+    Before these, ``places`` has the address of the present tick. ``owner`` owns what lies there.
+    """
+
+    address: int
+    places: tuple[int, ...]
+    owner: Any
+
+
 class Observer(NamedTuple):
-    """Something to do at the ticks of a task, with the memory as it is between outputs and updates."""
+    """Something to do at the ticks of a task, with the memory as it is between outputs and updates.
+
+    The compiled loop runs ``machine`` in the place of ``call``, if there is one.
+    """
 
     task: str
     every: int
     call: Callable[[int], None]  # takes the tick
+    machine: MachineCall | None = None

@@ -14,17 +14,18 @@ def with_transitions(nodes: Iterable[Node]) -> None:
     As Simulink's rate transitions do: from a slower task a faster one reads what the slower gave one of the
     slower's periods ago, swapped when the slower is due again, since its present value may not be ready.
     From a faster task a slower one reads what the faster gave when the slower became due; the value is
-    latched, since the faster runs on meanwhile. So is a late value, unless the reader is always through
-    before it changes.
+    latched, since the faster runs on meanwhile. So is a late value, unless the fastest task of all reads it
+    and is always through before it changes: that task runs where late values are swapped.
     """
     nodes = list(nodes)
     tasks = {node.path: node.task for node in nodes}
+    fastest = min(tasks.values(), key=rank, default=None)
     for node in nodes:
         for port, wire in list(node.wires()):
             producer, reader = tasks.get(wire.block, node.task), node.task
             if producer != reader and not wire.earlier:
                 late = not wire.delayed and rank(producer) > rank(reader)
-                through = (late or wire.delayed) and _falls_on(producer, reader)
+                through = (late or wire.delayed) and reader == fastest and _falls_on(producer, reader)
                 node.inputs[port] = replace(wire, late=late, latched=not through)
 
 

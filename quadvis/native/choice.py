@@ -12,13 +12,16 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from quadvis.block import Block
+from quadvis.engine.clock import Unpaced
 from quadvis.engine.engine import Engine
+from quadvis.engine.interpreter import Executor, Interpreter
 from quadvis.engine.program import COPY, Program
 from quadvis.engine.solver import TABLEAUS
 from quadvis.errors import QuadvisError, counted, quoted, suggestion
 
 if TYPE_CHECKING:
     from quadvis.native.block_type import BlockType
+    from quadvis.native.clock import MachineClock
 
 AUTO, PYTHON, NATIVE = ENGINES = ("auto", "python", "native")
 Announce = Callable[[str], None]
@@ -48,10 +51,13 @@ class Choice:
         return f"{self.engine}, {self.reason}" if self.reason else self.engine
 
 
-def choose(engine: Engine, ticks: int, wanted: str = AUTO, announce: Announce | None = None) -> Choice:
+def choose(
+    engine: Engine, ticks: int, wanted: str = AUTO, announce: Announce | None = None, *, paced: bool = False
+) -> Choice:
     """Choose how to run so many ticks; QuadvisError if machine code is wanted and cannot be had.
 
-    What has to be compiled for the choice is compiled, and announced.
+    What has to be compiled for the choice is compiled, and announced. If none is wanted, a ``paced`` run,
+    whose length the clock gives, takes machine code if some blocks have it and nothing has to be compiled.
     """
     if wanted not in ENGINES:
         some = suggestion(wanted, ENGINES) or f"choose one of {', '.join(ENGINES)}"
@@ -64,7 +70,7 @@ def choose(engine: Engine, ticks: int, wanted: str = AUTO, announce: Announce | 
         return Choice(PYTHON, "since numba is not installed")
     program, blocks = engine.program, [node.block for node in engine.graph.nodes]
     saved = _saved(program, blocks, ticks)
-    if wanted == AUTO and saved < START:
+    if wanted == AUTO and saved < START and not paced:
         return Choice(PYTHON, SHORT)
     from quadvis.native.library import block_types, library
 
@@ -72,7 +78,10 @@ def choose(engine: Engine, ticks: int, wanted: str = AUTO, announce: Announce | 
     kinds = list(dict.fromkeys(types.values()))
     missing = library().missing(kinds)
     cost = START + LOAD * len(kinds) + (COMPILER + COMPILE * len(missing) if missing else 0.0)
-    if wanted == AUTO and saved < cost:
+    if wanted == AUTO and paced and (missing or not kinds):
+        lacking = f"{counted(len(missing), 'block type')} would have to be compiled, once; 'native' does it"
+        return Choice(PYTHON, f"since {lacking if missing else 'no block can be compiled'}")
+    if wanted == AUTO and not paced and saved < cost:
         which = counted(len(missing), "block type")
         why = f"since compiling {which} would take about {cost:.0f} s, once; 'native' does it"
         return Choice(PYTHON, why if missing else SHORT)
@@ -101,18 +110,39 @@ def _saved(program: Program, blocks: Sequence[Block], ticks: int) -> float:
     return found
 
 
-def use(engine: Engine, choice: Choice) -> None:
-    """Let an engine run as chosen, from now on."""
+def use(engine: Engine, choice: Choice, clock: MachineClock | None = None) -> None:
+    """Let an engine run as chosen, from now on; the compiled loop asks ``clock``, if given, for each tick."""
     if choice.engine != NATIVE:
         return
+    engine.run_with(lambda interpreter: executor(interpreter, choice, clock))
+    if clock is not None:
+        engine.clock = Unpaced()
+
+
+def executor(interpreter: Interpreter, choice: Choice, clock: MachineClock | None = None) -> Executor:
+    """Return what runs a program as chosen, over the memory of its interpreter."""
+    if choice.engine != NATIVE:
+        return interpreter
     from quadvis.native.executor import NativeExecutor
     from quadvis.native.library import library
 
     compiled, types = library(), choice.types
-    engine.run_with(
-        lambda interpreter: NativeExecutor(
-            interpreter,
-            compiled.loop(),
-            lambda op: compiled.function(types[op.block], op.method) if op.block in types else None,
-        )
+    return NativeExecutor(
+        interpreter,
+        compiled.loop(),
+        lambda op: compiled.function(types[op.block], op.method) if op.block in types else None,
+        clock,
     )
+
+
+def interpreted(engine: Engine, choice: Choice) -> set[str]:
+    """Return the paths of the blocks that Python runs."""
+    paths = {block.path for block in engine.program.blocks}
+    if choice.engine != NATIVE:
+        return paths
+    from quadvis.native.library import library
+
+    refused = library().refusals
+    return paths - {
+        engine.program.blocks[number].path for number, kind in choice.types.items() if kind not in refused
+    }

@@ -12,7 +12,9 @@ from quadvis.machine.garbage import uncollected
 from quadvis.native.block_type import BlockType, Kind, MethodType
 from quadvis.native.cache import MachineCode
 from quadvis.native.checked import power, replacements
+from quadvis.native.foreign import intrinsics
 from quadvis.native.machine_code import Compiled, Unlinkable, emit
+from quadvis.native.routine import ROUTINE, Routine, plain
 from quadvis.native.source import POWER, Unreadable, fingerprint, names_in, prepared
 
 # A division by zero and a wrong index are noticed. Nobody calls the functions from Python.
@@ -56,11 +58,34 @@ def machine_code(compiled: Mapping[str, Compiled], prefix: str) -> MachineCode:
     return MachineCode(content, names, frozenset(name for name in names if names[name] in fallible))
 
 
-def compile_loop_code(prefix: str) -> MachineCode:
-    """Compile the loop."""
-    from quadvis.native.loop import compile_loop
+def compile_routine(routine: Routine, prefix: str) -> MachineCode:
+    """Compile a routine with the plain functions that it calls."""
+    import numba
 
-    return machine_code({"loop": compile_loop()}, prefix)
+    kinds: Any = {"w": numba.int64, "r": numba.float64}
+    pointer: Callable[[Any], Any] = numba.types.CPointer
+    pointers = [pointer(kinds[kind]) for kind in routine.pointers]
+    replaced: Mapping[Any, Any] = {**intrinsics(), **routine.instead}
+    options = {**OPTIONS, "error_model": "numpy", "boundscheck": False}
+    known: dict[types.FunctionType, Any] = {}
+
+    def scoped(function: types.FunctionType) -> types.FunctionType:
+        scope = dict(function.__globals__)
+        for name in set(names_in(function.__code__)) & scope.keys():
+            value = scope[name]
+            if isinstance(value, types.FunctionType):
+                taken = replaced.get(value, value)
+                scope[name] = jitted(taken) if isinstance(taken, types.FunctionType) else taken
+        return types.FunctionType(function.__code__, scope, function.__name__)
+
+    def jitted(function: types.FunctionType) -> Any:
+        if function not in known:
+            jit: Any = numba.njit
+            known[function] = jit(scoped(function), error_model="numpy")
+        return known[function]
+
+    compiled = compile_function(scoped(plain(routine.function)), pointers, options)
+    return machine_code({ROUTINE: compiled}, prefix)
 
 
 def compile_function(

@@ -4,36 +4,49 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from fractions import Fraction
 
 from quadvis.engine.interpreter import NOT_FINITE_OUTPUT, Interpreter, Stop
 from quadvis.engine.memory import Memory
 from quadvis.engine.program import Op
 from quadvis.engine.taps import Observer, Tap
 from quadvis.native import loop
+from quadvis.native.clock import MachineClock
 from quadvis.native.tables import Function, PythonCall, Tables
 
 EXACT = 1 << 53  # whole numbers below are exact as floats
 INSTRUCTIONS = 1 << 25  # after so many, some tenths of a second, Python has its turn: Ctrl-C
 
 
+def last_exact(period: Fraction) -> int:
+    """Return the last tick whose time the compiled loop works out exactly."""
+    numerator, denominator = period.as_integer_ratio()
+    return (EXACT - 1) // numerator if denominator < EXACT else -1
+
+
 class NativeExecutor:
     """Runs a program's ticks over an interpreter's memory, at the address of the compiled loop.
 
     A compiled call that fails is repeated by the interpreter: its result, or its exception, is what counts.
-    Rows reach their taps when a ring is full, and at the latest at the end of ``run``.
+    Rows reach their taps when a ring is full, and at the latest at the end of ``run``. With a clock, the loop
+    runs each tick when the clock lets it go.
     """
 
     def __init__(
-        self, interpreter: Interpreter, address: int, function: Callable[[Op], Function | None]
+        self,
+        interpreter: Interpreter,
+        address: int,
+        function: Callable[[Op], Function | None],
+        clock: MachineClock | None = None,
     ) -> None:
-        self.interpreter = interpreter
+        self.interpreter, self._clock = interpreter, clock
         self.memory: Memory = interpreter.memory
         self._function = function
         self._run = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(address)
         self._tables: Tables | None = None
+        self._writes = True
         self._reached = -1  # the tick for which the tables are ready, if nothing else has moved it
-        numerator, denominator = interpreter.program.period.as_integer_ratio()
-        self._last = (EXACT - 1) // numerator if denominator < EXACT else -1  # the last tick in exact time
+        self._last = last_exact(interpreter.program.period)
 
     @property
     def tick(self) -> int:
@@ -49,23 +62,37 @@ class NativeExecutor:
         self.interpreter.attach(observer)
         self._tables = None
 
+    def leave_writes(self) -> None:
+        """Hand nothing to the world outside any more."""
+        self.interpreter.leave_writes()
+        self._writes = False
+        if self._tables is not None:
+            self._tables.leave_writes()
+
     def detach(self, observer: Tap | Observer) -> None:
         """End what `attach` has begun."""
         self.interpreter.detach(observer)
         self._tables = None
 
+    def prepare(self) -> None:
+        """Make the tables."""
+        self._made()
+
     def _made(self) -> Tables:
         if self._tables is None:
-            self._tables = Tables(self.interpreter, self._function)
+            self._tables = Tables(self.interpreter, self._function, self._clock)
             self._reached = -1
+            if not self._writes:
+                self._tables.leave_writes()
         return self._tables
 
     def run(self, until: int) -> Stop | None:
         """Run all ticks before ``until``; None if nothing failed."""
         if until > self._last:
+            assert self._clock is None, "whoever gives a clock asks `last_exact` first"
             return self.interpreter.run(until)
         tables = self._made()
-        turn = max(1, INSTRUCTIONS // max(1, len(tables.code)))
+        turn = until if self._clock else max(1, INSTRUCTIONS // max(1, len(tables.code)))
         while self.tick < until:
             stop = self._turn(tables, min(until, self.tick + turn))
             if stop is not None:
@@ -87,6 +114,10 @@ class NativeExecutor:
                     return None
                 if result == loop.FULL:
                     _hand_on(tables)
+                    continue
+                if result == loop.PAUSED:
+                    assert self._clock is not None
+                    self._clock.answer(control[loop.PAUSE])
                     continue
                 stop = self._answer(tables, result, control[loop.PLACE])
                 if stop is not None:

@@ -23,11 +23,21 @@ from quadvis.native import cache
 from quadvis.native.block_type import BlockType, MethodType
 from quadvis.native.cache import MachineCode
 from quadvis.native.choice import Announce
+from quadvis.native.loop import POINTERS, loop
 from quadvis.native.machine_code import Loaded, processor
+from quadvis.native.routine import ROUTINE, Routine
 from quadvis.native.tables import Function
 
-LOOP = "loop"
-COMPILER = ("block_type", "checked", "compiler", "loop", "machine_code", "runtime", "source")  # of this room
+LOOP = Routine(loop, POINTERS)
+COMPILER = (
+    "block_type",
+    "checked",
+    "compiler",
+    "foreign",
+    "machine_code",
+    "runtime",
+    "source",
+)  # of this room
 
 
 class Library:
@@ -38,16 +48,21 @@ class Library:
         self._functions: dict[BlockType | str, dict[str, Function]] = {}
         self.refusals: dict[BlockType, str] = {}
 
+    def routine(self, routine: Routine) -> int:
+        """Return the address of a compiled routine."""
+        text = routine.text
+        if text not in self._functions:
+            key = _key(text)
+            code = cache.load(key)
+            if code is None or not self._add(text, code):
+                from quadvis.native.compiler import compile_routine
+
+                self._add(text, _kept(key, compile_routine(routine, _prefix(key))))
+        return self._functions[text][ROUTINE].address
+
     def loop(self) -> int:
         """Return the address of the compiled loop."""
-        if LOOP not in self._functions:
-            key = _key(LOOP)
-            code = cache.load(key)
-            if code is None or not self._add(LOOP, code):
-                from quadvis.native.compiler import compile_loop_code
-
-                self._add(LOOP, _kept(key, compile_loop_code(_prefix(key))))
-        return self._functions[LOOP][LOOP].address
+        return self.routine(LOOP)
 
     def missing(self, kinds: Iterable[BlockType]) -> list[BlockType]:
         """Load block types that are kept; return those that must be compiled."""

@@ -1,8 +1,11 @@
 """The compiled loop: it runs any program, from tables of whole numbers, over the memory of the engine.
 
-The source is Python and is compiled once, by `compile_loop`. The loop returns to its caller for what only
+The source is Python and is compiled once, as a `Routine`. The loop returns to its caller for what only
 Python can do: the call of a block that is not compiled, a full ring of rows, a fault, the end. The caller
 does it and calls again; the loop continues where it was.
+
+Where a clock is given, the loop calls it before each tick. A clock is machine code too: it waits, and may
+move the loop to a later tick, or pause it; see `quadvis.native.clock`.
 
 An instruction has two numbers: what to do, and an operand. Instructions stand in the order of the
 interpreter's tick. A segment is a run of instructions with one rhythm: at ticks at which the rhythm is not
@@ -11,11 +14,9 @@ due, the loop leaves the segment out.
 
 from __future__ import annotations
 
-import types
 from typing import Any
 
-from quadvis.native.compiler import OPTIONS, compile_function
-from quadvis.native.machine_code import Compiled
+from quadvis.native.foreign import invoke
 
 WIDTH = 2
 # Instructions. A larger number is the address of a function to call; its operand is that of its places. The
@@ -28,12 +29,19 @@ INTEGRATE = 4
 PYTHON = 5  # what only Python can do; the operand itself is its number
 
 # Why the loop returned.
-DONE, FAILED, NOT_FINITE, FULL, ASKED = range(5)
+DONE, FAILED, NOT_FINITE, FULL, ASKED, PAUSED = range(6)
 
 # The places in ``control``.
 TICK, UNTIL, SEGMENT, PLACE, RESULT, RHYTHMS, SEGMENTS, NUMERATOR, DENOMINATOR = range(9)
 STATES, HELD, STAGES, MINOR, DERIVATIVES, CALLS = range(9, 15)
-CONTROLS = 15
+CLOCK, CLOCK_PLACES, PAUSE = range(
+    15, 18
+)  # a clock's address, or 0; that of its places; by it: why it pauses
+LEFT, LEFT_END = range(18, 20)  # segments that are left out from now on
+TIME = 20  # the place of time in memory
+CONTROLS = 21
+
+POINTERS = "wwwwwwrwwwwrr"  # of `loop`: to whole or real numbers
 
 
 def loop(
@@ -52,10 +60,20 @@ def loop(
     result = DONE
     while tick < control[UNTIL]:
         if segment < 0:
+            control[TICK] = tick
+            if control[CLOCK] != 0:
+                invoke(control[CLOCK], control[CLOCK_PLACES])
+                if control[PAUSE] != 0:
+                    control[SEGMENT], control[RESULT] = -1, PAUSED
+                    return
+                _pass(rhythms, control[RHYTHMS], control[TICK] - tick)
+                tick = control[TICK]
+                if tick >= control[UNTIL]:
+                    break
             segment = place = 0
             _begin(control, tick, rhythms, due, memory)
         while segment < control[SEGMENTS]:
-            if due[segments[3 * segment]]:
+            if due[segments[3 * segment]] and not control[LEFT] <= segment < control[LEFT_END]:
                 place = max(place, segments[3 * segment + 1])
                 end = segments[3 * segment + 2]
                 while place < end:
@@ -98,7 +116,14 @@ def _begin(control: Any, tick: int, rhythms: Any, due: Any, memory: Any) -> None
         due[index] = waiting == 0
         rhythms[2 * index + 1] = (rhythms[2 * index] if waiting == 0 else waiting) - 1
     # Both are exact as floats, so that the quotient is rounded once, as in the interpreter.
-    memory[0] = (tick * control[NUMERATOR]) / control[DENOMINATOR]
+    memory[control[TIME]] = (tick * control[NUMERATOR]) / control[DENOMINATOR]
+
+
+def _pass(rhythms: Any, count: int, ticks: int) -> None:
+    """Leave ticks out: advance what each rhythm waits."""
+    for index in range(count):
+        waiting = rhythms[2 * index + 1] - ticks
+        rhythms[2 * index + 1] = waiting if waiting >= 0 else waiting % rhythms[2 * index]
 
 
 def _call(code: Any, place: int, end: int) -> int:
@@ -179,41 +204,3 @@ def _integrate(control: Any, code: Any, memory: Any, places: Any, stages: Any, s
     for index in range(count):
         memory[places[2 * index]] = scratch[final + index]
     return result
-
-
-def invoke(address: int, places: int) -> int:
-    """Call the machine code at an address; `compile_loop` has the compiled form."""
-    raise NotImplementedError
-
-
-def compile_loop() -> Compiled:
-    """Compile the loop, with numba."""
-    import numba
-
-    kinds: Any = numba.types
-    scope = {**globals(), "invoke": _invoke()}
-    for function in (_begin, _call, _copy, _move, _finite, _row, _integrate, loop):
-        made = types.FunctionType(function.__code__, scope, function.__name__)
-        scope[function.__name__] = numba.njit(made, error_model="numpy")
-    whole, real = kinds.CPointer(kinds.int64), kinds.CPointer(kinds.float64)
-    pointers = [whole] * 6 + [real] + [whole] * 4 + [real] * 2
-    return compile_function(scope["loop"].py_func, pointers, {**OPTIONS, "error_model": "numpy"})
-
-
-def _invoke() -> Any:
-    """Return the function that calls an address, for compiled code."""
-    from llvmlite import ir
-    from numba import types as kinds
-    from numba.extending import intrinsic
-
-    @intrinsic
-    def invoke(context: Any, address: Any, places: Any) -> Any:
-        def emit(_: Any, builder: Any, __: Any, values: Any) -> Any:
-            pointer = ir.IntType(8).as_pointer()
-            form = ir.FunctionType(ir.IntType(32), [pointer])
-            function = builder.inttoptr(values[0], form.as_pointer())
-            return builder.call(function, [builder.inttoptr(values[1], pointer)])
-
-        return kinds.int32(address, places), emit
-
-    return invoke

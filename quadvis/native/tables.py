@@ -19,6 +19,8 @@ from quadvis.engine.program import COPY, Op
 from quadvis.engine.solver import TABLEAUS
 from quadvis.engine.taps import Observer, Tap
 from quadvis.native import loop
+from quadvis.native.clock import MachineClock
+from quadvis.native.timing import PLACES, TimedCalls
 
 Rhythm = tuple[int, int]  # ticks from one time to the next, and the first tick
 Whole = NDArray[np.int64]
@@ -81,15 +83,26 @@ class Redo:
 
 
 class Tables:
-    """The tables of a program; ``function`` gives the compiled method of a call, or None."""
+    """The tables of a program; ``function`` gives the compiled method of a call, or None.
 
-    def __init__(self, interpreter: Interpreter, function: Callable[[Op], Function | None]) -> None:
-        self._interpreter, self._function = interpreter, function
+    ``clock`` is what the loop waits for before each tick.
+    """
+
+    def __init__(
+        self,
+        interpreter: Interpreter,
+        function: Callable[[Op], Function | None],
+        clock: MachineClock | None = None,
+    ) -> None:
+        self._interpreter, self._function, self._clock = interpreter, function, clock
+        self._control: Whole = np.zeros(loop.CONTROLS, np.int64)
         program, memory = interpreter.program, interpreter.memory
         self._base = memory.floats.ctypes.data
         self._saved: Whole = np.zeros(
             max((block.record.size for block in program.blocks), default=0), np.int64
         )
+        self._timed = TimedCalls(interpreter.profile) if interpreter.profile is not None else None
+        self._calls_timed: list[tuple[int, Any]] = []  # first place, words of its timing
         self._rhythms: dict[Rhythm, int] = {}
         self._segments: list[list[int]] = []
         self._code: list[tuple[int, int]] = []
@@ -100,6 +113,7 @@ class Tables:
         self.python: list[PythonCall] = []
         self.redo: dict[int, Redo] = {}  # by instruction
         self.rings: list[Ring] = []
+        self._fresh = True  # the next instruction begins a segment
         self._first_minor = 0  # the instruction of the first call between two ticks
         self._lay_out()
         self._finish()
@@ -107,6 +121,10 @@ class Tables:
     def saved(self, size: int) -> bytes:
         """Return the copy of the record that the last fallible update began with."""
         return self._saved[: size // SLOT].tobytes()
+
+    def leave_writes(self) -> None:
+        """Leave out the instructions with which blocks write."""
+        self._control[loop.LEFT : loop.LEFT_END + 1] = self._writes
 
     def waits(self, tick: int) -> None:
         """Set how many ticks each rhythm waits, for a loop that begins at a tick."""
@@ -120,11 +138,20 @@ class Tables:
         program = self._interpreter.program
         for task, op in program.phase("before"):
             self._op((task.every, task.offset), op)
+        handover = self._interpreter.handover
+        if handover is not None and handover.machine is not None:
+            self._machine(ALWAYS, handover.machine.address, handover.machine.places)
+        elif handover is not None:
+            self._ask(ALWAYS, PythonCall(handover.call, -1))
         for task in program.tasks:
             for first, count in _runs(task.finite):
                 self._add((task.every, task.offset), loop.CHECK, first, count)
+        self._fresh = True
+        first = len(self._segments)
         for task, op in program.phase("write"):
             self._op((task.every, task.offset), op)
+        self._fresh = True
+        self._writes = first, len(self._segments)
         for observer in sorted(self._interpreter.observers, key=lambda each: not isinstance(each, Observer)):
             self._observer(observer)
         for task, op in program.phase("update"):
@@ -139,7 +166,8 @@ class Tables:
 
     def _instruct(self, rhythm: Rhythm, kind: int, operand: int) -> int:
         number = self._rhythms.setdefault(rhythm, len(self._rhythms))
-        if not self._segments or self._segments[-1][0] != number:
+        if self._fresh or self._segments[-1][0] != number:
+            self._fresh = False
             self._segments.append([number, len(self._code), len(self._code)])
         self._code.append((kind, operand))
         self._segments[-1][2] = len(self._code)
@@ -151,7 +179,7 @@ class Tables:
             self._add(rhythm, loop.MOVE, source, target, size)
             return
         before = len(self._code) - 1
-        follows = self._segments and self._segments[-1][0] == self._rhythms.get(rhythm)
+        follows = not self._fresh and self._segments[-1][0] == self._rhythms.get(rhythm)
         if not follows or before not in self._pairs:
             before = self._instruct(rhythm, loop.COPY, 0)
         self._pairs.setdefault(before, []).extend((source + index, target + index) for index in range(size))
@@ -166,7 +194,7 @@ class Tables:
             self._ask(rhythm, python)
             return
         block = self._interpreter.program.blocks[op.block]
-        copy = self._as_copy(op)
+        copy = self._as_copy(op) if self._timed is None else None
         if copy is not None:
             self._copy(rhythm, copy[0].position, copy[1].position, copy[0].size)
             return
@@ -198,8 +226,14 @@ class Tables:
         first = len(self._places)
         positions = [block.position, *(slot.position for slot in (*op.sources, *op.targets))]
         self._places += [self._base + position * SLOT for position in positions]
+        address = function.address
+        if self._timed is not None:
+            call, places = self._timed.call(op.block, op.method, address)
+            self._calls_timed.append((first, call))
+            address, first = self._timed.address, len(self._places)
+            self._places += places
         self._calls.append((len(self._code), first))
-        return function.address, first
+        return address, first
 
     def _ask(self, rhythm: Rhythm, python: PythonCall) -> int:
         self.python.append(python)
@@ -208,7 +242,11 @@ class Tables:
     def _observer(self, observer: Tap | Observer) -> None:
         rhythm = self._interpreter.rhythm(observer)
         if isinstance(observer, Observer):
-            self._ask(rhythm, PythonCall(None, -1, observer.call))
+            if observer.machine is None:
+                self._ask(rhythm, PythonCall(None, -1, observer.call))
+                return
+            address, places, _ = observer.machine
+            self._machine(rhythm, address, (self._control.ctypes.data + SLOT * loop.TICK, *places))
             return
         row = self._interpreter.program[observer.block].row
         size = (row.stop - row.start) // SLOT
@@ -216,6 +254,12 @@ class Tables:
         start = self.rings[-1].start + self.rings[-1].room * (self.rings[-1].size + 1) if self.rings else 0
         self._add(rhythm, loop.ROW, len(self.rings), row.start // SLOT, size)
         self.rings.append(Ring(observer, start, room, size))
+
+    def _machine(self, rhythm: Rhythm, address: int, places: Sequence[int]) -> None:
+        """Add a call of machine code that is no block's."""
+        self._calls.append((len(self._code), len(self._places)))
+        self._places += places
+        self._instruct(rhythm, address, 0)
 
     def _solver(self) -> None:
         """Add the solver's step: compiled, if all that it calls is."""
@@ -236,6 +280,8 @@ class Tables:
         program, memory = self._interpreter.program, self._interpreter.memory
         self.places: Whole = np.array(self._places, np.int64)
         self.code: Whole = np.array(self._code, np.int64).reshape(-1, loop.WIDTH)
+        for first, call in self._calls_timed:
+            call[PLACES] = self.places.ctypes.data + SLOT * first
         for number, first in self._calls:
             self.code[number, 1] = self.places.ctypes.data + SLOT * first
         for number, pairs in self._pairs.items():
@@ -256,15 +302,19 @@ class Tables:
         self.states: Whole = np.array([*chain.from_iterable(both), *held], np.int64)
         self.stages = _stages(program.solver, float(program.period))
         self.scratch = np.zeros(2 * len(program.states) + len(held))
-        control = np.zeros(loop.CONTROLS, np.int64)
+        control = self._control
+        if self._clock is not None:
+            self._clock_places: Whole = np.array([control.ctypes.data, *self._clock.places], np.int64)
+            control[loop.CLOCK] = self._clock.address
+            control[loop.CLOCK_PLACES] = self._clock_places.ctypes.data
         control[loop.RHYTHMS], control[loop.SEGMENTS] = len(self._rhythms), len(self.segments)
         control[loop.NUMERATOR], control[loop.DENOMINATOR] = program.period.as_integer_ratio()
+        control[loop.TIME] = program.time.position
         control[loop.STATES], control[loop.HELD] = len(program.states), len(held)
         control[loop.STAGES] = len(self.stages)
         control[loop.MINOR] = self._first_minor
         control[loop.DERIVATIVES] = self._first_minor + len(program.minor)
         control[loop.CALLS] = control[loop.DERIVATIVES] + len(program.derivatives)
-        self._control = control
         # One element of a view costs a third of an array's.
         self.control: memoryview = memoryview(cast(Any, control))
         arrays: Sequence[NDArray[Any]] = (

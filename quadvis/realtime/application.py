@@ -25,22 +25,27 @@ from typing import Any
 from quadvis.diagram.load import load_text
 from quadvis.diagram.sections.on_host_loss import CONTINUE
 from quadvis.engine.engine import Engine
+from quadvis.engine.profile import ProfileReport
 from quadvis.errors import QuadvisError, RunError
 from quadvis.errors.caller import IS_COMMAND
+from quadvis.graph.graph import MULTI, Graph
 from quadvis.links.endpoints import close_all, live, open_carriers
 from quadvis.machine.failures import surroundings
 from quadvis.machine.interrupts import leave_to_parent
-from quadvis.native.choice import Choice, choose, use
+from quadvis.native.choice import NATIVE, PYTHON, Choice, choose, interpreted, use
+from quadvis.native.executor import last_exact
 from quadvis.realtime import control
+from quadvis.realtime.clocks import MonotonicClock
 from quadvis.realtime.control import SharedMemory
+from quadvis.realtime.crew import Crew, lead
 from quadvis.realtime.devices import PortBindings
+from quadvis.realtime.hold_ups import hold_ups
 from quadvis.realtime.lifeline import Lifeline
 from quadvis.realtime.options import RealTime
-from quadvis.realtime.overload import OverloadWatch
 from quadvis.realtime.pacer import Ended, Pacer
 from quadvis.realtime.schedule import Schedule
 from quadvis.realtime.streams import RowStream
-from quadvis.realtime.system import SHARE, Grants, Sleeper, ask_all, wake_up_time
+from quadvis.realtime.system import SHARE, Grants, ask_all, raise_thread, wake_up_time
 
 GRACE = 2.0  # s that a step has to end, once it was asked to
 
@@ -81,7 +86,8 @@ class Ready:
 class Ending:
     """How an application has ended: at its stop time if ``reason`` is "", else why.
 
-    ``exit_code`` is that of the error, ``asked`` says that somebody has asked for the end.
+    ``exit_code`` is that of the error, ``asked`` says that somebody has asked for the end, ``unsafe``
+    why the outputs have held their safe values before the end, if they have.
     """
 
     reason: str = ""
@@ -91,6 +97,8 @@ class Ending:
     notes: tuple[str, ...] = ()
     exit_code: int = RunError.exit_code
     asked: bool = False
+    unsafe: str = ""
+    profile: ProfileReport | None = None
 
     @staticmethod
     def of(error: BaseException) -> Ending:
@@ -149,45 +157,69 @@ class _Application:
         self._start = 0
         self.goes_on_alone = False  # true from the start of a run that may lose its supervisor
 
-    def run(self) -> None:
+    def run(self) -> Ending:
         """Run to the stop time."""
         setup, shared = self._setup, self._shared
         diagram = load_text(setup.text, setup.folder, setup.name, setup.own_blocks)
         part = diagram.graph.part_of(setup.computer)
         schedule = Schedule.of(part)
-        watch = OverloadWatch([task.name for task in part.tasks], diagram.overload_of(setup.computer))
-        sleeper = Sleeper()
-        pacer = Pacer(
-            schedule,
-            watch,
-            shared,
-            lambda: time.monotonic_ns() - self._start,
-            lambda instant: sleeper.until(self._start + instant),
-        )
+        names, overload = [task.name for task in part.tasks], diagram.overload_of(setup.computer)
+        limits, clock = [overload.of(name) for name in names], MonotonicClock()
+        pacer = Pacer(schedule, names, limits, shared, clock, lambda: engine.hold_safe())
         with ExitStack() as stack:
             carriers = open_carriers(part, setup.lines)
             stack.callback(close_all, carriers.values())
             engine = self._engine = Engine(live(part, carriers), diagram.seed, pacer)
             setup.devices.bind(engine)
-            choice = choose(engine, diagram.ticks, setup.engine, setup.link.send)
-            use(engine, choice)
+            if setup.wishes.profile:
+                engine.measure()
+            choice = choose(engine, diagram.ticks, setup.engine, setup.link.send, paced=True)
+            native = choice.engine == NATIVE and diagram.ticks <= last_exact(engine.period)
+            crew = self._crew(part, choice if native else Choice(PYTHON), pacer)
+            if crew is None:
+                use(engine, choice, pacer if native else None)
             for stream, ring in zip(setup.streams, shared.rings, strict=True):
-                engine.observe(stream.task, stream.put_into(ring, engine), stream.every)
+                stream.put_into(ring, engine, native)
+            engine.prepare()
             stack.enter_context(diagram.guarded())
             stack.enter_context(engine)
             stack.callback(self._leave)
             grants = ask_all(setup.wishes)
-            sleeper.polled = _polled(setup.wishes, schedule, sleeper)
-            grants.granted.append(f"polling {sleeper.polled / 1e3:.0f} us")
+            if native:
+                clock.hear_signals()
+            clock.polled = _polled(setup.wishes, schedule, clock)
+            grants.granted.append(f"polling {clock.polled / 1e3:.0f} us")
             grants.refused += [note for carrier in carriers.values() for note in carrier.notes]
             Lifeline(shared.control[control.LIFELINE]).hold()
             setup.link.send(Ready(grants, Choice(choice.engine, choice.reason)))
-            self._start = setup.link.recv()  # all applications begin at one instant
+            self._start = clock.start = setup.link.recv()  # all applications begin at one instant
             shared.control[control.START] = self._start
             self.goes_on_alone = diagram.on_host_loss == CONTINUE
             self._signals.looping = True
+            if crew is not None:
+                stack.callback(crew.leave)
+                crew.start(diagram.ticks)
             engine.run(diagram.ticks)
             pacer.finish()
+            if crew is not None:
+                pacer.conclude(crew.rest, diagram.ticks)
+        return Ending(unsafe=pacer.unsafe, profile=engine.profile() if setup.wishes.profile else None)
+
+    def _crew(self, part: Graph, choice: Choice, pacer: Pacer) -> Crew | None:
+        """Let each task run by itself, if the diagram wants it so."""
+        engine = self._engine
+        assert engine is not None
+        if part.tasking != MULTI:
+            return None
+        for sentence in hold_ups(part, interpreted(engine, choice)):
+            self._setup.link.send(sentence)
+        return lead(engine, choice, pacer, self._tend)
+
+    def _tend(self, task: int) -> None:
+        """Give the thread of a task its priority: rate-monotonic, below that of the fastest."""
+        wanted = self._setup.wishes.priority
+        if wanted:
+            raise_thread(max(1, wanted - task))
 
     def _leave(self) -> None:
         """Let the guardian know that no step follows, and nothing interrupt the closing of the blocks."""
@@ -211,8 +243,7 @@ def perform(setup: Setup) -> None:
     threading.Thread(target=_end_with_parent, args=(application,), daemon=True).start()
     IS_COMMAND.set(setup.is_command)
     try:
-        application.run()
-        ending = Ending()
+        ending = application.run()
     except (Ended, Interrupted) as error:
         ending = application.ended_early(error)
     except Exception as error:
@@ -221,10 +252,10 @@ def perform(setup: Setup) -> None:
         setup.link.send(ending)
 
 
-def _polled(wishes: RealTime, schedule: Schedule, sleeper: Sleeper) -> int:
+def _polled(wishes: RealTime, schedule: Schedule, clock: MonotonicClock) -> int:
     """Return how long (ns) before each deadline the loop is to look at the clock."""
     polled = wishes.polled()
-    return min(wake_up_time(sleeper), schedule.interval // SHARE) if polled is None else polled
+    return min(wake_up_time(clock), schedule.interval // SHARE) if polled is None else polled
 
 
 def _running(error: BaseException, engine: Engine) -> str:

@@ -19,6 +19,7 @@ BEGUN = (
 DONE = 3  # by the loop: the number of steps
 END = 4  # by either: not 0 if the run is to end before its next step
 LEFT = 5  # by the loop: not 0 once it runs no more steps
+SAFE = 6  # by the loop: not 0 once the outputs are to hold their safe values to the end
 LIFELINE = slice(8, 8 + lifeline.SIZE)  # of the loop's thread
 WORDS = LIFELINE.stop
 LEFT_OUT = (
@@ -38,6 +39,7 @@ class SharedMemory:
         view = memoryview(words).cast("B").cast("q")
         self.control = view[:WORDS]
         ends = [WORDS + times.WORDS * (task + 1) for task in range(tasks)]
+        self.times = view[WORDS : WORDS + times.WORDS * tasks]
         self.tasks = [view[end - times.WORDS : end] for end in ends]
         made = []
         start = WORDS + times.WORDS * tasks

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from quadvis.engine.profile import ProfileReport
 from quadvis.errors import counted
 from quadvis.native.choice import Choice
 from quadvis.realtime.system import Grants
@@ -13,12 +14,18 @@ from quadvis.realtime.times import TaskTimes
 
 @dataclass(frozen=True)
 class Share:
-    """What one computer did in a real-time run; ``computer`` is "" in a diagram without computers."""
+    """What one computer did in a real-time run; ``computer`` is "" in a diagram without computers.
+
+    ``unsafe`` says why its outputs have held their safe values before the end, if they have. ``profile``
+    is that of its blocks, if it was asked for.
+    """
 
     computer: str
     engine: Choice
     grants: Grants
     tasks: tuple[TaskTimes, ...]
+    unsafe: str = ""
+    profile: ProfileReport | None = None
 
     def facts(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -28,6 +35,7 @@ class Share:
             "granted": list(self.grants.granted),
             "not_granted": list(self.grants.refused),
             "tasks": {task.task: task.facts() for task in self.tasks},
+            "unsafe": self.unsafe or None,
         }
 
 
@@ -55,6 +63,21 @@ class Flight:
         """A sentence about the rows that were lost; "" if none were."""
         found = counted(self.lost, "row")
         return f"{found} found no room on the way to the log and the verdicts" if self.lost else ""
+
+    @property
+    def passed(self) -> bool:
+        """True if no row was lost, and no outputs had to be made safe."""
+        return not self.lost and not any(share.unsafe for share in self.shares)
+
+    @property
+    def complaints(self) -> list[str]:
+        """Sentences on why it has not passed."""
+        unsafe = [
+            f"{share.unsafe}; the outputs have held their safe values from then on"
+            for share in self.shares
+            if share.unsafe
+        ]
+        return [*unsafe, *([self.loss] if self.loss else [])]
 
     def facts(self) -> dict[str, Any]:
         """Return it as plain data."""

@@ -34,12 +34,15 @@ class Patience:
     @staticmethod
     def of(name: str, words: Any, schedule: Schedule, limits: OverloadLimits) -> Patience:
         """Return the patience with a loop of these limits: the ticks that it may miss in a row, and two."""
-        stops = limits.action == STOP
-        missed = limits.max if limits.consecutive is None else limits.consecutive
+        all_limits = [limits, *(task.limits for task in limits.tasks)]
+        stops = all(each.action == STOP for each in all_limits)
+        missed = max(each.max if each.consecutive is None else each.consecutive for each in all_limits)
         first = schedule.deadline(min(rhythm.offset for rhythm in schedule.rhythms))
         longest = max(schedule.deadline(rhythm.every) for rhythm in schedule.rhythms)
         allowed = (2 + missed * stops) * schedule.interval
-        return Patience(name, words, allowed, first, first + limits.startup * longest, stops)
+        return Patience(
+            name, words, allowed, first, first + max(each.startup for each in all_limits) * longest, stops
+        )
 
 
 class Sign(Enum):
@@ -48,7 +51,7 @@ class Sign(Enum):
     WELL = "well"
     PAUSES = "pauses"  # it gives no sign of life, which the diagram allows
     HANGS = "hangs"
-    ENDS = "ends"
+    ENDS = "ends"  # or it goes on, and its outputs hold their safe values
 
 
 class Heartbeat:
@@ -78,7 +81,7 @@ class Heartbeat:
         """Return what the loop does."""
         words, now = self._control, self._now()
         start, begun, done = words[control.START], words[control.BEGUN], words[control.DONE]
-        if words[control.END] or words[control.LEFT] or self._has_died:
+        if words[control.END] or words[control.LEFT] or words[control.SAFE] or self._has_died:
             return Sign.ENDS
         if not start:
             return Sign.WELL

@@ -192,9 +192,10 @@ class Member:
         That is ``patience``, or longer if the diagram allows longer steps.
         """
         begun = self._control[control.BEGUN]
-        allowed = (self._limits.max + 1) * float(max(task.period for task in self._part.tasks))
-        longest = max(patience, allowed)
-        if not begun or self._limits.action == WARN or self.now - begun / NANOSECONDS < longest:
+        tasks = [(self._limits.of(task.name), float(task.period)) for task in self._part.tasks]
+        longest = max(patience, *((limits.max + 1) * period for limits, period in tasks))
+        lasting = any(limits.action == WARN for limits, _ in tasks)
+        if not begun or lasting or self.now - begun / NANOSECONDS < longest:
             return 0.0
         return longest
 
@@ -203,7 +204,15 @@ class Member:
         assert self.ready is not None
         tasks = zip(self._part.tasks, self._shared.tasks, strict=True)
         found = tuple(TaskTimes.read(task.name, float(task.period), words) for task, words in tasks)
-        return Share(self.computer, self.ready.engine, self.ready.grants, found)
+        assert self.ending is not None
+        return Share(
+            self.computer,
+            self.ready.engine,
+            self.ready.grants,
+            found,
+            self.ending.unsafe,
+            self.ending.profile,
+        )
 
     def error(self) -> QuadvisError:
         """Return why the application has ended early."""

@@ -11,7 +11,7 @@ from quadvis.diagram.times import read_duration
 from quadvis.document import YamlScalar
 from quadvis.errors import QuadvisError
 from quadvis.errors.caller import as_given
-from quadvis.graph.graph import SINGLE, Graph
+from quadvis.graph.graph import MULTI, SINGLE, Graph, Task
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
 
 PRIORITY = 80
@@ -28,12 +28,13 @@ class RealTime:
     ``poll`` is the time before each deadline in which the loop does not sleep, but looks at the clock: a
     time such as "60 us", or ``auto``: as long as the system needs to wake the loop, measured at the start, at
     most a tenth of the shortest period. What is None is as the diagram says of the computer, or else any
-    processor, a priority of 80, and ``auto``.
+    processor, a priority of 80, and ``auto``. ``profile`` asks for the time of every call of a block.
     """
 
     cpu: int | None = None
     priority: int | None = None
     poll: str | None = None
+    profile: bool = False
 
     def __post_init__(self) -> None:
         if self.priority is not None and not 0 <= self.priority <= HIGHEST:
@@ -50,6 +51,7 @@ class RealTime:
             _first(self.cpu, said.cpu),
             _first(self.priority, said.priority, PRIORITY),
             _first(self.poll, said.poll, AUTO),
+            self.profile,
         )
 
     def polled(self) -> int | None:
@@ -63,9 +65,8 @@ class RealTime:
         """Refuse a graph that cannot run in real time, or not with these settings."""
         if sys.platform != "linux":
             raise QuadvisError("a real-time run needs Linux, for its clock and its priorities")
-        if graph.tasking != SINGLE:
-            problem = f"a real-time run has one loop, and 'tasking: {graph.tasking}' needs one for each rate"
-            raise QuadvisError(f"{problem}; write 'tasking: {SINGLE}'")
+        if graph.tasking == MULTI:
+            _check_frames(graph)
         polled, period = self.polled() or 0, Schedule.of(graph).interval
         if polled > BUSIEST * period:
             problem = f"{as_given('--poll', 'poll')} {self.poll} is more than 90 % of the period"
@@ -77,3 +78,19 @@ class RealTime:
 def _first(*values: T | None) -> T | None:
     """Return the first value that is not None, if there is one."""
     return next((value for value in values if value is not None), None)
+
+
+def _check_frames(graph: Graph) -> None:
+    """Refuse frames that would have to be copied between threads."""
+
+    def alone(task: Task) -> bool:
+        return task != graph.tasks[0]
+
+    for node in graph.nodes:
+        for port, wire in node.wires():
+            task = graph[wire.block].task
+            is_frame = node.block.interface.inputs[port].signal.scalar == "frame"
+            if is_frame and (task != node.task or wire.delayed) and (alone(task) or alone(node.task)):
+                frames = f"'{node.path}.{port}' takes frames of '{wire.block}'"
+                problem = f"{frames}, which cannot cross tasks in real time"
+                raise QuadvisError(f"{problem}; give both blocks one rate, or write 'tasking: {SINGLE}'")

@@ -1,47 +1,72 @@
-"""Overload: whether the overruns of a real-time run are more than its diagram allows."""
+"""Overload: the overruns of each task against its limits, as in xPC Target.
+
+An overrun is a tick of a task at which the task was due and did not run, because a step took too long or the
+loop woke too late. Each task has its own count, as each sub-rate in xPC Target.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import Any
 
-from quadvis.diagram.sections.overload import STOP, OverloadLimits
-from quadvis.errors import counted
+from quadvis.diagram.sections.overload import ACTIONS, SAFE, STOP
+from quadvis.native.clock import GO
+from quadvis.realtime import control
+from quadvis.realtime.plan import (
+    ACTION,
+    AT_ONCE,
+    CONSECUTIVE,
+    COUNTED,
+    EVERY,
+    EXCEEDED,
+    FOUND,
+    HEAD,
+    IN_A_ROW,
+    IN_ALL,
+    LIMIT,
+    MAX,
+    MISSED,
+    OFFSET,
+    ROW,
+    UNLIMITED,
+)  # fmt: skip
+
+# Why a wait pauses: the run is to end; too many overruns end it, or make it safe; a signal has come; a task
+# that runs by itself has failed.
+ENDING, OVERLOADED, UNSAFE, SIGNAL, FAULTED = range(1, 6)
+STOPS, SAVES = ACTIONS.index(STOP), ACTIONS.index(SAFE)
 
 
-class OverloadWatch:
-    """Counts the overruns of tasks against the limits of a diagram.
+def missed(plan: Any, shared: Any, task: int, number: int, start: int, starting: int) -> int:
+    """Count overruns of a task from tick ``start`` on; return what follows.
 
-    An overrun is a tick of a task at which the task was due and did not run, because a step took too long
-    or the loop woke too late. Each task has its own count, as each sub-rate in xPC Target. What one of the
-    first steps of any task has caused does not count.
+    Those that one of the first steps has caused, as ``starting`` says, do not count.
     """
+    row = HEAD + ROW * task
+    if starting != 0:
+        return GO
+    plan[row + COUNTED] += number
+    plan[row + IN_A_ROW] += number
+    if plan[row + COUNTED] > plan[row + MAX]:
+        limit, found = IN_ALL, plan[row + COUNTED]
+    elif plan[row + CONSECUTIVE] != UNLIMITED and plan[row + IN_A_ROW] > plan[row + CONSECUTIVE]:
+        limit, found = AT_ONCE, plan[row + IN_A_ROW]
+    else:
+        return GO
+    stops = plan[row + ACTION] == STOPS
+    saves = plan[row + ACTION] == SAVES and shared[control.SAFE] == 0
+    if not (stops or saves):
+        return GO
+    every, offset = plan[row + EVERY], plan[row + OFFSET]
+    plan[EXCEEDED], plan[LIMIT], plan[FOUND] = task, limit, found
+    plan[MISSED] = start + max(offset - start, (offset - start) % every)
+    if saves:
+        shared[control.SAFE] = 1
+        return UNSAFE
+    return OVERLOADED
 
-    def __init__(self, tasks: Sequence[str], limits: OverloadLimits) -> None:
-        self._tasks, self._limits = tasks, limits
-        self._counted = [0] * len(tasks)
-        self._in_a_row = [0] * len(tasks)
-        self._starting = True
 
-    def ran(self, tasks: Sequence[int], fewest: int) -> None:
-        """Note a step of tasks: their overruns in a row end. ``fewest`` steps has one of them done so far."""
-        for task in tasks:
-            self._in_a_row[task] = 0
-        self._starting = fewest <= self._limits.startup
-
-    def missed(self, task: int, count: int) -> str:
-        """Count overruns of a task after the last step; return the limit that stops the run, or ""."""
-        limits = self._limits
-        if self._starting:
-            return ""
-        self._counted[task] += count
-        self._in_a_row[task] += count
-        if limits.action != STOP:
-            return ""
-        name = f"task '{self._tasks[task]}'"
-        if self._counted[task] > limits.max:
-            found = counted(self._counted[task], "overrun")
-            return f"{name}: overload limit ({limits.max}) exceeded with {found}"
-        if limits.consecutive is not None and self._in_a_row[task] > limits.consecutive:
-            found = counted(self._in_a_row[task], "overrun")
-            return f"{name}: overload limit ({limits.consecutive} in a row) exceeded with {found} in a row"
-        return ""
+def worse(one: int, other: int) -> int:
+    """Return what follows of two things that do."""
+    if one == OVERLOADED or other == OVERLOADED:
+        return OVERLOADED
+    return max(one, other)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NoReturn
+from collections.abc import Callable, Sequence
+from typing import Any
 
-from quadvis.errors import RunError, sentence
-from quadvis.realtime import control, times
+from quadvis.diagram.sections.overload import OverloadLimits
+from quadvis.errors import RunError, counted, sentence
+from quadvis.realtime import control, dispatch, overload, pacing, times
+from quadvis.realtime import plan as plans
+from quadvis.realtime.clocks import Clock
 from quadvis.realtime.control import SharedMemory
-from quadvis.realtime.overload import OverloadWatch
-from quadvis.realtime.ring import put_pair
+from quadvis.realtime.grid import deadline, due_in
+from quadvis.realtime.plan import make_plan
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
+from quadvis.realtime.words import address_of, whole_words
 from quadvis.units import Unit, format_quantity
 
 SECOND = Unit.parse("s")
@@ -28,106 +32,131 @@ class Pacer:
     the loop wakes too late for, is left out: the run goes on with a later tick of the same grid, and the
     tasks that were due there have an overrun.
 
-    ``now`` gives the present instant, ``sleep`` waits until an instant (ns since the start) or returns
-    earlier, for instance after a signal.
+    ``names`` and ``limits`` are those of the tasks. ``save`` is called where overruns are to make the outputs
+    safe; ``unsafe`` says then why. The interpreter asks `wait`; the compiled loop calls the machine code at
+    ``address``, which does the same (`quadvis.native.clock.MachineClock`).
     """
 
     def __init__(
         self,
         schedule: Schedule,
-        watch: OverloadWatch,
+        names: Sequence[str],
+        limits: Sequence[OverloadLimits],
         shared: SharedMemory,
-        now: Callable[[], int],
-        sleep: Callable[[int], None],
+        clock: Clock,
+        save: Callable[[], None] | None = None,
     ) -> None:
-        self._schedule, self._watch = schedule, watch
-        self._now, self._sleep = now, sleep
+        self._names, self._limits, self._save = names, limits, save
+        self.unsafe = ""
+        self._plan = make_plan(schedule, limits)
         self._control: Any = shared.control
-        self._tasks: list[Any] = shared.tasks
-        self._left_out = shared.left_out.words
-        for words in self._tasks:
-            times.clear(words)
-        self._rhythms = list(enumerate(schedule.rhythms))
-        self._due: list[int] = []  # the tasks of the step that is running
-        self._tick = 0
-        self._begun = self._end = self._late = 0
+        self._times: Any = shared.times
+        self._left_out: Any = shared.left_out.words
+        self.clock = clock
+        self._crew: Any = whole_words(dispatch.HEAD)
+        self._memory: Any = whole_words(1)
+        self._fault: Callable[[], Exception] | None = None
+        for task in shared.tasks:
+            times.clear(task)
+
+    def lead(self, crew: Any, memory: Any, fault: Callable[[], Exception]) -> None:
+        """Dispatch all tasks but the first, which run by themselves; see `dispatch` for the plans.
+
+        ``fault`` gives the error where one of them has failed.
+        """
+        self._plan[plans.OWN] = 1
+        self._crew, self._memory, self._fault = crew, memory, fault
+
+    @property
+    def words(self) -> tuple[Any, Any, Any, Any, Any, Any, Any]:
+        """All that `pacing.wait` takes before the ticks."""
+        return (
+            self._plan, self._control, self._times, self._left_out, self.clock, self._crew, self._memory
+        )  # fmt: skip
+
+    @property
+    def address(self) -> int:
+        """The address of its machine code."""
+        from quadvis.native.library import library
+
+        return library().routine(pacing.PACE)
+
+    @property
+    def places(self) -> Sequence[int]:
+        """The addresses of the words of its machine code."""
+        *before, clock, crew, memory = self.words
+        return [address_of(each) for each in (*before, clock.words, crew, memory)]
 
     def wait(self, tick: int, end: int) -> range:
         """Wait for the deadline of the next tick; return this tick.
 
         RunError if tasks have more overruns than they may have; `Ended` if the run is to end.
         """
-        instant = self._now()
-        self.finish(instant)
-        chosen = self._schedule.next(tick, instant)
-        if chosen < end:
-            instant = self._slept(self._schedule.deadline(chosen))
-            if instant >= self._schedule.deadline(chosen + 1):
-                chosen = max(chosen, self._schedule.latest(instant))
-        if chosen > tick:
-            self._skip(tick, min(chosen, end), instant)
-        if chosen >= end:
-            return range(end, end)
-        self._begin(chosen, instant)
-        return range(chosen, chosen + 1)
+        plan = self._plan
+        while pause := pacing.wait(*self.words, tick, end):
+            self.answer(pause)
+        chosen, plan[plans.WAITING] = plan[plans.WAITING], -1
+        return range(chosen, min(chosen + 1, end))
 
-    def _slept(self, deadline: int) -> int:
-        """Return the instant at which the wait for a deadline is over."""
-        while True:
-            if self._control[control.END]:
-                raise Ended
-            self._sleep(deadline)
-            instant = self._now()
-            if instant >= deadline:
-                return instant
+    def answer(self, pause: int) -> None:
+        """Do what follows a wait that has not begun a step."""
+        if pause == overload.ENDING:
+            raise Ended
+        if pause == overload.FAULTED:
+            assert self._fault is not None
+            raise self._fault()
+        if pause == overload.OVERLOADED:
+            raise self._overload()
+        if pause == overload.UNSAFE:
+            self.unsafe = f"t = {self._missed:.9g} s: {self._exceeded()}"
+            if self._save is not None:
+                self._save()
 
-    def _begin(self, tick: int, instant: int) -> None:
-        self._due = [
-            task for task, (every, offset) in self._rhythms if tick >= offset and (tick - offset) % every == 0
-        ]
-        self._tick, self._begun = tick, instant
-        self._late = instant - self._schedule.deadline(tick)
-        self._control[control.TICK] = tick
-        self._control[control.BEGUN] = instant or 1
+    def finish(self) -> None:
+        """Count the step that has ended."""
+        pacing.finish(self._plan, self._control, self._times, self.clock.now())
 
-    def finish(self, instant: int | None = None) -> None:
-        """Count the step that has ended; its times are those of each task in it."""
-        if not self._due:
-            return
-        self._end = self._now() if instant is None else instant
-        taken = self._end - self._begun
-        late, late_bin, taken_bin = self._late, times.bin_of(self._late), times.bin_of(taken)
-        for task in self._due:
-            words = self._tasks[task]
-            words[times.STEPS] += 1
-            times.count(words, times.LATENESS, late, late_bin)
-            times.count(words, times.TET, taken, taken_bin)
-        self._watch.ran(self._due, min([self._tasks[task][times.STEPS] for task in self._due]))
-        self._due = []
-        self._control[control.DONE] += 1
+    def conclude(self, rest: Callable[[], None], end: int) -> None:
+        """Let ``rest`` wait for the tasks that run by themselves; count ticks never dispatched.
+
+        A wait that takes too long is a step that does so.
+        """
+        self._control[control.BEGUN] = max(1, self.clock.now())
+        rest()
         self._control[control.BEGUN] = 0
+        for task in range(1, self._crew[dispatch.COUNT]):
+            row = plans.HEAD + plans.ROW * task
+            rhythm = self._plan[row + plans.EVERY], self._plan[row + plans.OFFSET]
+            seen = self._crew[dispatch.HEAD + dispatch.ROW * task + dispatch.SEEN]
+            self._times[times.WORDS * task + times.OVERRUNS] += due_in(*rhythm, seen, end)
 
-    def _skip(self, tick: int, stop: int, instant: int) -> None:
-        """Note that the ticks from ``tick`` to ``stop`` are left out, and count the overruns."""
-        if any(rhythm.due_in(tick, stop) for _, rhythm in self._rhythms):
-            put_pair(self._left_out, control.LEFT_OUT[0], tick, stop - tick)
-        for task, rhythm in self._rhythms:
-            count = rhythm.due_in(tick, stop)
-            if count:
-                words = self._tasks[task]
-                words[times.OVERRUNS] += count
-                exceeded = self._watch.missed(task, count)
-                if exceeded:
-                    self._refuse(exceeded, rhythm.first(tick), instant)
-
-    def _refuse(self, exceeded: str, tick: int, instant: int) -> NoReturn:
-        if self._end > self._schedule.deadline(tick):
-            before = self._schedule.deadline(self._tick) / NANOSECONDS
-            cause = f"the step of t = {before:.9g} s took {_time(self._end - self._begun)}"
+    def _overload(self) -> RunError:
+        plan = self._plan
+        due, task = deadline(plan, plan[plans.MISSED]), plan[plans.EXCEEDED]
+        if task >= plan[plans.OWN]:
+            running = self._crew[dispatch.HEAD + dispatch.ROW * task + dispatch.TICK]
+            cause = f"its step of t = {deadline(plan, running) / NANOSECONDS:.9g} s is not through"
+        elif plan[plans.ENDED] > due:
+            before = deadline(plan, plan[plans.TICK]) / NANOSECONDS
+            cause = f"the step of t = {before:.9g} s took {_time(plan[plans.ENDED] - plan[plans.BEGUN])}"
         else:
-            cause = f"the loop woke {_time(instant - self._schedule.deadline(tick))} late"
-        reason = sentence(f"{exceeded}: {cause}", REMEDY)
-        raise RunError(reason, time=self._schedule.deadline(tick) / NANOSECONDS)
+            cause = f"the loop woke {_time(plan[plans.INSTANT] - due)} late"
+        return RunError(sentence(f"{self._exceeded()}: {cause}", REMEDY), time=self._missed)
+
+    @property
+    def _missed(self) -> float:
+        """The time of the tick that was one too many (s)."""
+        return deadline(self._plan, self._plan[plans.MISSED]) / NANOSECONDS
+
+    def _exceeded(self) -> str:
+        """Return which limit of which task has been exceeded."""
+        plan = self._plan
+        task, found = plan[plans.EXCEEDED], plan[plans.FOUND]
+        limits, name = self._limits[task], f"task '{self._names[task]}'"
+        overruns = counted(found, "overrun")
+        if plan[plans.LIMIT] == plans.IN_ALL:
+            return f"{name}: overload limit ({limits.max}) exceeded with {overruns}"
+        return f"{name}: overload limit ({limits.consecutive} in a row) exceeded with {overruns} in a row"
 
 
 def _time(nanoseconds: int) -> str:

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from quadvis.native.routine import Routine
+
 SLOT = 8
 PUT, TAKEN, LOST = range(3)  # numbers of records: put and lost by the producer, taken by the consumer
 HEAD = 8  # words before the records: a line of the processor's cache
@@ -23,7 +25,7 @@ class RecordRing:
     """
 
     def __init__(self, words: Any, room: int, width: int) -> None:
-        self._words, self._bytes = words, words.cast("B")
+        self.words, self._bytes = words, words.cast("B")
         self._room, self._width = room, width
         self._records = np.frombuffer(words, np.int64)[HEAD:].reshape(room, width)
         self._put = self._taken = self._seen = 0
@@ -34,18 +36,13 @@ class RecordRing:
         return HEAD + room * width
 
     @property
-    def words(self) -> Any:
-        """Its words."""
-        return self._words
-
-    @property
     def lost(self) -> int:
         """How many records found no room."""
-        return int(self._words[LOST])
+        return int(self.words[LOST])
 
     def put(self, number: int, raw: memoryview, pieces: Sequence[slice]) -> None:
         """Add a record: a number, and pieces of bytes one after another, which fill its other words."""
-        words = self._words
+        words = self.words
         if self._put - words[TAKEN] >= self._room:
             words[LOST] += 1
             return
@@ -59,17 +56,31 @@ class RecordRing:
         self._put += 1
         words[PUT] = self._put
 
+    def machine(self, memory: int, pieces: Sequence[slice]) -> tuple[int, ...]:
+        """Return the addresses that the machine code of `put` takes; ``memory`` is that of the pieces."""
+        self._pieces = np.array(
+            [self._room, self._width, len(pieces)]
+            + [
+                number
+                for piece in pieces
+                for number in (piece.start // SLOT, (piece.stop - piece.start) // SLOT)
+            ],
+            np.int64,
+        )
+        words = np.frombuffer(self.words, np.int64)
+        return words.ctypes.data, memory, self._pieces.ctypes.data
+
     def take(self, *, last: bool = False) -> Words:
         """Return the records (N, width) that were there at the last call already, or all with ``last``.
 
         Some processors let another one see the number of records before their words; by the next call these
         have surely come through. With ``last`` the producer must have ended.
         """
-        present = int(self._words[PUT])
+        present = int(self.words[PUT])
         until, self._seen = (present if last else self._seen), present
         places = np.arange(self._taken, until) % self._room
         found = self._records[places]
-        self._taken = self._words[TAKEN] = until
+        self._taken = self.words[TAKEN] = until
         return found
 
 
@@ -85,3 +96,24 @@ def put_pair(words: Any, room: int, first: int, second: int) -> None:
     at = HEAD + done % room * 2
     words[at], words[at + 1] = first, second
     words[PUT] = done + 1
+
+
+def put(number: Any, words: Any, memory: Any, pieces: Any) -> None:
+    """Do as `RecordRing.put`, as machine code; ``pieces``: room, width, how many, first and size of each."""
+    room, width, count = pieces[0], pieces[1], pieces[2]
+    done = words[PUT]
+    if done - words[TAKEN] >= room:
+        words[LOST] += 1
+        return
+    at = HEAD + done % room * width
+    words[at] = number[0]
+    at += 1
+    for piece in range(count):
+        first = pieces[3 + 2 * piece]
+        for index in range(pieces[4 + 2 * piece]):
+            words[at + index] = memory[first + index]
+        at += pieces[4 + 2 * piece]
+    words[PUT] = done + 1
+
+
+PUTTING = Routine(put, "wwww")

@@ -17,21 +17,6 @@ class Rhythm(NamedTuple):
     every: int
     offset: int = 0
 
-    def first(self, tick: int) -> int:
-        """Return its first tick from ``tick`` on."""
-        return tick + max(self.offset - tick, (self.offset - tick) % self.every)
-
-    def last(self, tick: int) -> int:
-        """Return its last tick up to ``tick``; -1 if there is none."""
-        return tick - (tick - self.offset) % self.every if tick >= self.offset else -1
-
-    def due_in(self, start: int, stop: int) -> int:
-        """Return how many of its ticks lie in ``range(start, stop)``."""
-        return self._before(stop) - self._before(start)
-
-    def _before(self, tick: int) -> int:
-        return max(0, -((self.offset - tick) // self.every))
-
 
 class Schedule:
     """Tick k is due k periods after the start, in whole nanoseconds, rounded down; nothing moves this grid.
@@ -42,7 +27,7 @@ class Schedule:
 
     def __init__(self, period: Fraction, rhythms: Sequence[Rhythm]) -> None:
         self.rhythms = tuple(rhythms)
-        self._numerator, self._denominator = (period * NANOSECONDS).as_integer_ratio()
+        self.numerator, self.denominator = (period * NANOSECONDS).as_integer_ratio()
 
     @staticmethod
     def of(graph: Graph) -> Schedule:
@@ -54,18 +39,7 @@ class Schedule:
 
     def deadline(self, tick: int) -> int:
         """Return the instant at which a tick is due."""
-        return tick * self._numerator // self._denominator
-
-    def next(self, tick: int, instant: int) -> int:
-        """Return the first tick with a due task, from ``tick`` on and due no earlier than an instant."""
-        if self.deadline(tick) < instant:
-            tick = -(-instant * self._denominator // self._numerator)
-        return min([rhythm.first(tick) for rhythm in self.rhythms])
-
-    def latest(self, instant: int) -> int:
-        """Return the last tick with a due task that is due up to an instant; -1 if there is none."""
-        tick = ((instant + 1) * self._denominator - 1) // self._numerator
-        return max([rhythm.last(tick) for rhythm in self.rhythms])
+        return tick * self.numerator // self.denominator
 
     @property
     def interval(self) -> int:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
 
 from quadvis.engine.engine import Engine
-from quadvis.engine.taps import Tap
+from quadvis.engine.taps import MachineCall, Tap
 from quadvis.graph.graph import Graph, Node
-from quadvis.realtime.ring import RecordRing, Words
+from quadvis.realtime.ring import PUTTING, RecordRing, Words
 
 HELD = 2.0  # s of rows for which there is room
 SPARE = 16  # records besides
@@ -34,10 +34,16 @@ class RowStream(NamedTuple):
         """The room and the width of its ring: a record is a tick and the rows."""
         return self.room, 1 + sum(self.sizes)
 
-    def put_into(self, ring: RecordRing, engine: Engine) -> Callable[[int], None]:
-        """Return what an engine has to do at each of its ticks."""
-        rows = [engine.program[path].row for path in self.blocks]
-        return partial(_put, ring, engine.memory.raw, _joined(rows))
+    def put_into(self, ring: RecordRing, engine: Engine, native: bool = False) -> None:
+        """Let an engine put the rows of its ticks into a ring; without Python if it is ``native``."""
+        pieces = _joined([engine.program[path].row for path in self.blocks])
+        machine = None
+        if native:
+            from quadvis.native.library import library
+
+            places = ring.machine(engine.memory.floats.ctypes.data, pieces)
+            machine = MachineCall(library().routine(PUTTING), places, ring)
+        engine.observe(self.task, partial(_put, ring, engine.memory.raw, pieces), self.every, machine)
 
     def hand_on(self, records: Words, taps: Sequence[Tap]) -> None:
         """Give the rows in records to the taps, one for each of its blocks."""

@@ -1,4 +1,4 @@
-"""What a loop asks of Linux: a real-time priority, a processor, memory that stays, exact timers; and sleep.
+"""What a loop asks of Linux: a real-time priority, a processor, memory that stays, exact timers.
 
 Each wish is tried by itself. What is not granted does not stop a run, but is reported with its reason.
 """
@@ -10,18 +10,16 @@ import errno
 import gc
 import os
 import resource
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from quadvis.machine.files import reason
+from quadvis.realtime.clocks import Clock
 from quadvis.realtime.options import RealTime
-from quadvis.realtime.schedule import NANOSECONDS
 
 CAP_IPC_LOCK, CAP_SYS_NICE = 14, 23
 PR_SET_TIMERSLACK = 29
 MCL_CURRENT, MCL_FUTURE = 1, 2
-CLOCK_MONOTONIC, TIMER_ABSTIME = 1, 1
 AMPLE = 4  # later allocations fail where future memory is locked under a limit that is near
 
 TRIALS = 200  # sleeps whose lateness is measured
@@ -131,40 +129,12 @@ def _status(key: str) -> str:
         return next(line.partition(":")[2].strip() for line in lines if line.startswith(f"{key}:"))
 
 
-class _Timespec(ctypes.Structure):
-    _fields_ = (("seconds", ctypes.c_long), ("nanoseconds", ctypes.c_long))
-
-
-class Sleeper:
-    """Waits until an instant of the monotonic clock: asleep at first, at the end by looking at the clock.
-
-    ``polled`` is the time (ns) before the instant at which the sleep ends. Only this clock counts, which
-    nobody can set.
-    """
-
-    def __init__(self, polled: int = 0) -> None:
-        self.polled = polled
-        self._sleep = ctypes.CDLL(None).clock_nanosleep
-        self._time = _Timespec()
-        self._arguments = (CLOCK_MONOTONIC, TIMER_ABSTIME, ctypes.byref(self._time), None)
-
-    def until(self, instant: int) -> None:
-        """Wait until an instant (ns), or until a signal comes."""
-        wake = instant - self.polled
-        if time.monotonic_ns() < wake:
-            self._time.seconds, self._time.nanoseconds = divmod(wake, NANOSECONDS)
-            if self._sleep(*self._arguments):
-                return
-        while time.monotonic_ns() < instant:
-            pass
-
-
-def wake_up_time(sleeper: Sleeper) -> int:
+def wake_up_time(clock: Clock) -> int:
     """Return how late (ns) the system wakes this thread, but for one time in a hundred."""
     late = []
-    instant = time.monotonic_ns()
+    instant = clock.now()
     for _ in range(TRIALS):
-        instant = max(instant, time.monotonic_ns()) + TRIAL
-        sleeper.until(instant)
-        late.append(time.monotonic_ns() - instant)
+        instant = max(instant, clock.now()) + TRIAL
+        clock.sleep(instant)
+        late.append(clock.now() - instant)
     return sorted(late)[int(LATEST * TRIALS)]

@@ -6,6 +6,7 @@ of the bins of a histogram, whose widths are 1/16 of the time.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,7 +23,7 @@ WORDS = TET + COUNTS + BINS
 
 def bin_of(time: int) -> int:
     """Return the bin of a time (ns)."""
-    shift = time.bit_length() - FINE - 1
+    shift = math.frexp(float(time))[1] - FINE - 1  # the bits of the time, as machine code knows them, too
     if shift <= 0:
         return max(0, time)
     return min((shift << FINE) + (time >> shift), BINS - 1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.engine.engine import Engine
+from quadvis.engine.profile import ProfileReport
 from quadvis.engine.taps import Tap
 from quadvis.engine.tuning import Change
 from quadvis.errors.caller import as_given
@@ -88,10 +89,16 @@ class Simulated:
     clock, early = SIMULATED, ""
     computers: Sequence[str] = ()
 
-    def __init__(self, diagram: Diagram, engine: str, announce: Announce | None) -> None:
+    def __init__(
+        self, diagram: Diagram, engine: str, announce: Announce | None, profile: bool = False
+    ) -> None:
+        self.profiles: Mapping[str, ProfileReport] = {}  # by computer, after a run for which they were asked
+        self._profiled = profile
         self.graphs: Sequence[Graph] = [diagram.graph]
         refuse_devices(diagram.graph, as_given("add --real-time", "give real_time=RealTime()"))
         self._engine = Engine(diagram.graph, diagram.seed)
+        if profile:
+            self._engine.measure()
         self._ticks = diagram.ticks
         self._choice = choose(self._engine, self._ticks, engine, announce)
         use(self._engine, self._choice)
@@ -103,6 +110,8 @@ class Simulated:
             engine.attach(tap)
         stack.enter_context(engine)  # to be closed when the log is
         advance([engine], self._ticks, takers.tend)
+        if self._profiled:
+            self.profiles = {"": engine.profile()}
         return self._choice, None
 
 
@@ -116,6 +125,7 @@ class Paced:
         for computer, part in parts.items():
             wishes.on(diagram.computer(computer)).check(part)
         self._diagram, self._engine, self._announce, self._wishes = diagram, engine, announce, wishes
+        self.profiles: Mapping[str, ProfileReport] = {}  # by computer, after a run for which they were asked
         self.computers: Sequence[str] = [*parts]
         self.graphs: Sequence[Graph] = [*parts.values()]
 
@@ -130,6 +140,7 @@ class Paced:
         )  # fmt: skip
         for tap in taps:
             tap.end(self._diagram.ticks)
+        self.profiles = {share.computer: share.profile for share in flight.shares if share.profile}
         return flight.engine, flight
 
 

@@ -12,6 +12,7 @@ from quadvis.run.verdict import Outcome, Verdict
 from quadvis.units import Unit, format_quantity
 
 if TYPE_CHECKING:
+    from quadvis.engine.profile import ProfileReport, Timed
     from quadvis.realtime.times import Spread, TaskTimes
 
 SECOND, MILLISECOND, MICROSECOND, HERTZ = map(Unit.parse, ("s", "ms", "us", "Hz"))
@@ -34,12 +35,32 @@ def summary_lines(result: Result) -> list[str]:
         rows = [_task_row(share.computer, times) for share in shares for times in share.tasks]
         lines += [f"  {line}" for line in table(rows)]
         lines += [f"  {_with('real time', share.computer)}: {share.grants}" for share in shares]
+    for computer, profile in result.profiles.items():
+        lines += [f"  {line}" for line in profile_lines(computer, profile)]
     lines += not_judged(len(diagram.loop_requirements))
     met = sum(verdict.met for verdict in outcome.verdicts)
     if outcome.verdicts:
         count = len(outcome.verdicts)
         lines.append(f"{'PASSED' if result.passed else 'FAILED'}: {met} of {count} expectations met")
     return lines
+
+
+def profile_lines(computer: str, profile: ProfileReport) -> list[str]:
+    """Return the times of blocks as a table, the block with the largest share first."""
+    blocks: dict[str, list[Timed]] = {}
+    for method in profile.methods:
+        blocks.setdefault(method.block, []).append(method)
+    totals = {block: sum(method.total for method in methods) for block, methods in blocks.items()}
+    whole = sum(totals.values()) or 1.0
+    rows: list[tuple[str, ...]] = [("block", "calls", "min", "mean", "max", "share")]
+    for block in sorted(totals, key=lambda block: -totals[block]):
+        methods = blocks[block]
+        count = sum(method.calls for method in methods)
+        least, most = min(method.least for method in methods), max(method.most for method in methods)
+        shown = [f"{1e6 * time:.3g} us" for time in (least, totals[block] / count, most)]
+        rows.append((block, str(count), *shown, f"{100 * totals[block] / whole:.1f} %"))
+    title = f"{_with('profile', computer)}: every call timed, which costs about {1e6 * profile.cost:.2g} us more a call in Python"
+    return [title, *table(rows)]
 
 
 def not_judged(count: int) -> list[str]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from quadvis.engine.profile import ProfileReport
 from quadvis.native.choice import PYTHON, Choice
 from quadvis.output.recording import Recording
 from quadvis.output.statistics import finite
@@ -28,7 +29,7 @@ class Result:
     ``duration`` is the simulated time (s), ``wall`` the wall time (s), ``cpu`` the processor time (s).
     ``lost`` says which rows the log lacks because the disk refused them; "" without a log or without lost
     rows. ``engine`` is what ran the diagram, and why. ``flight`` has the times of the tasks of a real-time
-    run; None after a simulation.
+    run; None after a simulation. ``profiles`` are the times of blocks by computer, if asked for.
     """
 
     diagram: Diagram
@@ -40,6 +41,7 @@ class Result:
     lost: str = ""
     engine: Choice = PYTHON_ONLY
     flight: Flight | None = None
+    profiles: Mapping[str, ProfileReport] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.signals[name]
@@ -72,11 +74,11 @@ class Result:
 
     @property
     def passed(self) -> bool:
-        """True if every expectation on a run is met, and no row was lost on the way to the verdicts.
+        """True if every expectation on a run is met, no row was lost, and no outputs had to be made safe.
 
-        Those on the loop `analyse` judges.
+        Expectations on the loop are judged by `analyse`.
         """
-        return self.outcome.passed and not (self.flight and self.flight.lost)
+        return self.outcome.passed and (self.flight is None or self.flight.passed)
 
     @property
     def real_time_factor(self) -> float:

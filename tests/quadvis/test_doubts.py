@@ -86,6 +86,13 @@ FAST = "above half the rate of the block, 5 Hz; its samples are those of a slowe
             "8:52",
             "block 'w': width is 0.02 s, shorter than the period of the block, 0.1 s; some pulses are missed",
         ),
+        (
+            CASE.replace("$size", "2 m").replace(
+                "params: {size: 2 m}", "overload: {tasks: {fats: {max: 1}}}"
+            ),
+            "3:20",
+            "no block runs at the rate 'fats'",
+        ),
         (WITH_PART, "part", "parameter 'other' is not used; write '$other' where it belongs"),
     ],
 )

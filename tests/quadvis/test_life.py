@@ -14,6 +14,7 @@ from quadvis.engine.engine import Engine
 from quadvis.engine.taps import Tap
 from quadvis.errors import RunError
 from quadvis.graph.graph import Constant, Graph, Node, Task, Wire
+from quadvis.native.choice import NATIVE, choose, use
 
 FAST, SLOW = Task("fast", Fraction(1, 10)), Task("slow", Fraction(1, 5))
 EVENTS: list[Any] = []
@@ -117,6 +118,22 @@ def test_taps_see_the_outputs_after_they_were_written() -> None:
         EVENTS.clear()
         made.run(1)
     assert EVENTS[:5] == ["read", "output", ("write", 0.0), "tap 0", "update"]
+
+
+@pytest.mark.parametrize("native", [False, True])
+def test_once_the_safe_values_are_to_be_held_no_block_writes_and_all_else_goes_on(native: bool) -> None:
+    made = loop()
+    if native:
+        use(made, choose(made, 0, NATIVE))
+    with made:
+        made.run(1)
+        EVENTS.clear()
+        made.hold_safe()
+        made.run(2)
+        assert [("write", -7.0), *("read", "output", "update") * 2] == EVENTS
+        made.observe("fast", lambda tick: EVENTS.append(tick))  # a new list of calls
+        made.run(1)
+        assert EVENTS[-4:] == ["read", "output", 3, "update"]
 
 
 def test_the_safe_values_are_written_before_anything_is_closed() -> None:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import ctypes
+import errno
+import threading
+import time
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,23 +14,51 @@ import numpy as np
 from quadvis.api import Diagram
 from quadvis.diagram.sections.overload import OverloadLimits
 from quadvis.engine.engine import Engine
-from quadvis.native.choice import choose, use
+from quadvis.graph.graph import MULTI
+from quadvis.native.choice import NATIVE, choose, use
+from quadvis.realtime import clocks
+from quadvis.realtime.clocks import Clock, machine_words
 from quadvis.realtime.control import SharedMemory
-from quadvis.realtime.overload import OverloadWatch
+from quadvis.realtime.crew import Crew, lead
 from quadvis.realtime.pacer import Pacer
-from quadvis.realtime.schedule import Schedule
+from quadvis.realtime.schedule import NANOSECONDS, Schedule
 from quadvis.realtime.streams import RowStream
 from quadvis.realtime.times import TaskTimes
 
 WARN = OverloadLimits(action="warn")
 
 
+class Timespec(ctypes.Structure):
+    """An instant as C has it."""
+
+    _fields_ = (("seconds", ctypes.c_int64), ("rest", ctypes.c_int64))
+
+    @property
+    def value(self) -> int:
+        return int(self.seconds * NANOSECONDS + self.rest)
+
+    def put(self, value: int) -> None:
+        self.seconds, self.rest = divmod(value, NANOSECONDS)
+
+
+C_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int32, *[ctypes.c_int64] * 4)
+BEFORE = NANOSECONDS  # the instant 0 of a fake clock in the time of its C functions, which is never negative
+
+
 class FakeClock:
-    """The present instant (ns); a sleep ends at its instant, or later by what ``late`` says for its turn."""
+    """The present instant (ns); a sleep ends at its instant, or so much later as ``late`` says.
+
+    If it ends earlier, a signal has come.
+
+    ``words`` are the same clock for machine code, by C functions that call Python.
+    """
 
     def __init__(self, late: dict[int, int] | None = None) -> None:
         self.instant, self.late = -1000, late or {}
         self.sleeps = 0
+        self._functions = C_FUNCTION(self._get), C_FUNCTION(self._wait)
+        self.words = machine_words(*self._functions)
+        self.words[clocks.START] = BEFORE
 
     def now(self) -> int:
         return self.instant
@@ -35,6 +67,52 @@ class FakeClock:
         self.instant = max(self.instant, until) + self.late.get(self.sleeps, 0)
         self.sleeps += 1
 
+    def _get(self, _: int, place: int, __: int, ___: int) -> int:
+        Timespec.from_address(place).put(self.instant + BEFORE)
+        return 0
+
+    def _wait(self, _: int, __: int, place: int, ___: int) -> int:
+        until = Timespec.from_address(place).value - BEFORE
+        self.sleep(until)
+        return 0 if self.instant >= until else errno.EINTR
+
+
+class CrewClock(FakeClock):
+    """A fake clock for several threads: it goes on while all of them wait, or are busy."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.idle: Callable[[], set[int]] = set  # the tasks that rest
+        self.tasks = 1
+        self._change = threading.Condition()
+        self._until: dict[int, int] = {}  # when the tasks that are busy will be done
+
+    def work(self, task: int, time: int) -> None:
+        """Let the step of a task that runs in this thread take so long."""
+        with self._change:
+            self._until[task] = self.instant + time
+            while task in self._until:
+                assert self._change.wait(30)
+
+    def sleep(self, until: int) -> None:
+        with self._change:
+            self.sleeps += 1
+            while True:
+                self._settle()
+                first = min(self._until, key=self._until.__getitem__, default=0)
+                if not first or self._until[first] > until:
+                    break
+                self.instant = max(self.instant, self._until.pop(first))
+                self._change.notify_all()
+            self.instant = max(self.instant, until)
+
+    def _settle(self) -> None:
+        """Wait until each task rests or is busy."""
+        end = time.monotonic() + 30
+        while len(self.idle() | self._until.keys()) < self.tasks - 1:
+            assert time.monotonic() < end
+            self._change.wait(0.0005)
+
 
 class Paced:
     """An engine that a pacer runs by a fake clock, without a process of its own."""
@@ -42,29 +120,54 @@ class Paced:
     def __init__(
         self,
         diagram: Diagram,
-        clock: FakeClock,
+        clock: Clock,
         limits: OverloadLimits = WARN,
         streams: Sequence[RowStream] = (),
         engine: str = "python",
     ) -> None:
-        graph = diagram.graph
+        graph, self._clock = diagram.graph, clock
         rings = [stream.ring for stream in streams]
         words = np.zeros(SharedMemory.size(len(graph.tasks), rings), np.int64)
         self.shared = SharedMemory(words, len(graph.tasks), rings)
         self.schedule = Schedule.of(graph)
         self._tasks = graph.tasks
-        watch = OverloadWatch([task.name for task in graph.tasks], limits)
-        self.pacer = Pacer(self.schedule, watch, self.shared, clock.now, clock.sleep)
+        names = [task.name for task in graph.tasks]
+        each = [limits.of(name) for name in names]
+        self.pacer = Pacer(self.schedule, names, each, self.shared, clock, lambda: self.engine.hold_safe())
         self.engine = Engine(graph, diagram.seed, self.pacer)
-        use(self.engine, choose(self.engine, 10**9, engine))
+        native, choice = engine == NATIVE, choose(self.engine, 10**9, engine)
+        self.crew = None
+        if graph.tasking == MULTI:
+            assert isinstance(clock, CrewClock)
+            self.crew = crew = lead(self.engine, choice, self.pacer, lambda _: None)
+            tasks = range(1, len(names))
+            clock.tasks, clock.idle = (
+                len(names),
+                lambda: {task for task in tasks if crew.failed or not crew.busy(task)},
+            )
+        else:
+            use(self.engine, choice, self.pacer if native else None)
         for stream, ring in zip(streams, self.shared.rings, strict=True):
-            self.engine.observe(stream.task, stream.put_into(ring, self.engine), stream.every)
+            stream.put_into(ring, self.engine, native)
 
     def run(self, ticks: int) -> dict[str, TaskTimes]:
         with self.engine:
-            self.engine.run(ticks)
+            if self.crew is None:
+                self.engine.run(ticks)
+            else:
+                self._run_all(self.crew, ticks)
             self.pacer.finish()
         return self.times
+
+    def _run_all(self, crew: Crew, ticks: int) -> None:
+        """Run with threads; the clock goes on until all of them rest."""
+        crew.start(ticks)
+        try:
+            self.engine.run(ticks)
+            self._clock.sleep(self.schedule.deadline(10 * ticks))
+            self.pacer.conclude(crew.rest, ticks)
+        finally:
+            crew.leave()
 
     @property
     def times(self) -> dict[str, TaskTimes]:

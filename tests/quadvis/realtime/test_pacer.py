@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import threading
+import time
 from fractions import Fraction
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadvis.api import Diagram, load_text
-from quadvis.diagram.sections.overload import OverloadLimits
-from quadvis.errors import RunError
+from quadvis.diagram.sections.overload import OverloadLimits, TaskLimits
+from quadvis.errors import Place, RunError
 from quadvis.realtime import control
+from quadvis.realtime.clocks import MonotonicClock
+from quadvis.realtime.overload import SIGNAL
 from quadvis.realtime.pacer import Ended
 from tests.quadvis.realtime.fakes import WARN, FakeClock, Paced
 
@@ -134,9 +140,10 @@ def test_ticks_without_a_due_task_are_passed_over() -> None:
     assert (times["fast"].overruns, times["odd"].overruns) == (0, 0)
 
 
-def test_a_run_that_is_to_end_does_so_between_two_steps() -> None:
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_a_run_that_is_to_end_does_so_between_two_steps(engine: str) -> None:
     clock = FakeClock()
-    paced = Paced(diagram(), clock)
+    paced = Paced(diagram(), clock, engine=engine)
     ended: list[int] = []
 
     def work(tick: int) -> None:
@@ -149,6 +156,72 @@ def test_a_run_that_is_to_end_does_so_between_two_steps() -> None:
         paced.engine.run(100)
     assert paced.engine.tick == 5
     assert paced.times["fast"].steps == 5
+
+
+# Machine code
+
+
+def told(engine: str, takes: dict[int, float], late: dict[int, float], limits: OverloadLimits) -> Any:
+    """Return all that a run leaves: the ticks that ran, all words, the clock, its message."""
+    clock = FakeClock({place: round(time * MS) for place, time in late.items()})
+    paced = Paced(diagram(TWO), clock, limits, engine=engine)
+    ticks = busy(paced, clock, takes)
+    slow: list[int] = []
+    paced.engine.observe("slow", slow.append)
+    message = ""
+    try:
+        paced.run(120)
+    except RunError as error:
+        message = str(error)
+    return (
+        ticks,
+        slow,
+        bytes(paced.shared.times),
+        bytes(paced.shared.control),
+        clock.instant,
+        message,
+        (paced.shared.left_out.take(last=True).tolist()),
+    )
+
+
+@given(
+    st.dictionaries(st.integers(0, 119), st.floats(0, 12), max_size=6),
+    st.dictionaries(st.integers(0, 99), st.floats(0, 6), max_size=4),
+    st.builds(
+        OverloadLimits,
+        st.integers(0, 9),
+        st.integers(0, 5),
+        st.integers(0, 9),
+        st.sampled_from(["stop", "warn"]),
+    ),
+)
+@settings(max_examples=40, deadline=None)
+def test_the_compiled_pacer_does_what_the_interpreted_one_does(
+    takes: dict[int, float], late: dict[int, float], limits: OverloadLimits
+) -> None:
+    assert told("native", takes, late, limits) == told("python", takes, late, limits)
+
+
+def test_a_compiled_loop_returns_to_python_after_a_signal_and_at_no_other_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock = MonotonicClock(time.monotonic_ns())
+    paced = Paced(diagram(), clock, engine="native")
+    answered: list[int] = []
+    monkeypatch.setattr(paced.pacer, "answer", answered.append)
+    taken: list[int] = []
+    before = signal.signal(signal.SIGUSR1, lambda *_: taken.append(paced.shared.control[control.TICK]))
+    clock.hear_signals()
+    sender = threading.Timer(0.05, os.kill, (os.getpid(), signal.SIGUSR1))
+    try:
+        sender.start()
+        paced.run(300)
+    finally:
+        sender.join()
+        signal.set_wakeup_fd(-1)
+        signal.signal(signal.SIGUSR1, before)
+    assert answered == [SIGNAL]
+    assert len(taken) == 1 and 0 < taken[0] < 299
 
 
 # Overload
@@ -216,3 +289,29 @@ def test_each_task_has_its_own_count() -> None:
     assert "task 'slow': overload limit (1 in a row) exceeded with 2 overruns in a row" in overloaded(
         {16: 1.1, 21: 1.1}, only, TWO
     )
+
+
+def test_a_task_has_limits_of_its_own_and_takes_the_others_from_the_diagram() -> None:
+    text = TWO.replace("stop_time", "overload: {max: 2, startup: 1, tasks: {slow: {max: 0}}}\nstop_time")
+    limits = load_text(text).overload
+    assert limits.of("fast")[:4] == (2, None, 1, "stop")
+    assert limits.of("slow")[:4] == (0, None, 1, "stop")
+    assert load_text(text).hash == load_text(load_text(text).resolved).hash != load_text(TWO).hash
+    assert overloaded({8: 2.5}, limits, TWO) == ""
+    assert "task 'slow': overload limit (0) exceeded with 1 overrun" in overloaded({16: 1.5}, limits, TWO)
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_an_overrun_too_many_can_make_the_outputs_safe_and_the_run_goes_on(engine: str) -> None:
+    clock = FakeClock()
+    limits = OverloadLimits(action="safe", tasks=(TaskLimits("slow", OverloadLimits(max=9), Place("")),))
+    paced = Paced(diagram(TWO), clock, limits, engine=engine)
+    ticks = busy(paced, clock, {20: 2.5, 30: 1.5})
+    held: list[int] = []
+    leave = paced.engine.hold_safe
+    paced.engine.hold_safe = lambda: (held.append(len(ticks)), leave())  # type: ignore[method-assign]
+    times = paced.run(60)
+    assert held == [21]
+    assert paced.shared.control[control.SAFE] == 1
+    assert times["fast"].overruns == 3
+    assert paced.pacer.unsafe == "t = 0.021 s: task 'fast': overload limit (0) exceeded with 2 overruns"

@@ -321,12 +321,57 @@ def test_options_that_are_refused(
     assert Path("run.mcap").read_text() == "the log of an earlier run"
 
 
-def test_only_one_task_at_a_time_can_run_in_real_time() -> None:
+@pytest.mark.parametrize("engine", mostly_slow(["native", "python"]))
+def test_tasks_that_run_by_themselves_give_the_signals_of_a_simulation(engine: str) -> None:
     write(seed="7\ntasking: multi")
-    with pytest.raises(
-        QuadvisError, match="has one loop, and 'tasking: multi' needs one for each rate; write"
-    ):
-        quadvis.load("flight.yaml").run(real_time=CALM)
+    diagram = quadvis.load("flight.yaml")
+    simulated = diagram.run(engine=engine)
+    said: list[str] = []
+    result = diagram.run(engine=engine, real_time=CALM, announce=said.append)
+    assert result.passed
+    assert life() == ["open", "safe", "close"] * 2
+    assert result.flight is not None
+    fast, slow = result.flight.shares[0].tasks
+    assert (fast.steps + fast.overruns, slow.steps + slow.overruns) == (21, 5)
+    assert fast.steps and slow.steps
+    for name in ("wave.y", "end.y"):
+        ran = np.isin(simulated.times(name), result.times(name))
+        np.testing.assert_array_equal(result[name], simulated[name][ran])
+    if (
+        not fast.overruns
+    ):  # where the fast task has left a tick out, the slow one begins late with older values
+        ran = np.isin(simulated.times("slow.y"), result.times("slow.y"))
+        np.testing.assert_array_equal(result["slow.y"], simulated["slow.y"][ran])
+    assert any("task 'fast' runs Python" in words for words in said)
+
+
+@pytest.mark.parametrize("engine", mostly_slow(["native", "python"]))
+def test_a_block_that_fails_in_a_thread_of_its_own_ends_the_run(engine: str) -> None:
+    write("raise OSError('no such device')", seed="7\ntasking: multi")
+    text = (
+        Path("flight.yaml")
+        .read_text()
+        .replace("end: {block: own.ending, rate: fast}", "end: {block: own.ending, rate: slow}")
+    )
+    Path("flight.yaml").write_text(text)
+    with pytest.raises(RunError, match="OSError: no such device") as caught:
+        quadvis.load("flight.yaml").run(engine=engine, real_time=CALM)
+    assert (caught.value.block, caught.value.time) == ("end", 0.1)
+    assert life() == ["open", "safe", "close"]
+
+
+def test_outputs_that_overruns_made_safe_fail_the_run_and_let_it_go_on(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    once = "Path('once').exists() or (Path('once').touch(), clock.sleep(0.07))"
+    write(once, overload="{startup: 0, action: safe}")
+    command = ["run", "flight.yaml", "--real-time", "--priority", "0", "--log", "run.mcap"]
+    assert main(command) == 1
+    told = capsys.readouterr().err
+    assert "overload limit (0) exceeded with" in told
+    assert "the outputs have held their safe values from then on\n" in told
+    assert life() == ["open", "safe", "safe", "close"]
+    assert read_log("run.mcap").stamps("wave.y")[-1] > 200_000_000
 
 
 def test_real_time_is_linuxs(monkeypatch: pytest.MonkeyPatch) -> None:

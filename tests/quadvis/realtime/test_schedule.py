@@ -10,6 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadvis.api import load_text
+from quadvis.diagram.sections.overload import OverloadLimits
+from quadvis.realtime import grid
+from quadvis.realtime.plan import make_plan
 from quadvis.realtime.schedule import Rhythm, Schedule
 
 PERIODS = st.fractions(Fraction(1, 10**6), Fraction(1, 3), max_denominator=10**6)
@@ -30,16 +33,20 @@ def test_the_next_and_the_latest_due_tick_are_those_of_a_list(
     ticks = [each for each in range(COUNT) if any(due(rhythm, each) for rhythm in rhythms)]
     deadline = {each: floor(each * period * 10**9) for each in range(COUNT)}
     assert all(schedule.deadline(each) == deadline[each] for each in deadline)
-    assert schedule.next(tick, instant) == min(
+    plan = make_plan(schedule, [OverloadLimits()] * len(rhythms))
+    assert all(grid.deadline(plan, each) == deadline[each] for each in deadline)
+    assert grid.following(plan, tick, instant) == min(
         each for each in ticks if each >= tick and deadline[each] >= instant
     )
-    assert schedule.latest(instant) == max((each for each in ticks if deadline[each] <= instant), default=-1)
+    assert grid.latest(plan, instant) == max(
+        (each for each in ticks if deadline[each] <= instant), default=-1
+    )
 
 
 @given(st.builds(Rhythm, st.integers(1, 7), st.integers(0, 9)), st.integers(0, 40), st.integers(0, 40))
 def test_the_number_of_due_ticks_is_counted(rhythm: Rhythm, start: int, length: int) -> None:
     stop = start + length
-    assert rhythm.due_in(start, stop) == sum(due(rhythm, each) for each in range(start, stop))
+    assert grid.due_in(*rhythm, start, stop) == sum(due(rhythm, each) for each in range(start, stop))
 
 
 @pytest.mark.parametrize("rate", ["3 Hz", "1/7 s", "1 kHz"])
@@ -50,5 +57,7 @@ def test_the_grid_has_no_drift_in_a_year(rate: str) -> None:
     year = 365 * 24 * 3600
     tick = floor(year / graph.tick)
     assert schedule.deadline(tick) == floor(tick * graph.tick * 10**9)
-    assert schedule.next(0, year * 10**9 - 10**9) - tick == pytest.approx(-1 / graph.tick, abs=1)
+    plan = make_plan(schedule, [OverloadLimits()])
+    assert grid.deadline(plan, tick) == schedule.deadline(tick)
+    assert grid.following(plan, 0, year * 10**9 - 10**9) - tick == pytest.approx(-1 / graph.tick, abs=1)
     assert schedule.interval == floor(graph.tick * 10**9)

@@ -1,4 +1,4 @@
-"""What the system grants, and the reason for what it refuses; sleep and polling."""
+"""What the system grants, and the reason for what it refuses."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ import pytest
 from quadvis.errors import QuadvisError
 from quadvis.realtime import system
 from quadvis.realtime.options import RealTime
-from quadvis.realtime.schedule import NANOSECONDS
-from quadvis.realtime.system import CAP_SYS_NICE, Grants, Sleeper, ask_all, wake_up_time
+from quadvis.realtime.system import CAP_SYS_NICE, Grants, ask_all
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="asks Linux")
 
@@ -115,72 +114,6 @@ def test_a_call_that_the_system_refuses_is_named() -> None:
     grants = Grants()
     grants.ask("a wish", lambda: os.strerror(system._libc("mlockall", 1 << 20)).lower())
     assert str(grants) == "nothing granted; not granted: a wish (invalid argument)"
-
-
-class Clock:
-    """The monotonic clock, and sleep, in steps of 10 us; a sleep is some time late."""
-
-    def __init__(self, late: int) -> None:
-        self.instant, self.late, self.slept = 0, late, []
-
-    def monotonic_ns(self) -> int:
-        self.instant += 10_000
-        return self.instant
-
-    def nanosleep(self, clock: int, flags: int, time: Any, rest: None) -> int:
-        assert (clock, flags, rest) == (1, 1, None)
-        spec = time._obj
-        until = spec.seconds * NANOSECONDS + spec.nanoseconds
-        self.slept.append(until)
-        self.instant = max(self.instant, until) + self.late
-        return 0
-
-
-@pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
-    made = Clock(70_000)
-    monkeypatch.setattr(system, "time", made)
-    return made
-
-
-def sleeper(clock: Clock, polled: int = 0) -> Sleeper:
-    made = Sleeper(polled)
-    made._sleep = clock.nanosleep
-    return made
-
-
-def test_the_end_of_a_wait_is_polled(clock: Clock) -> None:
-    sleeper(clock, 100_000).until(5 * NANOSECONDS)
-    assert clock.slept == [5 * NANOSECONDS - 100_000]
-    assert clock.instant == 5 * NANOSECONDS
-    sleeper(clock).until(6 * NANOSECONDS)
-    assert clock.instant > 6 * NANOSECONDS + 70_000
-
-
-def test_there_is_no_sleep_if_the_time_is_near_or_past(clock: Clock) -> None:
-    sleeper(clock, 100_000).until(50_000)
-    sleeper(clock).until(0)
-    assert clock.slept == []
-
-
-def test_a_signal_ends_a_wait(clock: Clock) -> None:
-    made = sleeper(clock, 100_000)
-    made._sleep = lambda *_: errno.EINTR
-    made.until(NANOSECONDS)
-    assert clock.instant < NANOSECONDS
-
-
-def test_the_time_to_wake_up_is_measured(clock: Clock) -> None:
-    assert wake_up_time(sleeper(clock)) == pytest.approx(80_000, abs=10_000)
-
-
-def test_the_real_clock_wakes_no_earlier_than_asked() -> None:
-    import time
-
-    for polled in (0, 50_000):
-        instant = time.monotonic_ns() + 2_000_000
-        Sleeper(polled).until(instant)
-        assert time.monotonic_ns() >= instant
 
 
 # Options

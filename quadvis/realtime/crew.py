@@ -1,0 +1,317 @@
+"""The threads of a diagram with `tasking: multi` in real time: one for each task."""
+
+from __future__ import annotations
+
+import ctypes
+import signal
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from quadvis.engine.clock import Unpaced
+from quadvis.engine.engine import Engine
+from quadvis.engine.interpreter import Executor, Handover, Interpreter, Stop
+from quadvis.engine.layout import TIME
+from quadvis.engine.memory import Memory
+from quadvis.engine.program import Op, Program
+from quadvis.engine.taps import MachineCall, Observer, Tap
+from quadvis.native.choice import NATIVE, Choice, executor
+from quadvis.native.clock import GO, MachineClock
+from quadvis.realtime import dispatch
+from quadvis.realtime.clocks import START, for_thread
+from quadvis.realtime.dispatch import AT_ONCE, AT_REST, COUNT, HEAD, IDLE, ROW
+from quadvis.realtime.pacer import Pacer
+from quadvis.realtime.words import address_of, whole_words
+
+SWITCH = 1e-4  # s after which a thread in Python lets another one have the interpreter
+PATIENCE = 2.0  # s that steps have to end, when the run ends early
+ROOM = 16  # words for a mutex or a semaphore: more than any Linux needs
+INHERITED = 1  # PTHREAD_PRIO_INHERIT
+
+
+class Crew:
+    """Runs each task of a program in a thread of its own, the fastest one in the caller's: an executor.
+
+    ``tend`` is called in each new thread before its first step, with the number of its task. ``explain``
+    gives the error of a task that has failed.
+    """
+
+    def __init__(
+        self,
+        interpreter: Interpreter,
+        choice: Choice,
+        pacer: Pacer,
+        explain: Callable[[Stop], Exception],
+        tend: Callable[[int], None],
+    ) -> None:
+        self.memory: Memory = interpreter.memory
+        self._error: Exception | None = None
+        self._explain, self._tend = explain, tend
+        self._native = choice.engine == NATIVE
+        self._kept: list[Any] = []
+        program = interpreter.program
+        self._names = [task.name for task in program.tasks]
+        self._tasks = {block.path: block.task for block in program.blocks}
+        self._crew = self._words(program)
+        self._memory = self.memory.raw.cast("q")
+        pacer.lead(self._crew, self._memory, self._failed)
+        self._gates = [_Gate(self, number, pacer) for number in range(len(self._names))]
+        self._parts = [
+            interpreter.part(name, self._handover(number)) for number, name in enumerate(self._names)
+        ]
+        clocks: list[MachineClock | None] = [None] * len(self._names)
+        if self._native:
+            clocks = [pacer, *self._gates[1:]]
+        self._executors: list[Executor] = [
+            executor(part, choice, clock) for part, clock in zip(self._parts, clocks, strict=True)
+        ]
+        self._threads: list[threading.Thread] = []
+
+    def _words(self, program: Program) -> Any:
+        """Return the words of `dispatch`, with the copies of a program."""
+        count = len(program.tasks)
+        heads = HEAD + ROW * count + 2 * count * count
+        copies: list[int] = []
+
+        def place(ops: Sequence[Op]) -> int:
+            if not ops:
+                return 0
+            start = heads + len(copies)
+            copies.append(len(ops))
+            for op in ops:
+                copies.extend((op.sources[0].position, op.targets[0].position, op.sources[0].size))
+            return start
+
+        givers = {
+            slot: number
+            for number, task in enumerate(program.tasks)
+            for block in program.blocks
+            if block.task == task.name
+            for slot in block.outputs.values()
+        }
+        found: dict[int, int] = {}
+        for number, task in enumerate(program.tasks[1:], 1):
+            found[HEAD + ROW * number + dispatch.DELAYS] = place(task.delays)
+            for giver in range(number):
+                # A late value and time lie still until the loop of the fastest task dispatches again.
+                ops = [op for op in task.latches if givers.get(op.sources[0], 0) == giver]
+                ops = [op for op in ops if op.sources[0] != TIME]
+                found[HEAD + ROW * count + count * count + giver * count + number] = place(ops)
+        words = whole_words(heads + len(copies))
+        words[COUNT] = count
+        for at, value in (*found.items(), *enumerate(copies, heads)):
+            words[at] = value
+        self._ask_c(words)
+        return words
+
+    def _ask_c(self, words: Any) -> None:
+        """Put a mutex, semaphores, and the functions for them into the words."""
+        library = ctypes.CDLL(None)
+        functions = (
+            library.pthread_mutex_lock, library.pthread_mutex_unlock, library.sem_post, library.sem_wait,
+        )  # fmt: skip
+        for at, function in enumerate(functions, dispatch.LOCK):
+            words[at] = ctypes.cast(function, ctypes.c_void_p).value or 0
+        attributes, words[dispatch.MUTEX] = self._room(), self._room()
+        library.pthread_mutexattr_init(ctypes.c_void_p(attributes))
+        library.pthread_mutexattr_setprotocol(ctypes.c_void_p(attributes), INHERITED)
+        library.pthread_mutex_init(ctypes.c_void_p(words[dispatch.MUTEX]), ctypes.c_void_p(attributes))
+        for number in range(words[COUNT]):
+            semaphore = words[HEAD + ROW * number + dispatch.SEMAPHORE] = self._room()
+            library.sem_init(ctypes.c_void_p(semaphore), 0, 0)
+
+    def _room(self) -> int:
+        """Return the address of memory for something of C's."""
+        self._kept.append(np.zeros(ROOM, np.int64))
+        return int(self._kept[-1].ctypes.data)
+
+    def _handover(self, number: int) -> Handover:
+        own = whole_words(1)
+        own[0] = number
+        call = partial(dispatch.hand_over, self._crew, self._memory, own)
+        if not self._native:
+            return Handover(call)
+        from quadvis.native.library import library
+
+        places = tuple(map(address_of, (self._crew, self._memory, own)))
+        return Handover(call, MachineCall(library().routine(dispatch.HAND_OVER), places, own))
+
+    @property
+    def tick(self) -> int:
+        """The next tick of the fastest task."""
+        return self._executors[0].tick
+
+    @tick.setter
+    def tick(self, tick: int) -> None:
+        self._executors[0].tick = tick
+
+    def prepare(self) -> None:
+        """Do now what would take time at the first ticks."""
+        for each in self._executors:
+            each.prepare()
+
+    def run(self, until: int) -> Stop | None:
+        """Run the ticks of the fastest task before ``until``, which dispatches the others."""
+        return self._executors[0].run(until)
+
+    def attach(self, observer: Tap | Observer) -> None:
+        """Have rows taken from now on, or something done at the ticks of a task, in its thread."""
+        self._executors[self._number(observer)].attach(observer)
+
+    def detach(self, observer: Tap | Observer) -> None:
+        """End what `attach` has begun."""
+        self._executors[self._number(observer)].detach(observer)
+
+    def leave_writes(self) -> None:
+        """Hand nothing to the world outside any more."""
+        for each in self._executors:
+            each.leave_writes()
+
+    def _number(self, observer: Tap | Observer) -> int:
+        name = observer.task if isinstance(observer, Observer) else self._tasks[observer.block]
+        return self._names.index(name)
+
+    def start(self, until: int) -> None:
+        """Start the threads, for a run of so many ticks whose start is known.
+
+        Signals go to the caller's thread alone.
+        """
+        sys.setswitchinterval(SWITCH)
+        for gate in self._gates:
+            gate.start()
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
+        try:
+            for number in range(1, len(self._names)):
+                thread = threading.Thread(target=self._work, args=(number, until), daemon=True)
+                thread.start()
+                self._threads.append(thread)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+    def rest(self) -> None:
+        """Let all steps end that have begun or are due, and the threads after them."""
+        self._end(AT_REST)
+        for thread in self._threads:
+            thread.join()
+        if self._error is not None:
+            raise self._error
+
+    def leave(self) -> None:
+        """End the threads after the steps that are running, if these do not last too long."""
+        self._end(AT_ONCE)
+        for thread in self._threads:
+            thread.join(PATIENCE)
+
+    def _end(self, how: int) -> None:
+        self._crew[dispatch.QUIT] = max(how, self._crew[dispatch.QUIT])
+        for number in range(1, len(self._names)):
+            dispatch.post(self._crew, self._crew[HEAD + ROW * number + dispatch.SEMAPHORE])
+
+    def _failed(self) -> Exception:
+        """Return the error of the task that has failed."""
+        assert self._error is not None
+        return self._error
+
+    @property
+    def failed(self) -> bool:
+        """Return whether a task has failed."""
+        return bool(self._crew[dispatch.FAULT])
+
+    def busy(self, number: int) -> bool:
+        """Return whether a task runs, or is about to: it is released, and waits for no other one."""
+        row = HEAD + ROW * number
+        return self._crew[row + dispatch.STATE] != IDLE and not self._crew[row + dispatch.WAITS]
+
+    @np.errstate(all="ignore")
+    def _work(self, number: int, until: int) -> None:
+        """Run the steps of a task: the whole life of its thread."""
+        error: Exception | None = None
+        try:
+            self._tend(number)
+            stop = self._natively(number, until + 1) if self._native else self._interpreted(number)
+            error = None if stop is None else self._explain(stop)
+        except Exception as other:
+            error = other
+        if error is not None:
+            self._error = self._error or error
+            self._crew[dispatch.FAULT] = 1
+
+    def _natively(self, number: int, until: int) -> Stop | None:
+        try:
+            return self._executors[number].run(until)
+        except _Quit:
+            return None
+
+    def _interpreted(self, number: int) -> Stop | None:
+        part, gate = self._executors[number], self._gates[number]
+        while gate.enter() == GO:
+            part.tick = gate.tick
+            stop = part.run(part.tick + 1)
+            if stop is not None:
+                return stop
+        return None
+
+
+def lead(engine: Engine, choice: Choice, pacer: Pacer, tend: Callable[[int], None]) -> Crew:
+    """Let an engine run each task in a thread of its own, as chosen; a pacer dispatches them."""
+    made: list[Crew] = []
+
+    def make(interpreter: Interpreter) -> Crew:
+        made.append(Crew(interpreter, choice, pacer, engine.explained, tend))
+        return made[0]
+
+    engine.run_with(make)
+    if choice.engine == NATIVE:
+        engine.clock = Unpaced()
+    return made[0]
+
+
+class _Quit(Exception):
+    """A thread is to end."""
+
+
+class _Gate:
+    """Where the thread of a task waits until it is released; see `quadvis.native.clock.MachineClock`."""
+
+    def __init__(self, crew: Any, number: int, pacer: Pacer) -> None:
+        self._own = whole_words(1)
+        self._own[0] = number
+        self._pacer = pacer
+        self._crew = crew._crew
+        self._row = HEAD + ROW * number
+        self._clock: Any = for_thread(pacer.clock.words)  # of its machine code
+
+    def start(self) -> None:
+        """Take the start of the run, which is known now."""
+        self._clock[START] = self._pacer.clock.words[START]
+
+    def enter(self) -> int:
+        """Count the step that has ended, and wait; return GO, or another number for the end."""
+        plan, _, tasks, *_, clock, crew, _ = self._pacer.words
+        return dispatch.enter(plan, tasks, clock, crew, self._own)
+
+    @property
+    def tick(self) -> int:
+        """The tick for which the task was released."""
+        return int(self._crew[self._row + dispatch.TICK])
+
+    @property
+    def address(self) -> int:
+        """The address of its machine code."""
+        from quadvis.native.library import library
+
+        return library().routine(dispatch.GATE)
+
+    @property
+    def places(self) -> Sequence[int]:
+        """The addresses that its machine code takes."""
+        plan, _, tasks, *_, crew, _ = self._pacer.words
+        return [address_of(each) for each in (plan, tasks, self._clock, crew, self._own)]
+
+    def answer(self, pause: int) -> None:
+        """End the thread."""
+        raise _Quit

@@ -1,0 +1,149 @@
+"""What a pacer does at each tick: which tick runs, when, and what is counted.
+
+All is done in whole numbers, by plain functions of words that can be indexed. Python runs them for the
+interpreter, and numba compiles the same functions for the compiled loop, so the two cannot differ. ``plan``
+is laid out by `plan`, ``shared`` by `control`, ``tasks`` are the words of all tasks as `times` has them,
+``left_out`` those of the ring of ticks that are left out, ``crew`` and ``memory`` are those of `dispatch`.
+Instants are nanoseconds since the start.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from quadvis.native import loop
+from quadvis.native.clock import GO
+from quadvis.native.routine import Routine
+from quadvis.realtime import clocks, control, dispatch, times
+from quadvis.realtime.clocks import now, signalled, sleep
+from quadvis.realtime.dispatch import release
+from quadvis.realtime.grid import deadline, due_in, following, latest
+from quadvis.realtime.overload import ENDING, FAULTED, OVERLOADED, SIGNAL, missed, worse
+from quadvis.realtime.plan import (
+    BEGUN,
+    COUNTED_TO,
+    DUE,
+    ENDED,
+    EVERY,
+    HEAD,
+    IN_A_ROW,
+    INSTANT,
+    LATE,
+    OFFSET,
+    OWN,
+    ROW,
+    STARTING,
+    STARTUP,
+    STEPPING,
+    TASKS,
+    TICK,
+    WAITING,
+)  # fmt: skip
+from quadvis.realtime.ring import put_pair
+from quadvis.realtime.times import bin_of, count
+
+
+def wait(
+    plan: Any, shared: Any, tasks: Any, left_out: Any, clock: Any, crew: Any, memory: Any, tick: int, end: int
+) -> int:
+    """Wait until a tick from ``tick`` on may run, which ``plan[WAITING]`` is then, at most ``end``.
+
+    Return `GO`, and the step has begun; or why it has not: then the wait goes on when it is called again.
+    """
+    if plan[WAITING] < 0:
+        instant = now(clock)
+        finish(plan, shared, tasks, instant)
+        plan[WAITING], plan[INSTANT], plan[COUNTED_TO] = following(plan, tick, instant), instant, tick
+    chosen, instant = plan[WAITING], plan[INSTANT]
+    if chosen < end:
+        due = deadline(plan, chosen)
+        while True:
+            if crew[dispatch.FAULT] != 0:
+                return FAULTED
+            if shared[control.END] != 0:
+                return ENDING
+            if instant >= due:
+                break
+            if signalled(clock):
+                return SIGNAL
+            sleep(clock, due)
+            instant = now(clock)
+            plan[INSTANT] = instant
+        if instant >= deadline(plan, chosen + 1):
+            chosen = max(chosen, latest(plan, instant))
+    chosen = min(chosen, end)
+    plan[WAITING] = chosen
+    if chosen > plan[COUNTED_TO]:
+        answer = _skip(plan, shared, tasks, left_out, chosen)
+        if answer != GO:
+            return answer
+    if chosen < end:
+        if plan[OWN] < plan[TASKS]:
+            answer = release(plan, shared, tasks, crew, memory, chosen)
+            if answer != GO:
+                return answer
+        _begin(plan, shared, chosen, instant)
+    return GO
+
+
+def _begin(plan: Any, shared: Any, tick: int, instant: int) -> None:
+    for row in range(HEAD, HEAD + ROW * plan[OWN], ROW):
+        waited = tick - plan[row + OFFSET]
+        plan[row + DUE] = 1 if waited >= 0 and waited % plan[row + EVERY] == 0 else 0
+    plan[STEPPING], plan[TICK], plan[BEGUN] = 1, tick, instant
+    plan[LATE] = instant - deadline(plan, tick)
+    shared[control.TICK] = tick
+    shared[control.BEGUN] = max(1, instant)
+
+
+def finish(plan: Any, shared: Any, tasks: Any, instant: int) -> None:
+    """Count the step that has ended, if one was running; its times are those of each task in it."""
+    if plan[STEPPING] == 0:
+        return
+    plan[STEPPING], plan[ENDED], plan[STARTING] = 0, instant, 0
+    late, taken = plan[LATE], instant - plan[BEGUN]
+    late_bin, taken_bin = bin_of(late), bin_of(taken)
+    for task in range(plan[OWN]):
+        row, words = HEAD + ROW * task, times.WORDS * task
+        if plan[row + DUE] != 0:
+            tasks[words + times.STEPS] += 1
+            count(tasks, words + times.LATENESS, late, late_bin)
+            count(tasks, words + times.TET, taken, taken_bin)
+            plan[row + IN_A_ROW] = 0
+            if tasks[words + times.STEPS] <= plan[row + STARTUP]:
+                plan[STARTING] = 1
+    shared[control.DONE] += 1
+    shared[control.BEGUN] = 0
+
+
+def _skip(plan: Any, shared: Any, tasks: Any, left_out: Any, stop: int) -> int:
+    """Note that the ticks before ``stop`` are left out, and count the overruns; return what follows."""
+    start, plan[COUNTED_TO] = plan[COUNTED_TO], stop
+    answer, noted = GO, False
+    for task in range(plan[OWN]):
+        row = HEAD + ROW * task
+        found = due_in(plan[row + EVERY], plan[row + OFFSET], start, stop)
+        if found > 0:
+            if not noted:
+                put_pair(left_out, control.LEFT_OUT[0], start, stop - start)
+                noted = True
+            tasks[times.WORDS * task + times.OVERRUNS] += found
+            answer = worse(answer, missed(plan, shared, task, found, start, plan[STARTING]))
+            if answer == OVERLOADED:
+                break
+    return answer
+
+
+def pace(
+    steering: Any, plan: Any, shared: Any, tasks: Any, left_out: Any, clock: Any, crew: Any, memory: Any
+) -> None:
+    """Wait as the clock of the compiled loop, whose control words are ``steering``."""
+    steering[loop.PAUSE] = wait(
+        plan, shared, tasks, left_out, clock, crew, memory, steering[loop.TICK], steering[loop.UNTIL]
+    )
+    if steering[loop.PAUSE] == GO:
+        steering[loop.TICK] = plan[WAITING]
+        plan[WAITING] = -1
+
+
+PACE = Routine(pace, "wwwwwwww", {**clocks.MACHINE, **dispatch.MACHINE})
