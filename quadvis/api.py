@@ -37,12 +37,20 @@ class Diagram(Checked):
         engine: str = "auto",
         announce: Callable[[str], None] | None = None,
         real_time: RealTime | None = None,
+        profile: bool = False,
     ) -> Result:
         """Run to the stop time; see ``quadvis.run.session.run``."""
         from quadvis.run.session import run
 
         return run(
-            self, log=log, progress=progress, keep=keep, engine=engine, announce=announce, real_time=real_time
+            self,
+            log=log,
+            progress=progress,
+            keep=keep,
+            engine=engine,
+            announce=announce,
+            real_time=real_time,
+            profile=profile,
         )
 
     def start(self, log: str | Path | None = None) -> LiveRun:

@@ -177,7 +177,7 @@ def _engine_option(parser: Parser) -> None:
 
 
 def _real_time_options(parser: Parser) -> None:
-    words = "let each tick wait for its time, in a process of its own; needs Linux and 'tasking: single'"
+    words = "let each tick wait for its time, in a process of its own; needs Linux"
     parser.add_argument("--real-time", action="store_true", help=words)
     words = "with --real-time: the processor for the loop"
     parser.add_argument("--cpu", type=int, metavar="N", help=words)

@@ -59,7 +59,8 @@ def profile_lines(computer: str, profile: ProfileReport) -> list[str]:
         least, most = min(method.least for method in methods), max(method.most for method in methods)
         shown = [f"{1e6 * time:.3g} us" for time in (least, totals[block] / count, most)]
         rows.append((block, str(count), *shown, f"{100 * totals[block] / whole:.1f} %"))
-    title = f"{_with('profile', computer)}: every call timed, which costs about {1e6 * profile.cost:.2g} us more a call in Python"
+    cost = f"{1e6 * profile.cost:.2g} us"
+    title = f"{_with('profile', computer)}: every call timed, which costs about {cost} more a call in Python"
     return [title, *table(rows)]
 
 
