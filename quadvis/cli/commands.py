@@ -193,8 +193,7 @@ def check(options: argparse.Namespace) -> int:
         print(f"{options.file}: {count} blocks in {tasks}: no fault")
         lines = [*(f"link {name}: {facts}" for name, facts in links.items()), *map(str, ages)]
         lines += _hold_ups(diagram.graph)
-        print("".join(f"  {line}
-" for line in lines), end="")
+        print("".join(f"  {line}\n" for line in lines), end="")
     return 0
 
 

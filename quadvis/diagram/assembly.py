@@ -105,7 +105,9 @@ class Assembly:
             self.warn_unused()
             warn_network(spec, graph, faults)
             if expansion.is_whole:
-                warn_tasks(spec[OVERLOAD], graph, faults)
+                own = [each.overload for each in spec[COMPUTERS].values() if known(each) and each.overload]
+                for limits in (spec[OVERLOAD], *own):
+                    warn_tasks(limits, graph, faults)
         written = spec[STOP_TIME]
         context = Context(
             wiring, graph, stop, written is not None and known(written) and stop < written, faults,

@@ -21,7 +21,7 @@ PIPE, READ, BUFFER, BYTE = range(7, 11)
 WORDS = 11
 
 
-class Clock(Protocol):
+class Timekeeper(Protocol):
     """Instants are nanoseconds since the start."""
 
     words: Any  # the same clock in machine code

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import signal
 import sys
 import threading
@@ -15,22 +14,19 @@ import numpy as np
 from quadvis.engine.clock import Unpaced
 from quadvis.engine.engine import Engine
 from quadvis.engine.interpreter import Executor, Handover, Interpreter, Stop
-from quadvis.engine.layout import TIME
 from quadvis.engine.memory import Memory
-from quadvis.engine.program import Op, Program
 from quadvis.engine.taps import MachineCall, Observer, Tap
 from quadvis.native.choice import NATIVE, Choice, executor
 from quadvis.native.clock import GO, MachineClock
 from quadvis.realtime import dispatch
 from quadvis.realtime.clocks import START, for_thread
-from quadvis.realtime.dispatch import AT_ONCE, AT_REST, COUNT, HEAD, IDLE, ROW
+from quadvis.realtime.crew_words import crew_words
+from quadvis.realtime.dispatch import AT_ONCE, AT_REST, HEAD, IDLE, ROW
 from quadvis.realtime.pacer import Pacer
 from quadvis.realtime.words import address_of, whole_words
 
 SWITCH = 1e-4  # s after which a thread in Python lets another one have the interpreter
 PATIENCE = 2.0  # s that steps have to end, when the run ends early
-ROOM = 16  # words for a mutex or a semaphore: more than any Linux needs
-INHERITED = 1  # PTHREAD_PRIO_INHERIT
 
 
 class Crew:
@@ -52,11 +48,10 @@ class Crew:
         self._error: Exception | None = None
         self._explain, self._tend = explain, tend
         self._native = choice.engine == NATIVE
-        self._kept: list[Any] = []
         program = interpreter.program
         self._names = [task.name for task in program.tasks]
         self._tasks = {block.path: block.task for block in program.blocks}
-        self._crew = self._words(program)
+        self._crew, self._kept = crew_words(program)
         self._memory = self.memory.raw.cast("q")
         pacer.lead(self._crew, self._memory, self._failed)
         self._gates = [_Gate(self, number, pacer) for number in range(len(self._names))]
@@ -70,64 +65,6 @@ class Crew:
             executor(part, choice, clock) for part, clock in zip(self._parts, clocks, strict=True)
         ]
         self._threads: list[threading.Thread] = []
-
-    def _words(self, program: Program) -> Any:
-        """Return the words of `dispatch`, with the copies of a program."""
-        count = len(program.tasks)
-        heads = HEAD + ROW * count + 2 * count * count
-        copies: list[int] = []
-
-        def place(ops: Sequence[Op]) -> int:
-            if not ops:
-                return 0
-            start = heads + len(copies)
-            copies.append(len(ops))
-            for op in ops:
-                copies.extend((op.sources[0].position, op.targets[0].position, op.sources[0].size))
-            return start
-
-        givers = {
-            slot: number
-            for number, task in enumerate(program.tasks)
-            for block in program.blocks
-            if block.task == task.name
-            for slot in block.outputs.values()
-        }
-        found: dict[int, int] = {}
-        for number, task in enumerate(program.tasks[1:], 1):
-            found[HEAD + ROW * number + dispatch.DELAYS] = place(task.delays)
-            for giver in range(number):
-                # A late value and time lie still until the loop of the fastest task dispatches again.
-                ops = [op for op in task.latches if givers.get(op.sources[0], 0) == giver]
-                ops = [op for op in ops if op.sources[0] != TIME]
-                found[HEAD + ROW * count + count * count + giver * count + number] = place(ops)
-        words = whole_words(heads + len(copies))
-        words[COUNT] = count
-        for at, value in (*found.items(), *enumerate(copies, heads)):
-            words[at] = value
-        self._ask_c(words)
-        return words
-
-    def _ask_c(self, words: Any) -> None:
-        """Put a mutex, semaphores, and the functions for them into the words."""
-        library = ctypes.CDLL(None)
-        functions = (
-            library.pthread_mutex_lock, library.pthread_mutex_unlock, library.sem_post, library.sem_wait,
-        )  # fmt: skip
-        for at, function in enumerate(functions, dispatch.LOCK):
-            words[at] = ctypes.cast(function, ctypes.c_void_p).value or 0
-        attributes, words[dispatch.MUTEX] = self._room(), self._room()
-        library.pthread_mutexattr_init(ctypes.c_void_p(attributes))
-        library.pthread_mutexattr_setprotocol(ctypes.c_void_p(attributes), INHERITED)
-        library.pthread_mutex_init(ctypes.c_void_p(words[dispatch.MUTEX]), ctypes.c_void_p(attributes))
-        for number in range(words[COUNT]):
-            semaphore = words[HEAD + ROW * number + dispatch.SEMAPHORE] = self._room()
-            library.sem_init(ctypes.c_void_p(semaphore), 0, 0)
-
-    def _room(self) -> int:
-        """Return the address of memory for something of C's."""
-        self._kept.append(np.zeros(ROOM, np.int64))
-        return int(self._kept[-1].ctypes.data)
 
     def _handover(self, number: int) -> Handover:
         own = whole_words(1)

@@ -9,7 +9,7 @@ from quadvis.diagram.sections.overload import OverloadLimits
 from quadvis.errors import RunError, counted, sentence
 from quadvis.realtime import control, dispatch, overload, pacing, times
 from quadvis.realtime import plan as plans
-from quadvis.realtime.clocks import Clock
+from quadvis.realtime.clocks import Timekeeper
 from quadvis.realtime.control import SharedMemory
 from quadvis.realtime.grid import deadline, due_in
 from quadvis.realtime.plan import make_plan
@@ -43,7 +43,7 @@ class Pacer:
         names: Sequence[str],
         limits: Sequence[OverloadLimits],
         shared: SharedMemory,
-        clock: Clock,
+        clock: Timekeeper,
         save: Callable[[], None] | None = None,
     ) -> None:
         self._names, self._limits, self._save = names, limits, save

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from quadvis.machine.files import reason
-from quadvis.realtime.clocks import Clock
+from quadvis.realtime.clocks import Timekeeper
 from quadvis.realtime.options import RealTime
 
 CAP_IPC_LOCK, CAP_SYS_NICE = 14, 23
@@ -129,7 +129,7 @@ def _status(key: str) -> str:
         return next(line.partition(":")[2].strip() for line in lines if line.startswith(f"{key}:"))
 
 
-def wake_up_time(clock: Clock) -> int:
+def wake_up_time(clock: Timekeeper) -> int:
     """Return how late (ns) the system wakes this thread, but for one time in a hundred."""
     late = []
     instant = clock.now()

@@ -685,6 +685,26 @@ def test_short_runs_are_interpreted_long_ones_compiled_if_that_pays(folder: Path
     assert choose(engine, 10**6).engine == NATIVE  # it is kept now
 
 
+def test_in_real_time_machine_code_is_taken_where_it_is_kept_however_long_the_run(folder: Path) -> None:
+    class Paced(Scaled):  # no other test has compiled it
+        def output(self, u):
+            return self.factor * u + 0.125
+
+    engine = alone(Paced(), {"u": 3.0}, {}, Fraction(1))
+    for ticks in (10, 10**8):
+        choice = choose(engine, ticks, paced=True)
+        assert choice.engine == PYTHON
+        assert choice.reason == "since 1 block type would have to be compiled, once; 'native' does it"
+    assert choose(engine, 10, NATIVE, paced=True).engine == NATIVE
+    assert choose(engine, 10, paced=True).engine == NATIVE
+
+    class Outside(Scaled, numeric=False):
+        """Has no machine code."""
+
+    python = alone(Outside(), {"u": 3.0}, {}, Fraction(1))
+    assert choose(python, 10**8, paced=True).reason == "since no block can be compiled"
+
+
 def test_an_unknown_engine_is_refused_with_the_one_that_is_meant() -> None:
     with pytest.raises(QuadvisError, match="there is no engine 'nativ'; did you mean 'native'"):
         choose(scaled(), 1, "nativ")

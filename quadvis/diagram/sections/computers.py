@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from quadvis.diagram.entries import named_entries
 from quadvis.diagram.sections.forms import QUANTITY, TEXT, Schema, closed, map_of, ref
-from quadvis.diagram.sections.overload import OVERLOAD, OverloadLimits
+from quadvis.diagram.sections.overload import OVERLOAD, OverloadLimits, written
 from quadvis.diagram.sections.section import Checked, FileSection
 from quadvis.diagram.times import read_duration
 from quadvis.document import YamlMap, YamlNode
@@ -94,8 +94,7 @@ def _poll(node: YamlNode) -> str:
 def _written(spec: ComputerSpec) -> Mapping[str, Any]:
     plain = {key: getattr(spec, key) for key in COMPUTER_KEYS if getattr(spec, key) is not None}
     if spec.overload is not None:
-        limits = spec.overload._asdict()
-        plain["overload"] = {key: value for key, value in limits.items() if value is not None}
+        plain["overload"] = written(spec.overload)
     return plain
 
 

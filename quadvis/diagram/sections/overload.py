@@ -98,6 +98,12 @@ def plain(limits: OverloadLimits, usual: OverloadLimits = USUAL) -> dict[str, An
     return found
 
 
+def written(limits: OverloadLimits) -> dict[str, Any]:
+    """Return limits in full as a diagram writes them."""
+    found = {name: getattr(limits, name) for name in LIMIT_KEYS if getattr(limits, name) is not None}
+    return {**found, **({"tasks": plain(limits)["tasks"]} if limits.tasks else {})}
+
+
 def warn_tasks(limits: OverloadLimits, graph: Graph, faults: Faults) -> None:
     """Warn of limits for a task that a diagram does not have."""
     names = [task.name for task in graph.tasks]

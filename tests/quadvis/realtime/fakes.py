@@ -17,7 +17,7 @@ from quadvis.engine.engine import Engine
 from quadvis.graph.graph import MULTI
 from quadvis.native.choice import NATIVE, choose, use
 from quadvis.realtime import clocks
-from quadvis.realtime.clocks import Clock, machine_words
+from quadvis.realtime.clocks import Timekeeper, machine_words
 from quadvis.realtime.control import SharedMemory
 from quadvis.realtime.crew import Crew, lead
 from quadvis.realtime.pacer import Pacer
@@ -120,7 +120,7 @@ class Paced:
     def __init__(
         self,
         diagram: Diagram,
-        clock: Clock,
+        clock: Timekeeper,
         limits: OverloadLimits = WARN,
         streams: Sequence[RowStream] = (),
         engine: str = "python",
