@@ -9,6 +9,11 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from quadvis.machine.processes import ONE_THREAD
+
+# As in the workers of a sweep: before numpy is imported, and for the commands under test.
+os.environ.update(ONE_THREAD)
+
 # Whoever starts the tests in the background of a script leaves Ctrl-C ignored, and programs inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup leaves it ignored, and so would all commands under test

@@ -512,7 +512,7 @@ def test_a_script_needs_no_guard_and_its_environment_is_left_alone() -> None:
     assert (process.returncode, out, told) == (0, "once True\n", "")
 
 
-def test_a_worker_has_one_thread_for_each_library() -> None:
+def test_a_worker_has_one_thread_for_each_library(monkeypatch: pytest.MonkeyPatch) -> None:
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
@@ -520,6 +520,7 @@ def test_a_worker_has_one_thread_for_each_library() -> None:
 
     from quadvis.machine.processes import launching
 
+    monkeypatch.setenv("OPENCV_FOR_THREADS_NUM", "2")
     with ProcessPoolExecutor(1, get_context("spawn")) as executor:
         with launching():
             threads = executor.submit(cv2.getNumThreads)
