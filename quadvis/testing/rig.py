@@ -21,6 +21,7 @@ STEPS = 16
 PERIOD = Fraction(1, 10)
 VECTOR = 3  # length of an axis that may have any length
 BOOL = In("bool").signal
+SCALES = (0.1, 1.0, 10.0)  # of random numbers
 GARBAGE = {"float64": np.nan, "int64": -(2**40)}
 Whole = tuple[bytes, tuple[Any, ...]]
 
@@ -52,7 +53,7 @@ class Subject:
 
 @dataclass
 class Rig:
-    """A block alone in an engine, and its inputs, a value of each for each of ``STEPS``."""
+    """A block alone in an engine, and its inputs, a value of each for each step."""
 
     engine: Engine
     series: list[dict[str, Any]]
@@ -140,11 +141,14 @@ def rigs(subject: Subject, *, missing: bool = False) -> Iterator[Rig]:
     free = any(item.signal.shape == ("*",) for item in declared)
     for shape in ((), (VECTOR,)) if free else ((),):
         for parameters in _parameters(subject, shape):
-            yield _rig(subject, subject.make(**parameters), {"*": shape} if free else {}, missing)
+            yield _rig(subject, subject.make(**parameters), {"*": shape} if free else {}, STEPS, missing)
 
 
 def extreme_rigs(subject: Subject) -> Iterator[tuple[str, Any, Rig]]:
-    """Yield each parameter with each extreme value that the block accepts, and a rig with that value."""
+    """Yield each parameter with each extreme value that the block accepts, and a rig with that value.
+
+    The rig has inputs for one step.
+    """
     params = subject.block.interface.params
     arrays = {
         name: param.default
@@ -158,7 +162,7 @@ def extreme_rigs(subject: Subject) -> Iterator[tuple[str, Any, Rig]]:
                 block = subject.make(**arrays | {name: value})
             except ParameterError:
                 continue
-            yield name, value, _rig(subject, block, {"*": ()}, False)
+            yield name, value, _rig(subject, block, {"*": ()}, steps=1)
 
 
 def _extremes(param: Param, sizes: Sizes) -> Iterator[Any]:
@@ -176,7 +180,7 @@ def _extremes(param: Param, sizes: Sizes) -> Iterator[Any]:
         yield np.full(shape, number).tolist()
 
 
-def _rig(subject: Subject, block: Block, sizes: Sizes, missing: bool) -> Rig:
+def _rig(subject: Subject, block: Block, sizes: Sizes, steps: int, missing: bool = False) -> Rig:
     interface = block.interface
     sizes |= parameter_sizes(block)
     for name, values in subject.inputs.items():
@@ -186,7 +190,7 @@ def _rig(subject: Subject, block: Block, sizes: Sizes, missing: bool) -> Rig:
         for size in item.signal.shape:
             if isinstance(size, str) and size != "*":
                 sizes.setdefault(size, VECTOR)
-    series = _series(subject, sizes, missing)
+    series = _series(subject, sizes, steps, missing)
     return Rig(alone(block, series[0], sizes, PERIOD, seed=1), series)
 
 
@@ -232,10 +236,10 @@ def _shaken(param: Param, shape: Shape) -> Any:
     return np.clip(value, least, most).tolist()
 
 
-def _series(subject: Subject, sizes: Sizes, missing: bool) -> list[dict[str, Any]]:
+def _series(subject: Subject, sizes: Sizes, steps: int, missing: bool) -> list[dict[str, Any]]:
     rng = np.random.default_rng(zlib.crc32(subject.block.__name__.encode()))
     series: list[dict[str, Any]] = []
-    for step in range(STEPS):
+    for step in range(steps):
         row: dict[str, Any] = {}
         for name, port in subject.block.interface.inputs.items():
             if name in subject.inputs:
@@ -256,5 +260,5 @@ def _random(port: In, shape: Shape, rng: np.random.Generator, step: int, missing
         return rng.random(shape) < 0.7
     if port.signal.scalar == "int64":
         return rng.integers(-2, 9, shape)
-    value = rng.normal(size=shape) * rng.choice([0.1, 1.0, 10.0])
+    value = rng.normal(size=shape) * SCALES[rng.integers(len(SCALES))]
     return np.where(rng.random(shape) < 0.1, np.nan, value) if missing else value
