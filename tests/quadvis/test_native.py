@@ -564,6 +564,7 @@ blocks:
 """
 
 
+@pytest.mark.slow  # four processes; of the fingerprint that this rests on there is a test below
 def test_an_edit_two_files_away_is_never_stale(tmp_path: Path, folder: Path) -> None:
     """The block calls a helper in another file, and this a constant in a third."""
     own = tmp_path / "blocks" / "own"

@@ -14,6 +14,7 @@ import pytest
 from quadvis.output.canvas import blank_sheet
 from quadvis.sweeps import strip_chart
 from quadvis.sweeps.strip_chart import Cloud, StripPanel, Strips, draw_strips
+from tests.stages import mostly_slow
 
 LONG = "the_largest_angle_at_which_the_craft_may_still_be_flown"
 
@@ -85,7 +86,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", mostly_slow(CASES, 4))
 def test_texts_stay_on_the_page_and_clear_of_each_other(case: str, sheets: list[Any], tmp_path: Path) -> None:
     draw_strips(CASES[case], tmp_path / "x.png")
     (sheet,) = sheets

@@ -44,6 +44,12 @@ def found(*arguments, folder):
     return said, {name: np.array(values, dtype=float) for name, values in said["poses"].items()}
 
 
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    """What the program says of the recording that it plays without arguments."""
+    return found(folder=tmp_path_factory.mktemp("recording"))
+
+
 def refused(*arguments, folder):
     """Return the one sentence with which the program ends."""
     done = compare(*arguments, folder=folder)
@@ -86,8 +92,8 @@ def test_rendered_pictures_are_compared_with_the_true_poses(tmp_path):
     assert {("truth", "n_points"), ("truth", "plane"), ("n_points", "plane")} <= pairs
 
 
-def test_both_methods_of_the_paper_find_the_same_attitude(tmp_path):
-    said, _ = found(folder=tmp_path)
+def test_both_methods_of_the_paper_find_the_same_attitude(recording):
+    said, _ = recording
     (pair,) = [p for p in said["differences"] if (p["first"], p["second"]) == ("n_points", "plane")]
     assert pair["pictures"] == 30
     assert max(pair["rms"][ANGLES]) < 1e-12
@@ -127,17 +133,17 @@ def test_a_folder_of_any_length_is_played_to_its_end(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_video_is_played_to_its_end(tmp_path):
+def test_a_video_is_played_to_its_end(tmp_path, recording):
     said, methods = found("--video", VIDEO, folder=tmp_path)
-    _, pictures = found(folder=tmp_path)
+    _, pictures = recording
     assert len(said["times"]) == 30
     assert methods["plane"] == pytest.approx(pictures["plane"], abs=0.04)  # the video is compressed
 
 
-def test_a_camera_with_twice_the_focal_length_sees_everything_twice_as_far(tmp_path):
+def test_a_camera_with_twice_the_focal_length_sees_everything_twice_as_far(tmp_path, recording):
     text = (ROOT / "diagrams" / "calib" / "camera.yaml").read_text()
     (tmp_path / "tele.yaml").write_text(text.replace("430, 2", "860, 4").replace("438", "876"))
-    _, plain = found("--pictures", "1", folder=tmp_path)
+    _, plain = recording
     _, tele = found("--pictures", "1", "--calibration", "tele.yaml", folder=tmp_path)
     # The first picture is level, where nothing else changes.
     for name, values in plain.items():
@@ -220,7 +226,7 @@ def test_the_calibration_of_the_pictures_is_the_detectors_too(tmp_path):
     assert all(np.isfinite(values).all() for values in methods.values())
 
 
-def test_orientation_tags_are_ignored_and_what_cannot_be_read_is_told(tmp_path):
+def test_orientation_tags_are_ignored_and_what_cannot_be_read_is_told(tmp_path, recording):
     shutil.copytree(PICTURES, tmp_path / "pictures")
     first, second = (tmp_path / "pictures" / f"{number:06d}.jpg" for number in (1, 2))
     data = first.read_bytes()
@@ -229,7 +235,7 @@ def test_orientation_tags_are_ignored_and_what_cannot_be_read_is_told(tmp_path):
         data[:2] + b"\xff\xe1" + (2 + len(asks)).to_bytes(2, "big") + asks + data[2:] + bytes(99)
     )
     second.write_bytes(second.read_bytes()[:3000])
-    _, plain = found(folder=tmp_path)
+    _, plain = recording
     done = compare("--folder", "pictures", "--json", folder=tmp_path)
     assert done.returncode == 0
     assert "000002.jpg is cut short" in done.stderr and "000001.jpg asks to be turned" in done.stderr
