@@ -12,7 +12,7 @@ from quadvis.diagram.diagram import Diagram
 from quadvis.engine.engine import Engine
 from quadvis.graph.graph import Constant, Graph, Node, Wire
 from quadvis.links.insertion import sender_path
-from quadvis.links.stamps import AGE, HOLDER, METER, STAMP, TickTime
+from quadvis.links.stamps import AGE, HOLDER, METER, STAMP, PresentStamp
 from quadvis.links.twin import ReceiverTwin, SenderTwin
 
 NOW = "now"
@@ -84,7 +84,7 @@ def _way(graph: Graph, meter: str) -> Iterator[Node]:
             node, port = source, STAMP
         else:
             yield replace(node, inputs={**node.inputs, port: replace(wire, port=NOW, index=())})
-            yield replace(source, kind="clock", block=TickTime(), inputs={}, sizes={})
+            yield replace(source, kind="clock", block=PresentStamp(), inputs={}, sizes={})
             return
 
 

@@ -44,7 +44,7 @@ def _plain(name: str) -> str:
     return "".join(each if each.isalnum() else "_" for each in name).strip("_")
 
 
-class Leg(NamedTuple):
+class PathStep(NamedTuple):
     """One wire of a path: its reader, the input there."""
 
     reader: str
@@ -112,10 +112,10 @@ class AgePaths:
     def __init__(self, drafts: Mapping[str, Draft], nodes: dict[str, Node], faults: Faults) -> None:
         self.drafts, self.nodes, self.faults = drafts, nodes, faults
         self.shadows: dict[Key, list[DraftWire]] = {}
-        self._readers: dict[str, list[Leg]] = {}
+        self._readers: dict[str, list[PathStep]] = {}
         for path in sorted(nodes):
             for port, wire in nodes[path].wires():
-                self._readers.setdefault(wire.block, []).append(Leg(path, port))
+                self._readers.setdefault(wire.block, []).append(PathStep(path, port))
 
     def add(self, routes: Sequence[AgeRoute]) -> None:
         """Add what measures the ages; report those that nothing can measure."""
@@ -144,12 +144,12 @@ class AgePaths:
             self._fault(route, problem, "name a stamp")
         return right
 
-    def _path(self, route: AgeRoute) -> list[Leg] | Unknown:
+    def _path(self, route: AgeRoute) -> list[PathStep] | Unknown:
         """Return the shortest path of wires from the block of the stamp to the one that acts."""
         start, goal = route.stamp.block, route.block
         if start not in self.nodes or goal not in self.nodes:
             return UNKNOWN
-        found: dict[str, list[Leg]] = {start: []}
+        found: dict[str, list[PathStep]] = {start: []}
         waiting = deque([start])
         while waiting and goal not in found:
             block = waiting.popleft()
@@ -164,7 +164,7 @@ class AgePaths:
             return UNKNOWN
         return found[goal]
 
-    def _carry(self, route: AgeRoute, steps: Sequence[Leg]) -> None:
+    def _carry(self, route: AgeRoute, steps: Sequence[PathStep]) -> None:
         source = route.stamp
         for step in steps:
             beside = self.nodes[step.reader]
@@ -187,7 +187,7 @@ class AgePaths:
         kind: type[AgeMeter | StampHolder | StampKeeper],
         beside: Node,
         source: Wire,
-        step: Leg | None,
+        step: PathStep | None,
     ) -> None:
         """Add one block beside another, which reads a stamp as the other one reads its input."""
         is_meter = kind is AgeMeter

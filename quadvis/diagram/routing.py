@@ -7,20 +7,17 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from quadvis.block import NO_FRAME
 from quadvis.diagram.draft import Draft, DraftWire, Key
+from quadvis.diagram.messages import message_of, report
 from quadvis.diagram.sections.computers import Computers
 from quadvis.diagram.sections.links import Links, LinkSpec, link_values
 from quadvis.diagram.times import rate_text
-from quadvis.diagram.values import Bare, read_value, shape_text
 from quadvis.document import YamlNode
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known, suggestion
-from quadvis.graph.graph import DELAY, Node, Task, selected
-from quadvis.links.insertion import fastest, insert, signal_names
+from quadvis.graph.graph import DELAY, Node, Task
+from quadvis.links.insertion import fastest, insert
 from quadvis.links.link import MEMORY, Link
-from quadvis.links.message import FRAME, Message, MessageSignal
+from quadvis.links.message import FRAME
 from quadvis.units import Unit
 
 ONE = Unit()
@@ -125,8 +122,7 @@ class Routing:
                     self._add(wire, node.place, problem, "leave it out")
 
     def _add(self, wire: DraftWire, place: Place, problem: str, remedy: str = "") -> None:
-        if not self.faults.reported(place):  # a wire may lead to several blocks of a part
-            self.faults.add(place, problem, remedy, subject=f"block '{wire.draft.path}'")
+        report(self.faults, wire, place, problem, remedy)
 
     def _hop(self, wire: DraftWire) -> Hop | Unknown:
         source, target = self.drafts[wire.wire.block], wire.draft
@@ -240,7 +236,7 @@ class Routing:
         if spec is not None:
             with self.faults.about(f"link '{name}'"):
                 values = link_values(spec, self.network.params, self.faults)
-        message = self._message(hops)
+        message = message_of([hop.wire for hop in hops], self.nodes, self.faults)
         if not known(values) or not known(message):
             return UNKNOWN
         reader = fastest(self.nodes[hop.wire.draft.path].task for hop in hops)
@@ -256,82 +252,6 @@ class Routing:
             self.faults.add(place, problem, remedy, subject=f"link '{name}'")
             return UNKNOWN
         return link
-
-    def _message(self, hops: Sequence[Hop]) -> Message | Unknown:
-        """Return the message of the signals that some wires take, in the order of their names."""
-        outputs = sorted({(hop.wire.wire.block, hop.wire.wire.port) for hop in hops})
-        signals = []
-        for name, (block, port) in zip(signal_names(outputs), outputs, strict=True):
-            node = self.nodes[block]
-            declared = node.block.interface.outputs[port]
-            mine = [hop.wire for hop in hops if (hop.wire.wire.block, hop.wire.wire.port) == (block, port)]
-            signals.append(self._signal(name, node, declared.nan, port, mine))
-        found = tuple(signal for signal in signals if known(signal))
-        return Message(found) if len(found) == len(signals) else UNKNOWN
-
-    def _signal(
-        self, name: str, node: Node, nan: bool, port: str, wires: Sequence[DraftWire]
-    ) -> MessageSignal | Unknown:
-        scalar, shape = node.block.interface.outputs[port].signal.scalar, node.shape(port)
-        units = node.units.get(port, ())
-        if scalar == FRAME:
-            for wire in wires:
-                if wire.connection.initial is not None:
-                    problem, remedy = "a picture has no initial value", "leave 'initial' out"
-                    self._add(wire, wire.connection.initial.place, problem, remedy)
-            return MessageSignal(name, node.path, port, scalar, (), units, nan, NO_FRAME)
-        usual = math.nan if nan and scalar == "float64" else 0
-        value = np.full(shape, usual, scalar)
-        said: dict[int, tuple[Any, Place]] = {}
-        right = True
-        for wire in wires:
-            right &= wire.connection.initial is None or self._put_initial(wire, shape, units, value, said)
-        given = value if shape else value.item()
-        return (
-            MessageSignal(name, node.path, port, scalar, shape, units, nan, given, bool(said))
-            if right
-            else UNKNOWN
-        )
-
-    def _put_initial(
-        self,
-        wire: DraftWire,
-        shape: tuple[int, ...],
-        units: tuple[Unit, ...],
-        value: Any,
-        said: dict[int, tuple[Any, Place]],
-    ) -> bool:
-        """Put the value that a wire has at first into that of the whole signal; report what does not fit."""
-        node = wire.connection.initial
-        part = selected(shape, wire.wire.index)
-        assert node is not None and part is not None
-        read = self.faults.collect(read_value, wire.declared.signal, wire.declared.units, node)
-        if read is None:
-            return False
-        found = np.asarray(read[0])
-        if found.shape != part[1]:
-            problem = f"'initial' has {shape_text(found.shape)}, the wire {shape_text(part[1])}"
-            self._add(wire, node.place, problem, "give one value for each element")
-            return False
-        mine = units[part[0] : part[0] + found.size]
-        for unit, wanted in zip(read[1], mine, strict=False):
-            given = ONE if isinstance(unit, Bare) else unit
-            if given is not None and given.dimension != wanted.dimension:
-                self._add(
-                    wire,
-                    node.place,
-                    f"'initial' is not in {wanted}, as the signal is",
-                    f"write it in {wanted}",
-                )
-                return False
-        for place, element in enumerate(found.ravel().tolist(), part[0]):
-            other = said.setdefault(place, (element, node.place))
-            if other[0] != element:
-                problem = f"'{wire.wire.source}' begins with another value at {other[1]}"
-                self._add(wire, node.place, problem, "write the same 'initial' for both, or use two links")
-                return False
-            value.reshape(-1)[place] = element
-        return True
 
 
 def implicit_name(ends: Ends, task: Task) -> str:

@@ -19,7 +19,8 @@ from quadvis.block import Block, In, Out
 from quadvis.graph.graph import Graph, Node
 from quadvis.links.carriers import Carrier, open_receiver, open_sender
 from quadvis.links.link import Link
-from quadvis.links.twin import ReceiverTwin, SenderTwin, count_ports, nanoseconds
+from quadvis.links.twin import ReceiverTwin, SenderTwin, count_ports
+from quadvis.links.twin_code import nanoseconds
 
 
 def links_of(graph: Graph) -> list[Link]:

@@ -64,7 +64,7 @@ class AgeMeter(Block):
         self.last = stamp if stamp == stamp else self.last
 
 
-class TickTime(Block):
+class PresentStamp(Block):
     """A stamp that is now, for the question how old it can become on its way."""
 
     stepwise = True
