@@ -111,12 +111,13 @@ class FrameCarrier:
     def receive(self, before: int) -> Arrival | None:
         """Return the newest whole frame from before an instant, if it is new."""
         for data in self._line.read():
-            self._waiting += self._decoder.take(data)
+            for arrival in self._decoder.take(data):
+                if self._waiting and arrival.stamp <= self._waiting[-1].stamp:
+                    self._waiting.clear()  # the sender has begun anew
+                self._waiting.append(arrival)
         ready = [arrival for arrival in self._waiting if arrival.stamp < before]
-        if not ready:
-            return None
         del self._waiting[: len(ready)]  # stamps only rise
-        return ready[-1]
+        return ready[-1] if ready else None
 
     def close(self) -> None:
         """Close the line."""

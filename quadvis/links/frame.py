@@ -21,6 +21,7 @@ OVERHEAD = _HEAD.size + _CHECK.size
 END = b"\0"
 RUN = 254  # bytes without a zero that one code of COBS stands for
 COUNT = 1 << 16  # sequence numbers
+OVERTAKEN = 64  # by so many frames at most
 
 
 class Arrival(NamedTuple):
@@ -76,7 +77,8 @@ class Decoder:
 
     ``refused`` counts what stood between two ends of frames and was not a whole frame. ``lost`` counts the
     frames that did not come whole, by the sequence numbers of those that did, refused ones among them. A
-    frame that is not later than one before it, by its stamp, is ignored.
+    frame that others have overtaken is ignored; one whose number and stamp lie far back is that of a sender
+    which has begun anew.
     """
 
     def __init__(self, message: Message) -> None:
@@ -120,10 +122,11 @@ class Decoder:
         return sequence, Arrival(stamp, body[_HEAD.size : inside])
 
     def _is_later(self, sequence: int, arrival: Arrival) -> bool:
-        if arrival.stamp <= self._stamp:
-            return False
         ahead = (sequence - self._sequence) % COUNT
-        if ahead < COUNT // 2:  # else the sender has begun anew
+        is_later = arrival.stamp > self._stamp
+        if not is_later and (ahead == 0 or ahead >= COUNT - OVERTAKEN):
+            return False
+        if is_later and ahead < COUNT // 2:
             self.lost += max(0, ahead - 1)
         self._sequence, self._stamp = sequence, arrival.stamp
         return True

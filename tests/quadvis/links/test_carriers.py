@@ -13,6 +13,7 @@ import pytest
 
 from quadvis.errors import QuadvisError
 from quadvis.links.carriers import open_receiver, open_sender
+from quadvis.links.frame import encode
 from quadvis.links.link import MEMORY, UDP
 from quadvis.links.serial_line import SerialLine
 from quadvis.links.udp import UdpSocket
@@ -64,6 +65,11 @@ def test_a_serial_sender_and_receiver_meet_on_a_line(ends: tuple[int, int, str])
     assert receiver.receive(10**9) is None
     until(lambda: (receiver.receive(10**9), receiver.refused)[1])
     assert (receiver.lost, receiver.refused) == (0, 1)
+    # What is left of an earlier run, far ahead of this one, holds nothing up.
+    os.write(master, encode(LINK.message, 9999, 10**15, PAYLOAD))
+    until(lambda: (receiver.receive(10**9), receiver.lost)[1])
+    os.write(master, encode(LINK.message, 0, 300, PAYLOAD))
+    assert until(lambda: receiver.receive(10**9)) == (300, PAYLOAD)
     receiver.close()
 
 

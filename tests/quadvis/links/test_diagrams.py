@@ -209,3 +209,23 @@ def test_a_computer_may_have_limits_of_its_own() -> None:
         text.replace("FORCE", "push.y").replace("PLACE", "place.y").replace("SPEED", "speed.y")
     )
     assert (diagram.overload_of("world").max, diagram.overload_of("target").max) == (2, 7)
+
+
+def test_a_base_gives_its_computers_and_links_and_a_variant_its_places(tmp_path: Path) -> None:
+    base = (
+        ONE_LINK.replace("read: {", "read: {slot: true, ")
+        + """
+variants:
+  other: {slots: {read: {block: signal.saturation, with: {lower: -1, upper: 1}}}}
+"""
+    )
+    (tmp_path / "base.yaml").write_text(base)
+    (tmp_path / "over.yaml").write_text(
+        "quadvis: 1\nname: over\nbase: base.yaml\nwithout: {links: [line]}\n"
+        "links: {air: {from: near, to: far, via: udp}}\ncomputers: {far: {priority: 7}}\n"
+    )
+    other = load(tmp_path / "base.yaml", variant="other")
+    assert other.graph["read"].kind == "signal.saturation" and other.graph["read"].computer == "far"
+    over = load(tmp_path / "over.yaml")
+    assert [link.name for link in over.links] == ["air"] and over.links[0].via == "udp"
+    assert yaml.safe_load(over.resolved)["computers"] == {"near": {}, "far": {"priority": 7}}

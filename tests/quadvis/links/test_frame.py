@@ -109,21 +109,22 @@ def test_what_is_missing_is_counted_by_the_sequence_numbers() -> None:
     assert decoder.lost == 2 + 1
 
 
-def test_a_frame_that_is_not_later_is_ignored() -> None:
+def sent(*numbers: tuple[int, int]) -> bytes:
+    """Return frames with these sequence numbers and stamps."""
+    return b"".join(encode(ONE, number, stamp, ONE.pack((0.0,))) for number, stamp in numbers)
+
+
+def test_a_frame_that_others_have_overtaken_is_ignored() -> None:
     decoder = Decoder(ONE)
-    frames = [
-        encode(ONE, number, stamp, ONE.pack((0.0,))) for number, stamp in ((0, 10), (2, 30), (1, 20), (2, 30))
-    ]
-    assert [each.stamp for each in decoder.take(b"".join(frames))] == [10, 30]
+    found = decoder.take(sent((0, 10), (2, 30), (1, 20), (2, 30), (3, 40)))
+    assert [each.stamp for each in found] == [10, 30, 40]
     assert (decoder.lost, decoder.refused) == (1, 0)
 
 
-def test_a_sender_that_begins_anew_is_followed() -> None:
+@pytest.mark.parametrize("before", [(40_000, 10), (40_000, 10**12), (100, 10**12)])
+def test_a_sender_that_begins_anew_is_followed(before: tuple[int, int]) -> None:
     decoder = Decoder(ONE)
-    frames = [
-        encode(ONE, number, stamp, ONE.pack((0.0,))) for number, stamp in ((40_000, 10), (0, 20), (1, 30))
-    ]
-    assert [each.stamp for each in decoder.take(b"".join(frames))] == [10, 20, 30]
+    assert [each.stamp for each in decoder.take(sent(before, (0, 20), (1, 30)))] == [before[1], 20, 30]
 
 
 def test_endless_noise_takes_no_memory() -> None:
