@@ -30,7 +30,7 @@ CHECKS = ("check", "check_written", "doubts")
 FILES = ("reads", "read_file", "verify_files")
 TAGS = ("not_replayable", "not_restorable", "harmless")
 RESERVED = {
-    "self", "time", "period", "interface", "numeric", "open", "close", "write_safe",
+    "self", "time", "period", "interface", "numeric", "stepwise", "open", "close", "write_safe",
     PORTS, "ports_from", "with_ports", "made_for",
     *CHECKS, *FILES, *METHODS, *TAGS,
 }  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from contextlib import ExitStack
 from dataclasses import astuple
 from fractions import Fraction
 from pathlib import Path
@@ -11,7 +13,9 @@ import pytest
 import yaml
 
 from quadvis.api import Diagram, load, load_text
-from quadvis.links.endpoints import links_of
+from quadvis.cli import main
+from quadvis.engine.engine import Engine
+from quadvis.links.endpoints import links_of, live, open_carriers
 
 # A double integrator under sampled gains; WORLD and TARGET stand where a block says who runs it.
 LOOP = """
@@ -229,3 +233,49 @@ variants:
     over = load(tmp_path / "over.yaml")
     assert [link.name for link in over.links] == ["air"] and over.links[0].via == "udp"
     assert yaml.safe_load(over.resolved)["computers"] == {"near": {}, "far": {"priority": 7}}
+
+
+@pytest.mark.parametrize("first", ["world", "target"])
+def test_two_computers_with_live_links_fly_the_simulated_loop(first: str) -> None:
+    """Whoever is the first at an instant: a message counts from the next instant on."""
+    diagram = linked()
+    wanted = diagram.run()
+    words = {link.name: bytearray(8 * link.needs.words) for link in diagram.links}
+    rows: dict[str, list[float]] = {"place": [], "push": []}
+    with ExitStack() as stack:
+        engines = []
+        for computer, block in (("world", "place"), ("target", "push")):
+            part = diagram.graph.part_of(computer)
+            engine = stack.enter_context(Engine(live(part, open_carriers(part, words)), diagram.seed))
+            task = engine.graph[block].task.name
+            engine.observe(
+                task, lambda _, engine=engine, block=block: rows[block].append(engine.read(block, "y"))
+            )
+            engines.append(engine)
+        if first == "target":
+            engines.reverse()
+        while engines[0].time <= 2.0:
+            now = min(engine.tick * engine.period for engine in engines)
+            for engine in engines:
+                if engine.tick * engine.period == now:
+                    engine.run(1)
+    for block, found in rows.items():
+        np.testing.assert_array_equal(found, wanted[f"{block}.y"][: len(found)])
+        assert len(found) >= 40
+
+
+def test_check_prints_the_load_of_each_link_and_the_worst_ages(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ramp = "sources.ramp, with: {slope: 1 s/s}, rate: slow"
+    text = ONE_LINK.replace("sources.sine, rate: slow", ramp)
+    (tmp_path / "one.yaml").write_text(text + "expect: [{age: [wave.y, read], below: 250 ms}]\n")
+    assert main(["check", str(tmp_path / "one.yaml")]) == 0
+    assert capsys.readouterr().out.splitlines()[1:] == [
+        "  link line: 25 bytes a frame, 10 a second: 26 % of 9600 baud",
+        "  age of wave.y at read: at most 100 ms from the tick at which the stamp is given (limit 250 ms)",
+    ]
+    assert main(["check", "--json", str(tmp_path / "one.yaml")]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["blocks"] == 2 and facts["ages"] == {"age of wave.y at read": pytest.approx(0.1)}
+    assert facts["links"] == {"line": "25 bytes a frame, 10 a second: 26 % of 9600 baud"}
