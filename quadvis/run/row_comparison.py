@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from quadvis.engine.taps import Tap
 from quadvis.output.comparison import BlockComparison, SignalDifference
 from quadvis.output.log_reader import Log
-from quadvis.output.recording import Slots
+from quadvis.output.recording import SLOT, Slots
 from quadvis.run.recorded_run import RecordedPart, check_ports
 from quadvis.run.row_tap import stamps_of
 from quadvis.run.rows import RecordedNode
 
 Whole = NDArray[np.int64]
 MISSING = -1
+PIECE = 1 << 14  # bytes of rows that are compared together
 
 
 @dataclass(frozen=True)
@@ -49,24 +50,41 @@ class RowComparison(Tap):
             check_ports(log, there, recorded.node)
             self._stamps, self._old = log.arrays(topic)
         else:
-            self._stamps, self._old = np.zeros(0, np.int64), np.zeros((0, recorded.block.size // 8), np.int64)
+            self._stamps, self._old = (
+                np.zeros(0, np.int64),
+                np.zeros((0, recorded.block.size // SLOT), np.int64),
+            )
         self._ticks = part.ticks_of(self.block, self.every, end)
         self._wanted = stamps_of(self._ticks, part.graph.tick)
         self._places = _places(self._stamps, self._wanted)
         self._next = 0
+        self._waiting = bytearray()
         self._comparison = BlockComparison(recorded.block)
 
     @property
     def rows(self) -> int:
         """How many rows were compared."""
+        self._flush()
         return self._comparison.rows
 
     def take(self, tick: int, row: memoryview) -> None:
-        """Compare the next row."""
-        self.take_all(np.array([tick]), np.frombuffer(row, np.int64).reshape(1, -1))
+        """Compare the next row, together with others that follow."""
+        self._waiting += row
+        if len(self._waiting) >= PIECE:
+            self._flush()
 
     def take_all(self, ticks: Whole, rows: Slots) -> None:
         """Compare the next rows."""
+        self._flush()
+        self._compare(rows)
+
+    def _flush(self) -> None:
+        """Compare the rows that wait."""
+        if self._waiting:
+            self._compare(np.frombuffer(bytes(self._waiting), np.int64).reshape(-1, self._old.shape[1]))
+            self._waiting.clear()
+
+    def _compare(self, rows: Slots) -> None:
         places = self._places[self._next : self._next + len(rows)]
         self._next += len(rows)
         there = places != MISSING
@@ -74,6 +92,7 @@ class RowComparison(Tap):
 
     def found(self) -> list[FoundDifference]:
         """Return the signals that differ."""
+        self._flush()
         ticks = self._ticks[self._places != MISSING]
         return [FoundDifference(each, int(ticks[each.row])) for each in self._comparison.differences()]
 

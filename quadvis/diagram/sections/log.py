@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import Any
@@ -13,6 +14,7 @@ from quadvis.document import YamlNode
 from quadvis.errors import suggestion
 from quadvis.links.stamps import METER
 
+WILD = frozenset("*?[")  # characters of a pattern that stand for others
 LOG_KEYS = ("signals", "every")
 
 
@@ -41,7 +43,8 @@ class LogSection(RunSection[Logged]):
             return found
         patterns = faults.collect(fields["signals"].items) if "signals" in fields else None
         if patterns is not None:
-            wanted = {path for pattern in patterns for path in _matching(pattern, context)}
+            named = _named(context)
+            wanted = {path for pattern in patterns for path in _matching(pattern, named, context)}
             # What measures an age is there to be judged.
             found.paths = [
                 path for path, node in context.nodes.items() if path in wanted or node.origin == METER
@@ -72,16 +75,26 @@ class LogSection(RunSection[Logged]):
         return {"signals": logged.paths, "every": logged.every}
 
 
-def _matching(pattern: YamlNode, context: Context) -> list[str]:
-    """Return the blocks that a pattern names, by themselves, by a part around them or by a signal."""
+def _named(context: Context) -> dict[str, list[str]]:
+    """Return the blocks by the names that a pattern can match: their own, those of parts, of signals."""
+    found: dict[str, list[str]] = {}
+    for path, node in context.nodes.items():
+        names = path.split("/")
+        around = ["/".join(names[:count]) for count in range(1, len(names) + 1)]
+        for name in (*around, *(f"{path}.{port}" for port in node.block.interface.outputs)):
+            found.setdefault(name, []).append(path)
+    return found
+
+
+def _matching(pattern: YamlNode, named: Mapping[str, list[str]], context: Context) -> list[str]:
+    """Return the blocks that a pattern names."""
     text = context.faults.collect(pattern.text)
     if text is None:
         return []
-    found = [
-        path for path, node in context.nodes.items()
-        if fnmatchcase(path, text) or fnmatchcase(path, f"{text}/*")
-        or any(fnmatchcase(f"{path}.{port}", text) for port in node.block.interface.outputs)
-    ]  # fmt: skip
+    if WILD.isdisjoint(text):
+        found = named.get(text, [])
+    else:
+        found = [path for name, paths in named.items() if fnmatchcase(name, text) for path in paths]
     if not found and context.is_whole:
         remedy = suggestion(text, context.nodes) or "write a block, a part, or a pattern such as 'eyes/*'"
         context.faults.add(pattern.place, f"no block is called '{text}'", remedy)
