@@ -121,7 +121,9 @@ def replay(options: argparse.Namespace) -> int:
         print("\n".join(replay_lines(found)))
         if found.output:
             print(f"log: {found.output}")
-    return 0 if found.same or options.set else FAILED
+    if found.lost:
+        print(found.lost, file=sys.stderr)
+    return 0 if (found.same or options.set) and not found.lost else FAILED
 
 
 def sweep(options: argparse.Namespace) -> int:

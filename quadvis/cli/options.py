@@ -31,7 +31,8 @@ what they were. No device is opened, and nothing is written but the new log.
 time), damage, ticks, left_out, end_s, from_log and not_run (blocks), signals, rows (compared), same,
 differences: [{signal, unit, element, values, largest, rows, different_rows, tick, time_s}], in the order of
 the first tick that differs, for which element and values are given, as in the log and in the replay;
-lacks: [{block, rows, time_s, only_in}], engine, new_log. Numbers are null where they are infinite or NaN.
+lacks: [{block, rows, time_s, only_in}], engine, new_log, lost (what the new log lacks, and why). Numbers are
+null where they are infinite or NaN.
 Exit code: 0 the same to the bit, or with --set; 1 something differs, or a block fails; 2 the log does not
 hold what is needed, or bad input."""
 

@@ -40,7 +40,7 @@ class Replay:
     last one was at ``time`` (s). The outputs of the blocks ``played`` came from the log, and those that are
     ``idle`` only write, which a replay does not. ``signals`` and ``rows`` were compared; ``differences`` are
     in the order of their ticks. ``lacks`` are rows that only the log has, or only the replay; a log that is
-    not whole may lack rows. ``output`` is the new log.
+    not whole may lack rows. ``output`` is the new log, ``lost`` what the disk refused of it.
     """
 
     log: Log
@@ -58,6 +58,7 @@ class Replay:
     lacks: tuple[Lack, ...]
     engine: Choice
     output: Path | None = None
+    lost: str = ""
 
     @property
     def same(self) -> bool:
@@ -101,8 +102,6 @@ def replay(
             diagram, loop, log=new, keep=(), taps=comparisons, facts={"replay of": str(log.path)},
             progress=progress,
         )  # fmt: skip
-    if result.lost:
-        raise QuadvisError(result.lost)
     away = [node for part in run.parts for node in outside(part.graph)]
     found = [each for comparison in comparisons for each in comparison.found()]
     left_out = sum(part.missed(run.ticks) for part in run.parts)
@@ -122,6 +121,7 @@ def replay(
         lacks=tuple(lack for each in comparisons for lack in each.lacks()) if run.whole else (),
         engine=result.engine,
         output=new,
+        lost=result.lost,
     )
 
 

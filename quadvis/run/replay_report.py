@@ -119,4 +119,5 @@ def replay_facts(found: Replay) -> dict[str, Any]:
         ],
         "engine": found.engine.engine,
         "new_log": str(found.output) if found.output else None,
+        "lost": found.lost or None,
     }  # fmt: skip

@@ -164,6 +164,16 @@ def test_the_log_itself_is_not_written_over(capsys: pytest.CaptureFixture[str]) 
     assert Path("run.mcap").read_bytes() == before
 
 
+def test_a_new_log_that_the_disk_refuses_does_not_hide_the_result(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flown()
+    monkeypatch.setattr("quadvis.output.log.LogWriter.loss", "the disk is full")
+    assert main(["replay", "run.mcap", "-o", "new.mcap"]) == 1
+    out, err = capsys.readouterr()
+    assert "the same to the bit" in out and err.endswith("\nthe disk is full\n")
+
+
 def test_parameters_that_were_tuned_are_tuned_again() -> None:
     with quadvis.load("flight.yaml").start(log="run.mcap") as run:
         run.advance("0.5 s")
