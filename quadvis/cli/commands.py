@@ -365,10 +365,11 @@ def cache(options: argparse.Namespace) -> int:
 
 
 def new(options: argparse.Namespace) -> int:
-    """Write the skeleton of a block or of a diagram."""
-    from quadvis.library.skeleton import new_block, new_diagram
+    """Write the skeleton of a block, an output device or a diagram."""
+    from quadvis.library.skeleton import KINDS, new_block, new_diagram
 
-    for path in (new_block if options.kind == "block" else new_diagram)(options.name):
+    name, kind = options.name, options.kind
+    for path in new_block(name, kind) if kind in KINDS else new_diagram(name):
         print(path)
     return 0
 

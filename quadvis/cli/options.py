@@ -146,9 +146,9 @@ def parser() -> Parser:
     _own_block_option(schema)
     cache = add("cache", commands.cache, "say where compiled blocks are kept, and how large they are")
     cache.add_argument("--clear", action="store_true", help="remove them all")
-    new = add("new", commands.new, "write the skeleton of a block or of a diagram")
-    new.add_argument("kind", choices=("block", "diagram"))
-    new.add_argument("name", metavar="NAME", help="a block as group.block, a diagram as FILE.yaml")
+    new = add("new", commands.new, "write the skeleton of a block, an output device or a diagram")
+    new.add_argument("kind", choices=("block", "device", "diagram"))
+    new.add_argument("name", metavar="NAME", help="a block or device as group.block, a diagram as FILE.yaml")
     return made
 
 

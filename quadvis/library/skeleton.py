@@ -1,17 +1,21 @@
-"""Write skeletons that run at once: `quadvis new block GROUP.NAME` and `quadvis new diagram FILE`."""
+"""Write skeletons that run at once, for `quadvis new`: of a block, of an output device, of a diagram."""
 
 from __future__ import annotations
 
 import keyword
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 from quadvis.errors import QuadvisError
 from quadvis.library.catalogue import STANDARD, Catalogue
+from quadvis.library.device_skeleton import DEVICE, DEVICE_GIVEN, DEVICE_TEST
 from quadvis.machine.files import Kind, reason, write_output
 
 SKELETON = Kind("the skeleton")
-TAKEN = ("Any", "Block", "In", "Out", "Param", "State", "Work")  # names that the skeleton imports
+# Names that the skeletons import.
+TAKEN = ("Any", "Block", "In", "Initial", "Line", "Out", "Output", "Param", "Safe", "State", "Work")
 
 BLOCK = '''"""{title}."""
 
@@ -60,26 +64,52 @@ def test_a_share_above_one_is_refused() -> None:
 '''
 
 OWN_HEAD = """from pathlib import Path
-
+{typing}
 import pytest
 from quadvis.block import ParameterError
 from quadvis.library.catalogue import Catalogue
-from quadvis.testing import check_block, drive
+from quadvis.testing import check_block, {drive}
 
 BLOCKS = Catalogue(Path(__file__).parents[{up}])
 {name} = BLOCKS.find("{path}")
-
+{given}
 
 def test_it_does_what_every_block_must_do() -> None:
-    check_block({name}, test=Path(__file__))
+    check_block({name}, {with_given}test=Path(__file__))
 """
 
-STANDARD_HEAD = """import pytest
+STANDARD_HEAD = """{typing}{gap}import pytest
 
 from quadvis.block import ParameterError
-from quadvis.testing import drive
+from quadvis.testing import {drive}
 from {module} import {name}
-"""
+{gap}{given}"""
+
+
+class Skeleton(NamedTuple):
+    """The texts of a block and of its test; ``words`` are what the head of the test needs."""
+
+    block: str
+    test: str
+    words: Mapping[str, str]
+
+
+KINDS = {
+    "block": Skeleton(
+        BLOCK, TEST, {"drive": "drive", "given": "", "gap": "", "typing": "", "with_given": ""}
+    ),
+    "device": Skeleton(
+        DEVICE,
+        DEVICE_TEST,
+        {
+            "drive": "drive_output",
+            "given": DEVICE_GIVEN,
+            "gap": "\n",
+            "typing": "from typing import Any\n",
+            "with_given": "given=GIVEN, ",
+        },
+    ),
+}
 
 DIAGRAM = """# A signal through a lag: change it into your own.
 # `quadvis list` shows all blocks, and the parts that come with quadvis; `quadvis describe NAME` one of them.
@@ -114,8 +144,8 @@ figures:
 """
 
 
-def new_block(name: str) -> list[Path]:
-    """Write a block and its test below the working directory, and return both paths.
+def new_block(name: str, kind: str = "block") -> list[Path]:
+    """Write a block, or a device, and its test below the working directory, and return both paths.
 
     In a folder with the standard library they go there, otherwise into ``blocks/`` and ``tests/``.
     QuadvisError if the name is not a valid name of a block or is in use, or if a file exists.
@@ -125,8 +155,8 @@ def new_block(name: str) -> list[Path]:
             f"'{name}' cannot name a block; write group.name in lower case, such as signal.my_filter"
         )
     *groups, last = name.split(".")
-    kind = "".join(part.capitalize() for part in last.split("_"))
-    if any(map(keyword.iskeyword, (*groups, last))) or kind in TAKEN:
+    class_name = "".join(part.capitalize() for part in last.split("_"))
+    if any(map(keyword.iskeyword, (*groups, last))) or class_name in TAKEN:
         raise QuadvisError(
             f"'{name}' cannot name a block, since Python uses a word of it; choose another name"
         )
@@ -137,12 +167,14 @@ def new_block(name: str) -> list[Path]:
     block = Path(library if ours else "blocks", *groups, f"{last}.py")
     test = Path("tests", "blocks", *groups, f"test_{last}.py")
     _refuse_existing(block, test)
-    words = {"name": kind, "path": name, "title": last.replace("_", " ").capitalize()}
+    skeleton = KINDS[kind]
+    title = last.replace("_", " ").capitalize()
+    words = {"name": class_name, "path": name, "title": title, **skeleton.words}
     head = STANDARD_HEAD.format(module=f"{STANDARD}.{name}", **words) if ours else OWN_HEAD.format(
         up=len(test.parts) - 1, **words
     )  # fmt: skip
-    _write(block, BLOCK.format(**words))
-    _write(test, TEST.format(head=head, **words))
+    _write(block, skeleton.block.format(**words))
+    _write(test, skeleton.test.format(head=head, **words))
     return [block, test]
 
 

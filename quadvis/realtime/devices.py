@@ -15,7 +15,7 @@ from quadvis.graph.graph import Graph
 from quadvis.native.choice import Announce
 from quadvis.realtime.cables import Cable, Ends
 from quadvis.realtime.guard import Guard
-from quadvis.realtime.guardian import Alarm, outboxes, words_for
+from quadvis.realtime.guardian import Alarm, Standing, outboxes, words_for
 from quadvis.realtime.heartbeat import Patience
 from quadvis.realtime.outlet import OutputPort
 from quadvis.realtime.schedule import NANOSECONDS
@@ -46,8 +46,8 @@ class PortBindings:
 class Devices:
     """The ports of a graph, from `start` to `close`; a graph without devices has no process for them."""
 
-    def __init__(self, context: SpawnContext, graph: Graph, on_host_loss: str, priority: int) -> None:
-        self._context, self._on_host_loss, self._priority = context, on_host_loss, priority
+    def __init__(self, context: SpawnContext, graph: Graph, on_host_loss: str, standing: Standing) -> None:
+        self._context, self._on_host_loss, self._standing = context, on_host_loss, standing
         self._outputs = {path: device for path, device in devices(graph) if isinstance(device, Output)}
         self._inputs = {path: device for path, device in devices(graph) if isinstance(device, Input)}
         words = context.RawArray("q", words_for(len(self._outputs))) if self._outputs else None
@@ -72,7 +72,7 @@ class Devices:
             return None
         ports = [self._output_port(path, device, ends) for path, device in self._outputs.items()]
         self._guard = Guard(
-            self._context, ports, self.bindings.words, patiences, self._on_host_loss, self._priority
+            self._context, ports, self.bindings.words, patiences, self._on_host_loss, self._standing
         )
         self._guard.start(announce)
         return self._guard.process.pid

@@ -20,12 +20,12 @@ from quadvis.realtime.guardian import (
     GuardianSetup,
     Guarding,
     Order,
+    Standing,
     Watch,
     guard,
     looked,
 )
 from quadvis.realtime.heartbeat import Patience
-from quadvis.realtime.options import HIGHEST
 from quadvis.realtime.outlet import Outlet, OutputPort
 from quadvis.realtime.schedule import NANOSECONDS
 
@@ -49,15 +49,13 @@ class Guard:
         words: Any,
         patiences: Sequence[Patience],
         on_host_loss: str,
-        priority: int,
+        standing: Standing,
     ) -> None:
         self.ports = tuple(ports)
         self._looked = looked(words)
         self._link, self._theirs = context.Pipe()
-        # Above the loops, so that one that hangs cannot keep it from the processor.
-        above = min(HIGHEST, priority + 1) if priority else 0
         setup = GuardianSetup(
-            self.ports, words, tuple(patiences), self._theirs, os.getpid(), on_host_loss, above
+            self.ports, words, tuple(patiences), self._theirs, os.getpid(), on_host_loss, standing
         )
         self.process: BaseProcess = context.Process(target=guard, args=(setup,), name="guardian")
         self._started = self._lost = False

@@ -12,18 +12,19 @@ import os
 import select
 import signal
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Any, NamedTuple
 
 from quadvis.diagram.sections.on_host_loss import SAFE
 from quadvis.machine.interrupts import leave_to_parent
 from quadvis.machine.serial_port import PortError
 from quadvis.realtime.heartbeat import Heartbeat, Patience, Sign
 from quadvis.realtime.lives import Lives
-from quadvis.realtime.options import RealTime
+from quadvis.realtime.options import HIGHEST, RealTime
 from quadvis.realtime.outbox import Outbox
 from quadvis.realtime.outlet import Outlet, OutputPort
 from quadvis.realtime.schedule import NANOSECONDS
@@ -35,12 +36,29 @@ FAREWELL = 3  # safe frames at least, before the ports are closed
 LAST = NANOSECONDS  # ns that these may take
 
 
+class Standing(NamedTuple):
+    """How the guardian stands to the loops: its ``priority`` (0: none), and the processors that it avoids.
+
+    It stands above all loops, so that none that hangs keeps it from a processor; and beside them, since a
+    processor is not free until a loop that was killed there has given its memory back.
+    """
+
+    priority: int = 0
+    avoided: frozenset[int] = frozenset()
+
+    @staticmethod
+    def to(loops: Sequence[RealTime]) -> Standing:
+        """Return how it stands to these loops."""
+        highest = max(loop.priority or 0 for loop in loops)
+        avoided = frozenset(loop.cpu for loop in loops if loop.cpu is not None)
+        return Standing(min(HIGHEST, highest + 1) if highest else 0, avoided)
+
+
 @dataclass(frozen=True)
 class GuardianSetup:
     """What the guardian needs: ``words`` has an outbox for each of the ``ports``, in their order.
 
-    ``supervisor`` is the process that started it, ``on_host_loss`` what its death means, ``priority`` its
-    own (0: none).
+    ``supervisor`` is the process that started it, ``on_host_loss`` what its death means.
     """
 
     ports: tuple[OutputPort, ...]
@@ -49,7 +67,7 @@ class GuardianSetup:
     link: Connection
     supervisor: int
     on_host_loss: str
-    priority: int
+    standing: Standing
 
 
 class Order(Enum):
@@ -174,7 +192,7 @@ class Guardian:
         if self.told_to_end and not self.safe:
             self._make_safe(Alarm("the guardian was told to end"))
         for heart in self._hearts:
-            heart.hold_on(self._setup.priority)
+            heart.hold_on(self._setup.standing.priority)
         signs = [(heart.look(), heart) for heart in self._hearts] if not self.safe else []
         if any(sign is Sign.ENDS for sign, _ in signs):
             self._make_safe()
@@ -243,7 +261,9 @@ def guard(setup: GuardianSetup) -> None:
         guardian.told_to_end = True
 
     signal.signal(signal.SIGTERM, end)
-    grants = ask_all(RealTime(priority=setup.priority))
+    if others := os.sched_getaffinity(0) - setup.standing.avoided:
+        os.sched_setaffinity(0, others)
+    grants = ask_all(RealTime(priority=setup.standing.priority))
     opened = guardian.open()
     guardian.look()
     if opened:

@@ -17,6 +17,7 @@ from quadvis.realtime.application import GRACE
 from quadvis.realtime.cables import Cables
 from quadvis.realtime.devices import Devices
 from quadvis.realtime.flight import Flight
+from quadvis.realtime.guardian import Standing
 from quadvis.realtime.lines import Lines
 from quadvis.realtime.member import LeftOut, Member
 from quadvis.realtime.options import RealTime
@@ -69,18 +70,30 @@ class _Supervisor:
     ) -> None:
         context = multiprocessing.get_context("spawn")
         self._announce = announce
-        priority = wishes.on(None).priority or 0
-        self._devices = Devices(context, diagram.graph, diagram.on_host_loss, priority)
+        asked = {name: wishes.on(diagram.computer(name)) for name in diagram.graph.computers}
+        priority = max(each.priority or 0 for each in asked.values())
+        standing = Standing.to(list(asked.values()))
+        self._devices = Devices(context, diagram.graph, diagram.on_host_loss, standing)
         self._lines = Lines(context, diagram.links)
         self._cables = Cables(context, [*self._devices.cables, *self._lines.cables], priority)
         self._members = []
         for computer in diagram.graph.computers:
             part = diagram.graph.part_of(computer)
             own = [tap for tap in taps if tap.block in part]
-            asked = wishes.on(diagram.computer(computer))
             bindings = self._devices.bindings
             self._members.append(
-                Member(context, diagram, computer, part, asked, engine, own, left_out, bindings, announce)
+                Member(
+                    context,
+                    diagram,
+                    computer,
+                    part,
+                    asked[computer],
+                    engine,
+                    own,
+                    left_out,
+                    bindings,
+                    announce,
+                )
             )
         self._begun = False
         self._unsafe: list[str] = []  # what may be without its safe values, in sentences

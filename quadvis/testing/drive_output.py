@@ -14,11 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from quadvis.block import Output, parameter_sizes
+from quadvis.block import Block, Output, parameter_sizes
 from quadvis.block.device import checked_frame
 from quadvis.diagram.sections.on_host_loss import SAFE
 from quadvis.realtime.guard import Guard
-from quadvis.realtime.guardian import outboxes, words_for
+from quadvis.realtime.guardian import Standing, outboxes, words_for
 from quadvis.realtime.outlet import OutputPort
 from quadvis.realtime.schedule import NANOSECONDS
 from quadvis.testing.drive import series_of
@@ -36,12 +36,14 @@ class DrivenOutput(NamedTuple):
     wire: bytes
 
 
-def drive_output(block: Output, **inputs: Any) -> DrivenOutput:
+def drive_output(block: Block, **inputs: Any) -> DrivenOutput:
     """Send commands through the guardian, kill their sender with SIGKILL, and return what a peer has read.
 
     Each input is one value, or an array with a leading time axis. A pty takes the place of the block's port.
     AssertionError if a frame does not come, or if anything else comes in between.
     """
+    if not isinstance(block, Output):
+        raise TypeError(f"{type(block).__name__} is no output device")
     frames = [checked_frame(frame) for frame in _frames(block, inputs)]
     with _pty() as (peer, path):
         reader = _Reader(peer)
@@ -49,7 +51,7 @@ def drive_output(block: Output, **inputs: Any) -> DrivenOutput:
         words = context.RawArray("q", words_for(1))
         interval = round(block.interval * NANOSECONDS)
         port = OutputPort("block", path, block.settings, interval, block.initial_frame(), block.safe_frame())
-        guard = Guard(context, [port], words, [], SAFE, 0)
+        guard = Guard(context, [port], words, [], SAFE, Standing())
         sender = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
         try:
             guard.start(lambda _: None)

@@ -38,9 +38,17 @@ def test_a_new_block_is_found_by_a_diagram_beside_it_and_passes_its_test(
     assert (done.returncode, "3 passed" in done.stdout) == (0, True), done.stdout
 
 
+def test_a_new_device_passes_its_test(monkeypatch: pytest.MonkeyPatch) -> None:
+    new_block("hardware.my_board", "device")
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    done = subprocess.run([sys.executable, "-m", "pytest", "-q"], capture_output=True, text=True)
+    assert (done.returncode, "3 passed" in done.stdout) == (0, True), done.stdout
+
+
+@pytest.mark.parametrize("kind", ["block", "device"])
 @pytest.mark.parametrize("name", ["fan", "signal.my_filter", "control.position_integrator"])
 @pytest.mark.parametrize("ours", [False, True], ids=["own", "standard"])
-def test_what_is_written_is_as_ruff_wants_it(name: str, ours: bool, project: Path) -> None:
+def test_what_is_written_is_as_ruff_wants_it(name: str, ours: bool, kind: str, project: Path) -> None:
     ruff = [sys.executable, "-m", "ruff"]
     if ours:
         (project / "blocks" / "quadvis_blocks").mkdir(parents=True)
@@ -48,7 +56,7 @@ def test_what_is_written_is_as_ruff_wants_it(name: str, ours: bool, project: Pat
         for module in ("quadvis/block", "quadvis/testing", "blocks/quadvis_blocks/__init__"):
             (project / f"{module}.py").touch()  # so that ruff knows them as this project's
         shutil.copy(Path(__file__).parents[2] / "pyproject.toml", project)
-    paths = [str(path) for path in new_block(name)]
+    paths = [str(path) for path in new_block(name, kind)]
     options = [] if ours else ["--select", "E,F,I,B,UP,SIM,RUF"]
     for command in (["format", "--diff"], ["check", "--no-cache", *options]):
         done = subprocess.run([*ruff, *command, *paths], capture_output=True, text=True, check=False)
@@ -56,8 +64,9 @@ def test_what_is_written_is_as_ruff_wants_it(name: str, ours: bool, project: Pat
 
 
 @pytest.mark.slow
-def test_what_is_written_is_as_mypy_wants_it() -> None:
-    paths = [str(path) for path in new_block("signal.my_filter")]
+@pytest.mark.parametrize("kind", ["block", "device"])
+def test_what_is_written_is_as_mypy_wants_it(kind: str) -> None:
+    paths = [str(path) for path in new_block("signal.my_filter", kind)]
     command = [sys.executable, "-m", "mypy", "--strict", *paths]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr

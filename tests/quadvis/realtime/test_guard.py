@@ -14,7 +14,7 @@ from quadvis.diagram.sections.on_host_loss import SAFE
 from quadvis.errors import RunError
 from quadvis.machine.serial_port import Line
 from quadvis.realtime.guard import LOST, Guard
-from quadvis.realtime.guardian import outboxes, words_for
+from quadvis.realtime.guardian import Standing, outboxes, words_for
 from quadvis.realtime.outlet import OutputPort
 from tests.processes import wait_for
 from tests.quadvis.realtime.ptys import Pty, ptys
@@ -30,7 +30,7 @@ def guard_of(*lines: Pty) -> tuple[Guard, Any]:
         OutputPort(f"out{number}", line.path, Line(10**6), 5_000_000, b"first", b"safe!")
         for number, line in enumerate(lines)
     ]
-    return Guard(context, ports, words, [], SAFE, 0), words
+    return Guard(context, ports, words, [], SAFE, Standing()), words
 
 
 def test_frames_come_from_its_own_process_until_it_is_closed() -> None:

@@ -17,9 +17,19 @@ import pytest
 from quadvis.diagram.sections.on_host_loss import CONTINUE, SAFE, STOP
 from quadvis.machine.serial_port import Line
 from quadvis.realtime import control
-from quadvis.realtime.guardian import Alarm, Guardian, GuardianSetup, Order, Watch, outboxes, words_for
+from quadvis.realtime.guardian import (
+    Alarm,
+    Guardian,
+    GuardianSetup,
+    Order,
+    Standing,
+    Watch,
+    outboxes,
+    words_for,
+)
 from quadvis.realtime.heartbeat import Patience
 from quadvis.realtime.lifeline import Lifeline
+from quadvis.realtime.options import RealTime
 from quadvis.realtime.outlet import OutputPort
 from tests.processes import wait_for
 from tests.quadvis.realtime.ptys import Pty, ptys
@@ -50,7 +60,7 @@ class Rig:
         ]
         patience = Patience("", self.control, 50 * MS, lasting=lasting)
         setup = GuardianSetup(
-            tuple(ports), self.words, (patience,), theirs, self.supervisor.pid, on_host_loss, 0
+            tuple(ports), self.words, (patience,), theirs, self.supervisor.pid, on_host_loss, Standing()
         )
         self.guardian = Guardian(setup)
         self.boxes = outboxes(self.words)
@@ -263,3 +273,10 @@ def test_asked_to_end_it_stays_until_its_applications_have_ended(rig: Any) -> No
     assert not made.guardian._finished
     made.application.kill()
     made.guardian.run()
+
+
+def test_it_stands_above_all_loops_and_beside_their_processors() -> None:
+    loops = [RealTime(cpu=1, priority=80), RealTime(priority=85), RealTime(cpu=3, priority=0)]
+    assert Standing.to(loops) == Standing(86, frozenset({1, 3}))
+    assert Standing.to([RealTime(priority=99)]).priority == 99
+    assert Standing.to([RealTime(priority=0)]) == Standing()
