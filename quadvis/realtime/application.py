@@ -203,6 +203,7 @@ class _Application:
             pacer.finish()
             if crew is not None:
                 pacer.conclude(crew.rest, diagram.ticks)
+            shared.control[control.LEFT] = control.AT_STOP_TIME
         return Ending(unsafe=pacer.unsafe, profile=engine.profile() if setup.wishes.profile else None)
 
     def _crew(self, part: Graph, choice: Choice, pacer: Pacer) -> Crew | None:
@@ -223,7 +224,8 @@ class _Application:
 
     def _leave(self) -> None:
         """Let the guardian know that no step follows, and nothing interrupt the closing of the blocks."""
-        self._shared.control[control.LEFT] = 1
+        words = self._shared.control
+        words[control.LEFT] = words[control.LEFT] or control.EARLY
         self._signals.close()
 
     def ended_early(self, error: BaseException) -> Ending:

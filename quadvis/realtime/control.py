@@ -19,6 +19,7 @@ BEGUN = (
 DONE = 3  # by the loop: the number of steps
 END = 4  # by either: not 0 if the run is to end before its next step
 LEFT = 5  # by the loop: not 0 once it runs no more steps
+EARLY, AT_STOP_TIME = 1, 2  # what LEFT says
 SAFE = 6  # by the loop: not 0 once the outputs are to hold their safe values to the end
 LIFELINE = slice(8, 8 + lifeline.SIZE)  # of the loop's thread
 WORDS = LIFELINE.stop

@@ -77,10 +77,10 @@ class Devices:
         self._guard.start(announce)
         return self._guard.process.pid
 
-    def watch(self, process: int) -> None:
-        """Let the guardian watch an application."""
+    def watch(self, process: int, loop: int) -> None:
+        """Let the guardian watch an application, and the loop of this place among the patiences."""
         if self._guard is not None:
-            self._guard.watch(process)
+            self._guard.watch(process, loop)
 
     @property
     def sources(self) -> list[Connection | int]:

@@ -79,9 +79,10 @@ class Order(Enum):
 
 @dataclass(frozen=True)
 class Watch:
-    """The supervisor names an application, as a process."""
+    """The supervisor names an application: its process, and the place of its loop among the patiences."""
 
     process: int
+    loop: int | None = None
 
 
 @dataclass(frozen=True)
@@ -126,6 +127,7 @@ class Guardian:
         self._looked = looked(setup.words)
         self._hearts = [Heartbeat(patience, time.monotonic_ns) for patience in setup.patiences]
         self._supervisor, self._applications = Lives(), Lives()
+        self._loops: dict[int, int | None] = {}  # of the applications, by process
         self._supervisor.watch(setup.supervisor)
         shortest = min([patience.allowed // LOOKS for patience in setup.patiences], default=LONGEST_LOOK)
         self._look_every = min(max(shortest, SHORTEST_LOOK), LONGEST_LOOK)
@@ -187,22 +189,28 @@ class Guardian:
         self._supervisor.look()
         self._applications.look()
         host_lost = self._supervisor.any_ended and self._setup.on_host_loss == SAFE
-        if self._applications.any_ended or host_lost:
+        if host_lost or any(not self._has_finished(process) for process in self._applications.ended):
             self._make_safe()
         if self.told_to_end and not self.safe:
             self._make_safe(Alarm("the guardian was told to end"))
         for heart in self._hearts:
             heart.hold_on(self._setup.standing.priority)
         signs = [(heart.look(), heart) for heart in self._hearts] if not self.safe else []
-        if any(sign is Sign.ENDS for sign, _ in signs):
+        kinds = {sign for sign, _ in signs}
+        if Sign.ENDS in kinds or kinds == {Sign.FINISHED}:
             self._make_safe()
         for sign, heart in signs:
             if sign is Sign.HANGS and not self.safe:
                 self._make_safe(Alarm(heart.complaint))
-        paused = any(sign is Sign.PAUSES for sign, _ in signs)
+        paused = Sign.PAUSES in kinds
         if paused and not self._paused:
             self._hurry()
         self._paused = paused
+
+    def _has_finished(self, process: int) -> bool:
+        """Return whether the loop of an application has reached the stop time."""
+        loop = self._loops[process]
+        return loop is not None and self._hearts[loop].has_finished
 
     def _listen(self) -> None:
         """Take what the supervisor says."""
@@ -210,6 +218,7 @@ class Guardian:
             while self._listening and self._link.poll():
                 said = self._link.recv()
                 if isinstance(said, Watch):
+                    self._loops[said.process] = said.loop
                     self._applications.watch(said.process)
                 else:
                     self._make_safe()

@@ -52,6 +52,7 @@ class Sign(Enum):
     PAUSES = "pauses"  # it gives no sign of life, which the diagram allows
     HANGS = "hangs"
     ENDS = "ends"  # or it goes on, and its outputs hold their safe values
+    FINISHED = "finished"  # it has reached the stop time
 
 
 class Heartbeat:
@@ -81,7 +82,11 @@ class Heartbeat:
         """Return what the loop does."""
         words, now = self._control, self._now()
         start, begun, done = words[control.START], words[control.BEGUN], words[control.DONE]
-        if words[control.END] or words[control.LEFT] or words[control.SAFE] or self._has_died:
+        if words[control.END] or words[control.SAFE]:
+            return Sign.ENDS
+        if self.has_finished:
+            return Sign.FINISHED
+        if words[control.LEFT] or self._has_died:
             return Sign.ENDS
         if not start:
             return Sign.WELL
@@ -91,6 +96,11 @@ class Heartbeat:
         if now - last <= self.patience.allowed:
             return Sign.WELL
         return Sign.HANGS if self.patience.lasting and now - start > self.patience.startup else Sign.PAUSES
+
+    @property
+    def has_finished(self) -> bool:
+        """True if the loop has reached the stop time: its end is no loss then."""
+        return bool(self._control[control.LEFT] == control.AT_STOP_TIME)
 
     @property
     def descriptors(self) -> list[int]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import select
+from collections.abc import Set
 
 
 class Lives:
@@ -35,9 +36,10 @@ class Lives:
                 os.close(self._watched.pop(process))
                 self._ended.add(process)
 
-    def has_ended(self, process: int) -> bool:
-        """Return whether one was found to have ended."""
-        return process in self._ended
+    @property
+    def ended(self) -> Set[int]:
+        """Those that were found to have ended."""
+        return self._ended
 
     @property
     def any_ended(self) -> bool:

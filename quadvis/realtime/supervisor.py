@@ -155,9 +155,9 @@ class _Supervisor:
         if guardian is not None:
             self._cables.watch(guardian)
         with launching():
-            for member in self._members:
+            for place, member in enumerate(self._members):
                 process = member.start(self._lines.of(member.computer))
-                self._devices.watch(process)
+                self._devices.watch(process, place)
                 self._cables.watch(process)
 
     def _close(self) -> list[str]:

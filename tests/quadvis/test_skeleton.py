@@ -38,6 +38,7 @@ def test_a_new_block_is_found_by_a_diagram_beside_it_and_passes_its_test(
     assert (done.returncode, "3 passed" in done.stdout) == (0, True), done.stdout
 
 
+@pytest.mark.slow
 def test_a_new_device_passes_its_test(monkeypatch: pytest.MonkeyPatch) -> None:
     new_block("hardware.my_board", "device")
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")

@@ -58,9 +58,11 @@ class Rig:
             OutputPort(f"out{number}", line.path, LINE, 5 * MS, b"first", b"safe!")
             for number, line in enumerate(lines)
         ]
+        self.other = np.zeros(control.WORDS, np.int64)  # of a second loop, which has not started
         patience = Patience("", self.control, 50 * MS, lasting=lasting)
+        patiences = (patience, Patience("other", self.other, 50 * MS))
         setup = GuardianSetup(
-            tuple(ports), self.words, (patience,), theirs, self.supervisor.pid, on_host_loss, Standing()
+            tuple(ports), self.words, patiences, theirs, self.supervisor.pid, on_host_loss, Standing()
         )
         self.guardian = Guardian(setup)
         self.boxes = outboxes(self.words)
@@ -95,7 +97,7 @@ class Rig:
     def follow(self) -> None:
         """Let a watched application command both ports."""
         self.application = self.process()
-        self.link.send(Watch(self.application.pid))
+        self.link.send(Watch(self.application.pid, 0))
         for box in self.boxes:
             box.put(b"going")
         self.until_wire(b"going", b"going")
@@ -151,6 +153,10 @@ def kill(made: Rig) -> None:
     made.application.kill()
 
 
+def finish_both(made: Rig) -> None:
+    made.control[control.LEFT] = made.other[control.LEFT] = control.AT_STOP_TIME
+
+
 def end_thread(made: Rig) -> None:
     made.control[control.START] = time.monotonic_ns() + 10**15
     made.loop_ends.set()
@@ -172,13 +178,27 @@ def lose_host(made: Rig) -> None:
     made.supervisor.kill()
 
 
-@pytest.mark.parametrize("cause", [kill, end_thread, order, end, leave, lose_host])
+@pytest.mark.parametrize("cause", [kill, finish_both, end_thread, order, end, leave, lose_host])
 def test_every_end_makes_all_ports_safe_for_ever(rig: Any, cause: Any) -> None:
     made = rig()
     made.follow()
     cause(made)
     made.stays_safe()
     assert made.alarms() == []  # the supervisor knows
+
+
+def test_a_loop_that_has_reached_the_stop_time_before_others_leaves_the_ports_to_them(rig: Any) -> None:
+    made = rig()
+    made.follow()
+    made.control[control.LEFT] = control.AT_STOP_TIME
+    made.application.kill()
+    made.until(lambda: made.guardian._applications.any_ended)
+    made.guardian.look()
+    assert not made.guardian.safe
+    made.boxes[0].put(b"still")
+    made.until_wire(b"still", b"going")
+    made.other[control.LEFT] = control.AT_STOP_TIME
+    made.stays_safe()
 
 
 def hang(made: Rig) -> None:

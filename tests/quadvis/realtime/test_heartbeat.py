@@ -95,6 +95,14 @@ def test_in_the_first_steps_and_with_warnings_a_loop_pauses_and_may_go_on() -> N
     assert warned.look(521) is Sign.PAUSES
 
 
+def test_a_loop_that_has_reached_the_stop_time_has_finished_and_not_died() -> None:
+    loop = Loop().start()
+    loop.words[control.LEFT] = control.AT_STOP_TIME
+    assert loop.look(10**6) is Sign.FINISHED
+    loop.words[control.END] = 1
+    assert loop.look(10**6) is Sign.ENDS
+
+
 @pytest.mark.parametrize("word", [control.END, control.LEFT])
 def test_an_end_is_seen_whatever_the_loop_does(word: int) -> None:
     loop = Loop().start()

@@ -259,3 +259,36 @@ def test_a_cable_brings_the_commands_to_an_input() -> None:
     assert seen[-1] == 1.0
     assert set(np.round(seen, 3)) <= {0.5, 1.0}
     assert result["back.refused"][-1] == 0
+
+
+TWO = """\
+quadvis: 1
+name: two
+rates: {fast: 50 Hz, slow: 4 Hz}
+stop_time: 0.7 s
+overload: {max: 1000000}
+computers: {target: {}, world: {}}
+blocks:
+  stick: {block: own.stick, rate: fast, at: target}
+  out:
+    block: hardware.sbus_out
+    rate: fast
+    at: target
+    with: {port: "pty:rc", channels: [1], lowest: [0], highest: [1], initial: [0.5], safe: [0]}
+    in: {command: stick.y}
+  wave: {block: sources.sine, rate: slow, at: world}
+  back:
+    block: hardware.sbus_in
+    rate: fast
+    at: target
+    with: {port: "pty:rc", channels: [1], lowest: [0], highest: [1]}
+"""
+
+
+@pytest.mark.slow
+def test_a_computer_whose_last_tick_is_earlier_leaves_the_outputs_to_the_others() -> None:
+    write("pty:rc")
+    Path("flight.yaml").write_text(TWO)
+    result = quadvis.load("flight.yaml").run(real_time=quadvis.RealTime(priority=0, poll="0 s"))
+    read = result["back.command"].ravel()
+    assert read[~np.isnan(read)][-1] == 1.0  # 0.2 s after the last tick of the other one
