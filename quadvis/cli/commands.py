@@ -161,8 +161,10 @@ def _hold_ups(graph: Graph) -> list[str]:
     from quadvis.graph.graph import MULTI
     from quadvis.realtime.hold_ups import hold_ups
 
+    if graph.tasking != MULTI:
+        return []
     python = {node.path for node in graph.nodes if not node.block.numeric}
-    return hold_ups(graph, python) if graph.tasking == MULTI else []
+    return [line for name in graph.computers for line in hold_ups(graph.part_of(name), python)]
 
 
 def check(options: argparse.Namespace) -> int:
