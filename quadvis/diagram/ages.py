@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import NamedTuple
 
 from quadvis.diagram.draft import Connection, Draft, DraftWire, Key
@@ -112,10 +113,15 @@ class AgePaths:
     def __init__(self, drafts: Mapping[str, Draft], nodes: dict[str, Node], faults: Faults) -> None:
         self.drafts, self.nodes, self.faults = drafts, nodes, faults
         self.shadows: dict[Key, list[DraftWire]] = {}
-        self._readers: dict[str, list[PathStep]] = {}
-        for path in sorted(nodes):
-            for port, wire in nodes[path].wires():
-                self._readers.setdefault(wire.block, []).append(PathStep(path, port))
+
+    @cached_property
+    def _readers(self) -> dict[str, list[PathStep]]:
+        """The inputs that read each block, in the order of the names."""
+        found: dict[str, list[PathStep]] = {}
+        for path in sorted(self.drafts):
+            for port, wire in self.nodes[path].wires():
+                found.setdefault(wire.block, []).append(PathStep(path, port))
+        return found
 
     def add(self, routes: Sequence[AgeRoute]) -> None:
         """Add what measures the ages; report those that nothing can measure."""
