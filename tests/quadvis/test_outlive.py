@@ -170,7 +170,7 @@ def test_a_terminal_that_nobody_reads_holds_up_no_run(folder: Path) -> None:
 def test_a_terminal_that_goes_away_ends_no_run(folder: Path) -> None:
     reader, writer = os.openpty()
     code = (
-        "import os, quadvis.run.session, sys; quadvis.run.session.SLICE = 0.0; from quadvis.cli import main;"
+        "import os, quadvis.run.session, sys; quadvis.run.loops.SLICE = 0.0; from quadvis.cli import main;"
         "os.read(0, 1); sys.exit(main())"
     )
     command = [sys.executable, "-c", code, "run", "flight.yaml", "--log", "run.mcap"]

@@ -154,7 +154,7 @@ def test_a_log_of_a_run_that_stopped_early_does_not_pass(end: str, tmp_path: Pat
             raise KeyboardInterrupt
 
     with pytest.MonkeyPatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr("quadvis.run.session.SLICE", 0.0)  # after every tick
+        patch.setattr("quadvis.run.loops.SLICE", 0.0)  # after every tick
         diagram.run(log=tmp_path / "run.mcap", progress=interrupt)
     log = read_log(tmp_path / "run.mcap")
     (verdict,) = diagram.judge(log).verdicts
