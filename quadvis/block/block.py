@@ -30,7 +30,8 @@ CHECKS = ("check", "check_written", "doubts")
 FILES = ("reads", "read_file", "verify_files")
 TAGS = ("not_replayable", "not_restorable", "harmless")
 RESERVED = {
-    "self", "time", "period", "interface", "numeric", "stepwise", "open", "close", "write_safe",
+    "self", "time", "period", "interface", "numeric", "stepwise", "functions",
+    "open", "close", "write_safe",
     PORTS, "ports_from", "with_ports", "made_for",
     *CHECKS, *FILES, *METHODS, *TAGS,
 }  # fmt: skip
@@ -98,6 +99,7 @@ class Block:
     interface: ClassVar[Interface]
     numeric: ClassVar[bool] = True
     stepwise: ClassVar[bool] = False  # whether outputs change at ticks only, though they depend on the time
+    functions: ClassVar[tuple[Any, ...]] = ()  # plain functions with machine code that its methods call
     not_replayable: ClassVar[str] = ""  # why a second run may differ from the first: "it reads a camera"
     not_restorable: ClassVar[str] = ""  # why it cannot return to a snapshot: "the model has no way back"
     harmless: ClassVar[str] = ""  # why its writes need no safe values: "a file moves nothing"

@@ -34,6 +34,8 @@ START = 0.08  # to load LLVM
 LOAD = 0.001  # to load a block type
 COMPILER = 0.6  # to load numba
 COMPILE = 1.3  # to compile a block type
+LOOK = 0.6e-3  # what the machine code of a block's functions saves of its call
+COMPILE_FUNCTIONS = 10.0  # to compile them
 
 
 @dataclass(frozen=True)
@@ -72,22 +74,33 @@ def choose(
     saved = _saved(program, blocks, ticks)
     if wanted == AUTO and saved < START and not paced:
         return Choice(PYTHON, SHORT)
+    from quadvis.native.functions import load, prepare
     from quadvis.native.library import block_types, library
 
     types = block_types(program, blocks)
     kinds = list(dict.fromkeys(types.values()))
     missing = library().missing(kinds)
-    cost = START + LOAD * len(kinds) + (COMPILER + COMPILE * len(missing) if missing else 0.0)
-    if wanted == AUTO and paced and (missing or not kinds):
-        lacking = f"{counted(len(missing), 'block type')} would have to be compiled, once; 'native' does it"
-        return Choice(PYTHON, f"since {lacking if missing else 'no block can be compiled'}")
+    rooms = {block.functions: type(block).__name__ for block in blocks if block.functions}
+    absent = [name for functions, name in rooms.items() if not load(functions)]
+    compiled = COMPILE * len(missing) + COMPILE_FUNCTIONS * len(absent)
+    cost = START + LOAD * (len(kinds) + len(rooms)) + (COMPILER + compiled if compiled else 0.0)
+    which = " and ".join(
+        [
+            *([counted(len(missing), "block type")] if missing else []),
+            *(f"what {name} calls" for name in absent),
+        ]
+    )
+    if wanted == AUTO and paced and (which or not (kinds or rooms)):
+        lacking = f"{which} would have to be compiled, once; 'native' does it"
+        return Choice(PYTHON, f"since {lacking if which else 'no block can be compiled'}")
     if wanted == AUTO and not paced and saved < cost:
-        which = counted(len(missing), "block type")
         why = f"since compiling {which} would take about {cost:.0f} s, once; 'native' does it"
-        return Choice(PYTHON, why if missing else SHORT)
-    if missing and announce:
-        announce(f"compiling {counted(len(missing), 'block type')}, once: about {cost:.0f} s")
+        return Choice(PYTHON, why if which else SHORT)
+    if which and announce:
+        announce(f"compiling {which}, once: about {cost:.0f} s")
     library().prepare(kinds, announce)
+    for functions in rooms:
+        prepare(functions)
     refused = {kind.block.__name__: library().refusals[kind] for kind in kinds if kind in library().refusals}
     names = ", ".join(f"{name} ({why})" for name, why in refused.items())
     return Choice(NATIVE, f"but interpreted: {names}" if names else "", types)
@@ -102,7 +115,8 @@ def _saved(program: Program, blocks: Sequence[Block], ticks: int) -> float:
             for ops in (task.delays, task.latches, *task.phases.values())
             for op in ops
         )
-        found += CALL * calls * max(0, ticks - task.offset) / task.every
+        looks = sum(bool(blocks[op.block].functions) for op in task.phases.get("output", ()))
+        found += (CALL * calls + LOOK * looks) * max(0, ticks - task.offset) / task.every
     if program.states:
         stages = len(TABLEAUS[program.solver].nodes)
         calls = len(program.derivatives) + len(program.minor)

@@ -9,10 +9,12 @@ from typing import Any
 
 from quadvis.engine.memory import packed
 from quadvis.machine.garbage import uncollected
-from quadvis.native.block_type import BlockType, Kind, MethodType
+from quadvis.native.block_type import BlockType, MethodType
+from quadvis.native.block_type import Kind as SlotKind
 from quadvis.native.cache import MachineCode
 from quadvis.native.checked import power, replacements
 from quadvis.native.foreign import intrinsics
+from quadvis.native.functions import LOOPS, Kind, NativeFunction
 from quadvis.native.machine_code import Compiled, Unlinkable, emit
 from quadvis.native.routine import ROUTINE, Routine, plain
 from quadvis.native.source import POWER, Unreadable, fingerprint, names_in, prepared
@@ -43,6 +45,48 @@ def compile_block(kind: BlockType, prefix: str) -> MachineCode:
     except (Unreadable, Unlinkable, NotImplementedError, numba.core.errors.NumbaError) as error:
         failed = next((method.name for method in kind.methods if method.name not in compiled), "")
         return MachineCode(refusal=f"method '{failed}': {_cause(error)}" if failed else str(error))
+
+
+def compile_functions(functions: Sequence[NativeFunction], prefix: str) -> MachineCode:
+    """Compile plain functions; code that has a ``refusal``, with its function, if numba cannot."""
+    import numba
+
+    scope, pointer = _Scope(set()), vars(numba.types)["CPointer"]
+    compiled: dict[str, Compiled] = {}
+    try:
+        for function in functions:
+            scalars = ["int64", *(kind.scalar for kind in (*function.takes, *function.gives))]
+            body = scope.jit(function.function)
+            compiled[function.__name__] = compile_function(
+                _entry(function, body), [pointer(getattr(numba.types, scalar)) for scalar in scalars]
+            )
+        return machine_code(compiled, prefix)
+    except (Unreadable, Unlinkable, NotImplementedError, numba.core.errors.NumbaError) as error:
+        failed = next((each.__name__ for each in functions if each.__name__ not in compiled), "")
+        return MachineCode(refusal=f"function '{failed}': {_cause(error)}" if failed else str(error))
+
+
+def _entry(function: NativeFunction, body: Any) -> Any:
+    """Return the function of pointers that calls a plain function; the first has the sizes of the letters."""
+    import numba
+
+    def read(name: str, kind: Kind) -> str:
+        parts = [
+            f"sizes[{function.letters.index(part)}]" if isinstance(part, str) else str(part)
+            for part in kind.shape
+        ]
+        return f"carray({name}, ({', '.join(parts)},))" if parts else f"{name}[0]"
+
+    takes = [f"p{index}" for index in range(len(function.takes))]
+    gives = [f"r{index}" for index in range(len(function.gives))]
+    reads = ", ".join(map(read, takes, function.takes))
+    found = [f"f{index}" for index in range(len(gives))]
+    lines = [f"def call({', '.join(['sizes', *takes, *gives])}):", f"    {', '.join(found)} = body({reads})"]
+    for value, name, kind in zip(found, gives, function.gives, strict=True):
+        lines.append(f"    {read(name, kind)}{'[...]' if kind.shape else ''} = {value}")
+    namespace: dict[str, Any] = {"carray": vars(numba)["carray"], "body": body}
+    exec("\n".join(lines), namespace)
+    return namespace["call"]
 
 
 def _cause(error: Exception) -> str:
@@ -133,6 +177,7 @@ class _Scope:
 
     def jit(self, function: types.FunctionType) -> Any:
         """Return numba's dispatcher for a plain function and the plain functions that it calls."""
+        function = getattr(function, LOOPS, function)
         known, key = self._known, (function, "")
         if not _meets_self(function, set()):
             known, key = _shared, (function, fingerprint(function))
@@ -170,7 +215,7 @@ def _hashable(value: Any) -> bool:
     return isinstance(value, types.ModuleType | types.BuiltinFunctionType | type)
 
 
-def _pointed(kind: Kind) -> Any:
+def _pointed(kind: SlotKind) -> Any:
     """Return numba's type for the target of a pointer; numba cannot store through pointers to bool."""
     import numba
 

@@ -23,6 +23,7 @@ from quadvis.native import cache
 from quadvis.native.block_type import BlockType, MethodType
 from quadvis.native.cache import MachineCode
 from quadvis.native.choice import Announce
+from quadvis.native.functions import NativeFunction
 from quadvis.native.loop import POINTERS, loop
 from quadvis.native.machine_code import Loaded, processor
 from quadvis.native.routine import ROUTINE, Routine
@@ -33,6 +34,7 @@ COMPILER = (
     "block_type",
     "checked",
     "compiler",
+    "functions",
     "foreign",
     "machine_code",
     "runtime",
@@ -82,6 +84,30 @@ class Library:
                 announce(f"compiling {kind.block.__name__}, {number} of {len(missing)} block types, once")
             key = _key(kind.text)
             self._add(kind, _kept(key, compile_block(kind, _prefix(key))))
+
+    def load_functions(self, functions: Sequence[NativeFunction]) -> bool:
+        """Bind functions that are kept together; return whether they are."""
+        code = cache.load(_key(repr([function.text for function in functions])))
+        return code is not None and self._bind(functions, code)
+
+    def compile_functions(self, functions: Sequence[NativeFunction]) -> None:
+        """Compile functions together, keep and bind them."""
+        from quadvis.native.compiler import compile_functions
+
+        key = _key(repr([function.text for function in functions]))
+        self._bind(functions, _kept(key, compile_functions(functions, _prefix(key))))
+
+    def _bind(self, functions: Sequence[NativeFunction], code: MachineCode) -> bool:
+        if not code.refusal:
+            if code.names is None or code.names.keys() != {function.__name__ for function in functions}:
+                return False
+            try:
+                self._loaded.add(code.content)
+            except RuntimeError:
+                return False
+            for function in functions:
+                function.bind(self._loaded.address(code.names[function.__name__]))
+        return True
 
     def _add(self, kind: BlockType | str, code: MachineCode) -> bool:
         """Make code callable; return whether it is what it should be."""

@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from quadvis.native.functions import LOOPS
+
 POWER = "__power__"
 PLAIN = (int, float, complex, str, bytes, bool, type(None), type(...), frozenset, range, np.generic)
 
@@ -149,6 +151,7 @@ def _describe(value: Any, names: Collection[str], parts: list[str], seen: dict[i
         cells = [cell.cell_contents for cell in value.__closure__ or ()]
         for constant in (value.__defaults__, value.__kwdefaults__, *cells):
             _describe(constant, used, parts, seen)
+        _describe(getattr(value, LOOPS, None), used, parts, seen)
         known = value.__globals__
         _describe_all({name: known[name] for name in used if name in known}, used, parts, seen)
     elif isinstance(plain := getattr(value, "py_func", None), types.FunctionType):  # compiled by its author

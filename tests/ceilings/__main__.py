@@ -20,10 +20,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from quadvis.native.functions import prepare
 from quadvis_vision.detection.circles import Target
 from quadvis_vision.detection.colours import ColourCalibration
 from quadvis_vision.detection.detect import search
 from quadvis_vision.detection.follow import follow
+from quadvis_vision.detection.measure import NATIVE
 from tests.ceilings.kinds import KINDS
 from tests.ceilings.stage import DISC, SQUARE, Kind, Shot, shoot
 
@@ -79,6 +81,7 @@ def main() -> int:
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 40
     words = sys.argv[2:]
     cv2.setNumThreads(1)
+    prepare(NATIVE)
     print(
         f"{'':30}{'rms':>7}{'worst':>7}{'seen':>8}"
         + "".join(f"{w:>9}" for w in ("right", "silent", "false", "followed", "blobs"))

@@ -23,6 +23,7 @@ from quadvis_vision.detection.detect import (
     usable,
 )
 from quadvis_vision.detection.follow import follow
+from quadvis_vision.detection.measure import NATIVE
 
 STALE_PICTURE = 0  # of the choices of repeats
 RECENT = 32  # remembered pictures
@@ -62,6 +63,8 @@ class CircleDetector(Block, numeric=False):
 
     Source: sections 5 (centres of gravity, colour calibration, order of the corners) and 6.
     """
+
+    functions = NATIVE
 
     frame = In("frame", doc="the newest picture")
     centres = Out("float64[4,2]", unit="px", nan=True, doc="u, v of circles 1 to 4; NaN rows are missing")

@@ -14,19 +14,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis_vision.detection import rays
-from quadvis_vision.detection.approach import approach
 from quadvis_vision.detection.colours import Colour, ColourCalibration
-from quadvis_vision.detection.square import expected_bends
+from quadvis_vision.detection.measure import located, remeasured
 
 Pixels = NDArray[np.uint8]
 
 SMALLEST = 32  # px: a picture with a shorter edge holds no target
 COLUMNS = 16  # width of the reduced picture from which the ceiling's colour is taken
 WINDOW = 7  # edge of its median filter: nearly half the picture, so that circles stay a minority
-CONTRAST_MIN = 10.0  # grey levels between circle and ceiling, as a distance of colours
-GROWTH_MAX = math.log(2.0)  # of a circle against its expected radius
-BEND_MAX = 0.75  # of an ellipse that may be a circle: a tilt of 67 deg
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,41 +81,24 @@ def locate(pixels: Pixels, guesses: Sequence[tuple[complex, float]]) -> list[Dis
     """
     if not guesses:
         return []
-    centres = np.array([(centre.real, centre.imag) for centre, _ in guesses])
-    radii = np.array([radius for _, radius in guesses])
-    centres, sizes, _ = approach(pixels, centres, radii)
-    found = rays.settle(pixels, centres, sizes[:, None, None] * np.eye(2))
-    return discs_of(pixels, found, radii, rays.edge_width(found))
+    table = np.array([(centre.real, centre.imag, radius) for centre, radius in guesses])
+    return discs(located(pixels, table))
 
 
 def refine(pixels: Pixels, guesses: Sequence[Disc], shapes: Any) -> list[Disc | None]:
     """Return circles measured once more, with the `shapes` (n, 2, 2) in px that a target gives them."""
     centres = np.array([(disc.centre.real, disc.centre.imag) for disc in guesses])
-    found, width, _ = rays.sharpen(pixels, centres, shapes, guesses[0].width)
-    return discs_of(pixels, found, rays.radii_of(shapes), width)
+    return discs(remeasured(pixels, centres, shapes, guesses[0].width))
 
 
-def discs_of(pixels: Pixels, found: rays.Ellipses, radii: Any, edge: float) -> list[Disc | None]:
-    """Return what was measured; None for what is no circle near the expected `radii` (n,), or is cut."""
-    height, width = pixels.shape[:2]
-    sizes = rays.radii_of(found.shapes)
-    bends = expected_bends(found.shapes)
-    ratios = (found.paints / np.maximum(found.lights, 1.0)).tolist()
-    contrast = rays.contrasts(found).tolist()
-    result: list[Disc | None] = []
-    for (u, v), size, radius, bend, ratio, light, whole in zip(
-        found.centres.tolist(), sizes.tolist(), radii.tolist(), bends, ratios, contrast,
-        rays.symmetry(found), strict=True,
-    ):  # fmt: skip
-        # The picture ends half a pixel beyond the centres of its outermost pixels.
-        room = min(u, v, width - 1 - u, height - 1 - v) + 0.5
-        there = light >= CONTRAST_MIN and size > 0.5 and room >= size and abs(bend) < BEND_MAX
-        if there and abs(math.log(size / radius)) < GROWTH_MAX:
-            blue, green, red = ratio
-            result.append(Disc(complex(u, v), size, (blue, green, red), bend, whole, edge))
-        else:
-            result.append(None)
-    return result
+def discs(rows: Any) -> list[Disc | None]:
+    """Return the circles of rows (n, COLUMNS); None for one that is not there."""
+    return [
+        Disc(complex(u, v), radius, (blue, green, red), complex(real, imaginary), whole, width)
+        if there
+        else None
+        for there, u, v, radius, blue, green, red, real, imaginary, whole, width in rows.tolist()
+    ]
 
 
 def mean(pixels: Pixels, x: float, y: float, reach: float) -> Colour:

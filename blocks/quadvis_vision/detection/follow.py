@@ -8,10 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis_vision.detection import rays
-from quadvis_vision.detection.approach import approach
 from quadvis_vision.detection.blobs import looks
-from quadvis_vision.detection.circles import Ceiling, Disc, Pixels, Target, discs_of, locate
+from quadvis_vision.detection.circles import Ceiling, Disc, Pixels, Target, discs, locate
 from quadvis_vision.detection.detect import (
     QUALITY_MIN,
     CirclePlace,
@@ -21,11 +19,11 @@ from quadvis_vision.detection.detect import (
     search,
     square_seen,
 )
+from quadvis_vision.detection.measure import followed
 from quadvis_vision.detection.square import expected_shapes, motion
 
 Array = NDArray[np.float64]
 
-JUMP = 0.3  # of a radius: after a larger movement of the target the rough places are taken once more
 REACH = 0.025  # of the picture's width, plus half a radius: the distance over which a circle is followed
 GROWTH_MAX = math.log(1.33)  # of the square from one picture to the next
 TURN_MAX = 0.5  # rad, the same
@@ -37,21 +35,21 @@ def follow(pixels: Pixels, target: Target, places: Array, fewest: int = 2) -> De
     """Search for the circles near their `places` (4, 6); if one is not there, search the whole picture."""
     known = [CirclePlace(complex(u, v), radius, (b, g, r)) for u, v, radius, b, g, r in places.tolist()]
     measured, exact = _followed(pixels, target, places)
-    discs: list[Disc | None] = [
+    kept_discs: list[Disc | None] = [
         disc if disc is not None and _same(disc, target, corner, place.radius) else None
         for corner, (place, disc) in enumerate(zip(known, measured, strict=True))
     ]
-    whole = [disc for disc in discs if disc is not None and disc.symmetry >= QUALITY_MIN]
+    whole = [disc for disc in kept_discs if disc is not None and disc.symmetry >= QUALITY_MIN]
     if len(whole) < 4:
-        _look_around(pixels, target, known, discs)
-        whole = [disc for disc in discs if disc is not None]
+        _look_around(pixels, target, known, kept_discs)
+        whole = [disc for disc in kept_discs if disc is not None]
         seen = refined(pixels, whole, target) if len(whole) == 4 else None
     else:
         seen = square_seen(whole, target) if exact else refined(pixels, whole, target)
     if seen is not None:
         return seen
-    moved = _moved(discs, known)
-    kept = None if moved is None else detection(discs, moved)
+    moved = _moved(kept_discs, known)
+    kept = None if moved is None else detection(kept_discs, moved)
     if kept is None:
         return search(pixels, target, fewest)
     # The search gives a better target only if it finds more circles than were followed.
@@ -64,17 +62,12 @@ def _followed(pixels: Pixels, target: Target, places: Array) -> tuple[list[Disc 
 
     The second value is false if they moved or grew so much that their ellipses are others.
     """
-    centres, radii = places[:, :2], places[:, 2]
-    points = [complex(u, v) for u, v in centres.tolist()]
+    points = [complex(u, v) for u, v in places[:, :2].tolist()]
     shapes = expected_shapes(points, target.ratio)
     if shapes is None:
-        shapes = radii[:, None, None] * np.eye(2)
-    rough, _, contrast = approach(pixels, centres, radii)
-    shift = np.sort(rough - centres, axis=0)[1:3].mean(0)
-    if np.hypot(*shift.tolist()) > JUMP * radii.min():
-        rough, _, contrast = approach(pixels, centres + shift, radii)
-    found, width, exact = rays.sharpen(pixels, rough, shapes, 0.0, contrast)
-    return discs_of(pixels, found, radii, width), exact
+        shapes = places[:, 2, None, None] * np.eye(2)
+    rows, exact = followed(pixels, places, shapes)
+    return discs(rows), exact > 0
 
 
 def _look_around(

@@ -1,0 +1,72 @@
+"""Plain functions as machine code: kinds, shapes, refusals, the cache."""
+
+import numpy as np
+import pytest
+
+from quadvis.native import cache
+from quadvis.native.functions import compiled_as, load, native, prepare
+
+
+def total_by_loops(values):
+    total = 0.0
+    for value in values:
+        total += value
+    return total
+
+
+@compiled_as(total_by_loops)
+def total(values):
+    return float(sum(values.tolist(), 0.0))
+
+
+@native(takes=("uint8[h,w]", "float64[n]", "float64"), gives=("float64[n]", "float64"))
+def spread(picture, values, least):
+    """Return the values, scaled, and the sum of the brightest pixel and of all values."""
+    return values * (1.0 / max(least, 1.0)), float(picture.max()) + total(values)
+
+
+@native(takes=("float64[n]",), gives=("float64",))
+def inverse(values):
+    return 1.0 / values[0]
+
+
+TOGETHER = (spread, inverse)
+
+
+@pytest.fixture
+def fresh(tmp_path, monkeypatch):
+    monkeypatch.setenv(cache.FOLDER, str(tmp_path))
+    yield tmp_path
+    for function in TOGETHER:
+        function.bind(None)
+
+
+def test_machine_code_gives_the_same_is_kept_and_is_loaded_again(fresh):
+    picture, values = np.arange(12, dtype=np.uint8).reshape(3, 4), np.array([0.1, 0.2, 0.7])
+    interpreted = spread(picture, values, 3.0)
+    assert not load(TOGETHER) and not spread.is_native
+    prepare(TOGETHER)
+    assert spread.is_native and len(list(fresh.iterdir())) == 1
+    for _ in range(2):
+        compiled = spread(picture[:, ::1], values, 3.0)
+        assert (compiled[0] == interpreted[0]).all() and compiled[1] == interpreted[1]
+        assert spread(picture, values[:2], 3.0)[0].shape == (2,)
+        for function in TOGETHER:
+            function.bind(None)
+        assert load(TOGETHER)
+
+
+def test_what_machine_code_refuses_is_pythons_to_say(fresh):
+    prepare(TOGETHER)
+    assert inverse(np.array([4.0])) == 0.25
+    with pytest.warns(RuntimeWarning, match="divide by zero"):
+        assert inverse(np.array([0.0])) == np.inf
+    with pytest.raises(TypeError, match=r"spread takes float64\[n\], not an array of shape \(1, 1\)"):
+        spread(np.zeros((2, 2), np.uint8), np.zeros((1, 1)), 1.0)
+
+
+def test_kinds_are_declared_rightly():
+    with pytest.raises(ValueError, match="no kind"):
+        native(takes=("float[n]",), gives=())(total_by_loops)
+    with pytest.raises(ValueError, match="gives sizes that it does not take"):
+        native(takes=("float64",), gives=("float64[n]",))(total_by_loops)
