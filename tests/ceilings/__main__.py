@@ -5,7 +5,8 @@
 
 right    all clear circles found within 0.5 px, and nothing else
 rms      error of the centres in px; worst: the largest
-silent   pictures in which a centre is reported that is off by more than 0.3 px, with quality 0.9 or more
+silent   pictures in which a centre is off by more than 0.3 px and 4 sigma, with quality 0.9 or more
+nees     mean of the squared errors over the variances that the detector states; 2 if sigma is right
 seen     clear circles that were reported
 false    pictures with a circle reported 2 px or more from any of the four, or any where no target is
 followed right, with the places of the same picture to begin with, moved by up to a third of a radius
@@ -33,6 +34,7 @@ COLOURS = Path(__file__).parents[2] / "diagrams" / "calib" / "colours.yaml"
 TARGET = Target(ColourCalibration.load(COLOURS), DISC / SQUARE, 2.0, 80.0)
 SIZE = (320, 240)
 SILENT = 0.3  # px
+ANNOUNCED = 4.0  # sigma
 FALSE = 2.0  # px
 
 
@@ -52,6 +54,7 @@ def row(name: str, kind: Kind, count: int) -> str:
     rng = np.random.default_rng(sum(name.encode()))
     right = silent = false = followed = blobs = clear = seen = 0
     errors: list[float] = []
+    normed: list[float] = []
     for _ in range(count):
         shot = shoot(rng, SIZE, kind)
         found = search(shot.pixels, TARGET)
@@ -60,7 +63,9 @@ def row(name: str, kind: Kind, count: int) -> str:
         right += shot.right(found.centres)
         errors += away[there & (away < FALSE)].tolist()
         sure = there & (found.quality >= 0.9)
-        silent += bool((away[sure] > SILENT).any())
+        silent += bool((away[sure] > np.maximum(SILENT, ANNOUNCED * found.sigma[sure])).any())
+        known = there & (away < FALSE)
+        normed += ((away[known] / found.sigma[known]) ** 2).tolist()
         false += bool((there & ~(away < FALSE)).any())
         clear += shot.clear.sum()
         seen += (there & shot.clear).sum()
@@ -70,7 +75,9 @@ def row(name: str, kind: Kind, count: int) -> str:
             shift = rng.uniform(-1, 1, 2)
             places[:, :2] += shift / np.hypot(*shift) * rng.uniform(0, 0.33) * places[:, 2].mean()
             followed += shot.right(follow(shot.pixels, TARGET, places).centres)
-    rms = f"{np.sqrt(np.mean(np.square(errors))):7.3f}{max(errors):7.2f}" if errors else f"{'-':>7}{'-':>7}"
+    figures = [np.sqrt(np.mean(np.square(errors))), max(errors), np.mean(normed)] if errors else []
+    rms = "".join(f"{figure:7.{digits}f}" for figure, digits in zip(figures, (3, 2, 1), strict=False))
+    rms = rms or f"{'-':>7}" * 3
     share = f"{seen / clear:8.1%}" if clear else f"{'-':>8}"
     parts = "".join(f"{100 * part / count:8.1f}%" for part in (right, silent, false, followed, blobs))
     return f"{name:30}{rms}{share}{parts}"
@@ -83,7 +90,7 @@ def main() -> int:
     cv2.setNumThreads(1)
     prepare(NATIVE)
     print(
-        f"{'':30}{'rms':>7}{'worst':>7}{'seen':>8}"
+        f"{'':30}{'rms':>7}{'worst':>7}{'nees':>7}{'seen':>8}"
         + "".join(f"{w:>9}" for w in ("right", "silent", "false", "followed", "blobs"))
     )
     for name, kind in KINDS.items():

@@ -84,7 +84,7 @@ def from_four(
     The method's pose is corrected for the radius of the circles, if this is not 0, and refined as chosen.
     """
     camera = pinhole(optics)
-    circles = seen_circles(centres, camera, side, 1.0)
+    circles = seen_circles(centres, camera, side, np.ones(4))
     if len(circles) < 4:
         return no_pose()
     pose = method([(circle.x, circle.y, 1.0) for circle in circles], side)

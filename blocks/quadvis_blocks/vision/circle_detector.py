@@ -71,6 +71,9 @@ class CircleDetector(Block, numeric=False):
     quality = Out(
         "float64[4]", nan=True, doc="1 for a whole circle, below 0.9 for a partly hidden one, NaN for none"
     )
+    sigma = Out(
+        "float64[4]", unit="px", nan=True, doc="standard deviation of u and of v, NaN for a missing circle"
+    )
     status = Out("int64", doc="0, 1, 2: four, three, two circles; 3 and above: no target, see above")
     found = Out("bool", doc="whether all four circles are found")
     lost = Out("bool", doc="whether a new frame has no target")
@@ -95,6 +98,7 @@ class CircleDetector(Block, numeric=False):
 
     last_centres = State("float64[4,2]", math.nan)
     last_quality = State("float64[4]", math.nan)
+    last_sigma = State("float64[4]", math.nan)
     last_status = State("int64", STALE)
     last_stamp = State("float64", math.nan)
     last_sequence = State("int64", 0)
@@ -138,19 +142,20 @@ class CircleDetector(Block, numeric=False):
         """Return the circles of a new picture, or the last result again."""
         self._look(frame)
         if not self._new:
-            centres, quality, status = self.last_centres, self.last_quality, self.last_status
+            status = self.last_status
+            known = self.last_centres, self.last_quality, self.last_sigma, status
             last = self.last_stamp, self.last_sequence
-            return centres, quality, status, status == 0, False, *last, False, self._frozen
-        centres, quality, status, _ = self._seen
+            return *known, status == 0, False, *last, False, self._frozen
+        *seen, status, _ = self._seen
         lost = status > TWO_CIRCLES
-        return centres, quality, status, status == 0, lost, frame.stamp, frame.sequence, True, False
+        return *seen, status, status == 0, lost, frame.stamp, frame.sequence, True, False
 
     def update(self, frame: Frame) -> None:
         """Keep the result of a new picture."""
         self.stuck = self._frozen
         self.newest = frame.sequence
         if self._new:
-            self.last_centres, self.last_quality, self.last_status, self.places = self._seen
+            self.last_centres, self.last_quality, self.last_sigma, self.last_status, self.places = self._seen
             self.last_stamp, self.last_sequence = frame.stamp, frame.sequence
             if self._sum != 0:
                 self.recent[1:] = self.recent[:-1].copy()

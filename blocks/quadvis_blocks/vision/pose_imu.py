@@ -19,6 +19,7 @@ from quadvis_vision.pose.refine import Estimate, Tilt, pose_of, refine
 
 LEVEL, MAP = range(2)
 NO_TILT = 8  # a status; smaller numbers are those of the detector
+SIGMA_MAX = 1e3  # px: from here on a circle counts nothing
 _NUMBERS = 10  # of the triangle of 4 x 4
 MISFIT_MAX = 0.1  # sides; greatest rms error of the levelled pose: 10 deg of tilt give 0.05 at 1.6 sides
 
@@ -36,6 +37,9 @@ class PoseImu(PoseFromCircles, Block):
     right = forward. Roll and pitch must be those at the instant of the frame: an error of one degree moves
     the craft by 1.7 % of the distance.
 
+    `sigma` takes the place of `pixel_sigma` circle by circle, as the detector measures it in each picture; it
+    says nothing of errors of the calibration, which all pictures share.
+
     `covariance` is that of a single pose, from the same sigmas. An error of the angles lasts longer than a
     frame, so successive poses share it. Without a pose all other outputs are NaN, `valid` is false, and
     `status` says why.
@@ -47,6 +51,12 @@ class PoseImu(PoseFromCircles, Block):
 
     imu_roll = In(unit="rad", doc="measured roll at the instant of the frame, right side down is positive")
     imu_pitch = In(unit="rad", doc="measured pitch at the instant of the frame, nose up is positive")
+    sigma = In(
+        "float64[4]",
+        unit="px",
+        default=(math.nan,) * 4,
+        doc="standard deviations of the coordinates of circles 1 to 4; NaN: pixel_sigma",
+    )
     covariance = Out(
         "float64[4,4]",
         unit="m^2 m^2 m^2 m*rad " * 3 + "m*rad m*rad m*rad rad^2",
@@ -61,15 +71,17 @@ class PoseImu(PoseFromCircles, Block):
         RADIUS, unit="m", min=0.0, doc="of the circles, to correct for perspective; 0: circles are points"
     )
     mode = Param("map", choices=("level", "map"), doc="take the angles as they are, or weigh them")
-    pixel_sigma = Param(0.2, unit="px", above=0.0, tune=True, doc="standard deviation of a coordinate")
+    pixel_sigma = Param(
+        0.2, unit="px", above=0.0, tune=True, doc="standard deviation of a coordinate that has no other"
+    )
     tilt_sigma = Param(
         math.radians(0.5), unit="rad", above=0.0, tune=True, doc="standard deviation of roll and of pitch"
     )
 
-    def output(self, centres: Any, imu_roll: float, imu_pitch: float) -> tuple[Any, ...]:
+    def output(self, centres: Any, imu_roll: float, imu_pitch: float, sigma: Any) -> tuple[Any, ...]:
         """Return the pose, its covariance and the status."""
         camera = pinhole(self.optics)
-        circles = seen_circles(centres, camera, self.side, self.pixel_sigma)
+        circles = seen_circles(centres, camera, self.side, _sigmas(sigma, self.pixel_sigma))
         covariance = np.full((4, 4), math.nan)
         if len(circles) < 2:
             return *no_pose(), covariance, NOT_FOUND
@@ -95,6 +107,11 @@ def _estimate(circles: list[Circle], tilt: Tilt, side: float, radius: float, mod
     if mode == MAP:
         return refine(circles, radius, level, tilt)
     return Estimate(level, level_covariance(circles, level, tilt.sigma))
+
+
+def _sigmas(given: Any, otherwise: float) -> Any:
+    """Return standard deviations (4,) in px, where none are given the other one."""
+    return np.where(given > 0, np.minimum(given, SIGMA_MAX), otherwise)
 
 
 def _is_whole(triangle: Triangle) -> bool:

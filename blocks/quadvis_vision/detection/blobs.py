@@ -21,6 +21,7 @@ FILL = (0.55, 1.25)  # area of a patch over that of the ellipse in its bounding 
 TINY = 1.5  # px of the reduced picture: a smaller patch has no shape
 WIDE = 480  # px: a wider picture is first searched at a quarter of its size
 PATCHES_MAX = 350  # patches that are examined, those with the longest outlines; their number takes time
+OUTLINES_MAX = 1500  # of all looks at a picture: noise has more, the worst of real ceilings less than half
 BLOBS_MAX = 20  # blobs of one colour; the time to arrange blobs grows with the fourth power of their number
 LOWER = (0.72, 0.52, 0.38)  # of the threshold, one after the other
 CLOSED = (3, 5)  # px: narrower dark lines are closed; circles of this size remain
@@ -53,6 +54,9 @@ def looks(pixels: Pixels, ceiling: Ceiling, target: Target) -> Iterator[Blobs]:
         for masks in (view.lower, view.closed, view.bright):
             for patches in masks(threshold, limits):
                 _add(blobs, patches, target)
+                if sum(view.outlines for view in views) > OUTLINES_MAX:
+                    yield blobs
+                    return
             yield blobs
 
 
@@ -86,6 +90,7 @@ class ReducedPicture:
         self._small: Any = cv2.resize(whole, self._size, interpolation=method)
         self._ceiling: Any = cv2.resize(ceiling.picture, self._size)
         self._dark = self._over(self._ceiling)
+        self.outlines = 0  # in all looks so far
 
     def _over(self, light: Any) -> Any:
         """Return the darkest channel of each pixel over a light."""
@@ -130,6 +135,7 @@ class ReducedPicture:
 
         mask = cv2.threshold(dark, threshold * _FULL, 255, cv2.THRESH_BINARY_INV)[1]
         outlines = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)[0]
+        self.outlines += len(outlines)
         if len(outlines) > PATCHES_MAX:
             outlines = sorted(outlines, key=len)[-PATCHES_MAX:]
         scale, middle = self._reduction, (self._reduction - 1) / 2

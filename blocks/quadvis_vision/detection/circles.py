@@ -42,7 +42,8 @@ class Disc(NamedTuple):
 
     `bend` describes its ellipse with half axes a and b, a the longer one at the angle w: (a^2 - b^2) exp(2 i
     w) / (a^2 + b^2), 0 for a circle. `symmetry` is 1 for a whole disc and below 0.9 for a disc that is partly
-    hidden. `width` in px is the standard deviation of the edges' blur.
+    hidden. `width` in px is the standard deviation of the edges' blur, `sigma` that of each coordinate of the
+    centre.
     """
 
     centre: complex
@@ -51,6 +52,7 @@ class Disc(NamedTuple):
     bend: complex
     symmetry: float
     width: float
+    sigma: float
 
 
 class Ceiling:
@@ -94,10 +96,10 @@ def refine(pixels: Pixels, guesses: Sequence[Disc], shapes: Any) -> list[Disc | 
 def discs(rows: Any) -> list[Disc | None]:
     """Return the circles of rows (n, COLUMNS); None for one that is not there."""
     return [
-        Disc(complex(u, v), radius, (blue, green, red), complex(real, imaginary), whole, width)
+        Disc(complex(u, v), radius, (blue, green, red), complex(real, imaginary), whole, width, sigma)
         if there
         else None
-        for there, u, v, radius, blue, green, red, real, imaginary, whole, width in rows.tolist()
+        for there, u, v, radius, blue, green, red, real, imaginary, whole, width, sigma in rows.tolist()
     ]
 
 

@@ -47,13 +47,15 @@ class Detection(NamedTuple):
     """The target in a picture, by corner 1..4.
 
     `centres` (4, 2) are in px, with NaN rows for missing circles; `quality` (4,) is that of the block, NaN
-    for missing circles; `status` is one of the constants above. `places` (4, 6) serve to follow all four
+    for missing circles; `sigma` (4,) is the standard deviation of u and of v in px, NaN for a circle that has
+    no centre; `status` is one of the constants above. `places` (4, 6) serve to follow all four
     circles, missing ones too: u, v and expected radius in px, colour divided by the ceiling's (blue, green,
     red).
     """
 
     centres: Array
     quality: Array
+    sigma: Array
     status: int
     places: Array
 
@@ -78,7 +80,9 @@ def usable(pixels: object, size: tuple[int, int] | None = None) -> bool:
 
 def nothing(status: int) -> Detection:
     """Return the detection of no circle."""
-    return Detection(np.full((4, 2), np.nan), np.full(4, np.nan), status, np.zeros((4, 6)))
+    return Detection(
+        np.full((4, 2), np.nan), np.full(4, np.nan), np.full(4, np.nan), status, np.zeros((4, 6))
+    )
 
 
 def search(pixels: Pixels, target: Target, fewest: int = 2, thorough: bool = True) -> Detection:
@@ -257,6 +261,8 @@ def detection(discs: Sequence[Disc | None], places: Sequence[CirclePlace]) -> De
         return None
     table = np.array([(p.centre.real, p.centre.imag, p.radius, *p.ratio) for p in places])
     centres = table[:, :2].copy()
+    sigma = np.array([math.nan if disc is None else disc.sigma for disc in discs])
     if hidden:
         centres[hidden] = math.nan
-    return Detection(centres, np.array(quality), len(hidden), table)
+        sigma[hidden] = math.nan
+    return Detection(centres, np.array(quality), sigma, len(hidden), table)

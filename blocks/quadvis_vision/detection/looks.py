@@ -20,6 +20,11 @@ REACH = (2.6, 5.0)  # px: half the length of a ray for a sharp edge, and how it 
 FIRST = (0.6, 6.0)  # of the radius, and px: half the length of rays where the width is not known
 STEADY = 0.4  # px: an edge that moves less from look to look is final
 LOOKS = 3
+NEIGHBOURS = 2.0  # how far the variance grows since neighbouring rays see the same pixels
+APART = 0.35  # px: the deviation of a centre whose rays do not agree at all
+SMALL = 0.035  # px^2: over the radius, the deviation by the size of pixels
+BLUR = 2.0  # grey levels over px: times the squared width of the edge and over the contrast
+LITTLE = 1e-6  # the least determinant: of a circle without rays
 
 
 def settle(pixels: Pixels, centres: Array, radii: Array) -> Ellipses:
@@ -102,6 +107,29 @@ def _all(blur: Array) -> Array:
     for k in range(1, blur.shape[1]):
         total += blur[:, k]
     return total
+
+
+def deviations(found: Ellipses, width: float) -> Array:
+    """Return the standard deviations (n,) in px of each coordinate of the centres; `width` is the edges'.
+
+    The covariance of a fit by weights w with residuals r is N^-1 V N^-1 with N = sum w x x' and V =
+    sum w^2 r^2 x x' (White 1980), times a factor for neighbouring rays, which see the same pixels. What the
+    residuals do not show is added by its measured size: rays that agree on something beside the circle, the
+    pixels' size, and noise on blurred edges, which is the same along many rays.
+    """
+    result, radii, light = np.empty(len(found.weights)), radii_of(found.shapes), contrasts(found)
+    for k in range(len(result)):
+        n, v, s = found.scatter[:3, k], found.scatter[3:, k], found.shapes[k]
+        area = max(n[0] * n[2] - n[1] * n[1], LITTLE)
+        spread = 0.0
+        for i in range(2):  # the rows of the shape times N^-1 = [[n2, -n1], [-n1, n0]] / area
+            p = (s[i, 0] * n[2] - s[i, 1] * n[1]) / area
+            q = (s[i, 1] * n[0] - s[i, 0] * n[1]) / area
+            spread += p * p * v[0] + 2 * p * q * v[1] + q * q * v[2]
+        apart = APART * (1 - found.weights[k]) * (1 - found.weights[k])
+        small, blurred = SMALL / radii[k], BLUR * width * width / max(light[k], 1.0)
+        result[k] = math.sqrt(NEIGHBOURS * spread / 2 + apart * apart + small * small + blurred * blurred)
+    return result
 
 
 def symmetry(found: Ellipses) -> Array:

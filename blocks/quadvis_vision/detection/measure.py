@@ -7,7 +7,7 @@ import numpy as np
 from quadvis.native.functions import native
 from quadvis_vision.detection.approach import approach
 from quadvis_vision.detection.lanes import Array, Ellipses, Pixels, radii_of
-from quadvis_vision.detection.looks import contrasts, edge_width, settle, sharpen, symmetry
+from quadvis_vision.detection.looks import contrasts, deviations, edge_width, settle, sharpen, symmetry
 
 CONTRAST_MIN = 10.0  # grey levels between circle and ceiling, as a distance of colours
 GROWTH_MAX = 2.0  # of a circle against its expected radius
@@ -17,12 +17,12 @@ JUMP = 0.3  # of a radius: after a larger movement of the target the rough place
 
 UNKNOWN = 1e-3  # grey levels: a contrast that nothing falls short of
 
-COLUMNS = 11
+COLUMNS = 12
 """Of a row: whether a circle is there; u, v and radius in px; colour over the ceiling's, blue, green, red;
-real and imaginary part of the bend; symmetry; width of the edge in px. See `Disc`."""
+real and imaginary part of the bend; symmetry; width of the edge and sigma of the centre in px. See `Disc`."""
 
 
-@native(takes=("uint8[h,w,3]", "float64[n,3]"), gives=("float64[n,11]",))
+@native(takes=("uint8[h,w,3]", "float64[n,3]"), gives=("float64[n,12]",))
 def located(pixels: Pixels, guesses: Array) -> Array:
     """Return the circles (n, COLUMNS) near guesses (n, 3) of u, v and radius, wrong by half a radius."""
     expected = guesses[:, 2].copy()
@@ -31,14 +31,14 @@ def located(pixels: Pixels, guesses: Array) -> Array:
     return _rows(pixels, found, expected, edge_width(found))
 
 
-@native(takes=("uint8[h,w,3]", "float64[n,2]", "float64[n,2,2]", "float64"), gives=("float64[n,11]",))
+@native(takes=("uint8[h,w,3]", "float64[n,2]", "float64[n,2,2]", "float64"), gives=("float64[n,12]",))
 def remeasured(pixels: Pixels, centres: Array, shapes: Array, width: float) -> Array:
     """Return circles (n, COLUMNS) measured once more, with `shapes` in px and edges of a known width."""
     found, width, _ = sharpen(pixels, centres, shapes, width, np.full(len(centres), UNKNOWN))
     return _rows(pixels, found, radii_of(shapes), width)
 
 
-@native(takes=("uint8[h,w,3]", "float64[4,6]", "float64[4,2,2]"), gives=("float64[4,11]", "float64"))
+@native(takes=("uint8[h,w,3]", "float64[4,6]", "float64[4,2,2]"), gives=("float64[4,12]", "float64"))
 def followed(pixels: Pixels, places: Array, shapes: Array) -> tuple[Array, float]:
     """Return what is near the `places` (4, 6) of a `Detection`, measured as ellipses of these shapes.
 
@@ -61,6 +61,7 @@ def _rows(pixels: Pixels, found: Ellipses, expected: Array, width: float) -> Arr
     """Return the rows of ellipses; none is there that is no circle near the expected radii, or is cut."""
     height, wide, _ = pixels.shape
     sizes, lights, whole = radii_of(found.shapes), contrasts(found), symmetry(found)
+    sigmas = deviations(found, width)
     rows = np.empty((len(expected), COLUMNS))
     for k in range(len(expected)):
         u, v, size = found.centres[k, 0], found.centres[k, 1], sizes[k]
@@ -82,7 +83,8 @@ def _rows(pixels: Pixels, found: Ellipses, expected: Array, width: float) -> Arr
         rows[k, 1], rows[k, 2], rows[k, 3] = u, v, size
         for channel in range(3):
             rows[k, 4 + channel] = found.paints[channel, k] / max(found.lights[channel, k], 1.0)
-        rows[k, 7], rows[k, 8], rows[k, 9], rows[k, 10] = real, imaginary, whole[k], width
+        rows[k, 7], rows[k, 8], rows[k, 9] = real, imaginary, whole[k]
+        rows[k, 10], rows[k, 11] = width, sigmas[k]
     return rows
 
 

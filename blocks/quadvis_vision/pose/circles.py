@@ -27,10 +27,10 @@ class Circle(NamedTuple):
     weights: Slopes
 
 
-def seen_circles(centres: Any, camera: Pinhole, side: float, sigma: float) -> list[Circle]:
+def seen_circles(centres: Any, camera: Pinhole, side: float, sigma: Any) -> list[Circle]:
     """Return the circles of which centres (4, 2) in px are known and belong to a ray, in their order.
 
-    `sigma` (px) is the standard deviation of a coordinate.
+    `sigma` (4,) in px are the standard deviations of their coordinates.
     """
     found = []
     for index in range(4):
@@ -38,7 +38,8 @@ def seen_circles(centres: Any, camera: Pinhole, side: float, sigma: float) -> li
         x, y = normalised(camera, u, v)
         if math.isfinite(x) and math.isfinite(y):
             a, b, c, d = pixel_slopes(camera, x, y)
-            weights = (a / sigma, b / sigma, c / sigma, d / sigma)
+            s = float(sigma[index])
+            weights = (a / s, b / s, c / s, d / s)
             forward, right = CORNERS[index]
             found.append(Circle(u, v, x, y, side * forward, side * right, weights))
     return found

@@ -307,6 +307,8 @@ def test_a_circle_that_is_hidden_in_part_is_reported_missing():
     assert seen.status[0] == 1 and not seen.found[0]
     assert np.isnan(seen.centres[0, 1]).all() and seen.quality[0, 1] < 0.9
     assert rms(seen.centres[0, [0, 2, 3]], truth[[0, 2, 3]]) < 0.07
+    assert (np.isnan(seen.sigma[0]) == [False, True, False, False]).all()
+    assert (np.hypot(*(seen.centres[0] - truth)[[0, 2, 3]].T) < 4 * seen.sigma[0, [0, 2, 3]]).all()
 
 
 def test_a_picture_of_another_size_than_the_calibration_is_refused_and_the_next_one_is_seen():

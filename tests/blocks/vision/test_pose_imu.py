@@ -66,9 +66,10 @@ def only(image, rows):
     return left
 
 
-def solve(image, roll, pitch, **parameters):
+def solve(image, roll, pitch, sigma=(math.nan,) * 4, **parameters):
     block = PoseImu(**{"calibration": CAMERA, **parameters})
-    return drive(block, centres=np.array(image)[None], imu_roll=[roll], imu_pitch=[pitch], rate="10 Hz")
+    circles = {"centres": np.array(image)[None], "sigma": np.array(sigma)[None]}
+    return drive(block, **circles, imu_roll=[roll], imu_pitch=[pitch], rate="10 Hz")
 
 
 def check_pose(seen, pose, tolerance):
@@ -201,7 +202,7 @@ def test_a_target_below_the_craft_gives_no_pose(mode):
 def test_nothing_raises_an_error_and_every_pose_is_whole(image, tilt, mode):
     block = PoseImu(calibration=CAMERA, mode=mode)
     block.open()
-    *numbers, residual, valid, covariance, status = block.output(image, *tilt)
+    *numbers, residual, valid, covariance, status = block.output(image, *tilt, np.full(4, math.nan))
     assert valid == (status < 3)
     for number in (*numbers, residual, covariance):
         assert np.isfinite(number).all() if valid else np.isnan(number).all()
@@ -273,6 +274,23 @@ def test_the_covariance_grows_with_both_sigmas(mode):
     )
 
 
+@pytest.mark.parametrize("mode", MODES)
+def test_circles_may_each_have_a_sigma_of_their_own(mode):
+    pose = (0.3, -0.2, 4.0, 0.1, 0.05, -2.0)
+    image = centres(pose) + np.random.default_rng(6).normal(0, 0.3, (4, 2))
+    one = solve(image, *pose[3:5], mode=mode, pixel_sigma=0.4)
+    same = solve(image, *pose[3:5], mode=mode, sigma=(0.4, 0.4, math.nan, 0.4), pixel_sigma=0.4)
+    assert (same.position == one.position).all() and (same.covariance == one.covariance).all()
+    missing = solve(only(image, (0, 1, 3)), *pose[3:5], mode=mode).covariance[0]
+    worse = solve(image, *pose[3:5], mode=mode, sigma=(0.2, 0.2, math.inf, 0.2))
+    if mode == "map":  # level takes all circles alike
+        assert worse.covariance[0] == pytest.approx(missing, rel=0.02)
+        three = solve(only(image, (0, 1, 3)), *pose[3:5], mode=mode)
+        assert worse.position == pytest.approx(three.position, abs=1e-4)
+    else:
+        assert np.trace(worse.covariance[0]) > np.trace(missing)
+
+
 def test_the_residual_is_the_rms_distance_of_the_circles_that_are_seen():
     pose = (0.2, 0.1, 3.0, 0.05, -0.1, 0.4)
     image = only(centres(pose) + np.random.default_rng(5).normal(0, 0.7, (4, 2)), (0, 1, 3))
@@ -308,7 +326,7 @@ def test_from_pictures_and_the_true_tilt_it_finds_the_craft_better_than_the_pape
     truth = position * (1, 1, -1) + (0, 0, ceiling)
 
     def error(block):
-        wanted = {name: inputs[name] for name in block.interface.inputs}
+        wanted = {name: inputs[name] for name in block.interface.inputs if name in inputs}
         found = drive(block, rate="10 Hz", **wanted)
         assert found.valid.all()
         return np.sqrt(((found.position - truth)[:, :2] ** 2).sum(axis=1).mean())
