@@ -71,7 +71,8 @@ def choose(
             raise QuadvisError("the engine 'native' needs the package numba; install it, or choose 'python'")
         return Choice(PYTHON, "since numba is not installed")
     program, blocks = engine.program, [node.block for node in engine.graph.nodes]
-    saved = _saved(program, blocks, ticks)
+    seen = _seen(program, blocks, ticks)
+    saved = seen + _saved(program, blocks, ticks)
     if wanted == AUTO and saved < START and not paced:
         return Choice(PYTHON, SHORT)
     from quadvis.native.functions import load, prepare
@@ -82,6 +83,8 @@ def choose(
     missing = library().missing(kinds)
     rooms = {block.functions: type(block).__name__ for block in blocks if block.functions}
     absent = [name for functions, name in rooms.items() if not load(functions)]
+    if wanted == AUTO and seen < COMPILE_FUNCTIONS * len(absent):
+        absent, saved = [], saved - seen  # they stay interpreted
     compiled = COMPILE * len(missing) + COMPILE_FUNCTIONS * len(absent)
     cost = START + LOAD * (len(kinds) + len(rooms)) + (COMPILER + compiled if compiled else 0.0)
     which = " and ".join(
@@ -99,8 +102,9 @@ def choose(
     if which and announce:
         announce(f"compiling {which}, once: about {cost:.0f} s")
     library().prepare(kinds, announce)
-    for functions in rooms:
-        prepare(functions)
+    for functions, name in rooms.items():
+        if name in absent:
+            prepare(functions)
     refused = {kind.block.__name__: library().refusals[kind] for kind in kinds if kind in library().refusals}
     names = ", ".join(f"{name} ({why})" for name, why in refused.items())
     return Choice(NATIVE, f"but interpreted: {names}" if names else "", types)
@@ -115,13 +119,21 @@ def _saved(program: Program, blocks: Sequence[Block], ticks: int) -> float:
             for ops in (task.delays, task.latches, *task.phases.values())
             for op in ops
         )
-        looks = sum(bool(blocks[op.block].functions) for op in task.phases.get("output", ()))
-        found += (CALL * calls + LOOK * looks) * max(0, ticks - task.offset) / task.every
+        found += CALL * calls * max(0, ticks - task.offset) / task.every
     if program.states:
         stages = len(TABLEAUS[program.solver].nodes)
         calls = len(program.derivatives) + len(program.minor)
         found += ticks * stages * (STAGE + CALL * calls)
     return found
+
+
+def _seen(program: Program, blocks: Sequence[Block], ticks: int) -> float:
+    """Return how many seconds the machine code of blocks' functions saves in a run."""
+    return sum(
+        LOOK * bool(blocks[op.block].functions) * max(0, ticks - task.offset) / task.every
+        for task in program.tasks
+        for op in task.phases["output"]
+    )
 
 
 def use(engine: Engine, choice: Choice, clock: MachineClock | None = None) -> None:

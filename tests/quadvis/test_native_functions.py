@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from quadvis.block import Block, In, Out
 from quadvis.native import cache
 from quadvis.native.functions import compiled_as, load, native, prepare
+from quadvis.testing import drive
 
 
 def total_by_loops(values):
@@ -70,3 +72,20 @@ def test_kinds_are_declared_rightly():
         native(takes=("float[n]",), gives=())(total_by_loops)
     with pytest.raises(ValueError, match="gives sizes that it does not take"):
         native(takes=("float64",), gives=("float64[n]",))(total_by_loops)
+
+
+class Looking(Block, numeric=False):
+    """A block that calls plain functions with machine code."""
+
+    functions = TOGETHER
+    u = In()
+    y = Out()
+
+    def output(self, u):
+        return inverse(np.array([u]))
+
+
+@pytest.mark.parametrize(("steps", "engine", "compiled"), [(9, "native", True), (9, "auto", False)])
+def test_a_run_by_machine_code_compiles_what_blocks_call_where_that_pays(fresh, steps, engine, compiled):
+    assert drive(Looking(), u=np.full(steps, 4.0), engine=engine, rate="10 Hz").y == pytest.approx(0.25)
+    assert inverse.is_native == compiled
