@@ -57,8 +57,10 @@ def test_machine_code_measures_the_same_to_the_bit_as_python():
                 strict=True,
             ):
                 compiled, interpreted = (each(pixels, *arguments) for each in (function, function.function))
-                for one, other in zip(*map(np.atleast_1d, (compiled, interpreted)), strict=True):
-                    assert (np.asarray(one) == np.asarray(other)).all()
+                one, other = (
+                    found if isinstance(found, tuple) else (found,) for found in (compiled, interpreted)
+                )
+                assert all((np.asarray(p) == np.asarray(q)).all() for p, q in zip(one, other, strict=True))
     finally:
         for function in NATIVE:
             function.bind(None)
