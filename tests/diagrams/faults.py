@@ -163,7 +163,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.diagrams.faults", description=__doc__)
     parser.add_argument("--pictures", action="store_true", help="render pictures, and let them fail")
     parser.add_argument("--places", nargs="+", choices=PLACES, default=[*PLACES])
-    parser.add_argument("--designs", nargs="+", choices=("paper", "fused"), default=["paper", "fused"])
+    parser.add_argument("--designs", nargs="+", choices=("paper", "robust"), default=["paper", "robust"])
     parser.add_argument("--kinds", nargs="+", choices=sorted({*OF_FRAMES, *OF_POINTS}))
     parser.add_argument("--seeds", default="1:5", metavar="FIRST:LAST")
     asked = parser.parse_args()

@@ -9,7 +9,7 @@ from tests.stages import mostly_slow
 
 from .faults import NO_TRUTH, OF_POINTS, POLICY, Flight, fly
 
-DESIGNS = (None, "fused")
+DESIGNS = (None, "robust")
 FEW = ("freeze", "alternate", "future_stamp", "lagging_stamp", "clock_restart", "turned", "outdated")
 
 
@@ -23,7 +23,7 @@ def check(flight: Flight, kind: str) -> None:
 
 @pytest.mark.parametrize("kind", mostly_slow(FEW, 2))
 def test_the_better_design_outlasts_three_seconds_of_a_faulty_camera(kind: str, tmp_path: Path) -> None:
-    flight = fly(tmp_path, "blackout", "fused", kind, seed=1, pictures=False)
+    flight = fly(tmp_path, "blackout", "robust", kind, seed=1, pictures=False)
     check(flight, kind)
     assert flight.back and flight.farthest < 1.5
 
@@ -33,6 +33,14 @@ def test_so_does_the_paper_s_with_pictures(kind: str, tmp_path: Path) -> None:
     flight = fly(tmp_path, "blackout", None, kind, seed=1, pictures=True)
     check(flight, kind)
     assert flight.back and flight.farthest < 1.5
+
+
+@pytest.mark.parametrize(("place", "kind", "seed"), [("takeover", "shifted", 5), ("descent", "shifted", 6)])
+def test_a_frame_of_another_place_after_a_gap_sets_no_speed(
+    place: str, kind: str, seed: int, tmp_path: Path
+) -> None:
+    flight = fly(tmp_path, place, "robust", kind, seed, pictures=False)
+    assert not flight.lost and flight.farthest < 1.5
 
 
 # One flight for each kind, and of few kinds one with each design, at one place after the other;

@@ -61,7 +61,8 @@ def test_the_papers_craft_is_the_default_of_the_blocks() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("craft", NAMES)
 @pytest.mark.parametrize(
-    ("name", "variant"), [("landing.yaml", "fused"), ("blackout.yaml", "fused"), ("takeover.yaml", "fused")]
+    ("name", "variant"),
+    [("landing.yaml", "robust"), ("blackout.yaml", "robust"), ("takeover.yaml", "robust")],
 )
 def test_every_craft_flies_under_the_failsafe(craft: str, name: str, variant: str) -> None:
     result = loaded(name, variant, CRAFTS / f"{craft}.yaml").run(engine="native")

@@ -39,7 +39,7 @@ def jumps(result: Any) -> np.ndarray:
     return np.abs(np.diff(controls, axis=0)) * changed
 
 
-@pytest.mark.parametrize("variant", mostly_slow([None, "fused"]))
+@pytest.mark.parametrize("variant", mostly_slow([None, "robust"]))
 def test_a_take_over_meets_what_its_diagram_expects(variant: str | None) -> None:
     assert fly("takeover", variant).passed  # tests/test_readmes.py flies all the others in the second stage
 
@@ -67,7 +67,7 @@ def test_a_blackout_of_eight_seconds_ends_softly_on_the_ground() -> None:
     assert result["supervision/landing.landed"][-1]
 
 
-@pytest.mark.parametrize("variant", mostly_slow([None, "fused"]))
+@pytest.mark.parametrize("variant", mostly_slow([None, "robust"]))
 def test_no_control_jumps_in_a_take_over_by_stick_or_by_switch(variant: str | None) -> None:
     found = jumps(fly("takeover", variant))
     assert found.max() == 0.0
@@ -151,7 +151,7 @@ def test_the_craft_outlasts_a_blackout_of_three_seconds_in_any_wind(seed: int) -
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2, 4))
 def test_the_better_design_outlasts_it_within_six_decimetres_of_its_target(seed: int) -> None:
-    result = fly("blackout", "fused", seed=seed)
+    result = fly("blackout", "robust", seed=seed)
     assert result.passed
     assert result["excursion.y"].max() <= 0.6
 
@@ -159,7 +159,7 @@ def test_the_better_design_outlasts_it_within_six_decimetres_of_its_target(seed:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(1, 3))
 def test_half_the_frames_keep_the_better_design_in_the_air(seed: int) -> None:
-    result = fly("blackout", "fused", seed=seed, settings={"eyes/camera.drop_rate": "0.5"})
+    result = fly("blackout", "robust", seed=seed, settings={"eyes/camera.drop_rate": "0.5"})
     assert result["excursion.y"].max() <= 0.6
     assert result["supervision/failsafe.mode"].max() <= 3  # AUTOMATIC and COAST
 
@@ -167,7 +167,7 @@ def test_half_the_frames_keep_the_better_design_in_the_air(seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 7, 9])
 def test_the_better_design_lands_after_eight_seconds_of_blackout_near_its_target(seed: int) -> None:
-    result = fly("landing", "fused_blackout", seed=seed)
+    result = fly("landing", "robust_blackout", seed=seed)
     assert result["craft/ground.impact"][-1] <= 0.35
     assert result["supervision/landing.landed"][-1]
     assert result["excursion.y"].max() <= 2.5  # seed 7 drifts 2.2 m
@@ -175,7 +175,7 @@ def test_the_better_design_lands_after_eight_seconds_of_blackout_near_its_target
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2, 4))
-@pytest.mark.parametrize("variant", [None, "blackout", "fused"])
+@pytest.mark.parametrize("variant", [None, "blackout", "robust"])
 def test_no_touch_down_is_harder_than_it_may_be(variant: str | None, seed: int) -> None:
     assert fly("landing", variant, seed)["craft/ground.impact"][-1] <= 0.35
 

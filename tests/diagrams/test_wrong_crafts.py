@@ -23,7 +23,7 @@ WRONG = [
     ("trajectory", None, {"craft/body.torque_bias": "[0 rad/s^2, 0 rad/s^2, 0.1 rad/s^2]"}, HEADING),
     ("blackout", None, {"pose.side": "1.1 m"}, HEIGHT),
     ("blackout", None, {"craft/body.lag": "250 ms"}, TORQUE),
-    ("landing", "fused", {"craft/body.mass": "0.6 kg"}, HEIGHT),
+    ("landing", "robust", {"craft/body.mass": "0.6 kg"}, HEIGHT),
     ("landing", None, {"craft/radio.delay": "80 ms"}, TORQUE),
     ("takeover", None, {"estimate.ceiling": "4.95 m"}, HEIGHT),
     ("takeover", None, {"craft/body.lag": "250 ms"}, "velocity"),

@@ -8,12 +8,15 @@ from typing import Any
 from quadvis.block import Block, In, Out, Param, saturated
 from quadvis_blocks._craft import GRAVITY, MASS
 
+LEAST = 0.5  # of the weight, which the thrust is taken to carry at least
+
 
 class Trim(Block):
     """Roll, pitch and upward force that balance a steady acceleration, such as that of wind.
 
-    ``roll = -atan(a_right / g)``, ``pitch = atan(a_forward / g)``, ``force = -m a_h``. Feed the angles to
-    ``angle_reference`` of `control.nested_saturation`, and the force to ``feedforward`` of
+    ``roll = -atan(a_right / (g - a_h))``, ``pitch = atan(a_forward / (g - a_h))``, ``force = -m a_h``: with
+    a disturbance a_h upwards, the thrust that tilts is m (g - a_h), here at least half of the weight. Feed
+    the angles to ``angle_reference`` of `control.nested_saturation`, and the force to ``feedforward`` of
     `control.altitude`. Each angle is held to ``tilt_limit``, so that a wrong estimate cannot tilt the craft
     further.
     """
@@ -33,8 +36,9 @@ class Trim(Block):
         cosine, sine = math.cos(heading), math.sin(heading)
         forward = cosine * float(acceleration[0]) + sine * float(acceleration[1])
         right = cosine * float(acceleration[1]) - sine * float(acceleration[0])
+        lift = max(self.gravity - float(acceleration[2]), LEAST * self.gravity)
         return (
-            saturated(-math.atan(right / self.gravity), self.tilt_limit),
-            saturated(math.atan(forward / self.gravity), self.tilt_limit),
+            saturated(-math.atan(right / lift), self.tilt_limit),
+            saturated(math.atan(forward / lift), self.tilt_limit),
             -self.mass * float(acceleration[2]),
         )

@@ -137,16 +137,17 @@ def place(ticks: Any, oldest: int, stamp: float) -> int:
 
 def filtered(
     chains: Any, past: Any, ticks: Any, oldest: int, now: Any, frames: Any, held: int, frame: Any,
-    model: Any, sigma: Any, gate: float, tolerance: float, strain: float, limit: float, trial: Any,
-    tried: Any, reset_after: float,
+    model: Any, sigma: Any, gate: float, tolerance: float, reach: Any, strain: float, limit: float,
+    trial: Any, tried: Any, reset_after: float,
 ) -> tuple[int, int, int, float, float]:  # fmt: skip
     """Compute the estimates at the tick `now`, before the frames of that tick, with a new frame if believed.
 
     `now` (4,) is the tick after those in `ticks`. The stamp of `frame` is NaN if there is no frame. A frame
-    is refused if it is beyond the gate, or if it raises `strain` above `limit`. Refused frames are tried on
-    separate estimates, `trial` (3, 9) with `tried` (3,). When the trial has agreed with the refused frames
-    for `reset_after`, its estimates replace the others. Where the ground may touch the craft, the strain is
-    zero while frames are believed, and a frame that is beyond the gate in height alone resets the height.
+    is refused if it is beyond the gate, out of `reach` (3,), or raises `strain` above `limit`. Refused frames
+    are tried on separate estimates, `trial` (3, 9) with `tried` (3,). When the trial has agreed with the
+    refused frames for `reset_after`, its estimates replace the others. Where the ground may touch the craft,
+    the strain is zero while frames are believed, and a frame that is beyond the gate in height alone resets
+    the height.
 
     `chains`, `past`, `frames`, `trial` and `tried` are changed in place. The result is the verdict on the
     frame, the number of frames held, the oldest tick in use, the squared innovation of the frame over its
@@ -165,6 +166,7 @@ def filtered(
             again(chains, past, ticks, first, now, stamp, frames, held, model, False)
             nis, level, beside, above = innovation(chains, frame, tolerance)
             low = is_low(chains, frame, model)
+            beside = beside if is_in_reach(chains, frame, frames, held, reach) else math.inf
             near = max(beside, above) <= gate * gate
             if near:  # the bound 2 limit: no single frame exceeds the limit
                 calm = low and math.isnan(tried[BEGUN])
@@ -227,6 +229,20 @@ def agree(
         begin(trial, frame[VALUE:VARIANCE], sigma, model[3:6])
         correct(trial, frame, model)
     tried[LAST], tried[STRAINED] = stamp, strain
+
+
+def is_in_reach(chains: Any, frame: Any, frames: Any, held: int, reach: Any) -> bool:
+    """Return whether reckoning from the newest believed frame can be as wrong as a frame says, in x and y.
+
+    `reach` (3,) are the greatest errors of position, velocity and acceleration. Before the first believed
+    frame, all frames are in reach.
+    """
+    if held == 0:
+        return True
+    elapsed = max(float(frame[STAMP] - frames[0, STAMP]), 0.0)
+    bound = reach[0] + (reach[1] + 0.5 * reach[2] * elapsed) * elapsed
+    away = max(abs(frame[VALUE] - chains[0, 0]), abs(frame[VALUE + 1] - chains[1, 0]))
+    return bool(away <= bound)
 
 
 def is_low(chains: Any, frame: Any, model: Any) -> bool:

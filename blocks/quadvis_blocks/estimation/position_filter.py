@@ -39,10 +39,15 @@ class PositionFilter(Block):
     refused.
 
     A frame counts if its stamp is news, or if its stamp goes back because the frame was overtaken on its way;
-    it needs ``valid`` and finite numbers. A frame is refused in two cases:
+    it needs ``valid`` and finite numbers. A frame is refused in three cases:
 
     - Along an axis, it is further from the expected position than ``gate`` standard deviations plus
       ``tolerance``, which allows for errors of the model.
+    - In x or y, it is further from the expected position than ``reach`` says that reckoning since the newest
+      believed frame can be wrong: by an error of position, velocity and acceleration. A model that follows
+      the frames closely has wide gates after a gap, and one wrong frame within them would set the velocity
+      and the disturbance. The reach is a second, closer model: it detects, while the other one holds the
+      craft. There is no reach by default.
     - The frame is nearer, but the strain rises above ``strain_limit``. The strain is the mean of the squared
       innovations of x and y over their variances, with a fading memory of some three frames. It is 2 when all
       is well. It rises at once when positions are not of the instants of their stamps, or contradict the
@@ -115,6 +120,10 @@ class PositionFilter(Block):
     )
     contact = Param(0.2, unit="m", tune=True, doc="height up to which the ground may touch the craft")
     tolerance = Param(0.0, unit="m", min=0.0, tune=True, doc="part of an innovation that the gate ignores")
+    reach = Param(
+        (math.inf, 0.0, 0.0), type="float64[3]", unit="m m/s m/s^2", min=0.0, tune=True,
+        doc="greatest errors of reckoning in x and y: of position, velocity and acceleration",
+    )  # fmt: skip
     reset_after = Param(1.0, unit="s", above=0.0, tune=True, doc="how long refused frames must agree")
     restart = Param(
         RESTART,
@@ -189,8 +198,8 @@ class PositionFilter(Block):
             frame = _frame(position, counts, valid, measured, self.noise)
             became, self.held_now, self.oldest_now, nis, self.strain_now = filtered(
                 self.chains, self.past_now, self.ticks, self.oldest, now, self.frames_now, self.held, frame,
-                model, self.initial_sigma, self.gate, self.tolerance, self.strain, self.strain_limit,
-                self.trial_now, self.tried_now, self.reset_after,
+                model, self.initial_sigma, self.gate, self.tolerance, self.reach, self.strain,
+                self.strain_limit, self.trial_now, self.tried_now, self.reset_after,
             )  # fmt: skip
             estimates[:] = self.chains
             latest(estimates, self.frames_now, self.held_now, time, model)

@@ -208,6 +208,41 @@ def test_a_tolerance_lets_pass_what_the_model_leaves_out() -> None:
     assert result.nis[60] > 25.0
 
 
+LOOSE: dict[str, Any] = {
+    "acceleration_noise": (0.5,) * 3, "wander": (1.0,) * 3, "noise": (1e-3,) * 3, "initial": (0.0, 0.0, 2.0),
+}  # fmt: skip
+
+
+def test_a_reach_refuses_after_a_gap_what_the_gate_of_a_loose_model_lets_pass() -> None:
+    times = STEP * np.arange(120)
+    position = np.where(times[:, None] < 3.5, [0.0, 0.0, 2.0], [0.4, 0.0, 2.0])
+    stamp = np.where((times >= 3.0) & (times < 3.5), 3.0 - STEP, times)  # no frames for half a second
+    believed = estimate(np.zeros(3), position, stamp, **LOOSE)
+    assert believed.refused[70] == 0 and believed.velocity[70, 0] > 0.5  # of a craft that stands
+    found = estimate(np.zeros(3), position, stamp, **LOOSE, reach=(0.2, 0.1, 0.3), reset_after=0.3)
+    assert found.refused[-1] == 6 and np.abs(found.estimate[:76, 0]).max() < 1e-9
+    assert found.estimate[76:] == pytest.approx(np.tile([0.4, 0.0, 2.0], (44, 1)), abs=1e-3)  # they agree
+    assert np.abs(found.velocity).max() < 0.01
+
+
+@pytest.mark.parametrize(("off", "refused"), [(0.24, 0), (0.25, 1)])
+def test_the_reach_grows_with_the_time_since_the_last_believed_frame(off: float, refused: int) -> None:
+    times = STEP * np.arange(60)
+    position = np.tile([0.0, 0.0, 2.0], (60, 1))
+    position[50, 1] = off
+    stamp = np.where((times > 2.0) & (times < 2.5), 2.0, times)
+    loose = {**LOOSE, "acceleration_noise": (5.0,) * 3}
+    found = estimate(np.zeros(3), position, stamp, **loose, reach=(0.1, 0.04, 1.0))  # 24.5 cm after 0.5 s
+    assert found.refused[50] == refused
+
+
+def test_before_the_first_frame_any_place_is_in_reach() -> None:
+    found = estimate(
+        np.zeros(3), np.tile([2.0, 0.0, 0.0], (5, 1)), STEP * np.arange(5), reach=(0.01, 0.0, 0.0)
+    )
+    assert found.refused[-1] == 0 and found.estimate[-1, 0] == pytest.approx(2.0, abs=0.1)
+
+
 def test_after_a_second_of_refusals_it_begins_anew_where_the_frames_are() -> None:
     times = STEP * np.arange(120)
     position = np.where(times[:, None] < 3.0, 0.0, [5.0, -5.0, 1.0])
