@@ -22,6 +22,7 @@ DESIGNS = {
     "integral": "integral",
     "fused": "fused_geometric",
     "robust": "robust_geometric",
+    "accelerometer": "accelerometer_geometric",
 }
 SETTLED, END = 40.0, 100.0  # s
 WATCHED = 10.0  # s before the end, in which every frame must show the target
@@ -131,7 +132,7 @@ def line(design: str, case: str, flights: list[Flight]) -> str:
     """Return a line of the table; its figures are those of the flights that were not lost."""
     kept = [flight for flight in flights if not flight.lost]
     lost = len(flights) - len(kept)
-    words = f"{design:9} {case:26} {lost:2} of {len(flights):2}"
+    words = f"{design:13} {case:26} {lost:2} of {len(flights):2}"
     if not kept:
         return words
     rms = 100 * np.sqrt(np.mean([flight.rms**2 for flight in kept]))
@@ -142,7 +143,7 @@ def line(design: str, case: str, flights: list[Flight]) -> str:
 
 def table(designs: Iterable[str], cases: Iterable[str], seeds: range, workers: int) -> None:
     """Print what becomes of every design and case."""
-    print(f"{'design':9} {'case':26} {'lost':8} {'rms of x, y':>12} {'greatest':>12} {'rms of h':>12}")
+    print(f"{'design':13} {'case':26} {'lost':8} {'rms of x, y':>12} {'greatest':>12} {'rms of h':>12}")
     with ProcessPoolExecutor(workers) as pool:
         for design in designs:
             for case in cases:

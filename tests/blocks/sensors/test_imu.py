@@ -11,7 +11,7 @@ from quadvis.block import ParameterError
 from quadvis.testing import Driven, drive
 from quadvis_blocks.sensors.imu import Imu
 
-QUIET = {"angle_noise": 0.0, "drift": 0.0, "rate_noise": 0.0}
+QUIET = {"angle_noise": 0.0, "drift": 0.0, "rate_noise": 0.0, "force_noise": 0.0, "force_drift": 0.0}
 ATTITUDE, RATES = np.array([0.1, -0.2, 3.0]), np.array([0.4, 0.5, -0.6])
 DEGREE = math.pi / 180
 
@@ -109,7 +109,7 @@ def test_random_signs_leave_the_noise_as_it_is() -> None:
 
 
 def test_yaw_is_not_measured_and_the_stamp_is_the_instant() -> None:
-    assert list(Imu.interface.outputs) == ["roll", "pitch", "gyro", "stamp"]
+    assert list(Imu.interface.outputs) == ["roll", "pitch", "gyro", "specific_force", "stamp"]
     assert measure(steps=3).stamp == pytest.approx([0.0, 0.01, 0.02])
 
 
@@ -161,3 +161,48 @@ def test_a_misaligned_unit_measures_about_its_own_axes(mount: Any, attitude: Any
     _, pitch, roll = (craft * unit).as_euler("ZYX")
     assert (result.roll[0], result.pitch[0]) == pytest.approx((roll, pitch), abs=1e-9)
     assert result.gyro[0] == pytest.approx(unit.inv().apply(RATES), abs=1e-12)
+
+
+def forces(steps: int = 200, **parameters: Any) -> np.ndarray:
+    """Specific forces of a craft that turns and is accelerated by (1, 2, 3) m/s^2 along x, y, h."""
+    times = 0.01 * np.arange(steps)[:, None]
+    attitude = np.array([0.1, -0.2, 3.0]) + times * np.array([0.2, -0.1, 0.5])
+    attitude[:, 2] = np.remainder(attitude[:, 2] + math.pi, 2 * math.pi) - math.pi
+    result = drive(
+        Imu(**parameters), attitude=attitude, rates=RATES, velocity=times * (1.0, 2.0, 3.0), rate="100 Hz"
+    )
+    return np.asarray(result.specific_force)
+
+
+def test_the_specific_force_is_the_acceleration_without_gravity_in_axes_of_the_craft() -> None:
+    found = forces(**QUIET)
+    middles = np.array([0.1, -0.2, 3.0]) + (0.01 * np.arange(1, 200) - 0.005)[:, None] * (0.2, -0.1, 0.5)
+    turns = Rotation.from_euler("ZYX", middles[:, ::-1])
+    assert found[1:] == pytest.approx(turns.inv().apply([1.0, 2.0, -3.0 - 9.81]), abs=1e-9)
+
+
+def test_a_craft_begins_at_rest_and_without_its_velocity_no_force_is_known() -> None:
+    first = forces(steps=1, **QUIET)[0]
+    start = Rotation.from_euler("ZYX", [3.0, -0.2, 0.1])
+    assert first == pytest.approx(start.inv().apply([0.0, 0.0, -9.81]))
+    assert np.isnan(measure(**QUIET).specific_force).all()
+
+
+def test_scale_delay_and_errors_reach_the_force_too() -> None:
+    plain, bias = forces(**QUIET), np.array([0.1, -0.2, 0.3])
+    assert forces(**QUIET, scale=1.3) == pytest.approx(1.3 * plain)
+    assert forces(**QUIET, delay=0.04)[10:] == pytest.approx(plain[6:-4])
+    assert forces(**QUIET, force_bias=tuple(bias)) == pytest.approx(plain + bias)
+    noise = forces(steps=10000, **{**QUIET, "force_noise": 0.1}) - forces(steps=10000, **QUIET)
+    assert noise.std(axis=0) == pytest.approx(np.full(3, 0.1), rel=4 / math.sqrt(2 * 10000))
+
+
+def test_signs_of_the_biases_of_the_force_leave_those_of_the_others_alone() -> None:
+    signs = {"bias_sign": "random", "rate_bias": (0.1, 0.1, 0.1), "angle_bias": (0.1, 0.1)}
+    plain = measure(**QUIET, **signs)
+    found = measure(**QUIET, **signs, force_bias=(0.5, 0.5, 0.5))
+    assert np.array_equal(plain.gyro, found.gyro) and np.array_equal(plain.roll, found.roll)
+    turned = forces(steps=2, **QUIET, bias_sign="random", force_bias=(0.5, 0.5, 0.5)) - forces(
+        steps=2, **QUIET
+    )
+    assert np.abs(turned) == pytest.approx(np.full((2, 3), 0.5))
