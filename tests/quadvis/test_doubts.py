@@ -91,7 +91,7 @@ FAST = "above half the rate of the block, 5 Hz; its samples are those of a slowe
                 "params: {size: 2 m}", "overload: {tasks: {fats: {max: 1}}}"
             ),
             "3:20",
-            "no block runs at the rate 'fats'",
+            "no block runs at the rate 'fats'; use 'c'",
         ),
         (WITH_PART, "part", "parameter 'other' is not used; write '$other' where it belongs"),
     ],
