@@ -106,6 +106,12 @@ class CrewClock(FakeClock):
                 self._change.notify_all()
             self.instant = max(self.instant, until)
 
+    def end(self) -> None:
+        """Let all steps end at once."""
+        with self._change:
+            self._until.clear()
+            self._change.notify_all()
+
     def _settle(self) -> None:
         """Wait until each task rests or is busy."""
         end = time.monotonic() + 30
@@ -161,12 +167,14 @@ class Paced:
 
     def _run_all(self, crew: Crew, ticks: int) -> None:
         """Run with threads; the clock goes on until all of them rest."""
+        assert isinstance(self._clock, CrewClock)
         crew.start(ticks)
         try:
             self.engine.run(ticks)
             self._clock.sleep(self.schedule.deadline(10 * ticks))
             self.pacer.conclude(crew.rest, ticks)
         finally:
+            self._clock.end()
             crew.leave()
 
     @property
