@@ -8,7 +8,7 @@ import numpy as np
 
 from quadvis.native.functions import compiled_as
 from quadvis_vision.detection.lanes import Array, Pixels, floor, middle, product, sampled, stepped, summed
-from quadvis_vision.detection.ray_loops import halved, ranked, sample, total
+from quadvis_vision.detection.loops import halved, ranked, sample, total
 
 _GRID = 11  # samples along an edge of the coarse window
 _WINDOW = 1.7  # half the edge of this window, in radii

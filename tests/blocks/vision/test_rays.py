@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from quadvis.native.functions import prepare
 from quadvis_vision.detection.approach import approach, approach_by_loops
 from quadvis_vision.detection.lanes import solved, summed
+from quadvis_vision.detection.loops import ranked
 from quadvis_vision.detection.measure import NATIVE
-from quadvis_vision.detection.ray_loops import look_by_loops, ranked
+from quadvis_vision.detection.ray_loops import look_by_loops
 from quadvis_vision.detection.rays import look
 from quadvis_vision.trials.scenes import CONDITIONS, shoot
 from tests.stages import mostly_slow
