@@ -16,7 +16,7 @@ import pytest
 from quadvis_vision.trials.scenes import CONDITIONS, draw_pose, homography
 
 PROGRAM = Path(__file__).parents[2] / "tools" / "bench_detector"
-SMALL = ("--size", "320x240", "--pictures", "1", "--rounds", "1")
+SMALL = ("--size", "320x240", "--pictures", "1", "--rounds", "1", "--interpreted")
 
 
 def run(*arguments, **environment):
