@@ -23,6 +23,7 @@ from quadvis.errors import UNKNOWN, Faults, Place, known
 from quadvis.graph.graph import MULTI, SINGLE, Constant, Node, Task, Wire
 from quadvis.graph.order import execution_order
 from quadvis.graph.tasking import with_transitions
+from quadvis.links.insertion import receivers_first
 
 _ANY_TASK = Task("unknown", Fraction(1))  # a node needs one; no check looks at it
 
@@ -89,7 +90,7 @@ class WireCheck:
         Routing(self.drafts, self.nodes, self.network, self.faults).run(links, whole, ages.shadows)
         if self.tasking == MULTI:
             with_transitions(self.nodes.values())
-        order, loops = execution_order(list(self.nodes.values()))
+        order, loops = execution_order(receivers_first(self.nodes.values()))
         for loop in loops:
             self._report_loop(loop)
         return order

@@ -32,6 +32,19 @@ def sender_path(link: str) -> str:
     return f"{link}/sender"
 
 
+def receivers_first(nodes: Iterable[Node]) -> list[Node]:
+    """Return nodes with the ends of links by their names, the receivers before all blocks.
+
+    So their places in the order of execution do not depend on the wires that are read first.
+    """
+    return sorted(nodes, key=_place)
+
+
+def _place(node: Node) -> tuple[int, str]:
+    places = {RECEIVER: 0, SENDER: 2}
+    return places.get(node.origin, 1), node.path if node.origin in places else ""
+
+
 def fastest(tasks: Iterable[Task]) -> Task:
     """Return the task in which a receiver runs, of those of its readers."""
     return min(tasks, key=rank)

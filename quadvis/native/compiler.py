@@ -9,12 +9,11 @@ from typing import Any
 
 from quadvis.engine.memory import packed
 from quadvis.machine.garbage import uncollected
-from quadvis.native.block_type import BlockType, MethodType
-from quadvis.native.block_type import Kind as SlotKind
+from quadvis.native.block_type import BlockType, Kind, MethodType
 from quadvis.native.cache import MachineCode
 from quadvis.native.checked import power, replacements
 from quadvis.native.foreign import intrinsics
-from quadvis.native.functions import LOOPS, Kind, NativeFunction
+from quadvis.native.functions import LOOPS, ArrayKind, NativeFunction
 from quadvis.native.machine_code import Compiled, Unlinkable, emit
 from quadvis.native.routine import ROUTINE, Routine, plain
 from quadvis.native.source import POWER, Unreadable, fingerprint, names_in, prepared
@@ -70,7 +69,7 @@ def _entry(function: NativeFunction, body: Any) -> Any:
     """Return the function of pointers that calls a plain function; the first has the sizes of the letters."""
     import numba
 
-    def read(name: str, kind: Kind) -> str:
+    def read(name: str, kind: ArrayKind) -> str:
         parts = [
             f"sizes[{function.letters.index(part)}]" if isinstance(part, str) else str(part)
             for part in kind.shape
@@ -215,7 +214,7 @@ def _hashable(value: Any) -> bool:
     return isinstance(value, types.ModuleType | types.BuiltinFunctionType | type)
 
 
-def _pointed(kind: SlotKind) -> Any:
+def _pointed(kind: Kind) -> Any:
     """Return numba's type for the target of a pointer; numba cannot store through pointers to bool."""
     import numba
 

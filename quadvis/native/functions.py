@@ -27,7 +27,7 @@ Dimensions = tuple[int | str, ...]
 
 
 @dataclass(frozen=True)
-class Kind:
+class ArrayKind:
     """An array: its scalar, and its shape by numbers and letters, which stand for the same in all kinds."""
 
     scalar: str
@@ -37,13 +37,13 @@ class Kind:
         return f"{self.scalar}[{','.join(map(str, self.shape))}]" if self.shape else self.scalar
 
     @staticmethod
-    def of(text: str) -> Kind:
+    def of(text: str) -> ArrayKind:
         """Read a kind, such as ``float64[n,3]``; ValueError if it is none."""
         match = KIND.fullmatch(text)
         if match is None:
             raise ValueError(f"'{text}' is no kind; write one such as 'float64[n,3]'")
         parts = match[2].split(",") if match[2] else []
-        return Kind(match[1], tuple(int(part) if part.isdigit() else part for part in parts))
+        return ArrayKind(match[1], tuple(int(part) if part.isdigit() else part for part in parts))
 
 
 class NativeFunction:
@@ -51,7 +51,7 @@ class NativeFunction:
 
     def __init__(self, function: types.FunctionType, takes: Sequence[str], gives: Sequence[str]) -> None:
         self.function = function
-        self.takes, self.gives = tuple(map(Kind.of, takes)), tuple(map(Kind.of, gives))
+        self.takes, self.gives = tuple(map(ArrayKind.of, takes)), tuple(map(ArrayKind.of, gives))
         self.letters = tuple(
             dict.fromkeys(part for kind in self.takes for part in kind.shape if isinstance(part, str))
         )
@@ -115,7 +115,7 @@ class _Call:
         known = dict(zip(function.letters, sizes, strict=True))
         self._call = ctypes.PYFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)(address)
 
-        def room(kind: Kind) -> NDArray[Any]:
+        def room(kind: ArrayKind) -> NDArray[Any]:
             shape = [part if isinstance(part, int) else known[part] for part in kind.shape]
             return np.empty(shape, kind.scalar)
 

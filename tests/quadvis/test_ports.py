@@ -99,7 +99,7 @@ def test_two_files_make_two_kinds_of_one_block(folder: Path) -> None:
         ("b: 2 m", "c: 2 m", "matrix has no input 'c'"),
         ("matrix.s", "matrix.t", "no output 't'"),
         ("model.json", "none.json", "none.json"),
-        (", with: {file: model.json}", "", "parameter 'file' is missing; give a text"),
+        (", with: {file: model.json}", "", "parameter 'file' is missing; give a path"),
     ],
 )
 def test_what_does_not_go_with_the_file_is_a_fault(
