@@ -103,7 +103,7 @@ def test_the_commands_of_the_readmes_are_found() -> None:
     assert {
         "run diagrams/hover.yaml",
         "run diagrams/hover.yaml --set 'bandwidth=1 rad/s'",
-        "run diagrams/landing.yaml --variant fused_blackout",
+        "run diagrams/landing.yaml --variant robust_blackout",
         "sweep diagrams/hover.yaml --variant geometric --over seed=0..29",
         "plot runs/hover.mcap",
     } <= typed

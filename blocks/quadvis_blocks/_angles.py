@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from quadvis_vision.camera.projection import body_rotation
+
 TURN = 2.0 * math.pi
 
 
@@ -17,16 +19,8 @@ def wrapped(angle: float) -> float:
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> Any:
-    """Return Rz(yaw) Ry(pitch) Rx(roll) (3, 3), from body axes (forward, right, down) to level axes."""
-    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
-    cy, sy = math.cos(yaw), math.sin(yaw)
-    return np.array(
-        (
-            (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
-            (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
-            (-sp, cp * sr, cp * cr),
-        )
-    )
+    """Return `body_rotation` as an array (3, 3), from body axes (forward, right, down) to level axes."""
+    return np.array(body_rotation(roll, pitch, yaw))
 
 
 def turned(turn: Any, vector: Any) -> Any:

@@ -28,21 +28,29 @@ def target_corners(side: float) -> Array:
     return np.array([[side * forward, side * right, 0.0] for forward, right in CORNERS])
 
 
-def camera_rotation(roll: float, pitch: float, yaw: float) -> Matrix:
-    """Return the rotation from target to camera axes of a craft with an attitude in rad.
+def body_rotation(roll: float, pitch: float, yaw: float) -> Matrix:
+    """Return Rz(yaw) Ry(pitch) Rx(roll), from body axes (forward, right, down) to level axes.
 
-    Right side down, nose up and clockwise from above are positive. The rotation from body axes (forward,
-    right, down) to target axes is Rz(yaw) Ry(pitch) Rx(roll). Right in the picture is forward, down in the
-    picture is left, and the optical axis points up: so this is diag(1, -1, -1) times its transpose.
+    Right side down, nose up and clockwise from above are positive; all angles are in rad.
     """
     cr, sr = math.cos(roll), math.sin(roll)
     cp, sp = math.cos(pitch), math.sin(pitch)
     cy, sy = math.cos(yaw), math.sin(yaw)
     return (
-        (cy * cp, sy * cp, -sp),
-        (sy * cr - cy * sp * sr, -sy * sp * sr - cy * cr, -cp * sr),
-        (-cy * sp * cr - sy * sr, cy * sr - sy * sp * cr, -cp * cr),
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, cp * sr, cp * cr),
     )
+
+
+def camera_rotation(roll: float, pitch: float, yaw: float) -> Matrix:
+    """Return the rotation from target to camera axes of a craft with an attitude in rad.
+
+    Target axes are level axes. Right in the picture is forward, down in the picture is left, and the optical
+    axis points up: so this is diag(1, -1, -1) times the transpose of `body_rotation`.
+    """
+    (fx, rx, dx), (fy, ry, dy), (fz, rz, dz) = body_rotation(roll, pitch, yaw)
+    return (fx, fy, fz), (-rx, -ry, -rz), (-dx, -dy, -dz)
 
 
 def camera_attitude(turn: Matrix) -> Vector:
