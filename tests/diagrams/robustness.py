@@ -154,7 +154,7 @@ def table(designs: Iterable[str], cases: Iterable[str], seeds: range, workers: i
 def main() -> None:
     """Fly what the command line says."""
     parser = argparse.ArgumentParser(prog="python -m tests.diagrams.robustness", description=__doc__)
-    parser.add_argument("--designs", nargs="+", choices=DESIGNS, default=["fused", "robust"])
+    parser.add_argument("--designs", nargs="+", choices=DESIGNS, default=["fused", "robust", "accelerometer"])
     parser.add_argument("--cases", nargs="+", choices=CASES, default=[*CASES])
     parser.add_argument("--seeds", default="1:20", metavar="FIRST:LAST")
     parser.add_argument("--workers", type=int, default=2)
