@@ -2,7 +2,7 @@
 
 A port is locked both ways before its line is touched: by ``flock``, which careful programs look at, and by
 TIOCEXCL, by which the system refuses everybody but root. pyserial opens a port by itself and sets its line in
-the same step, so it cannot keep that order.
+the same step, so it cannot keep that order; it finds the ports that there are.
 """
 
 from __future__ import annotations
@@ -14,9 +14,11 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from quadvis.errors import QuadvisError, quoted, sentence
+from quadvis.errors.words import on_one_line
 from quadvis.machine.files import reason
 
 PARITIES = ("none", "even", "odd")
+MOST = 1 << 16  # bytes at one reading: a flood must not hold up a loop
 BACKLOG = 4095  # bytes that the system keeps for a reader; what comes after these may have been lost
 CLOSEST = 0.03  # of the baud rate that was asked for; farther off no receiver follows
 
@@ -25,6 +27,9 @@ TCGETS2, TCSETS2 = 0x802C542A, 0x402C542B
 TERMIOS2 = struct.Struct("4IB19B2I")
 BOTHER, ANY_BAUD, INPUT_BAUD = 0o10000, 0o10017, 16
 TIOCNXCL = 0x540D
+# <linux/serial.h>: struct serial_struct, in 32-bit words.
+SERIAL_STRUCT, FLAGS, ASYNC_LOW_LATENCY = struct.Struct("18i"), 4, 1 << 13
+NAMED = 4  # ports at most in a message
 
 
 class PortError(QuadvisError):
@@ -63,7 +68,10 @@ class Line(NamedTuple):
 
 
 def open_port(path: str, line: Line) -> int:
-    """Open, lock and set up a port; return its descriptor. PortError in one sentence if that cannot be."""
+    """Open, lock and set up a port; return its descriptor. PortError in one sentence if that cannot be.
+
+    The driver is asked to hand bytes on at once; `has_low_latency` says whether it does.
+    """
     import termios
 
     try:
@@ -73,6 +81,7 @@ def open_port(path: str, line: Line) -> int:
     try:
         _lock(descriptor, path)
         set_line(descriptor, line)
+        _ask_low_latency(descriptor)
         termios.tcflush(descriptor, termios.TCIFLUSH)  # what came before is old
         _check_baud(descriptor, line, path)
     except BaseException:
@@ -110,20 +119,27 @@ def set_line(descriptor: int, line: Line) -> None:
             fcntl.ioctl(descriptor, termios.TIOCMBIS if high else termios.TIOCMBIC, struct.pack("I", bit))
 
 
+def has_low_latency(descriptor: int) -> bool:
+    """Return whether the driver hands bytes on at once; False of a pty."""
+    with suppress(OSError):
+        return bool(_serial_struct(descriptor)[FLAGS] & ASYNC_LOW_LATENCY)
+    return False
+
+
 def read_waiting(descriptor: int) -> bytes:
-    """Return all bytes that have come; PortError if the port is gone."""
-    found = []
-    while True:
+    """Return the bytes that have come, at most some 64 KiB; PortError if the port is gone."""
+    found = bytearray()
+    while len(found) < MOST:
         try:
-            piece = os.read(descriptor, 1 << 16)
+            piece = os.read(descriptor, MOST)
         except BlockingIOError:
             break
         except OSError as error:
             raise _gone(error) from error
         if not piece:
             raise _gone()
-        found.append(piece)
-    return b"".join(found)
+        found += piece
+    return bytes(found)
 
 
 def unsent(descriptor: int) -> int:
@@ -160,6 +176,23 @@ def _lock(descriptor: int, path: str) -> None:
     fcntl.ioctl(descriptor, termios.TIOCEXCL)
 
 
+def _ask_low_latency(descriptor: int) -> None:
+    import fcntl
+    import termios
+
+    with suppress(OSError):  # a driver that refuses
+        words = _serial_struct(descriptor)
+        words[FLAGS] |= ASYNC_LOW_LATENCY
+        fcntl.ioctl(descriptor, termios.TIOCSSERIAL, SERIAL_STRUCT.pack(*words))
+
+
+def _serial_struct(descriptor: int) -> list[int]:
+    import fcntl
+    import termios
+
+    return [*SERIAL_STRUCT.unpack(fcntl.ioctl(descriptor, termios.TIOCGSERIAL, bytes(SERIAL_STRUCT.size)))]
+
+
 def _check_baud(descriptor: int, line: Line, path: str) -> None:
     import fcntl
 
@@ -174,11 +207,27 @@ def _refused(path: str, error: OSError) -> PortError:
     if error.errno == errno.EBUSY:
         return _taken(path)
     if error.errno in (errno.ENOENT, errno.ENXIO, errno.ENODEV):
-        return PortError(f"{named} is missing; plug the device in, or give the path of another port")
+        remedy = f"plug the device in, or give the path of another port{_such_as()}"
+        return PortError(sentence(f"{named} is missing", remedy))
     if error.errno in (errno.EACCES, errno.EPERM):
         remedy = "on Debian the group 'dialout' may: `sudo adduser $USER dialout`"
         return PortError(sentence(f"{named} must not be opened by this user", remedy))
     return PortError(f"{named} cannot be opened: {reason(error)}")
+
+
+def _such_as() -> str:
+    """Return words that name the ports of this computer, those on USB first; none if it has none."""
+    from serial.tools.list_ports import comports
+
+    try:
+        ports = sorted(comports(), key=lambda port: (port.product is None, port.device))
+    except (OSError, TypeError, ValueError):  # an adapter was unplugged while it was looked at
+        return ""
+    named = [
+        quoted(port.device) + (f" ({on_one_line(port.product)})" if port.product else "")
+        for port in ports[:NAMED]
+    ]
+    return f", such as {', '.join(named)}" if named else ""
 
 
 def _gone(error: OSError | None = None) -> PortError:

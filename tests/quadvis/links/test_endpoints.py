@@ -122,7 +122,7 @@ def test_a_picture_that_is_too_large_stops_the_sender_in_a_sentence() -> None:
 
 def test_none_stays_open_if_one_end_cannot_be_opened() -> None:
     graph = network(made_link(SLOW, FAST), SLOW, FAST)
-    with pytest.raises(QuadvisError, match="cannot open the serial port"):
+    with pytest.raises(QuadvisError, match="port '/dev/none' is missing"):
         open_carriers(graph.part_of("near"), {"line": "/dev/none"})
 
 
