@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from typing import Any, Protocol
 
 from quadvis.errors import QuadvisError, sentence
-from quadvis.links.frame import Arrival, Decoder, encode
+from quadvis.links.frame import Decoder, encode
 from quadvis.links.link import MEMORY, SERIAL, Link
-from quadvis.links.mailbox import Mailbox
 from quadvis.links.serial_line import SerialLine
 from quadvis.links.udp import UdpSocket
+from quadvis.machine.mailbox import Arrival, Mailbox
 
 
 class Carrier(Protocol):
@@ -71,7 +71,7 @@ class MemoryCarrier:
                 f"link '{self._name}' has room for pictures of {height} x {width} px, and these are larger"
             )
             raise QuadvisError(sentence(problem, "declare the link with another 'room'"))
-        self._mailbox.put(stamp, payload)
+        self._mailbox.put(payload, stamp)
 
     def receive(self, before: int) -> Arrival | None:
         """Return the newest message from before an instant, if it is new."""

@@ -12,9 +12,9 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterator
-from typing import NamedTuple
 
 from quadvis.links.message import Message
+from quadvis.machine.mailbox import Arrival
 
 _HEAD, _CHECK = struct.Struct("<BHq"), struct.Struct("<I")
 OVERHEAD = _HEAD.size + _CHECK.size
@@ -22,13 +22,6 @@ END = b"\0"
 RUN = 254  # bytes without a zero that one code of COBS stands for
 COUNT = 1 << 16  # sequence numbers
 OVERTAKEN = 64  # by so many frames at most
-
-
-class Arrival(NamedTuple):
-    """What came over a carrier whole: when it was sent (ns of run time), and the message's bytes."""
-
-    stamp: int
-    payload: bytes
 
 
 def longest(message: Message) -> int:

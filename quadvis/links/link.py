@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from quadvis.links.frame import longest
-from quadvis.links.mailbox import Mailbox
 from quadvis.links.message import Message
+from quadvis.machine.mailbox import Mailbox
 
 MEMORY, SERIAL, UDP = CARRIERS = ("memory", "serial", "udp")
 BITS = 10  # of a byte on a serial line: a start bit, eight data bits, a stop bit

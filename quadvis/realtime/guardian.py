@@ -16,16 +16,18 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
 
+from quadvis.block.device import LONGEST
 from quadvis.diagram.sections.on_host_loss import SAFE
 from quadvis.machine.interrupts import leave_to_parent
+from quadvis.machine.mailbox import Mailbox
 from quadvis.machine.serial_port import PortError
 from quadvis.realtime.heartbeat import Heartbeat, Patience, Sign
 from quadvis.realtime.lives import Lives
 from quadvis.realtime.options import HIGHEST, RealTime
-from quadvis.realtime.outbox import Outbox
 from quadvis.realtime.outlet import Outlet, OutputPort
 from quadvis.realtime.schedule import NANOSECONDS
 from quadvis.realtime.system import Grants, ask_all
@@ -34,6 +36,8 @@ LONGEST_LOOK, SHORTEST_LOOK = 10_000_000, 1_000_000  # ns between two looks at t
 LOOKS = 8  # at a loop in the time that it is allowed to be silent
 FAREWELL = 3  # safe frames at least, before the ports are closed
 LAST = NANOSECONDS  # ns that these may take
+PLACES = 3  # of an outbox
+OUTBOX = Mailbox.size(LONGEST, PLACES)  # words
 
 
 class Standing(NamedTuple):
@@ -100,11 +104,11 @@ class Alarm:
     block: str = ""
 
 
-def outboxes(words: Any) -> list[Outbox]:
-    """Return the outboxes that words hold."""
+def outboxes(words: Any) -> list[Mailbox]:
+    """Return the outboxes that words hold: mailboxes for frames of at most ``LONGEST`` bytes."""
     view = memoryview(words).cast("B").cast("q")
-    starts = range(0, len(view) - len(view) % Outbox.SIZE, Outbox.SIZE)
-    return [Outbox(view[start : start + Outbox.SIZE]) for start in starts]
+    starts = range(0, len(view) - len(view) % OUTBOX, OUTBOX)
+    return [Mailbox(view[start : start + OUTBOX], LONGEST, PLACES) for start in starts]
 
 
 def looked(words: Any) -> Any:
@@ -114,7 +118,12 @@ def looked(words: Any) -> Any:
 
 def words_for(ports: int) -> int:
     """Return the number of words of the guardian of so many ports."""
-    return ports * Outbox.SIZE + 1
+    return ports * OUTBOX + 1
+
+
+def _newest_frame(box: Mailbox) -> bytes | None:
+    found = box.newest()
+    return found.payload if found is not None else None
 
 
 class Guardian:
@@ -123,7 +132,9 @@ class Guardian:
     def __init__(self, setup: GuardianSetup) -> None:
         self._setup, self._link = setup, setup.link
         boxes = outboxes(setup.words)
-        self._outlets = [Outlet(port, box.take) for port, box in zip(setup.ports, boxes, strict=True)]
+        self._outlets = [
+            Outlet(port, partial(_newest_frame, box)) for port, box in zip(setup.ports, boxes, strict=True)
+        ]
         self._looked = looked(setup.words)
         self._hearts = [Heartbeat(patience, time.monotonic_ns) for patience in setup.patiences]
         self._supervisor, self._applications = Lives(), Lives()

@@ -30,7 +30,7 @@ class OutputPort:
 class Outlet:
     """Sends frames to a port, one every interval on a grid of its own; PortError if the port is lost.
 
-    ``newest`` returns a frame that is newer than the one before, or None.
+    ``newest`` returns the newest frame; None before the first one, or if it cannot be read now.
     """
 
     def __init__(self, port: OutputPort, newest: Callable[[], bytes | None]) -> None:

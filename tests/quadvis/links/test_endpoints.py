@@ -16,8 +16,8 @@ from quadvis.graph.graph import Graph, Task
 from quadvis.links.carriers import open_sender
 from quadvis.links.endpoints import close_all, links_of, live, open_carriers
 from quadvis.links.link import MEMORY, UDP, Link
-from quadvis.links.mailbox import Mailbox
 from quadvis.links.udp import UdpSocket
+from quadvis.machine.mailbox import Mailbox
 
 from .networks import PORTS, film, made_link, network, task
 

@@ -6,7 +6,7 @@ All numbers of a record are the stamp, so a reader sees whether they belong toge
 import mmap
 import sys
 
-from quadvis.links.mailbox import Mailbox
+from quadvis.machine.mailbox import Mailbox
 
 
 def main() -> None:
@@ -14,11 +14,11 @@ def main() -> None:
     with open(path, "r+b") as file:
         words = mmap.mmap(file.fileno(), 0)
         box = Mailbox(words, room, count)
-        found = box.newest(2**62, -1)
+        found = box.newest()
         stamp = found.stamp if found is not None else 0
         while True:
             stamp += 1
-            box.put(stamp, stamp.to_bytes(8, "little") * (room // 8))
+            box.put(stamp.to_bytes(8, "little") * (room // 8), stamp)
 
 
 if __name__ == "__main__":
