@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -23,7 +24,8 @@ def choices(rounds: int, options: Sequence[str] = ("--log", "")) -> Iterator[Row
         folder = Path(environment["PYTHONPYCACHEPREFIX"], "diagrams")
         shutil.copytree(ROOT / "diagrams", folder)  # some diagrams write files beside themselves
         for path in sorted(folder.glob("*.yaml")):
-            for variant in ("", *yaml.safe_load(path.read_text()).get("variants", {})):
+            variants = yaml.safe_load(path.read_text()).get("variants", {})
+            for variant in ("", *(name for name in variants if not _has_ports(variants[name]))):
                 of = ("--variant", variant) if variant else ()
                 command = (*QUADVIS, "run", str(path), *of, *options, "--engine")
                 works: dict[str, Callable[[], float]] = {
@@ -36,3 +38,8 @@ def choices(rounds: int, options: Sequence[str] = ("--log", "")) -> Iterator[Row
                 name = f"{path.name}, {variant}" if variant else path.name
                 what = f"{name}: interpreted {python:.2f} s, machine code {native:.2f} s"
                 yield Row(what, auto - min(python, native), "s of CPU", None, "<= 0.3")
+
+
+def _has_ports(variant: Mapping[str, Any]) -> bool:
+    """Return whether blocks of a variant reach a port, which only a real-time run may do."""
+    return any("port" in block.get("with", {}) for block in variant.get("slots", {}).values())
