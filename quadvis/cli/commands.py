@@ -18,6 +18,7 @@ from quadvis.machine.garbage import collected_from_now_on
 from quadvis.machine.shipped import PREFIX, named_file
 
 if TYPE_CHECKING:
+    from quadvis.diagram.diagram import Diagram
     from quadvis.graph.graph import Graph
     from quadvis.library.catalogue import Catalogue, OwnBlocks
     from quadvis.realtime.options import RealTime
@@ -167,6 +168,19 @@ def _hold_ups(graph: Graph) -> list[str]:
     return [line for name in graph.computers for line in hold_ups(graph.part_of(name), python)]
 
 
+def _places(diagram: Diagram, options: argparse.Namespace) -> list[str]:
+    """Return what the variants of a diagram with computers share."""
+    from quadvis.diff.places import shared_blocks
+    from quadvis.diff.sides import read_side
+
+    if options.variant or diagram.graph.computers == ("",) or len(diagram.variants) < 2:
+        return []
+    own = _own_blocks(options)
+    return [
+        str(shared_blocks({name: read_side(options.file, name, own).sections for name in diagram.variants}))
+    ]
+
+
 def check(options: argparse.Namespace) -> int:
     """Report all faults of a diagram; 2 if any are found."""
     from quadvis.analysis.ages import worst_ages
@@ -197,6 +211,7 @@ def check(options: argparse.Namespace) -> int:
         print(f"{options.file}: {count} blocks in {tasks}: no fault")
         lines = [*(f"link {name}: {facts}" for name, facts in links.items()), *map(str, ages)]
         lines += _hold_ups(diagram.graph)
+        lines += _places(diagram, options)
         print("".join(f"  {line}\n" for line in lines), end="")
     return 0
 

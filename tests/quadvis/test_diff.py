@@ -14,6 +14,7 @@ from quadvis import read_log
 from quadvis.cli import main
 from quadvis.diff.changes import compare_diagrams
 from quadvis.diff.difference import diff
+from quadvis.diff.places import shared_blocks
 from quadvis.diff.report import DiffReport
 from quadvis.diff.texts import changed_texts, value_text
 from quadvis.errors import QuadvisError
@@ -235,3 +236,15 @@ def test_a_port_called_value_is_a_wire() -> None:
     ]
     ((block,),) = [compare_diagrams(*sides).blocks]
     assert [(change.name, change.old, change.new) for change in block.changes] == [("in.value", "a.y", "b.y")]
+
+
+def test_a_block_that_reads_another_one_in_the_place_of_one_that_differs_is_the_same() -> None:
+    desk = {"a": {"block": "x", "in": {"u": "slot.y"}}, "b": {"block": "x", "in": {"u": "a.y"}},
+            "slot": {"block": "p"}}  # fmt: skip
+    bench = {"a": {"block": "x", "in": {"u": "slot/inner.z"}}, "b": {"block": "x", "in": {"u": "a.y"}},
+             "slot/inner": {"block": "q"}}  # fmt: skip
+    found = shared_blocks({"desk": {"blocks": desk}, "bench": {"blocks": bench, "rates": {"r": "1 Hz"}}})
+    assert (found.differing, found.sections, found.same) == (("slot",), ("rates",), 2)
+    moved = desk | {"b": {"block": "x", "in": {"u": "slot.y"}}}
+    found = shared_blocks({"desk": {"blocks": desk}, "bench": {"blocks": moved}})
+    assert (found.differing, found.same) == (("b",), 2)
