@@ -52,6 +52,7 @@ class GeometricCamera(DeliveringCamera, Block):
     attitude = In("float64[3]", unit="rad", doc="roll, pitch, yaw")
     centres = Out("float64[4,2]", unit="px", nan=True, doc="u, v of circles 1 to 4; NaN rows are missing")
     quality = Out("float64[4]", nan=True, doc="1 for a circle that is seen")
+    sigma = Out("float64[4]", unit="px", nan=True, doc="noise of u and of v, NaN for a missing circle")
     status = Out("int64", doc="0, 1, 2: four, three, two circles; 3: target not found; 5: nothing yet")
     found = Out("bool", doc="whether all four circles are found")
     lost = Out("bool", doc="whether a new measurement has no target")
@@ -100,19 +101,19 @@ class GeometricCamera(DeliveringCamera, Block):
         deliver(self, time)
         sequence = int(self.wire[SEQUENCE])
         fresh = sequence != self.last_sequence
-        centres, quality = np.full((4, 2), math.nan), np.full(4, math.nan)
+        centres, quality, sigma = np.full((4, 2), math.nan), np.full(4, math.nan), np.full(4, math.nan)
         if sequence == 0:
-            return centres, quality, STALE, False, False, math.nan, 0, False, False
+            return centres, quality, sigma, STALE, False, False, math.nan, 0, False, False
         count = 0
         for corner in range(4):
             u, v = float(self.wire[CONTENT + 2 * corner]), float(self.wire[CONTENT + 2 * corner + 1])
             if math.isfinite(u):
                 centres[corner, 0], centres[corner, 1] = u, v
-                quality[corner] = 1.0
+                quality[corner], sigma[corner] = 1.0, self.noise
                 count += 1
         status = 4 - count if count >= 2 else NOT_FOUND
-        lost = fresh and status > TWO_CIRCLES
-        return centres, quality, status, status == 0, lost, float(self.wire[STAMP]), sequence, fresh, False
+        lost, stamp = fresh and status > TWO_CIRCLES, float(self.wire[STAMP])
+        return centres, quality, sigma, status, status == 0, lost, stamp, sequence, fresh, False
 
     def update(self, time: float) -> None:
         """Keep the measurement of this tick, and the measurements that have arrived."""
