@@ -143,7 +143,8 @@ def filtered(
     """Compute the estimates at the tick `now`, before the frames of that tick, with a new frame if believed.
 
     `now` (4,) is the tick after those in `ticks`. The stamp of `frame` is NaN if there is no frame. A frame
-    is refused if it is beyond the gate, out of `reach` (3,), or raises `strain` above `limit`. Refused frames
+    is refused if it is beyond the gate, out of `reach` (3,), or raises `strain` above `limit`. Out of
+    reach, it is first tried without the newest believed frame, which it may replace. Refused frames
     are tried on separate estimates, `trial` (3, 9) with `tried` (3,). When the trial has agreed with the
     refused frames for `reset_after`, its estimates replace the others. Where the ground may touch the craft,
     the strain is zero while frames are believed, and a frame that is beyond the gate in height alone resets
@@ -166,12 +167,20 @@ def filtered(
             again(chains, past, ticks, first, now, stamp, frames, held, model, False)
             nis, level, beside, above = innovation(chains, frame, tolerance)
             low = is_low(chains, frame, model)
-            beside = beside if is_in_reach(chains, frame, frames, held, reach) else math.inf
+            in_reach = is_in_reach(chains, frame, frames, held, reach)
+            beside = beside if in_reach else math.inf
             near = max(beside, above) <= gate * gate
             if near:  # the bound 2 limit: no single frame exceeds the limit
                 calm = low and math.isnan(tried[BEGUN])
                 strain += -strain if calm else STRAIN * (min(level, 2.0 * limit) - strain)
             verdict = TAKEN if near and strain <= limit else REFUSED
+            if not in_reach:
+                found = fits_without_newest(
+                    past, ticks, oldest, now, frames, held, frame, model, gate, tolerance, reach
+                )
+                if found >= 0:
+                    frames[: held - 1] = frames[1:held].copy()
+                    first, held, verdict = found, held - 1, TAKEN
             grounded = verdict == REFUSED and low and beside <= gate * gate
             if verdict == REFUSED:
                 start[:] = trial
@@ -195,6 +204,27 @@ def filtered(
         held = insert(frames, held, frame, float(ticks[oldest, 0]))
     again(chains, past, ticks, first, now, float(now[0]), frames, held, model, True)
     return verdict, held, oldest, nis, strain
+
+
+def fits_without_newest(
+    past: Any, ticks: Any, oldest: int, now: Any, frames: Any, held: int, frame: Any, model: Any, gate: float,
+    tolerance: float, reach: Any,
+) -> int:  # fmt: skip
+    """Return the tick of the newest believed frame if a refused one fits without it; else -1.
+
+    Of two frames that contradict each other either may be wrong. The one that contradicts the frames before
+    is dropped, since one wrong frame sets the velocity where the model follows the frames closely.
+    """
+    if held < 2 or not frames[0, STAMP] < frame[STAMP]:
+        return -1
+    back = place(ticks, oldest, float(frames[0, STAMP]))
+    if back < 0:
+        return -1
+    chains = past[back].copy()
+    again(chains, past, ticks, back, now, float(frame[STAMP]), frames[1:], held - 1, model, False)
+    _, _, beside, above = innovation(chains, frame, tolerance)
+    fits = max(beside, above) <= gate * gate
+    return back if fits and is_in_reach(chains, frame, frames, held, reach) else -1
 
 
 def agree(

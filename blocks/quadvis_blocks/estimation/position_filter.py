@@ -47,7 +47,8 @@ class PositionFilter(Block):
       believed frame can be wrong: by an error of position, velocity and acceleration. A model that follows
       the frames closely has wide gates after a gap, and one wrong frame within them would set the velocity
       and the disturbance. The reach is a second, closer model: it detects, while the other one holds the
-      craft. There is no reach by default.
+      craft. The newest believed frame may as well be the wrong one: a frame that fits without that one
+      counts in its place. There is no reach by default.
     - The frame is nearer, but the strain rises above ``strain_limit``. The strain is the mean of the squared
       innovations of x and y over their variances, with a fading memory of some three frames. It is 2 when all
       is well. It rises at once when positions are not of the instants of their stamps, or contradict the

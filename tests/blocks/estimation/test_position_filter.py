@@ -225,6 +225,15 @@ def test_a_reach_refuses_after_a_gap_what_the_gate_of_a_loose_model_lets_pass() 
     assert np.abs(found.velocity).max() < 0.01
 
 
+def test_a_believed_frame_that_the_next_contradicts_is_dropped_with_the_speed_that_it_set() -> None:
+    times = STEP * np.arange(80)
+    position = np.tile([0.0, 0.0, 2.0], (80, 1))
+    position[60, 0] = 0.08
+    found = estimate(np.zeros(3), position, times, **LOOSE, tolerance=0.1, reach=(0.08, 0.1, 0.3))
+    assert found.refused[-1] == 0 and found.velocity[60, 0] > 0.5
+    assert np.abs(found.velocity[61:]).max() < 1e-3 and np.abs(found.disturbance[61:, 0]).max() < 1e-3
+
+
 @pytest.mark.parametrize(("off", "refused"), [(0.24, 0), (0.25, 1)])
 def test_the_reach_grows_with_the_time_since_the_last_believed_frame(off: float, refused: int) -> None:
     times = STEP * np.arange(60)
