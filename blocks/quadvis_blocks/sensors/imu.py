@@ -142,6 +142,9 @@ class Imu(Block):
         gyro = true[2:5] + slow + self.rate_noise * drawn[2:5]
         lasting = self.force_signs * self.force_bias + self.force_drift * self.force_wander
         felt = true[5:] + lasting + self.force_noise * self.force_drawn[:3]
+        for axis in range(3):
+            if math.isnan(felt[axis]):
+                felt[axis] = math.nan  # the sign of a NaN that was computed depends on the engine
         return roll, pitch, gyro, felt, time - self.delay
 
     def update(self, attitude: Any, rates: Any, velocity: Any) -> None:
