@@ -398,7 +398,7 @@ def test_what_no_block_reads_is_not_disturbed_slot_by_slot(monkeypatch: pytest.M
     assert len(linear.states) == 7 and max(disturbed) < 50
 
 
-GUARDED = [("blackout", None), ("landing", "fused"), ("takeover", "fused"), ("blackout", "fused")]
+GUARDED = [("blackout", None), ("landing", "robust"), ("takeover", "robust"), ("blackout", "robust")]
 
 
 @pytest.mark.parametrize(("name", "variant"), mostly_slow(GUARDED, 1))
