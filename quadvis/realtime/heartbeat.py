@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,7 +22,9 @@ class Patience:
     """How long a loop may give no sign of life in its ``words``; times are in nanoseconds.
 
     Its first tick is due ``first`` after the start. After a silence longer than ``allowed`` the loop hangs;
-    if it is not ``lasting``, or in the time ``startup`` from the start on, it only pauses, and may go on.
+    if it is not ``lasting``, or in the time ``startup`` from the start on, it only pauses, and may go on. So
+    it does at its ``last`` tick: other processes end then, which can hold up the system, and safe values
+    follow anyway.
     """
 
     name: str
@@ -30,19 +33,23 @@ class Patience:
     first: int = 0
     startup: int = 0
     lasting: bool = True
+    last: int = sys.maxsize
 
     @staticmethod
-    def of(name: str, words: Any, schedule: Schedule, limits: OverloadLimits) -> Patience:
-        """Return the patience with a loop of these limits: the ticks that it may miss in a row, and two."""
+    def of(name: str, words: Any, schedule: Schedule, limits: OverloadLimits, ticks: int) -> Patience:
+        """Return the patience with a loop of so many ticks and these limits.
+
+        It lasts for the ticks that may be missed in a row, and two.
+        """
         all_limits = [limits, *(task.limits for task in limits.tasks)]
         stops = all(each.action == STOP for each in all_limits)
         missed = max(each.max if each.consecutive is None else each.consecutive for each in all_limits)
         first = schedule.deadline(min(rhythm.offset for rhythm in schedule.rhythms))
         longest = max(schedule.deadline(rhythm.every) for rhythm in schedule.rhythms)
         allowed = (2 + missed * stops) * schedule.interval
-        return Patience(
-            name, words, allowed, first, first + max(each.startup for each in all_limits) * longest, stops
-        )
+        startup = first + max(each.startup for each in all_limits) * longest
+        last = max(ticks - 1 - (ticks - 1 - offset) % every for every, offset in schedule.rhythms)
+        return Patience(name, words, allowed, first, startup, stops, last)
 
 
 class Sign(Enum):
@@ -95,7 +102,8 @@ class Heartbeat:
         last = start + begun if begun else max(start + self.patience.first, self._seen)
         if now - last <= self.patience.allowed:
             return Sign.WELL
-        return Sign.HANGS if self.patience.lasting and now - start > self.patience.startup else Sign.PAUSES
+        patient = now - start <= self.patience.startup or words[control.TICK] >= self.patience.last
+        return Sign.HANGS if self.patience.lasting and not patient else Sign.PAUSES
 
     @property
     def has_finished(self) -> bool:

@@ -74,7 +74,7 @@ class Member:
             IS_COMMAND.get(), computer, engine, wishes, count, streams, words, self._theirs, devices,
             self._lines,
         )  # fmt: skip
-        self.patience = Patience.of(computer, words, Schedule.of(part), self._limits)
+        self.patience = Patience.of(computer, words, Schedule.of(part), self._limits, diagram.ticks)
         name = f"application {computer}".rstrip()
         self.process: BaseProcess = context.Process(target=perform, args=(setup,), name=name)
         self._listening = True

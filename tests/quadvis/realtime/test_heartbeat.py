@@ -14,6 +14,7 @@ from quadvis.realtime.schedule import Rhythm, Schedule
 
 MS = 10**6
 START = 10**9
+TICKS = 100
 SCHEDULE = Schedule(Fraction(1, 100), [Rhythm(1, 2), Rhythm(5, 3)])  # 100 Hz from 20 ms on, 20 Hz
 
 
@@ -23,7 +24,8 @@ class Loop:
     def __init__(self, **limits: object) -> None:
         self.words = np.zeros(control.WORDS, np.int64)
         self.instant = -5
-        patience = Patience.of("target", self.words, SCHEDULE, OverloadLimits(**limits))  # type: ignore[arg-type]
+        allowed = OverloadLimits(**limits)  # type: ignore[arg-type]
+        patience = Patience.of("target", self.words, SCHEDULE, allowed, TICKS)
         self.heart = Heartbeat(patience, lambda: START + MS * self.instant)
 
     def start(self) -> Loop:
@@ -56,6 +58,14 @@ def test_a_step_that_does_not_end_hangs_after_two_periods() -> None:
     loop.begin(100)
     assert [loop.look(instant) for instant in (110, 120, 121)] == [Sign.WELL, Sign.WELL, Sign.HANGS]
     assert loop.heart.complaint == "the loop of 'target' has given no sign of life for 0.02 s"
+
+
+@pytest.mark.parametrize(("tick", "sign"), [(98, Sign.HANGS), (99, Sign.PAUSES)])
+def test_at_its_last_tick_a_loop_only_pauses(tick: int, sign: Sign) -> None:
+    loop = Loop(startup=0).start()
+    loop.words[control.TICK] = tick
+    loop.begin(10 * tick)
+    assert loop.look(10 * tick + 1000) is sign
 
 
 def test_a_loop_that_does_not_wake_hangs_after_two_periods() -> None:
