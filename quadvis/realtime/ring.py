@@ -28,7 +28,7 @@ class RecordRing:
         self.words, self._bytes = words, words.cast("B")
         self._room, self._width = room, width
         self._records = np.frombuffer(words, np.int64)[HEAD:].reshape(room, width)
-        self._put = self._taken = self._seen = 0
+        self._taken = self._seen = 0
 
     @staticmethod
     def size(room: int, width: int) -> int:
@@ -43,18 +43,16 @@ class RecordRing:
     def put(self, number: int, raw: memoryview, pieces: Sequence[slice]) -> None:
         """Add a record: a number, and pieces of bytes one after another, which fill its other words."""
         words = self.words
-        if self._put - words[TAKEN] >= self._room:
-            words[LOST] += 1
+        at = place_in(words, self._room, self._width)
+        if at < 0:
             return
-        at = HEAD + self._put % self._room * self._width
         words[at] = number
         start = SLOT * (at + 1)
         for piece in pieces:
             end = start + piece.stop - piece.start
             self._bytes[start:end] = raw[piece]
             start = end
-        self._put += 1
-        words[PUT] = self._put
+        words[PUT] += 1
 
     def machine(self, memory: int, pieces: Sequence[slice]) -> tuple[int, ...]:
         """Return the addresses that the machine code of `put` takes; ``memory`` is that of the pieces."""
@@ -84,28 +82,32 @@ class RecordRing:
         return found
 
 
+def place_in(words: Any, room: int, width: int) -> Any:
+    """Return where the next record begins; -1 if the ring is full, which is counted."""
+    done = words[PUT]
+    if done - words[TAKEN] >= room:
+        words[LOST] += 1
+        return -1
+    return HEAD + done % room * width
+
+
 def put_pair(words: Any, room: int, first: int, second: int) -> None:
     """Add a record of two words to a ring as `RecordRing.put` does, in operations that machine code has, too.
 
     A producer that adds records so does not add any by the method.
     """
-    done = words[PUT]
-    if done - words[TAKEN] >= room:
-        words[LOST] += 1
-        return
-    at = HEAD + done % room * 2
-    words[at], words[at + 1] = first, second
-    words[PUT] = done + 1
+    at = place_in(words, room, 2)
+    if at >= 0:
+        words[at], words[at + 1] = first, second
+        words[PUT] += 1
 
 
 def put(number: Any, words: Any, memory: Any, pieces: Any) -> None:
     """Do as `RecordRing.put`, as machine code; ``pieces``: room, width, how many, first and size of each."""
     room, width, count = pieces[0], pieces[1], pieces[2]
-    done = words[PUT]
-    if done - words[TAKEN] >= room:
-        words[LOST] += 1
+    at = place_in(words, room, width)
+    if at < 0:
         return
-    at = HEAD + done % room * width
     words[at] = number[0]
     at += 1
     for piece in range(count):
@@ -113,7 +115,7 @@ def put(number: Any, words: Any, memory: Any, pieces: Any) -> None:
         for index in range(pieces[4 + 2 * piece]):
             words[at + index] = memory[first + index]
         at += pieces[4 + 2 * piece]
-    words[PUT] = done + 1
+    words[PUT] += 1
 
 
 PUTTING = Routine(put, "wwww")
