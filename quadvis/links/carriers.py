@@ -125,7 +125,12 @@ class FrameCarrier:
 
 
 def open_sender(link: Link, resource: Any) -> Carrier:
-    """Open the sending end of a link; `LinkNeeds` says what ``resource`` is. QuadvisError if it fails."""
+    """Open the sending end of a link with its resource, which whoever starts both computers makes.
+
+    memory: `Link.words` words that both ends share, all 0 at the beginning. serial: the path of a port, that
+    of `Link.ports` or, where this is "", an end of a pair of ptys paced at `Link.baud`. udp: the address
+    (host, port) at which the receiver listens, for both ends. QuadvisError if it cannot be opened.
+    """
     return _opened(link, resource, listens=False)
 
 

@@ -1,7 +1,7 @@
 """The ends of links in an application: blocks that send and receive, in the place of the twins.
 
     part = graph.part_of(computer)
-    carriers = open_carriers(part, resources)      # what `LinkNeeds` of each link asks for, by name
+    carriers = open_carriers(part, resources)      # what `open_sender` asks for, by link
     engine = Engine(live(part, carriers), ...)
     ...
     for carrier in carriers.values(): carrier.close()
@@ -33,7 +33,7 @@ def links_of(graph: Graph) -> list[Link]:
 def open_carriers(part: Graph, resources: Mapping[str, Any]) -> dict[str, Carrier]:
     """Open the ends of the links in one computer's part of a graph; none stays open if one cannot be.
 
-    ``resources`` has for each of `links_of` what its `LinkNeeds` ask for.
+    ``resources`` has for each of `links_of` what `open_sender` asks for.
     """
     found: dict[str, Carrier] = {}
     try:

@@ -1,4 +1,4 @@
-"""Links: what carries the wires from one computer to another, and what it needs of whoever starts both."""
+"""Links: what carries the wires from one computer to another."""
 
 from __future__ import annotations
 
@@ -63,14 +63,9 @@ class Link:
         return -math.expm1(8 * self.bytes * math.log1p(-self.flips)) if self.flips < 1.0 else 1.0
 
     @property
-    def needs(self) -> LinkNeeds:
-        """What both ends need before they can be opened."""
-        words = 0
-        if self.via == MEMORY:
-            words = Mailbox.size(self.message.room(self.room), self.records)
-        return LinkNeeds(
-            self.name, self.source, self.target, self.via, words, self.baud, self.ports, self.address
-        )
+    def words(self) -> int:
+        """The words of 8 bytes that both ends share; 0 for other carriers than memory."""
+        return Mailbox.size(self.message.room(self.room), self.records) if self.via == MEMORY else 0
 
     @property
     def records(self) -> int:
@@ -85,26 +80,3 @@ class Link:
             return f"{self.bytes} bytes{pictures} in memory, {rate}"
         found = f"{self.bytes} bytes a frame, {rate}"
         return f"{found}: {100 * self.share:.3g} % of {self.baud} baud" if self.baud else f"{found}, over UDP"
-
-
-@dataclass(frozen=True)
-class LinkNeeds:
-    """The resources of a link: who starts the processes of both computers makes them and hands them on.
-
-    Which one depends on ``via``; each end is opened with it by `carriers.open_sender`, `open_receiver`:
-
-    memory: ``words`` words of 8 bytes that both processes share, all 0 at the beginning; both ends get them.
-    serial: the path of a port for each end: that of ``ports`` (sender, receiver), or where this is "" an end
-    of a pair of ptys whose bytes are paced at ``baud``.
-    udp: the address (host, port) at which the receiver listens, for both ends: ``address`` as "host:port", or
-    if this is "" any free port of 127.0.0.1.
-    """
-
-    link: str
-    source: str
-    target: str
-    via: str
-    words: int = 0
-    baud: int = 0
-    ports: tuple[str, str] = ("", "")
-    address: str = ""

@@ -27,7 +27,7 @@ class Lines:
         self.receiving: dict[str, Any] = {}
         for link in links:
             if link.via == MEMORY:
-                words = context.RawArray("q", link.needs.words)
+                words = context.RawArray("q", link.words)
                 self.sending[link.name] = self.receiving[link.name] = words
 
     @property

@@ -180,7 +180,7 @@ def test_an_address_that_is_in_use_or_unknown_is_refused_in_a_sentence() -> None
 
 def test_memory_gives_what_is_newest() -> None:
     link = made_link(task("slow", "1/10"), task("fast", "1/20"), via=MEMORY, baud=0)
-    words = memoryview(bytearray(8 * link.needs.words))
+    words = memoryview(bytearray(8 * link.words))
     sender, receiver = open_sender(link, words), open_receiver(link, words)
     assert receiver.receive(100) is None
     for stamp in (1, 2, 3):

@@ -240,7 +240,7 @@ def test_two_computers_with_live_links_fly_the_simulated_loop(first: str) -> Non
     """Whoever is the first at an instant: a message counts from the next instant on."""
     diagram = linked()
     wanted = diagram.run()
-    words = {link.name: bytearray(8 * link.needs.words) for link in diagram.links}
+    words = {link.name: bytearray(8 * link.words) for link in diagram.links}
     rows: dict[str, list[float]] = {"place": [], "push": []}
     with ExitStack() as stack:
         engines = []

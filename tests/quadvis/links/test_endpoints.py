@@ -35,9 +35,8 @@ def free_address() -> tuple[str, int]:
 
 def resources(link: Link) -> tuple[Any, Any]:
     """Return what the two ends of a link need, as a supervisor would make it."""
-    needs = link.needs
-    if needs.via == MEMORY:
-        words = memoryview(bytearray(8 * needs.words))
+    if link.via == MEMORY:
+        words = memoryview(bytearray(8 * link.words))
         return words, words
     address = free_address()
     return address, address
@@ -109,8 +108,8 @@ def test_a_picture_that_is_too_large_stops_the_sender_in_a_sentence() -> None:
     graph = film(SLOW, FAST)
     link = replace(links_of(graph)[0], room=(4, 5))
     part = graph.part_of("near")
-    carriers = {"line": open_carriers(part, {"line": bytearray(8 * links_of(graph)[0].needs.words)})["line"]}
-    small = {"line": open_sender(link, bytearray(8 * link.needs.words))}
+    carriers = {"line": open_carriers(part, {"line": bytearray(8 * links_of(graph)[0].words)})["line"]}
+    small = {"line": open_sender(link, bytearray(8 * link.words))}
     with Engine(live(part, carriers)) as engine:
         engine.run(1)
     with (
@@ -126,10 +125,10 @@ def test_none_stays_open_if_one_end_cannot_be_opened() -> None:
         open_carriers(graph.part_of("near"), {"line": "/dev/none"})
 
 
-def test_the_needs_of_a_link_say_what_both_ends_want() -> None:
-    memory = made_link(FAST, SLOW, via=MEMORY, baud=0).needs
+def test_a_link_says_what_both_ends_want() -> None:
+    memory = made_link(FAST, SLOW, via=MEMORY, baud=0)
     assert memory.words == Mailbox.size(36, 6) and (memory.source, memory.target) == ("near", "far")
-    serial = made_link(FAST, SLOW, ports=("/dev/a", "/dev/b")).needs
+    serial = made_link(FAST, SLOW, ports=("/dev/a", "/dev/b"))
     assert (serial.words, serial.baud, serial.ports) == (0, 9600, ("/dev/a", "/dev/b"))
-    udp = made_link(FAST, SLOW, via=UDP, baud=0, address="192.0.2.1:5005").needs
+    udp = made_link(FAST, SLOW, via=UDP, baud=0, address="192.0.2.1:5005")
     assert (udp.via, udp.address) == (UDP, "192.0.2.1:5005")
