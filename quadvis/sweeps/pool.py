@@ -66,9 +66,11 @@ def perform_all(jobs: Sequence[Job], workers: int) -> Generator[Row | None, None
         raise RunError(f"{problem}; try fewer workers") from None
     finally:
         children: set[BaseProcess] = set(multiprocessing.active_children()) - before
-        executor.shutdown(wait=finished, cancel_futures=True)
         if not finished:
             for child in children:
                 child.kill()
+        # Waits for the executor's own thread, which ends once the workers are gone. Left alone, that thread
+        # closes a pipe which the interpreter writes to at its exit, without a lock.
+        executor.shutdown(wait=True, cancel_futures=True)
         for child in children:
             child.join()
