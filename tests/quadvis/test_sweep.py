@@ -527,7 +527,8 @@ def test_a_worker_has_one_thread_for_each_library(monkeypatch: pytest.MonkeyPatc
         assert threads.result() == 1
 
 
-INTERRUPTED = "interrupted\n{} of 10 runs are finished and in x.csv; --resume does the rest\n"
+RUNS = 30  # many: the sweep must not be through before the signal of the test arrives
+INTERRUPTED = f"interrupted\n{{}} of {RUNS} runs are finished and in x.csv; --resume does the rest\n"
 
 
 def long_runs(seconds: int) -> None:
@@ -543,7 +544,7 @@ def test_what_is_finished_when_a_sweep_is_ended_stays_and_resuming_gives_the_byt
     number: signal.Signals, code: int, words: str, here: list[int]
 ) -> None:
     long_runs(150)
-    arguments = ("long.yaml", "--over", "seed=0..9", "--workers", "2")
+    arguments = ("long.yaml", "--over", f"seed=0..{RUNS - 1}", "--workers", "2")
     process = quadvis_sweep(*arguments, "-o", "x.csv", "--logs", "logs")
     workers = wait_for(lambda: children(process))
     wait_for(lambda: len(list(Path("logs").glob("*"))) >= 6)  # four are finished, if not yet all told
@@ -551,13 +552,13 @@ def test_what_is_finished_when_a_sweep_is_ended_stays_and_resuming_gives_the_byt
     out, told = process.communicate(timeout=60)
     assert (process.returncode, out) == (code, "")
     count = len(rows_of("x.csv"))
-    assert 1 <= count < 10
+    assert 1 <= count < RUNS
     assert told == words.format(count)
     assert all(wait_for(lambda pid=pid: gone(pid)) for pid in workers)
     assert [path.name for path in Path().glob(".*")] == []
     for name in ("x.csv", "y.csv"):
-        quadvis.sweep("long.yaml", {"seed": range(10)}, output=name, resume=True)
-    assert len(here) == 10 - count + 10
+        quadvis.sweep("long.yaml", {"seed": range(RUNS)}, output=name, resume=True)
+    assert len(here) == RUNS - count + RUNS
     assert Path("x.csv").read_bytes() == Path("y.csv").read_bytes()
 
 
