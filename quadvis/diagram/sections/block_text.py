@@ -43,7 +43,7 @@ def resolved_block(node: Node, folder: Path, nodes: Mapping[str, Node]) -> dict[
         if isinstance(source, Wire):
             inputs[port] = _wire(source, nodes)
         elif source.value is not node.block.interface.inputs[port].default:
-            inputs[port] = _quantity(node, port, source.value)
+            inputs[port] = quantity(node, port, source.value)
     return found | ({"with": values} if values else {}) | ({"in": inputs} if inputs else {})
 
 
@@ -74,17 +74,17 @@ def _parameter(node: Node, param: Param, folder: Path) -> Any:
         return param.choices[value]
     if param.is_text:
         return portable_name(value, folder) if param.is_file and value else value
-    return _quantity(node, param.name, value)
+    return quantity(node, param.name, value)
 
 
 def constant_text(node: Node, port: str, value: Any) -> str:
     """Return a constant input as a diagram writes it."""
-    found = _quantity(node, port, value)
+    found = quantity(node, port, value)
     return f"{found['value']} {found['unit']}" if isinstance(found, dict) else str(found)
 
 
-def _quantity(node: Node, name: str, value: Any) -> Any:
-    """Return a value in the units that the checker found for it."""
+def quantity(node: Node, name: str, value: Any) -> Any:
+    """Return the value of a parameter or of a constant input, in the units that the checker found for it."""
     return _with_units(node.units[name], value)
 
 

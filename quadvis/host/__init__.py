@@ -1,0 +1,1 @@
+"""What talks to a target: the object `Target`, bundles of diagrams, the console."""

@@ -1,0 +1,83 @@
+"""Packing: from a checked diagram to a bundle for a target, and the files that go with it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING
+
+from quadvis.errors import QuadvisError, quoted
+from quadvis.machine.shipped import PREFIX, named_file
+from quadvis.target.admission import source_digest
+from quadvis.target.bundle import Bundle
+from quadvis.version import __version__
+
+if TYPE_CHECKING:
+    from quadvis.diagram.diagram import Diagram
+
+
+def pack(
+    diagram: Diagram, name: str | None = None, engine: str = "auto", computer: str = ""
+) -> tuple[Bundle, dict[str, Path]]:
+    """Return a diagram as a bundle, and the paths of its files by their SHA-256.
+
+    Files lie in the bundle as they lie beside the diagram. QuadvisError if one is named by an absolute path,
+    or if a block's code lies beside the diagram: a target runs what is installed there.
+    """
+    from quadvis.run.played_files import played_files
+
+    folder = diagram.path.parent
+    names = {**_listed(diagram), **played_files(diagram)}
+    names = {name: digest for name, digest in names.items() if not name.startswith(PREFIX)}
+    above = max((_above(name) for name in names), default=0)
+    home = _last_parts(folder, above)
+    files, paths = {}, {}
+    for each, digest in names.items():
+        if PurePosixPath(each).is_absolute():
+            raise QuadvisError(
+                f"the file {quoted(each)} cannot go to a target: name it relative to the diagram"
+            )
+        files[os.path.normpath(home / each)] = digest
+        paths[digest] = named_file(each, diagram.path)
+    variant = diagram.variant or ""
+    bundle = Bundle(
+        name or "-".join(filter(None, (diagram.name, variant))),
+        variant,
+        diagram.resolved,
+        (home / diagram.path.name).as_posix(),
+        files,
+        sources_of(diagram),
+        diagram.hash,
+        __version__,
+        engine,
+        computer,
+    )
+    return Bundle.read(bundle.plain()), paths
+
+
+def sources_of(diagram: Diagram) -> dict[str, str]:
+    """Return the SHA-256 of the Python file of each block of a diagram, by the name of the block."""
+    found: dict[str, str] = {}
+    for node in diagram.graph.nodes:
+        if not node.origin and node.kind not in found:
+            found[node.kind] = source_digest(type(node.block))
+    return found
+
+
+def _listed(diagram: Diagram) -> Mapping[str, str]:
+    """Return the SHA-256 of the files that the resolved diagram lists, by the names that it gives them."""
+    from quadvis.diagram.sections.files import FILES
+
+    return FILES.resolved(diagram) or {}
+
+
+def _above(name: str) -> int:
+    """Return how many folders above the diagram a file lies."""
+    parts = PurePosixPath(os.path.normpath(name)).parts
+    return next((index for index, part in enumerate(parts) if part != ".."), len(parts))
+
+
+def _last_parts(folder: Path, count: int) -> PurePosixPath:
+    """Return the names of the last folders of a path."""
+    return PurePosixPath(*Path(os.path.realpath(folder)).parts[-count:] if count else ())

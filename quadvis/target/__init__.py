@@ -1,0 +1,1 @@
+"""What stays on the machine that flies: applications, runs, parameter sets, logs, scopes."""

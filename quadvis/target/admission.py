@@ -1,0 +1,72 @@
+"""Admission: whether a target runs an application, from what the bundle says and what is installed here."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import os
+from pathlib import Path
+
+from quadvis.diagram.diagram import Diagram
+from quadvis.diagram.load import load_text
+from quadvis.errors import QuadvisError, quoted
+from quadvis.graph.graph import Node
+from quadvis.machine.shipped import is_shipped
+from quadvis.target.bundle import Bundle
+from quadvis.version import __version__
+
+
+def admit(bundle: Bundle, place: Path) -> Diagram:
+    """Return the diagram of a bundle whose file stands at a place; QuadvisError if it may not run here.
+
+    Its blocks must be installed, from the same source as on the host. Its files stay in its folder.
+    """
+    diagram = load_text(bundle.text, place.parent, place.name, own_blocks=False)
+    tree = place
+    for _ in Path(bundle.place).parts:
+        tree = tree.parent
+    for node in diagram.graph.nodes:
+        _check_source(node, bundle)
+        _check_paths(node, tree)
+    if diagram.hash != bundle.hash:
+        raise QuadvisError(f"the diagram reads otherwise here than on the host{_versions(bundle)}")
+    computers = diagram.graph.computers
+    if bundle.computer and bundle.computer not in computers:
+        raise QuadvisError(
+            f"the diagram has no computer {quoted(bundle.computer)}; it has {', '.join(computers)}"
+        )
+    return diagram
+
+
+def source_digest(made: type) -> str:
+    """Return the SHA-256 of the Python file that defines a class."""
+    return hashlib.sha256(Path(inspect.getfile(made)).read_bytes()).hexdigest()
+
+
+def _check_source(node: Node, bundle: Bundle) -> None:
+    """Refuse a block that is another one on the host."""
+    if node.origin:
+        return
+    if bundle.sources.get(node.kind) != source_digest(type(node.block)):
+        raise QuadvisError(
+            f"the block {quoted(node.kind)} is not the same on host and target{_versions(bundle)}"
+        )
+
+
+def _check_paths(node: Node, tree: Path) -> None:
+    """Refuse a block that reads or writes outside the folder of the application."""
+    for param in node.block.interface.params.values():
+        if not param.is_file:
+            continue
+        path = os.path.realpath(getattr(node.block, param.name))
+        inside = path.startswith(os.path.realpath(tree) + os.sep)
+        if not inside and not (is_shipped(path) and not param.writes):
+            raise QuadvisError(
+                f"block {quoted(node.path)}: {param.name} names a file outside the application's folder"
+            )
+
+
+def _versions(bundle: Bundle) -> str:
+    if bundle.version == __version__:
+        return ": install the same quadvis and the same blocks on both"
+    return f": the host has quadvis {bundle.version}, the target {__version__}; install the same"

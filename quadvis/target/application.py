@@ -1,0 +1,222 @@
+"""The application that a target has loaded: its runs one after another, its signals, its parameters."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future
+from dataclasses import replace
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+from quadvis.diagram.diagram import Diagram
+from quadvis.diagram.times import read_duration
+from quadvis.document import YamlScalar
+from quadvis.errors import QuadvisError
+from quadvis.run.result import Result
+from quadvis.run.tuned import read_tuned
+from quadvis.target.bundle import Bundle
+from quadvis.target.newest import Newest
+from quadvis.target.parameters import Parameters
+from quadvis.target.session import Session
+from quadvis.target.store import Store
+
+if TYPE_CHECKING:
+    from quadvis.target.kernel import Publish
+
+STOPPED, LOADING, READY, RUNNING, STOPPING = "stopped", "loading", "ready", "running", "stopping"
+
+
+class Application:
+    """One application. Its state is ``loading`` until its processes are ready, and then ``ready``.
+
+    A run goes from there to ``running`` and to ``stopped``; the next `start` begins anew. The values that were
+    tuned stay. ``problem`` says why the last run came to an early end, ``result`` is that of the last run.
+    """
+
+    def __init__(self, bundle: Bundle, diagram: Diagram, store: Store, publish: Publish) -> None:
+        self.bundle, self.diagram = bundle, diagram
+        self.parameters = Parameters(diagram)
+        self.newest = Newest(diagram)
+        self.result: Result | None = None
+        self.problem = ""
+        self.said: list[str] = []  # since the last start
+        self._store, self._publish = store, publish
+        self._session: Session | None = None
+        self._stop_time: Fraction | None = None
+        self._drawing: Future[Any] | None = None
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self.bundle.name
+
+    @property
+    def session(self) -> Session | None:
+        """The run that is going on or was the last one."""
+        return self._session
+
+    @property
+    def running(self) -> bool:
+        """True while the loops run."""
+        return self.state in (RUNNING, STOPPING)
+
+    @property
+    def state(self) -> str:
+        """Return the word for what it does."""
+        session = self._session
+        if session is None or not session.running:
+            return STOPPED
+        return {"starting": LOADING, "ready": READY, "running": RUNNING}.get(session.helm.state, STOPPING)
+
+    # from loaded to stopped
+
+    def prepare(self) -> Future[Any]:
+        """Start the processes; the Future is done when they are ready to run."""
+        assert self._session is None or not self._session.running
+        self.newest.clear()
+        self.problem, self.result, self.said = "", None, []
+        self._session = Session(
+            self._timed(), self.bundle.engine, self._store.next_log(self.name), self.newest.taps, self._say,
+            self._ended,
+        )  # fmt: skip
+        if self.parameters.tuned:
+            self._session.helm.tune(self.parameters.tuned)
+        return self._session.ready
+
+    def start(self) -> Future[Any]:
+        """Start a run; QuadvisError if one is going on."""
+        if self.running:
+            raise QuadvisError(f"{self.name} runs already")
+        ready = self._session.ready if self.state in (LOADING, READY) else self.prepare()  # type: ignore[union-attr]
+        session = self._session
+        assert session is not None
+        begun: Future[Any] = Future()
+
+        def begin(done: Future[Any]) -> None:
+            problem = done.exception()
+            if problem is not None:
+                begun.set_exception(problem)
+            else:
+                session.helm.begin()
+                self._event("started")
+                begun.set_result(session.log.stem)
+
+        ready.add_done_callback(begin)
+        return begun
+
+    def stop(self) -> Future[Any]:
+        """Stop the run; the Future is done when the outputs have their safe values and the log is closed."""
+        session = self._session
+        if session is None or self.state not in (RUNNING, STOPPING):
+            raise QuadvisError(f"{self.name} does not run")
+        session.helm.stop()
+        return session.over
+
+    def make_safe(self, reason: str) -> None:
+        """Give all outputs their safe values for the rest of the run, and stop it."""
+        session = self._session
+        if session is not None and session.running:
+            session.helm.make_safe(reason)
+
+    def close(self) -> None:
+        """End all that goes on."""
+        session = self._session
+        if session is not None and session.running:
+            session.helm.stop()
+            session.join()
+
+    def set_times(self, stop_time: Any, sample_time: Any) -> None:
+        """Give the next run another stop time or another sample time; QuadvisError while one is going on."""
+        if self.running:
+            raise QuadvisError("times cannot change in a run: stop it first")
+        if stop_time is not None:
+            self._stop_time = read_duration(YamlScalar(_seconds(stop_time), False, "stop_time", 0, 0))
+        if sample_time is not None:
+            from quadvis.target.rescale import rescaled
+
+            self.diagram = rescaled(self.diagram, _seconds(sample_time))
+        self.close()
+        self.prepare()
+
+    def _timed(self) -> Diagram:
+        if self._stop_time is None:
+            return self.diagram
+        return replace(self.diagram, stop_time=self._stop_time)
+
+    def _say(self, sentence: str) -> None:
+        self.said.append(sentence)
+        self._event("said", text=sentence)
+
+    def _ended(self) -> None:
+        session = self._session
+        assert session is not None
+        self.problem, self.result = session.problem, session.result
+        self._event("stopped", problem=self.problem)
+
+    def _event(self, what: str, **more: Any) -> None:
+        self._publish("event", {"event": what, "application": self.name, **more}, None)
+
+    # looking and tuning
+
+    def values(self, names: Sequence[str]) -> dict[str, Any]:
+        """Return the newest values of signals by name, with their ticks; of all if none is named."""
+        found = [self.newest.value(name) for name in (names or self.newest.names)]
+        return {each.name: [each.value, each.tick] for each in found}
+
+    def tune(self, values: Mapping[str, Any]) -> Future[Any]:
+        """Give parameters values, all at one tick.
+
+        The Future has the tick, its time, and what has changed: ``[{name, old, new}]``.
+        """
+        changes = [each for name, value in values.items() for each in read_tuned(self.diagram, name, value)]
+        before = {(path, name): self.parameters.text(path, name) for path, name, _ in changes}
+        told: Future[Any] = Future()
+
+        def took(tick: int) -> None:
+            self.parameters.took(changes)
+            facts = [
+                {"name": f"{path}.{name}", "old": before[path, name], "new": self.parameters.text(path, name)}
+                for path, name, _ in changes
+            ]
+            time = float(tick * self.diagram.graph.tick)
+            self._event("tuned", tick=tick, time=time, changes=facts)
+            told.set_result({"tick": tick, "time": time, "changes": facts})
+
+        session = self._session
+        if session is None or not session.running:
+            # nothing runs: the next run begins with these values, once they are found to be right
+            took_at_start = self.parameters.check(changes)
+            took(took_at_start)
+            return told
+        waiting = session.helm.tune(changes)
+
+        def done(future: Future[int]) -> None:
+            problem = future.exception()
+            if problem is not None:
+                told.set_exception(problem)
+            else:
+                took(future.result())
+
+        waiting.add_done_callback(done)
+        return told
+
+    def drawing(self) -> Future[Any]:
+        """Return the picture of the diagram as SVG; it is drawn once."""
+        if self._drawing is None:
+            self._drawing = Future()
+            threading.Thread(target=_draw, args=(self.diagram, self._drawing), daemon=True).start()
+        return self._drawing
+
+
+def _draw(diagram: Diagram, drawing: Future[Any]) -> None:
+    from quadvis.diagram.picture import draw_diagram
+
+    try:
+        drawing.set_result(draw_diagram(diagram))
+    except Exception as error:
+        drawing.set_exception(error)
+
+
+def _seconds(time: Any) -> str:
+    return time if isinstance(time, str) else f"{float(time)!r} s"

@@ -1,0 +1,221 @@
+"""The kernel: one application loaded, started, stopped, looked at and tuned, by the verbs of `quadvis.wire`."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from typing import Any
+
+from quadvis.diagram.diagram import Diagram
+from quadvis.diagram.sections.on_host_loss import CONTINUE, SAFE
+from quadvis.errors import QuadvisError, quoted
+from quadvis.target.admission import admit
+from quadvis.target.application import Application
+from quadvis.target.bundle import Bundle
+from quadvis.target.parameters import compared, read_set
+from quadvis.target.status import status
+from quadvis.target.store import Store
+
+PIECE = 1_000_000  # bytes of a file in one reply
+Publish = Callable[[str, Mapping[str, Any], Any], None]  # takes a topic, a header, an array or None
+
+
+class Kernel:
+    """What a target does; ``publish`` takes what its streams carry.
+
+    The verbs are methods. Each returns plain data, or a Future of it where this takes long. They are called
+    from one thread. QuadvisError says in a sentence why one is refused.
+    """
+
+    def __init__(self, name: str, store: Store, publish: Publish) -> None:
+        self.name, self.store = name, store
+        self._publish = publish
+        self._born = time.monotonic()
+        self._application: Application | None = None
+
+    def call(self, verb: str, arguments: Mapping[str, Any]) -> Any:
+        """Do what a verb of the wire says."""
+        return getattr(self, verb)(**arguments)
+
+    def close(self) -> None:
+        """End a run, with its outputs at their safe values."""
+        if self._application is not None:
+            self._application.close()
+
+    def lose_host(self) -> None:
+        """Do what the application wants when its operator is lost."""
+        application = self._application
+        if application is None or not application.running:
+            return
+        wish = application.diagram.on_host_loss
+        self._event("the operator is lost", wish=wish)
+        if wish == SAFE:
+            application.make_safe("the operator was lost")
+        elif wish != CONTINUE:
+            application.stop()
+
+    # applications
+
+    def applications(self) -> list[str]:
+        """Return the names of the applications that are kept."""
+        return self.store.applications
+
+    def have(self, digests: Sequence[str]) -> list[str]:
+        """Return those SHA-256 of files that are missing here."""
+        return self.store.missing(digests)
+
+    def put(self, digest: str, at: int, data: bytes, last: bool) -> None:
+        """Take a piece of a file."""
+        self.store.put(digest, at, data, last)
+
+    def keep(self, bundle: Mapping[str, Any]) -> str:
+        """Keep an application in the place of one of its name; return the name."""
+        found = Bundle.read(bundle)
+        if self._application is not None and self._application.name == found.name:
+            self.unload()
+        self.store.add(found)
+        try:
+            admit(found, self.store.place(found))
+        except QuadvisError:
+            self.store.remove(found.name)
+            raise
+        return found.name
+
+    def forget(self, name: str) -> None:
+        """Remove an application that is not loaded."""
+        if self._application is not None and self._application.name == name:
+            raise QuadvisError(f"{quoted(name)} is loaded: unload it first")
+        self.store.remove(name)
+
+    def load(self, name: str) -> Future[Any]:
+        """Load an application in the place of the one that is loaded; it is ready to start then."""
+        bundle = self.store.bundle(name)
+        diagram = admit(bundle, self.store.place(bundle))
+        self.unload()
+        self._application = Application(bundle, diagram, self.store, self._publish)
+        return self._application.prepare()
+
+    def unload(self) -> None:
+        """End the run, if there is one, and forget the application that is loaded."""
+        if self._application is not None:
+            self._application.close()
+            self._application = None
+            self._event("unloaded")
+
+    def start(self) -> Future[Any]:
+        """Start the application."""
+        return self._loaded.start()
+
+    def stop(self) -> Future[Any]:
+        """Stop the application: safe values, log closed. It stays loaded."""
+        return self._loaded.stop()
+
+    def settime(self, stop_time: Any = None, sample_time: Any = None) -> None:
+        """Give the next run another stop time, or another sample time."""
+        self._loaded.set_times(stop_time, sample_time)
+
+    def status(self) -> dict[str, Any]:
+        """Return the state of the target, in xPC's words."""
+        return status(self.name, self._application, time.monotonic() - self._born)
+
+    @property
+    def _loaded(self) -> Application:
+        if self._application is None:
+            raise QuadvisError("no application is loaded: load one first")
+        return self._application
+
+    @property
+    def diagram(self) -> Diagram:
+        """The diagram of the application that is loaded."""
+        return self._loaded.diagram
+
+    # signals and parameters
+
+    def signals(self) -> list[dict[str, Any]]:
+        """Return what there is to know of each signal."""
+        return self._loaded.newest.facts()
+
+    def getsignal(self, names: Sequence[str]) -> dict[str, Any]:
+        """Return the newest values of signals; all of them if none is named."""
+        return self._loaded.values(names)
+
+    def parameters(self) -> list[dict[str, Any]]:
+        """Return what there is to know of each parameter."""
+        return self._loaded.parameters.facts()
+
+    def getparam(self, names: Sequence[str]) -> dict[str, Any]:
+        """Return the values of parameters as a diagram writes them; of all that can be tuned if none is named."""
+        parameters = self._loaded.parameters
+        if not names:
+            return {each["name"]: each["value"] for each in parameters.facts() if each["tunable"]}
+        return {name: parameters.text(*parameters.find(name)) for name in names}
+
+    def setparam(self, values: Mapping[str, Any]) -> Future[Any]:
+        """Give parameters values, all at one tick."""
+        return self._loaded.tune(values)
+
+    def saveparamset(self, name: str) -> str:
+        """Keep the present values of all that can be tuned under a name."""
+        application = self._loaded
+        application.parameters.save(self.store.set_path(application.name, name))
+        return name
+
+    def loadparamset(self, name: str) -> Future[Any]:
+        """Give parameters the values of a set, all at one tick."""
+        return self._loaded.tune(self.getparamset(name))
+
+    def listparamsets(self) -> list[str]:
+        """Return the names of the parameter sets of the application."""
+        return self.store.sets(self._loaded.name)
+
+    def getparamset(self, name: str) -> dict[str, Any]:
+        """Return the values of a parameter set by name."""
+        return read_set(self.store.known_set(self._loaded.name, name))
+
+    def deleteparamset(self, name: str) -> None:
+        """Remove a parameter set."""
+        self.store.known_set(self._loaded.name, name).unlink()
+
+    def compareparamsets(self, first: str, second: str) -> list[dict[str, Any]]:
+        """Return what differs between two parameter sets; "" is that of the present values."""
+        return compared(self._set(first), self._set(second))
+
+    def _set(self, name: str) -> dict[str, Any]:
+        return self.getparamset(name) if name else self.getparam(())
+
+    # results
+
+    def logs(self) -> list[dict[str, Any]]:
+        """Return the logs that are kept, the oldest first."""
+        return [{"name": path.stem, "bytes": path.stat().st_size} for path in self.store.logs()]
+
+    def getlogfile(self, name: str, at: int) -> dict[str, Any]:
+        """Return a piece of a log, and whether it is the last one."""
+        path = self.store.known_log(name)
+        with path.open("rb") as file:
+            file.seek(at)
+            data = file.read(PIECE)
+            return {"data": data, "last": file.tell() >= path.stat().st_size}
+
+    def drawing(self) -> Future[Any]:
+        """Return the picture of the diagram as SVG."""
+        return self._loaded.drawing()
+
+    def _event(self, what: str, **more: Any) -> None:
+        self._publish("event", {"event": what, **more}, None)
+
+
+def in_thread(work: Callable[[], Any]) -> Future[Any]:
+    """Return what some work gives, done in a thread of its own."""
+    found: Future[Any] = Future()
+
+    def perform() -> None:
+        try:
+            found.set_result(work())
+        except BaseException as error:
+            found.set_exception(error)
+
+    threading.Thread(target=perform, daemon=True).start()
+    return found

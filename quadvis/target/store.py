@@ -1,0 +1,178 @@
+"""What a target keeps on its disk: files by their SHA-256, applications, parameter sets, logs.
+
+ folder/files/<SHA-256>              contents of files, each once
+ folder/applications/<name>/         bundle.json, and the folder `tree` as the diagram's blocks see it
+ folder/sets/<name>/<set>.yaml       parameter sets of an application
+ folder/logs/<name>-<number>.mcap    the logs of its runs
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+from quadvis.errors import QuadvisError, quoted, suggestion
+from quadvis.errors.words import sentence
+from quadvis.target.bundle import DIGEST, NAME, Bundle, inner_path
+
+MOST_BYTES = 256_000_000  # of a file
+PARTLY = 8  # files that may be on their way at the same time
+LOGS = 100  # of one application; older ones are removed
+
+
+class Store:
+    """The folder of a target. One process has it at a time; see `quadvis.target.daemon`."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        for name in ("files", "applications", "sets", "logs"):
+            (folder / name).mkdir(mode=0o700, parents=True, exist_ok=True)
+        for left in (folder / "files").glob("*.part"):
+            left.unlink()
+        self._partly: dict[str, BinaryIO] = {}
+
+    # files
+
+    def missing(self, digests: Iterable[str]) -> list[str]:
+        """Return those of some SHA-256 that are not here."""
+        return [digest for digest in digests if not self._file(digest).exists()]
+
+    def put(self, digest: str, at: int, data: bytes, last: bool) -> None:
+        """Take the next piece of a file; with its last piece the contents must have their SHA-256."""
+        path, part = self._file(digest), self._file(digest).with_suffix(".part")
+        if path.exists():
+            return
+        if at == 0:
+            self._drop(digest)
+            if len(self._partly) >= PARTLY:
+                self._drop(next(iter(self._partly)))
+            self._partly[digest] = part.open("w+b")
+        file = self._partly.get(digest)
+        if file is None or file.tell() != at:
+            raise QuadvisError("the pieces of a file must come in their order, from the first one on")
+        if at + len(data) > MOST_BYTES:
+            self._drop(digest)
+            raise QuadvisError(f"a file of more than {MOST_BYTES // 1_000_000} MB cannot be kept")
+        file.write(data)
+        if last:
+            file.seek(0)
+            found = hashlib.file_digest(file, "sha256").hexdigest()
+            if found != digest:
+                self._drop(digest)
+                raise QuadvisError("the contents of a file do not have the SHA-256 that was said")
+            file.close()
+            del self._partly[digest]
+            part.replace(path)
+
+    def _drop(self, digest: str) -> None:
+        file = self._partly.pop(digest, None)
+        if file is not None:
+            file.close()
+        self._file(digest).with_suffix(".part").unlink(missing_ok=True)
+
+    def _file(self, digest: str) -> Path:
+        if not DIGEST.fullmatch(digest):
+            raise QuadvisError(f"{quoted(digest)} is no SHA-256: 64 hexadecimal digits")
+        return self.folder / "files" / digest
+
+    # applications
+
+    @property
+    def applications(self) -> list[str]:
+        """The names of all applications."""
+        return sorted(path.parent.name for path in (self.folder / "applications").glob("*/bundle.json"))
+
+    def add(self, bundle: Bundle) -> None:
+        """Keep an application, in the place of one of the same name; its files must be here."""
+        if absent := self.missing(bundle.files.values()):
+            name = next(name for name, digest in bundle.files.items() if digest in absent)
+            raise QuadvisError(f"the file {quoted(name)} of the application has not come")
+        home = self._home(bundle.name)
+        fresh = home.with_name(f".{home.name}.new")
+        shutil.rmtree(fresh, ignore_errors=True)
+        tree = fresh / "tree"
+        (tree / inner_path(bundle.place)).parent.mkdir(parents=True)
+        for name, digest in bundle.files.items():
+            path = tree / inner_path(name)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(self._file(digest), path)  # a block that writes there changes no other file
+        (fresh / "bundle.json").write_text(json.dumps(bundle.plain(), indent=1))
+        shutil.rmtree(home, ignore_errors=True)
+        fresh.replace(home)
+
+    def bundle(self, name: str) -> Bundle:
+        """Return an application that is kept here; QuadvisError if there is none of this name."""
+        path = self._home(name) / "bundle.json"
+        try:
+            return Bundle.read(json.loads(path.read_bytes()))
+        except FileNotFoundError:
+            problem = f"there is no application {quoted(name)} on the target"
+            raise QuadvisError(sentence(problem, suggestion(name, self.applications))) from None
+        except ValueError:
+            raise QuadvisError(f"the application {quoted(name)} is damaged: load it again") from None
+
+    def place(self, bundle: Bundle) -> Path:
+        """Return where the diagram of an application stands."""
+        return self._home(bundle.name) / "tree" / bundle.place
+
+    def remove(self, name: str) -> None:
+        """Forget an application; its sets and logs stay."""
+        self.bundle(name)
+        shutil.rmtree(self._home(name))
+
+    def _home(self, name: str) -> Path:
+        return self.folder / "applications" / _checked(name)
+
+    # parameter sets
+
+    def sets(self, name: str) -> list[str]:
+        """Return the names of the parameter sets of an application."""
+        return sorted(path.stem for path in (self.folder / "sets" / _checked(name)).glob("*.yaml"))
+
+    def set_path(self, name: str, chosen: str) -> Path:
+        """Return the path of a parameter set."""
+        folder = self.folder / "sets" / _checked(name)
+        folder.mkdir(mode=0o700, exist_ok=True)
+        return folder / f"{_checked(chosen, 'a parameter set')}.yaml"
+
+    # logs
+
+    def logs(self, name: str | None = None) -> list[Path]:
+        """Return the logs of an application, or all, the oldest first."""
+        found = (self.folder / "logs").glob("*.mcap")
+        mine = [path for path in found if name is None or path.stem.rpartition("-")[0] == name]
+        return sorted(mine, key=_age)
+
+    def next_log(self, name: str) -> Path:
+        """Return the path of the log of a new run, and remove logs of which there are too many."""
+        logs = self.logs(_checked(name))
+        for path in logs[: max(0, len(logs) - LOGS + 1)]:
+            path.unlink(missing_ok=True)
+        number = 1 + max((_number(path) for path in logs), default=0)
+        return self.folder / "logs" / f"{name}-{number}.mcap"
+
+    def pieces(self, log: Path, size: int) -> Iterator[bytes]:
+        """Yield the contents of a log, piece by piece."""
+        with log.open("rb") as file:
+            while data := file.read(size):
+                yield data
+
+
+def _checked(name: str, what: str = "an application") -> str:
+    if not NAME.fullmatch(name):
+        raise QuadvisError(f"{quoted(name)} is no name of {what}: use letters, digits, _ . -")
+    return name
+
+
+def _number(path: Path) -> int:
+    number = path.stem.rpartition("-")[2]
+    return int(number) if number.isascii() and number.isdigit() else 0
+
+
+def _age(path: Path) -> tuple[float, int]:
+    return os.stat(path).st_mtime, _number(path)
