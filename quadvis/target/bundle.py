@@ -6,6 +6,7 @@ SHA-256. Blocks are named; the target has them installed, with the same source o
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -45,6 +46,22 @@ class Bundle:
         """Return it as plain data."""
         facts = {name: getattr(self, name) for name in self.__dataclass_fields__}
         return {"format": FORMAT, **facts, "files": dict(self.files), "sources": dict(self.sources)}
+
+    @property
+    def data(self) -> bytes:
+        """The bundle as a file: JSON."""
+        return json.dumps(self.plain(), sort_keys=True).encode()
+
+    @staticmethod
+    def parse(data: bytes) -> Bundle:
+        """Read a bundle's file of unknown origin; QuadvisError if anything is not as it must be."""
+        try:
+            plain = json.loads(data)
+        except (ValueError, RecursionError):
+            plain = None
+        if not isinstance(plain, dict):
+            raise QuadvisError("this file is no bundle")
+        return Bundle.read(plain)
 
     @staticmethod
     def read(plain: Mapping[str, Any]) -> Bundle:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
@@ -13,12 +12,11 @@ from quadvis.diagram.sections.on_host_loss import CONTINUE, SAFE
 from quadvis.errors import QuadvisError, quoted
 from quadvis.target.admission import admit
 from quadvis.target.application import Application
-from quadvis.target.bundle import Bundle
+from quadvis.target.bundle import DIGEST, Bundle
 from quadvis.target.parameters import compared, read_set
 from quadvis.target.status import status
 from quadvis.target.store import Store
 
-PIECE = 1_000_000  # bytes of a file in one reply
 Publish = Callable[[str, Mapping[str, Any], Any], None]  # takes a topic, a header, an array or None
 
 
@@ -58,44 +56,46 @@ class Kernel:
 
     # applications
 
-    def applications(self) -> list[str]:
-        """Return the names of the applications that are kept."""
-        return self.store.applications
+    def applications(self) -> list[dict[str, Any]]:
+        """Return the applications that are kept."""
+        found = []
+        for name in self.store.applications:
+            bundle = self.store.bundle(name)
+            loaded = self._application is not None and self._application.name == name
+            found.append({"name": name, "variant": bundle.variant, "hash": bundle.hash, "loaded": loaded})
+        return found
 
-    def have(self, digests: Sequence[str]) -> list[str]:
+    def have(self, files: Sequence[str]) -> list[str]:
         """Return those SHA-256 of files that are missing here."""
-        return self.store.missing(digests)
+        return self.store.missing(files)
 
-    def put(self, digest: str, at: int, data: bytes, last: bool) -> None:
+    def put(self, file: str, size: int, offset: int, data: bytes) -> int:
         """Take a piece of a file."""
-        self.store.put(digest, at, data, last)
+        return self.store.put(file, size, offset, data)
 
-    def keep(self, bundle: Mapping[str, Any]) -> str:
-        """Keep an application in the place of one of its name; return the name."""
-        found = Bundle.read(bundle)
-        if self._application is not None and self._application.name == found.name:
-            self.unload()
-        self.store.add(found)
-        try:
-            admit(found, self.store.place(found))
-        except QuadvisError:
-            self.store.remove(found.name)
-            raise
-        return found.name
+    def load(self, application: str) -> Future[Any]:
+        """Load an application in the place of the one that is loaded; it is ready to start then.
 
-    def forget(self, name: str) -> None:
-        """Remove an application that is not loaded."""
-        if self._application is not None and self._application.name == name:
-            raise QuadvisError(f"{quoted(name)} is loaded: unload it first")
-        self.store.remove(name)
-
-    def load(self, name: str) -> Future[Any]:
-        """Load an application in the place of the one that is loaded; it is ready to start then."""
-        bundle = self.store.bundle(name)
+        It is named by its name, or by the SHA-256 of its bundle, which is kept under its name then.
+        """
+        if self._application is not None and self._application.running:
+            raise QuadvisError(f"{self._application.name} runs: stop it first")
+        bundle = self._bundle(application)
         diagram = admit(bundle, self.store.place(bundle))
         self.unload()
         self._application = Application(bundle, diagram, self.store, self._publish)
+        self._event("loaded", application=bundle.name)
         return self._application.prepare()
+
+    def _bundle(self, application: str) -> Bundle:
+        """Return an application by its name, or keep the one whose bundle has a SHA-256."""
+        if not DIGEST.fullmatch(application):
+            return self.store.bundle(application)
+        bundle = Bundle.parse(self.store.contents(application))
+        if self._application is not None and self._application.name == bundle.name:
+            self.unload()
+        self.store.add(bundle)
+        return bundle
 
     def unload(self) -> None:
         """End the run, if there is one, and forget the application that is loaded."""
@@ -112,9 +112,9 @@ class Kernel:
         """Stop the application: safe values, log closed. It stays loaded."""
         return self._loaded.stop()
 
-    def settime(self, stop_time: Any = None, sample_time: Any = None) -> None:
-        """Give the next run another stop time, or another sample time."""
-        self._loaded.set_times(stop_time, sample_time)
+    def settime(self, StopTime: float | None, SampleTime: float | None) -> Future[Any]:  # noqa: N803
+        """Give the next run another stop time, or another sample time (s)."""
+        return self._loaded.set_times(StopTime, SampleTime)
 
     def status(self) -> dict[str, Any]:
         """Return the state of the target, in xPC's words."""
@@ -133,17 +133,17 @@ class Kernel:
 
     # signals and parameters
 
-    def signals(self) -> list[dict[str, Any]]:
+    def signals(self, first: int, count: int) -> list[dict[str, Any]]:
         """Return what there is to know of each signal."""
-        return self._loaded.newest.facts()
+        return self._loaded.newest.facts()[first : first + count]
 
     def getsignal(self, names: Sequence[str]) -> dict[str, Any]:
         """Return the newest values of signals; all of them if none is named."""
         return self._loaded.values(names)
 
-    def parameters(self) -> list[dict[str, Any]]:
+    def parameters(self, first: int, count: int) -> list[dict[str, Any]]:
         """Return what there is to know of each parameter."""
-        return self._loaded.parameters.facts()
+        return self._loaded.parameters.facts()[first : first + count]
 
     def getparam(self, names: Sequence[str]) -> dict[str, Any]:
         """Return the values of parameters as a diagram writes them; of all that can be tuned if none is named."""
@@ -189,15 +189,14 @@ class Kernel:
 
     def logs(self) -> list[dict[str, Any]]:
         """Return the logs that are kept, the oldest first."""
-        return [{"name": path.stem, "bytes": path.stat().st_size} for path in self.store.logs()]
+        return [{"name": path.stem, "size": path.stat().st_size} for path in self.store.logs()]
 
-    def getlogfile(self, name: str, at: int) -> dict[str, Any]:
-        """Return a piece of a log, and whether it is the last one."""
+    def getlog(self, name: str, offset: int, count: int) -> dict[str, Any]:
+        """Return a piece of a log."""
         path = self.store.known_log(name)
         with path.open("rb") as file:
-            file.seek(at)
-            data = file.read(PIECE)
-            return {"data": data, "last": file.tell() >= path.stat().st_size}
+            file.seek(offset)
+            return {"data": file.read(count), "size": path.stat().st_size}
 
     def drawing(self) -> Future[Any]:
         """Return the picture of the diagram as SVG."""
@@ -205,17 +204,3 @@ class Kernel:
 
     def _event(self, what: str, **more: Any) -> None:
         self._publish("event", {"event": what, **more}, None)
-
-
-def in_thread(work: Callable[[], Any]) -> Future[Any]:
-    """Return what some work gives, done in a thread of its own."""
-    found: Future[Any] = Future()
-
-    def perform() -> None:
-        try:
-            found.set_result(work())
-        except BaseException as error:
-            found.set_exception(error)
-
-    threading.Thread(target=perform, daemon=True).start()
-    return found

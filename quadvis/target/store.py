@@ -9,18 +9,17 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import BinaryIO
 
-from quadvis.errors import QuadvisError, quoted, suggestion
-from quadvis.errors.words import sentence
+from quadvis.errors import QuadvisError, quoted, sentence, suggestion
 from quadvis.target.bundle import DIGEST, NAME, Bundle, inner_path
 
 MOST_BYTES = 256_000_000  # of a file
+MOST_BUNDLE = 4_000_000
 PARTLY = 8  # files that may be on their way at the same time
 LOGS = 100  # of one application; older ones are removed
 
@@ -42,24 +41,28 @@ class Store:
         """Return those of some SHA-256 that are not here."""
         return [digest for digest in digests if not self._file(digest).exists()]
 
-    def put(self, digest: str, at: int, data: bytes, last: bool) -> None:
-        """Take the next piece of a file; with its last piece the contents must have their SHA-256."""
+    def put(self, digest: str, size: int, offset: int, data: bytes) -> int:
+        """Take the next piece of a file of a size; return how many bytes of it are here.
+
+        With its last piece the contents must have their SHA-256.
+        """
         path, part = self._file(digest), self._file(digest).with_suffix(".part")
         if path.exists():
-            return
-        if at == 0:
+            return size
+        if offset == 0:
             self._drop(digest)
             if len(self._partly) >= PARTLY:
                 self._drop(next(iter(self._partly)))
             self._partly[digest] = part.open("w+b")
         file = self._partly.get(digest)
-        if file is None or file.tell() != at:
+        if file is None or file.tell() != offset:
             raise QuadvisError("the pieces of a file must come in their order, from the first one on")
-        if at + len(data) > MOST_BYTES:
+        reached = offset + len(data)
+        if max(size, reached) > MOST_BYTES or reached > size:
             self._drop(digest)
-            raise QuadvisError(f"a file of more than {MOST_BYTES // 1_000_000} MB cannot be kept")
+            raise QuadvisError(f"a file has its size, and at most {MOST_BYTES // 1_000_000} MB")
         file.write(data)
-        if last:
+        if reached == size:
             file.seek(0)
             found = hashlib.file_digest(file, "sha256").hexdigest()
             if found != digest:
@@ -68,6 +71,16 @@ class Store:
             file.close()
             del self._partly[digest]
             part.replace(path)
+        return reached
+
+    def contents(self, digest: str) -> bytes:
+        """Return the contents of a small file; QuadvisError if it is not here, or too large to be a bundle."""
+        path = self._file(digest)
+        if not path.exists():
+            raise QuadvisError(f"the file {quoted(digest)} is not on the target")
+        if path.stat().st_size > MOST_BUNDLE:
+            raise QuadvisError("this file is too large to be a bundle")
+        return path.read_bytes()
 
     def _drop(self, digest: str) -> None:
         file = self._partly.pop(digest, None)
@@ -101,7 +114,7 @@ class Store:
             path = tree / inner_path(name)
             path.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(self._file(digest), path)  # a block that writes there changes no other file
-        (fresh / "bundle.json").write_text(json.dumps(bundle.plain(), indent=1))
+        (fresh / "bundle.json").write_bytes(bundle.data)
         shutil.rmtree(home, ignore_errors=True)
         fresh.replace(home)
 
@@ -109,12 +122,10 @@ class Store:
         """Return an application that is kept here; QuadvisError if there is none of this name."""
         path = self._home(name) / "bundle.json"
         try:
-            return Bundle.read(json.loads(path.read_bytes()))
+            return Bundle.parse(path.read_bytes())
         except FileNotFoundError:
             problem = f"there is no application {quoted(name)} on the target"
             raise QuadvisError(sentence(problem, suggestion(name, self.applications))) from None
-        except ValueError:
-            raise QuadvisError(f"the application {quoted(name)} is damaged: load it again") from None
 
     def place(self, bundle: Bundle) -> Path:
         """Return where the diagram of an application stands."""
@@ -140,6 +151,10 @@ class Store:
         folder.mkdir(mode=0o700, exist_ok=True)
         return folder / f"{_checked(chosen, 'a parameter set')}.yaml"
 
+    def known_set(self, name: str, chosen: str) -> Path:
+        """Return the path of a parameter set; QuadvisError if there is none of this name."""
+        return _known(chosen, {each: self.set_path(name, each) for each in self.sets(name)}, "parameter set")
+
     # logs
 
     def logs(self, name: str | None = None) -> list[Path]:
@@ -156,17 +171,21 @@ class Store:
         number = 1 + max((_number(path) for path in logs), default=0)
         return self.folder / "logs" / f"{name}-{number}.mcap"
 
-    def pieces(self, log: Path, size: int) -> Iterator[bytes]:
-        """Yield the contents of a log, piece by piece."""
-        with log.open("rb") as file:
-            while data := file.read(size):
-                yield data
+    def known_log(self, name: str) -> Path:
+        """Return the path of a log; QuadvisError if there is none of this name."""
+        return _known(name, {path.stem: path for path in self.logs()}, "log")
 
 
 def _checked(name: str, what: str = "an application") -> str:
     if not NAME.fullmatch(name):
         raise QuadvisError(f"{quoted(name)} is no name of {what}: use letters, digits, _ . -")
     return name
+
+
+def _known(name: str, paths: Mapping[str, Path], what: str) -> Path:
+    if name not in paths:
+        raise QuadvisError(sentence(f"there is no {what} {quoted(name)}", suggestion(name, paths)))
+    return paths[name]
 
 
 def _number(path: Path) -> int:
