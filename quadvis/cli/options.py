@@ -7,6 +7,7 @@ from typing import Any
 
 from quadvis.cli import commands
 from quadvis.cli.arguments import Parser
+from quadvis.cli.target_options import add_target_commands
 from quadvis.version import __version__
 
 JSON_HELP = """\
@@ -146,6 +147,7 @@ def parser() -> Parser:
     _own_block_option(schema)
     cache = add("cache", commands.cache, "say where compiled blocks are kept, and how large they are")
     cache.add_argument("--clear", action="store_true", help="remove them all")
+    add_target_commands(add, _setting_options, _engine_option)
     new = add("new", commands.new, "write the skeleton of a block, an output device or a diagram")
     new.add_argument("kind", choices=("block", "device", "diagram"))
     new.add_argument("name", metavar="NAME", help="a block or device as group.block, a diagram as FILE.yaml")
