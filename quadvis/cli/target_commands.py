@@ -18,7 +18,9 @@ LIVE = 0.1  # s between two pictures of a live scope
 
 
 def target(options: argparse.Namespace) -> int:
-    """Be a target until SIGTERM or Ctrl-C."""
+    """Be a target until SIGTERM or Ctrl-C; or write the systemd unit of one."""
+    if options.action == "install":
+        return _install(options)
     from quadvis.target.daemon import serve
 
     serve(options.name, listen=options.listen, folder=options.folder, startup=options.startup,
@@ -26,8 +28,7 @@ def target(options: argparse.Namespace) -> int:
     return 0
 
 
-def install(options: argparse.Namespace) -> int:
-    """Print or write the systemd unit of a target."""
+def _install(options: argparse.Namespace) -> int:
     from quadvis.target.unit import unit_text, write_unit
 
     text = unit_text(options.name, listen=options.listen, startup=options.startup, cpu=options.cpu)

@@ -58,14 +58,12 @@ def _target_options(parser: Parser) -> None:
     parser.add_argument("--startup", metavar="APP", help="load and start this application at once")
     words = "end when nothing is loaded and nobody has asked for anything for so long (s)"
     parser.add_argument("--until-idle", metavar="S", type=float, help=words)
-    actions = parser.add_subparsers(metavar="install", required=False)
-    install = actions.add_parser("install", help="write a systemd unit that starts the target at boot")
-    install.add_argument("--name", metavar="NAME", default="local", help="of the target")
-    install.add_argument("--listen", metavar="ADDRESS", help="as of `quadvis target`")
-    install.add_argument("--startup", metavar="APP", help="load and start this application at boot")
-    install.add_argument("--cpu", metavar="N[,N]", help="the processors that the target may use")
-    install.add_argument("--output", "-o", metavar="PATH", help="default: the system's folder; '-' prints it")
-    install.set_defaults(command=commands.install)
+    words = "write a systemd unit that starts the target at boot, with these options"
+    parser.add_argument("action", nargs="?", choices=("install",), metavar="install", help=words)
+    words = "with install: the processors that the target may use"
+    parser.add_argument("--cpu", metavar="N[,N]", help=words)
+    words = "with install: where to write the unit; default: the system's folder; '-' prints it"
+    parser.add_argument("--output", "-o", metavar="PATH", help=words)
 
 
 def _scope_options(parser: argparse.ArgumentParser) -> None:

@@ -18,6 +18,7 @@ from quadvis.run.tuned import read_tuned
 from quadvis.target.bundle import Bundle
 from quadvis.target.newest import Newest
 from quadvis.target.parameters import Parameters
+from quadvis.target.scopes import ApplicationScopes
 from quadvis.target.session import Session
 from quadvis.target.store import Store
 
@@ -38,6 +39,7 @@ class Application:
         self.bundle, self.diagram = bundle, diagram
         self.parameters = Parameters(diagram)
         self.newest = Newest(diagram)
+        self.scopes = ApplicationScopes(diagram, store.scope_folder(bundle.name), publish)
         self.result: Result | None = None
         self.problem = ""
         self.said: list[str] = []  # since the last start
@@ -75,10 +77,11 @@ class Application:
         """Start the processes; the Future is done when they are ready to run."""
         assert self._session is None or not self._session.running
         self.newest.clear()
+        self.scopes.begin()
         self.problem, self.result, self.said = "", None, []
         self._session = Session(
-            self._timed(), self.bundle.engine, self._store.next_log(self.name), self.newest.taps, self._say,
-            self._ended,
+            self._timed(), self.bundle.engine, self._store.next_log(self.name), [*self.newest.taps, *self.scopes.taps],
+            self._say, self._ended, self.scopes.settle,
         )  # fmt: skip
         if self.parameters.tuned:
             self._session.helm.tune(self.parameters.tuned)
@@ -152,6 +155,7 @@ class Application:
         session = self._session
         assert session is not None
         self.problem, self.result = session.problem, session.result
+        self.scopes.end()
         self._event("stopped", problem=self.problem)
 
     def _event(self, what: str, **more: Any) -> None:

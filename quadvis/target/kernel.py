@@ -121,6 +121,11 @@ class Kernel:
         return status(self.name, self._application, time.monotonic() - self._born)
 
     @property
+    def is_idle(self) -> bool:
+        """True if nothing is loaded."""
+        return self._application is None
+
+    @property
     def _loaded(self) -> Application:
         if self._application is None:
             raise QuadvisError("no application is loaded: load one first")
@@ -184,6 +189,40 @@ class Kernel:
 
     def _set(self, name: str) -> dict[str, Any]:
         return self.getparamset(name) if name else self.getparam(())
+
+    # scopes
+
+    def addscope(self, id: int | None, type: str) -> int:
+        """Add a scope; return its number."""
+        return self._loaded.scopes.add(id, type)
+
+    def remscope(self, ids: Sequence[int]) -> None:
+        """Remove scopes."""
+        self._loaded.scopes.remove(ids)
+
+    def setscope(self, id: int, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Set properties of a scope."""
+        return self._loaded.scopes.set(id, values)
+
+    def startscope(self, ids: Sequence[int]) -> None:
+        """Let scopes acquire."""
+        self._loaded.scopes.start(ids)
+
+    def stopscope(self, ids: Sequence[int]) -> None:
+        """Interrupt scopes."""
+        self._loaded.scopes.stop(ids)
+
+    def trigger(self, ids: Sequence[int]) -> None:
+        """Trigger scopes by software."""
+        self._loaded.scopes.trigger(ids)
+
+    def scopes(self) -> list[dict[str, Any]]:
+        """Return all scopes with their properties; none if nothing is loaded."""
+        return self._application.scopes.facts() if self._application is not None else []
+
+    def getscope(self, id: int, first: int, count: int) -> dict[str, Any]:
+        """Return samples of the newest package of a scope."""
+        return self._loaded.scopes.samples(id, first, count)
 
     # results
 

@@ -3,6 +3,7 @@
  folder/files/<SHA-256>              contents of files, each once
  folder/applications/<name>/         bundle.json, and the folder `tree` as the diagram's blocks see it
  folder/sets/<name>/<set>.yaml       parameter sets of an application
+ folder/scopes/<name>/               files of file scopes
  folder/logs/<name>-<number>.mcap    the logs of its runs
 """
 
@@ -154,6 +155,12 @@ class Store:
     def known_set(self, name: str, chosen: str) -> Path:
         """Return the path of a parameter set; QuadvisError if there is none of this name."""
         return _known(chosen, {each: self.set_path(name, each) for each in self.sets(name)}, "parameter set")
+
+    def scope_folder(self, name: str) -> Path:
+        """Return the folder for the files of an application's scopes."""
+        folder = self.folder / "scopes" / _checked(name)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        return folder
 
     # logs
 
