@@ -41,6 +41,7 @@ class Kernel:
         """End a run, with its outputs at their safe values."""
         if self._application is not None:
             self._application.close()
+        self.store.close()
 
     def lose_host(self) -> None:
         """Do what the application wants when its operator is lost."""

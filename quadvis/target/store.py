@@ -83,6 +83,11 @@ class Store:
             raise QuadvisError("this file is too large to be a bundle")
         return path.read_bytes()
 
+    def close(self) -> None:
+        """Forget the files that are not whole."""
+        for digest in list(self._partly):
+            self._drop(digest)
+
     def _drop(self, digest: str) -> None:
         file = self._partly.pop(digest, None)
         if file is not None:
