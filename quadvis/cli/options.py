@@ -93,6 +93,8 @@ def parser() -> Parser:
     )
     _engine_option(run)
     _real_time_options(run)
+    words = "fly it on a target, by its name or address, and bring the log home"
+    run.add_argument("--target", metavar="NAME", help=words)
     words = "time every call of a block; write a trace for Perfetto or chrome://tracing there, '' for none"
     run.add_argument("--profile", metavar="PATH.json", help=words)
     run.add_argument("--json", action="store_true", help="print one JSON object instead of the summary")
