@@ -1,7 +1,8 @@
 """The audit file of a target: a JSON line for each command that changes something, and for each refusal.
 
-The file grows at its end alone and is renamed when it is long, so it takes a bounded part of the disk. Refusals
-beyond a rate are counted in place of written: whoever asks for the forbidden cannot push out what was done.
+The file grows at its end alone and is renamed when it is long, so it takes a bounded part of the disk.
+Refusals beyond a rate are counted in place of written: whoever asks for the forbidden cannot push out what
+was done.
 """
 
 from __future__ import annotations
@@ -46,6 +47,7 @@ class Audit:
         self._longest, self._files = longest, files
         self._budget = Budget(REFUSALS, REFUSED_AT_ONCE, clock)
         self._unwritten = 0
+        self._descriptor = -1
         private_folder(path.parent)
         try:
             self._open()

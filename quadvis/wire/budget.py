@@ -67,3 +67,21 @@ class Tally:
         """Return all counts."""
         with self._lock:
             return dict(self._counts)
+
+
+def sparing(
+    say: Callable[[str], object], clock: Callable[[], float] = time.monotonic
+) -> Callable[[str], None]:
+    """Return a way to say few sentences a second, and then how many were left out."""
+    budget = Budget(1.0, 5.0, clock)
+    unsaid = 0
+
+    def said(words: str) -> None:
+        nonlocal unsaid
+        if not budget.spend(""):
+            unsaid += 1
+            return
+        say(f"{words} ({unsaid} sentences were left out before)" if unsaid else words)
+        unsaid = 0
+
+    return said

@@ -1,7 +1,7 @@
 """From a message to its answer, without any socket: who may do what, and with which arguments.
 
-A request passes the budget of its key, its envelope, its verb, the level, the arguments and the lease, in this
-order; only then the target hears of it.
+A request passes the budget of its key, its envelope, its verb, the level, the arguments and the lease, in
+this order; only then the target hears of it.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,9 +18,9 @@ from quadvis.errors import QuadvisError
 from quadvis.wire.audit import Audit
 from quadvis.wire.budget import Budget, Tally
 from quadvis.wire.lease import Lease
-from quadvis.wire.limits import BURST, ITEMS_A_REQUEST, PENDING, RATE, RENEWAL
+from quadvis.wire.limits import BURST, ITEMS, ITEMS_A_REQUEST, PENDING, RATE, RENEWAL
 from quadvis.wire.messages import Reply, Request, UnreadableError, pack_reply, read_request
-from quadvis.wire.refusals import BadError, BusyError, WireError
+from quadvis.wire.refusals import BadError, BusyError, GoneError, RefusedError, WireError
 from quadvis.wire.verbs import CONTROL, Verb, check_level, checked, find_verb
 from quadvis.wire.who import Who
 
@@ -53,7 +54,8 @@ class Desk:
     """Answers the requests of all hosts.
 
     ``handle(verb, arguments, who)`` is the target: it returns plain data, `Done`, or a Future of one of them,
-    and raises QuadvisError. ``later(call)`` has a call made by the thread of the server.
+    and raises QuadvisError. ``later(call)`` has a call made by the thread of the server. The status of the
+    target gets the name of the operator and ``facts()``.
     """
 
     def __init__(
@@ -66,17 +68,19 @@ class Desk:
         audit: Audit | None = None,
         later: Callable[[Callable[[], object]], object] = lambda call: call(),
         say: Callable[[str], object] = lambda words: None,
+        facts: Callable[[], Mapping[str, Any]] = dict,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.target, self.lease, self.counts = target, lease, counts
         self._handle, self._audit, self._later, self._say, self._clock = handle, audit, later, say, clock
+        self._facts = facts
         self._budget = Budget(RATE, BURST, clock)
         self._open: dict[Future[Any], _Open] = {}
         self._waiting: Counter[bytes] = Counter()
         self._warned: set[bytes] = set()
         self.own: dict[str, Callable[[Mapping[str, Any], Who], Any]] = {
             "lease": self._lease,
-            "renew": lambda args, who: self.lease.renew(who, args["token"]) or {"lost_s": self.lease.lasts},
+            "renew": self._renew,
             "release": lambda args, who: self.lease.release(who, args["token"]),
         }
 
@@ -91,6 +95,8 @@ class Desk:
             request = read_request(data)
         except UnreadableError as error:
             self.counts.add("malformed")
+            self._budget.charge(who.public, min(len(data), ITEMS) / ITEMS_A_REQUEST)
+            self._say(f"a message of {who.name} cannot be read: {error}")
             if error.id is not None:
                 self._reply(Reply(error.id, error=BadError(self._worded(error))), send)
             return
@@ -110,6 +116,22 @@ class Desk:
             self._reply(Reply(request.id, error=type(error)(self._worded(error))), send)
             return
         self._perform(who, verb, request, args, send)
+
+    def turn_away(self, public: bytes, data: bytes, send: Send) -> None:
+        """Refuse a message of a key that was let in and is no more."""
+        self.counts.add(RefusedError.kind)
+        if not self._budget.spend(public, max(1, len(data) / ITEMS_A_REQUEST)):
+            return
+        with suppress(UnreadableError):
+            error = RefusedError(self._worded(RefusedError("this key is let in no more")))
+            self._reply(Reply(read_request(data).id, error=error), send)
+
+    def close(self) -> None:
+        """Answer the requests that are under way: the target is closing."""
+        for future, request in list(self._open.items()):
+            del self._open[future]
+            error = GoneError("the target is closing")
+            self._finish(request.who, request.verb, request.request, request.args, error, request.send)
 
     def _perform(self, who: Who, verb: Verb, request: Request, args: Mapping[str, Any], send: Send) -> None:
         try:
@@ -169,6 +191,10 @@ class Desk:
             return
         done = found if isinstance(found, Done) else Done(found)
         self.counts.add("answered")
+        if verb.name == "status" and isinstance(done.result, Mapping):
+            operator = self.lease.operator
+            more = {"operator": operator and operator.name, "wire": self._facts()}
+            done = Done({**done.result, **more})
         if self._audit is not None and verb.changes:
             self._audit.accepted(who, verb.name, args, old=done.old, new=done.new, tick=done.tick)
         self._reply(Reply(request.id, done.result, done.tick), send)
@@ -205,6 +231,10 @@ class Desk:
             return
         words = f"more than {RATE} requests a second; those beyond are dropped without an answer"
         self._reply(Reply(number, error=BusyError(f"{self.target} refuses: {words}")), send)
+
+    def _renew(self, args: Mapping[str, Any], who: Who) -> dict[str, Any]:
+        self.lease.renew(who, args["token"])
+        return {"lost_s": self.lease.lasts}
 
     def _lease(self, args: Mapping[str, Any], who: Who) -> dict[str, Any]:
         token = self.lease.take(who)

@@ -52,6 +52,15 @@ class Lease:
         self._on_lost(holder)
         return None
 
+    def withdraw(self) -> None:
+        """Take the lease from the operator, whose key is let in no more."""
+        with self._lock:
+            holder = self._holder
+            self._end()
+            self.lost += holder is not None
+        if holder is not None:
+            self._on_lost(holder)
+
     def take(self, who: Who) -> str:
         """Make a host the operator and return the token of the lease; BusyError if there is another one."""
         self.watch()

@@ -158,7 +158,11 @@ def find_verb(name: str, socket: str) -> Verb:
 def check_level(verb: Verb, level: int) -> None:
     """Raise RefusedError if a key of this level may not use a verb."""
     if level > verb.level:
-        raise RefusedError(f"this key {may(level)}; '{verb.name}' needs level {verb.level} or lower")
+        raise RefusedError(f"this key {may(level)}; '{verb.name}' needs {_at_most(verb.level)}")
+
+
+def _at_most(level: int) -> str:
+    return f"level {level} or lower" if level else "level 0"
 
 
 def check_topic(name: str, level: int) -> None:
@@ -168,7 +172,7 @@ def check_topic(name: str, level: int) -> None:
     if topic is None:
         raise UnknownError(f"there is no topic {quoted(name)}")
     if level > topic.level:
-        raise RefusedError(f"this key {may(level)}; the stream '{name}' needs level {topic.level} or lower")
+        raise RefusedError(f"this key {may(level)}; the stream '{name}' needs {_at_most(topic.level)}")
 
 
 def checked(verb: Verb, given: Mapping[str, Any]) -> dict[str, Any]:
