@@ -32,12 +32,16 @@ class Sink:
     `lost` counts the rows that are missing from `lost_from` (ns) on.
     """
 
-    def __init__(self, file: BinaryIO) -> None:
-        """Write to an open, empty file, and close it at the end."""
+    def __init__(self, file: BinaryIO, synced: bool = False) -> None:
+        """Write to an open, empty file, and close it at the end.
+
+        A ``synced`` one has the disk itself take each batch, so that it survives the loss of power.
+        """
         self.failure = ""
         self.lost = 0
         self.lost_from: int | None = None
         self._file = file
+        self._synced = synced
         self._parts: list[bytes | memoryview] = []
         self._taken = 0
         self._queue: deque[Batch] = deque()
@@ -113,6 +117,8 @@ class Sink:
                 batch = self._queue[0]
             try:
                 self._put(batch.data)
+                if self._synced:
+                    os.fsync(self._file.fileno())
             except OSError as error:
                 # Part of a batch is useless, and would make the count of lost rows wrong.
                 with suppress(OSError):

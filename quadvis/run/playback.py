@@ -15,9 +15,8 @@ from quadvis.block import NO_FRAME, Block
 from quadvis.engine.tuning import Change
 from quadvis.errors import QuadvisError, quoted
 from quadvis.graph.graph import Graph, Node
-from quadvis.output.recording import Slots
+from quadvis.output.recording import Slots, ports
 from quadvis.run.outside import outside
-from quadvis.run.rows import ports
 
 Whole = NDArray[np.int64]
 

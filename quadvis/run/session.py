@@ -22,10 +22,11 @@ from quadvis.engine.tuning import Change
 from quadvis.native.choice import AUTO, Announce
 from quadvis.output.kept import ALL, RowJudge, RunSignals
 from quadvis.output.recording import RecordedBlock
+from quadvis.output.stretch import stamps_of
 from quadvis.run.loops import SIMULATED, Paced, Progress, RunLoop, Simulated, Taken, Takers
 from quadvis.run.played_files import files_text, played_files
 from quadvis.run.result import Result
-from quadvis.run.row_tap import RowTap, Taker, stamps_of
+from quadvis.run.row_tap import RowTap, Taker
 from quadvis.run.rows import inputs_of, left_out, signals_of
 from quadvis.run.verdict import Judging, Outcome
 from quadvis.version import __version__
