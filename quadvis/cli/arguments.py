@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 from quadvis.errors import QuadvisError, quoted, sentence, suggestion
 
 HELP = ("-h", "--help")
+_PLACES: Mapping[Any, str] = {"?": "[{}]", "*": "[{} ...]", "+": "{} [...]"}
 
 
 class Parser(argparse.ArgumentParser):
@@ -79,9 +80,9 @@ def _checked(parser: Parser, words: Sequence[str]) -> list[str]:
             ended = True
         else:
             found += _option(parser, word, waiting)
-    needed = [place for place in parser.places if place.nargs is None]
+    needed = [place for place in parser.places if place.nargs in (None, "+")]
     further = [place for place in parser.places if place.nargs == "?"]
-    further += [place for place in parser.places if place.nargs == "*"] * (len(placed) - len(needed))
+    further += [place for place in parser.places if place.nargs in ("*", "+")] * (len(placed) - len(needed))
     for place, word in zip([*needed, *further], placed, strict=False):
         if place.choices is not None and word not in place.choices:
             remedy = suggestion(word, map(str, place.choices))
@@ -146,9 +147,7 @@ def _usage(parser: Parser) -> str:
     places = (
         "|".join(map(str, place.choices))
         if place.choices
-        else f"[{_name(place)}]"
-        if place.nargs == "?"
-        else _name(place)
+        else _PLACES.get(place.nargs, "{}").format(_name(place))
         for place in parser.places
     )
     return f"'{' '.join([parser.prog, *places])}'"

@@ -143,7 +143,16 @@ class HostScope:
         """Yield the packages as they come; ends after a time (s) without one."""
         found: queue.SimpleQueue[Samples] = queue.SimpleQueue()
         topic = f"scope/{self._number}"
-        self._connection.subscribe(topic, lambda header, array: found.put(Samples.read(header, array)))
+        parts: list[Any] = []
+
+        def take(header: Mapping[str, Any], array: Any) -> None:
+            if header["part"] == 0:
+                parts.clear()
+            parts.append(array)
+            if header["part"] == header["parts"] - 1 and len(parts) == header["parts"]:
+                found.put(Samples.read(header, np.concatenate(parts)))
+
+        self._connection.subscribe(topic, take)
         try:
             while True:
                 try:
@@ -155,4 +164,4 @@ class HostScope:
 
     def __repr__(self) -> str:
         found = self.facts()
-        return f"<Scope {self._number}: {found['Type']}, {found['Status']}, {', '.join(found['signals'])}>"
+        return f"<Scope {self._number}: {found['Type']}, {found['Status']}, {', '.join(found['Signals'])}>"

@@ -80,8 +80,8 @@ class Target:
         return self._connection.level
 
     def request(self, verb: str, **arguments: Any) -> Any:
-        """Return what the target answers to a verb of the wire; `quadvis wire` lists them."""
-        return self._connection.request(verb, **arguments)
+        """Return what the target answers to a verb of the wire, see `quadvis wire`; as the operator if needed."""
+        return self._connection.operate(verb, **arguments)
 
     def subscribe(self, topic: str, take: Callable[[Mapping[str, Any], Any], object]) -> None:
         """Let ``take(header, array)`` be called with the data of a topic, in another thread."""

@@ -120,7 +120,8 @@ class Paced:
 
     clock, early = REAL_TIME, ""
 
-    def __init__(self, diagram: Diagram, engine: str, announce: Announce | None, wishes: RealTime) -> None:
+    def __init__(self, diagram: Diagram, engine: str, announce: Announce | None, wishes: RealTime, helm: object = None) -> None:
+        self._helm = helm
         parts = live_parts(diagram.graph)
         for computer, part in parts.items():
             wishes.on(diagram.computer(computer)).check(part)
@@ -136,10 +137,15 @@ class Paced:
         taps = paced_taps(takers.taken, self._diagram)
         flight = supervise(
             self._diagram, self._wishes, self._engine, [*taps, *takers.taps], takers.left_out, takers.tend,
-            self._announce,
+            self._announce, self._helm,
         )  # fmt: skip
-        for tap in taps:
-            tap.end(self._diagram.ticks)
+        if self._helm is not None and self._helm.wanted_stop:
+            self.early = f"it was stopped at t = {self._helm.time:.9g} s"
+            for tap in taps:
+                tap.end(self._helm.tick)
+        else:
+            for tap in taps:
+                tap.end(self._diagram.ticks)
         self.profiles = {share.computer: share.profile for share in flight.shares if share.profile}
         return flight.engine, flight
 

@@ -59,6 +59,11 @@ class Application:
         return self._session
 
     @property
+    def stop_time(self) -> float:
+        """The stop time of the next run, or of the one that goes on (s)."""
+        return float(self._timed().stop_time)
+
+    @property
     def running(self) -> bool:
         """True while the loops run."""
         return self.state in (RUNNING, STOPPING)
@@ -129,7 +134,7 @@ class Application:
             session.helm.stop()
             session.join()
 
-    def set_times(self, stop_time: Any, sample_time: Any) -> None:
+    def set_times(self, stop_time: float | None, sample_time: float | None) -> Future[Any]:
         """Give the next run another stop time or another sample time; QuadvisError while one is going on."""
         if self.running:
             raise QuadvisError("times cannot change in a run: stop it first")
@@ -140,7 +145,7 @@ class Application:
 
             self.diagram = rescaled(self.diagram, _seconds(sample_time))
         self.close()
-        self.prepare()
+        return self.prepare()
 
     def _timed(self) -> Diagram:
         if self._stop_time is None:
@@ -164,9 +169,9 @@ class Application:
     # looking and tuning
 
     def values(self, names: Sequence[str]) -> dict[str, Any]:
-        """Return the newest values of signals by name, with their ticks; of all if none is named."""
+        """Return the newest values of signals by name; of all if none is named. None is one not there yet."""
         found = [self.newest.value(name) for name in (names or self.newest.names)]
-        return {each.name: [each.value, each.tick] for each in found}
+        return {each.name: each.value for each in found}
 
     def tune(self, values: Mapping[str, Any]) -> Future[Any]:
         """Give parameters values, all at one tick.

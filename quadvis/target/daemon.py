@@ -59,7 +59,7 @@ class Daemon:
     def __init__(self, name: str, folder: Path, say: Callable[[str], None]) -> None:
         from quadvis.wire.audit import Audit
         from quadvis.wire.hosts import AuthorizedHosts
-        from quadvis.wire.keys import own_pair
+        from quadvis.wire.keys import own_key, own_names
         from quadvis.wire.server import Server
 
         self._say = say
@@ -69,7 +69,7 @@ class Daemon:
         self._stack.enter_context(_alone(folder, name))
         self._asked = time.monotonic()
         self._told: dict[str, Any] = {}
-        pair = own_pair(name)
+        pair = own_key(name) if name in own_names() else None
         self._server = Server(
             name, self._handle, hosts=AuthorizedHosts(), pair=pair, audit=Audit(folder / "audit.jsonl"),
             on_lost=lambda who: self.kernel.lose_host(), say=say,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import threading
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from pathlib import Path
 
 from quadvis.diagram.diagram import Diagram
@@ -19,7 +20,7 @@ from quadvis.run.session import recorded
 
 
 class Session:
-    """One run. ``result`` is there if it has come to an end in order, ``problem`` says why if not.
+    """One run. ``ready`` is done when the processes can begin, ``over`` when all has ended. ``result`` is there if it has come to an end in order, ``problem`` says why if not.
 
     ``announce`` takes sentences, ``ended`` is called when all is over; both in the session's thread.
     """
@@ -32,15 +33,24 @@ class Session:
         taps: Sequence[Tap],
         announce: Callable[[str], None],
         ended: Callable[[], None],
-        facts: Mapping[str, str],
+        settle: Callable[[int], None],
     ) -> None:
         self.diagram, self.log, self.helm = diagram, log, Helm()
+        self.ready: Future[None] = Future()
+        self.over: Future[None] = Future()
+        self.helm.on_state = self._changed
+        self.helm.settle = settle
         self.result: Result | None = None
         self.problem = ""
-        self._engine, self._taps, self._facts = engine, taps, facts
+        self._engine, self._taps = engine, taps
         self._announce, self._ended = announce, ended
         self._thread = threading.Thread(target=self._perform, name="session", daemon=True)
         self._thread.start()
+
+    @property
+    def stopped(self) -> bool:
+        """True if it was told to end before its stop time."""
+        return self.helm.stopped
 
     @property
     def running(self) -> bool:
@@ -55,11 +65,18 @@ class Session:
         try:
             loop = Paced(self.diagram, self._engine, self._announce, RealTime(), self.helm)
             self.result = recorded(
-                self.diagram, loop, log=self.log, keep=(), taps=self._taps, facts=self._facts
+                self.diagram, loop, log=self.log, keep=(), taps=self._taps
             )
         except QuadvisError as error:
             self.problem = "; ".join([str(error), *getattr(error, "__notes__", ())])
         except Exception as error:
             self.problem = surroundings(error) or traceback.format_exc()
         finally:
+            if not self.ready.done():
+                self.ready.set_exception(QuadvisError(self.problem or "it was stopped before it was ready"))
             self._ended()
+            self.over.set_result(None)
+
+    def _changed(self) -> None:
+        if self.helm.state == "ready" and not self.ready.done():
+            self.ready.set_result(None)

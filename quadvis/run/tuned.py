@@ -1,0 +1,4 @@
+"""interim"""
+def read_tuned(diagram, name, value):
+    path, _, p = name.rpartition(".")
+    return [(path, p, value)]
