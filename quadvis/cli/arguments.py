@@ -134,7 +134,8 @@ def _check_value(action: argparse.Action, name: str, value: str) -> None:
     except argparse.ArgumentTypeError as error:
         raise QuadvisError(f"{name}: {error}; write {name} {_name(action)}") from None
     except ValueError:
-        raise QuadvisError(f"{name}: {quoted(value)} is not a whole number; write one, such as 3") from None
+        kind, such = ("number", "0.5") if action.type is float else ("whole number", "3")
+        raise QuadvisError(f"{name}: {quoted(value)} is not a {kind}; write one, such as {such}") from None
 
 
 def _name(action: argparse.Action) -> str:
