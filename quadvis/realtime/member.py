@@ -112,14 +112,6 @@ class Member:
         return float(self._control[control.TICK] * self._part.tick)
 
     @property
-    def tick(self) -> int:
-        return int(self._control[control.TICK])
-
-    def times(self):
-        tasks = zip(self._part.tasks, self._shared.tasks, strict=True)
-        return tuple(TaskTimes.read(task.name, float(task.period), words) for task, words in tasks)
-
-    @property
     def now(self) -> float:
         """The time since the start (s)."""
         return max(0, time.monotonic_ns() - self._control[control.START]) / NANOSECONDS

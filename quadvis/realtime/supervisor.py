@@ -6,7 +6,7 @@ import multiprocessing
 import time
 from collections.abc import Callable, Sequence
 from multiprocessing.connection import wait
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from quadvis.engine.taps import Tap
 from quadvis.errors import QuadvisError, RunError
@@ -40,7 +40,6 @@ def supervise(
     left_out: LeftOut,
     tend: Callable[[float, float], None],
     announce: Announce | None = None,
-    helm: Any = None,
 ) -> Flight:
     """Run a diagram in real time to its stop time, each computer in a process of its own.
 
@@ -50,7 +49,7 @@ def supervise(
     overruns, if a step does not end, or if a process is killed. However this ends, all processes have ended
     then, and all rows have been handed on.
     """
-    supervisor = _Supervisor(diagram, wishes, engine, taps, left_out, announce or _nothing, helm)
+    supervisor = _Supervisor(diagram, wishes, engine, taps, left_out, announce or _nothing)
     try:
         return supervisor.follow(tend)
     except BaseException as error:
@@ -68,9 +67,7 @@ class _Supervisor:
         taps: Sequence[Tap],
         left_out: LeftOut,
         announce: Announce,
-        helm: Any = None,
     ) -> None:
-        self._helm = helm
         context = multiprocessing.get_context("spawn")
         self._announce = announce
         asked = {name: wishes.on(diagram.computer(name)) for name in diagram.graph.computers}
@@ -106,31 +103,12 @@ class _Supervisor:
         self._start()
         while any(member.process.is_alive() for member in self._members):
             sources = [source for member in self._alive for source in member.sources]
-            if self._helm is not None:
-                sources.append(self._helm._wake_r)
             wait([*sources, *self._devices.sources], LOOK)
-            ticks = min((m.tick for m in self._members), default=0)
             self._look()
-            if self._helm is not None:
-                import contextlib, os
-                with contextlib.suppress(BlockingIOError):
-                    os.read(self._helm._wake_r, 100)
-                h = self._helm
-                h.members = self._members
-                if h.state == "starting" and all(m.ready for m in self._members):
-                    h.state = "ready"; h.on_state()
-                if h.wanted_stop:
-                    for m in self._members: m.ask()
-                    h.stopped = True
-                h.tick = ticks; h.time = float(ticks * self._members[0]._part.tick)
-                if getattr(h, "settle", None) and self._begun: h.settle(getattr(self, "_before", 0))
-                self._before = ticks
             if alarm := self._devices.alarm():
                 raise self._stopped(alarm.reason, alarm.block)
-            if not self._begun and all(member.ready for member in self._members) and (self._helm is None or self._helm.wanted_begin or self._helm.wanted_stop):
+            if not self._begun and all(member.ready for member in self._members):
                 self._begin()
-                if self._helm is not None:
-                    self._helm.state = "running"; self._helm.on_state()
             running = [member for member in self._members if member.running]
             if running:
                 tend(min(member.time for member in running), running[0].now)
@@ -216,7 +194,7 @@ class _Supervisor:
             ended = not member.process.is_alive()
             member.listen()
             member.take(last=last)
-            if member.failed and (ended or member.ending) and not (self._helm is not None and self._helm.wanted_stop and member.ending and member.ending.asked):
+            if member.failed and (ended or member.ending):
                 raise self._cause(member)
 
     def _cause(self, member: Member) -> QuadvisError:

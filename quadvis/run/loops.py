@@ -120,8 +120,7 @@ class Paced:
 
     clock, early = REAL_TIME, ""
 
-    def __init__(self, diagram: Diagram, engine: str, announce: Announce | None, wishes: RealTime, helm: object = None) -> None:
-        self._helm = helm
+    def __init__(self, diagram: Diagram, engine: str, announce: Announce | None, wishes: RealTime) -> None:
         parts = live_parts(diagram.graph)
         for computer, part in parts.items():
             wishes.on(diagram.computer(computer)).check(part)
@@ -137,15 +136,10 @@ class Paced:
         taps = paced_taps(takers.taken, self._diagram)
         flight = supervise(
             self._diagram, self._wishes, self._engine, [*taps, *takers.taps], takers.left_out, takers.tend,
-            self._announce, self._helm,
+            self._announce,
         )  # fmt: skip
-        if self._helm is not None and self._helm.wanted_stop:
-            self.early = f"it was stopped at t = {self._helm.time:.9g} s"
-            for tap in taps:
-                tap.end(self._helm.tick)
-        else:
-            for tap in taps:
-                tap.end(self._diagram.ticks)
+        for tap in taps:
+            tap.end(self._diagram.ticks)
         self.profiles = {share.computer: share.profile for share in flight.shares if share.profile}
         return flight.engine, flight
 
