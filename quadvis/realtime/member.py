@@ -26,7 +26,7 @@ from quadvis.realtime.lifeline import Lifeline
 from quadvis.realtime.options import RealTime
 from quadvis.realtime.ring import RecordRing, Words
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
-from quadvis.realtime.streams import RowStream, streams_of
+from quadvis.realtime.streams import RowStream, StreamTaps, streams_of
 from quadvis.realtime.times import TaskTimes
 
 if TYPE_CHECKING:
@@ -154,7 +154,7 @@ class Member:
             stream.hand_on(records, taps)
 
     @property
-    def _rings(self) -> Iterable[tuple[tuple[RowStream, list[Tap]], RecordRing]]:
+    def _rings(self) -> Iterable[tuple[tuple[RowStream, StreamTaps], RecordRing]]:
         return zip(self._streams, self._shared.rings, strict=True)
 
     def listen(self) -> None:
