@@ -23,7 +23,9 @@ LEFT = 5  # by the loop: not 0 once it runs no more steps
 EARLY, AT_STOP_TIME = 1, 2  # what LEFT says
 SAFE = 6  # by the loop: not 0 once the outputs are to hold their safe values to the end
 LIFELINE = slice(8, 8 + lifeline.SIZE)  # of the loop's thread
-WORDS = LIFELINE.stop
+TICKS = LIFELINE.stop  # by the supervisor, before the start: at how many ticks the run ends
+LAST = TICKS + 1  # likewise: the last tick with a due task, if it is another one than the diagram has; or 0
+WORDS = LAST + 1
 LEFT_OUT = (
     4096,
     2,
