@@ -128,11 +128,13 @@ def recorded(
             row.judge.flush()
         outcome = judging.outcome()
         if writer:
-            writer.close({"stopped": loop.early} if loop.early else _closing(outcome, flight))
+            closing = {} if loop.early and not flight else _closing(outcome, flight)
+            writer.close(closing | ({"stopped": loop.early} if loop.early else {}))
             signals.written(writer.path, writer.loss)
     wall, cpu = time.perf_counter() - wall, _processor_time() - cpu
     lost = writer.loss if writer else ""
-    return Result(diagram, signals, outcome, diagram.duration, wall, cpu, lost, choice, flight)
+    duration = diagram.duration if flight is None or flight.duration is None else flight.duration
+    return Result(diagram, signals, outcome, duration, wall, cpu, lost, choice, flight)
 
 
 def _processor_time() -> float:
