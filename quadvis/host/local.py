@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-import subprocess
+import socket
 import sys
 import tempfile
 import time
@@ -19,41 +19,32 @@ LOOK = 0.05
 
 def started_here() -> None:
     """See to it that the target of this machine's user runs; QuadvisError if it cannot be started."""
-    from quadvis.wire.address import local_path, read_address
-    from quadvis.wire.client import Client
-    from quadvis.wire.refusals import NoAnswerError
+    from quadvis.wire.address import local_path
 
     path = local_path(LOCAL)
     if _answers(path):
         return
-    with tempfile.TemporaryFile() as output:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "quadvis", "target", "--name", LOCAL, "--until-idle", str(UNUSED)],
-            stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True, cwd="/",
-        )  # fmt: skip
+    words = ["-m", "quadvis", "target", "--name", LOCAL, "--until-idle", str(UNUSED)]
+    with tempfile.TemporaryFile() as output, open(os.devnull, "rb") as nothing:
+        files = [(os.POSIX_SPAWN_DUP2, file.fileno(), number) for number, file in enumerate((nothing, output))]
+        files.append((os.POSIX_SPAWN_DUP2, output.fileno(), 2))
+        # It belongs to nobody: it goes on when this process has ended.
+        process = os.posix_spawn(
+            sys.executable, [sys.executable, *words], os.environ, file_actions=files, setsid=True
+        )
         until = time.monotonic() + START
-        while time.monotonic() < until:
-            if _answers(path):
-                break
-            code = process.poll()
-            if code is not None and not _answers(path):  # another one may have been quicker
+        while not _answers(path):
+            if os.waitpid(process, os.WNOHANG)[0] and not _answers(path):  # another one may have been quicker
                 output.seek(0)
                 said = output.read().decode(errors="replace").strip().splitlines()
-                raise QuadvisError(f"the target of this machine cannot start: {said[-1] if said else code}")
+                raise QuadvisError(f"the target of this machine cannot start{f': {said[-1]}' if said else ''}")
+            if time.monotonic() > until:
+                raise QuadvisError(f"the target of this machine does not answer after {START:g} s")
             time.sleep(LOOK)
-        else:
-            raise QuadvisError(f"the target of this machine does not answer after {START:g} s")
-    with Client(read_address(str(path)), LOCAL) as client:
-        try:
-            client.connect()
-        except NoAnswerError as error:
-            raise QuadvisError(str(error)) from None
 
 
 def _answers(path: Path) -> bool:
     """Return whether something listens at the path of a socket."""
-    import socket
-
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as found:
         try:
             found.connect(os.fspath(path))

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 PIECE = 1 << 20  # bytes of a file in one message
 LOADING = 120.0  # s that a target has to get an application ready
+STOPPING = 20.0  # s that a run has to come to its end
 SECOND = Unit.parse("s")
 
 # What `status` says, by the names of xPC Target, with the names that Python's style wants.
@@ -109,7 +110,7 @@ class Target:
         known = _BY_ALIAS.get(name, name)
         if known not in ("StopTime", "SampleTime"):
             raise AttributeError(f"'{name}' of a target cannot be set; StopTime and SampleTime can")
-        self._connection.operate("settime", **{known: float(value)})
+        self._connection.operate("settime", deadline=LOADING, **{known: float(value)})
 
     def __repr__(self) -> str:
         return f"<Target {self.name}>"
@@ -177,12 +178,12 @@ class Target:
 
     def stop(self) -> Target:
         """Stop the application: safe values at the outputs, log closed. It stays loaded."""
-        self._connection.operate("stop")
+        self._connection.operate("stop", deadline=STOPPING)
         return self
 
     def unload(self) -> None:
         """Remove the application that is loaded from the target's memory; the target keeps its files."""
-        self._connection.operate("unload")
+        self._connection.operate("unload", deadline=LOADING)
 
     # parameters and signals
 

@@ -49,6 +49,16 @@ class Stand:
         return self.found
 
 
+class Watch(Protocol):
+    """Who hears of a run as it goes on, in the supervisor's thread."""
+
+    def entered(self, state: str) -> None:
+        """Take the run's new state."""
+
+    def settled(self, tick: int) -> None:
+        """Take the first tick of which rows may still come."""
+
+
 class Wanted(NamedTuple):
     """A group of new values that is to hold from one tick on, and who waits for that tick."""
 
@@ -61,14 +71,15 @@ class Helm:
 
     A run with a helm gets ready, and waits until `begin`. ``stop_time`` (s, or a text such as "20 s"; `inf`
     for a run without end) replaces that of the diagram, and can be set until then. A run without end has as
-    many ticks as its engine counts exactly, at most 1e9 s.
+    many ticks as its engine counts exactly, at most 1e9 s. ``watch`` hears of the run.
     """
 
-    def __init__(self, stop_time: str | float | None = None) -> None:
+    def __init__(self, stop_time: str | float | Fraction | None = None, watch: Watch | None = None) -> None:
+        self._watch = watch
         self._lock = threading.Lock()
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._wanted: list[Wanted] = []
-        self._begun = self._stopped = False
+        self._begun = self._stopped = self._safe = False
         self._state = STARTING
         self._progress: Progress = Stand()
         self._stop_time: Fraction | float | None = None
@@ -115,13 +126,14 @@ class Helm:
             self._begun = True
             self._call()
 
-    def stop(self) -> None:
+    def stop(self, *, safe_first: bool = False) -> None:
         """Let the run end before its next step: an orderly end, with safe values, and no error.
 
-        A run that is starting ends when it would be ready.
+        With ``safe_first`` the guardian does not wait for that step. A run that is starting ends when it would
+        be ready.
         """
         with self._lock:
-            self._stopped = True
+            self._stopped, self._safe = True, safe_first or self._safe
             self._call()
 
     def tune(self, group: Sequence[NewValue]) -> Future[int]:
@@ -162,6 +174,16 @@ class Helm:
         """True once the run is to end."""
         return self._stopped
 
+    @property
+    def is_safe_first(self) -> bool:
+        """True once the outputs are to be safe before the loops end."""
+        return self._safe
+
+    def settle(self, tick: int) -> None:
+        """Note that no rows come any more of the ticks before one."""
+        if self._watch is not None:
+            self._watch.settled(tick)
+
     def take(self) -> list[Wanted]:
         """Return the groups that have come since the last call."""
         with self._lock:
@@ -181,6 +203,8 @@ class Helm:
     def enter(self, state: str) -> None:
         """Note that the run is in another state."""
         self._state = state
+        if self._watch is not None:
+            self._watch.entered(state)
 
     def end(self) -> None:
         """Note that the run has ended; who still waits for a tick gets an error."""

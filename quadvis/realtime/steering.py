@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from quadvis.diagram.times import LONGEST, time_text
 from quadvis.engine.tuning import Change
+from quadvis.graph.graph import MULTI, Graph
 from quadvis.native.executor import last_exact
 from quadvis.realtime.helm import ENDLESS, READY, RUNNING, Helm
 from quadvis.realtime.member import Member
@@ -31,6 +32,8 @@ class Steering:
         self._members: Sequence[Member] = ()
         self._tuner: Tuner | None = None
         self._begun = False
+        self._reached = 0
+        self._late = _most_late(diagram.graph)
         self.ticks = diagram.ticks
 
     def take_over(self, members: Sequence[Member]) -> None:
@@ -101,6 +104,21 @@ class Steering:
         if self._begun:
             self._tuner.send(max(member.tick for member in self._members))
 
+    def settle(self, reached: int, *, last: bool = False) -> None:
+        """Note how far the rows are that have been handed on, after a look at the rings.
+
+        ``reached`` is the tick before that look. A look hands on what was there at the one before it.
+        """
+        if self._helm is None or not self._begun:
+            return
+        self._helm.settle(reached + 1 if last else max(0, self._reached - self._late))
+        self._reached = reached
+
+    @property
+    def is_safe_first(self) -> bool:
+        """True if the outputs are to be safe before the members end."""
+        return self._helm is not None and self._helm.is_safe_first
+
     def noted(self, computer: str, records: Words) -> None:
         """Take the groups of values that a loop has noted, and their ticks."""
         if self._tuner is not None:
@@ -129,3 +147,13 @@ class Steering:
         if stop_time == ENDLESS:
             return most
         return min(most, int(Fraction(stop_time) / self._period) + 1)
+
+
+def _most_late(graph: Graph) -> int:
+    """Return how many ticks after its own a row may come at the latest, since its task runs by itself.
+
+    A step that takes longer than two periods of its task has cost it overruns.
+    """
+    if graph.tasking != MULTI:
+        return 0
+    return int(2 * max(task.period for task in graph.tasks) / graph.tick)

@@ -121,7 +121,9 @@ class _Supervisor:
         while any(member.process.is_alive() for member in self._members):
             sources = [source for member in self._alive for source in member.sources]
             wait([*sources, *self._devices.sources, *self._steering.sources], self._steering.pause)
+            reached = self._steering.tick
             self._look()
+            self._steering.settle(reached)
             if alarm := self._devices.alarm():
                 raise self._stopped(alarm.reason, alarm.block)
             if not self._begun and all(member.ready for member in self._members):
@@ -138,6 +140,7 @@ class _Supervisor:
                 member.warn()
                 self._check_step(member)
         self._look(last=True)
+        self._steering.settle(max(member.tick for member in self._members), last=True)
         if unsafe := self._close():
             raise RunError("; ".join(unsafe))
         first = self._members[0]
@@ -217,6 +220,8 @@ class _Supervisor:
     def _stop(self) -> None:
         """Let all applications end before their next steps; a signal wakes those that sleep."""
         self._stopping = True
+        if self._steering.is_safe_first:
+            self._devices.make_safe()
         for member in self._alive:
             member.process.terminate()
 

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import replace
-from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from quadvis.diagram.diagram import Diagram
-from quadvis.diagram.times import read_duration
-from quadvis.document import YamlScalar
 from quadvis.errors import QuadvisError
 from quadvis.run.result import Result
 from quadvis.run.tuned import read_tuned
@@ -21,6 +18,7 @@ from quadvis.target.parameters import Parameters
 from quadvis.target.scopes import ApplicationScopes
 from quadvis.target.session import Session
 from quadvis.target.store import Store
+from quadvis.wire.desk import Done
 
 if TYPE_CHECKING:
     from quadvis.target.kernel import Publish
@@ -45,7 +43,7 @@ class Application:
         self.said: list[str] = []  # since the last start
         self._store, self._publish = store, publish
         self._session: Session | None = None
-        self._stop_time: Fraction | None = None
+        self._stop_time: float | None = None
         self._drawing: Future[Any] | None = None
 
     @property
@@ -61,7 +59,7 @@ class Application:
     @property
     def stop_time(self) -> float:
         """The stop time of the next run, or of the one that goes on (s)."""
-        return float(self._timed().stop_time)
+        return float(self.diagram.stop_time if self._stop_time is None else self._stop_time)
 
     @property
     def running(self) -> bool:
@@ -74,6 +72,8 @@ class Application:
         session = self._session
         if session is None or not session.running:
             return STOPPED
+        if session.stopped:
+            return STOPPING
         return {"starting": LOADING, "ready": READY, "running": RUNNING}.get(session.helm.state, STOPPING)
 
     # from loaded to stopped
@@ -85,8 +85,8 @@ class Application:
         self.scopes.begin()
         self.problem, self.result, self.said = "", None, []
         self._session = Session(
-            self._timed(), self.bundle.engine, self._store.next_log(self.name), [*self.newest.taps, *self.scopes.taps],
-            self._say, self._ended, self.scopes.settle,
+            self.diagram, self.bundle.engine, self._store.next_log(self.name),
+            [*self.newest.taps, *self.scopes.taps], self._stop_time, self._say, self.scopes.settle, self._ended,
         )  # fmt: skip
         if self.parameters.tuned:
             self._session.helm.tune(self.parameters.tuned)
@@ -121,11 +121,10 @@ class Application:
         session.helm.stop()
         return session.over
 
-    def make_safe(self, reason: str) -> None:
-        """Give all outputs their safe values for the rest of the run, and stop it."""
-        session = self._session
-        if session is not None and session.running:
-            session.helm.make_safe(reason)
+    def make_safe(self) -> None:
+        """Give all outputs their safe values at once, and stop the run."""
+        if self._session is not None and self._session.running:
+            self._session.helm.stop(safe_first=True)
 
     def close(self) -> None:
         """End all that goes on."""
@@ -134,23 +133,22 @@ class Application:
             session.helm.stop()
             session.join()
 
-    def set_times(self, stop_time: float | None, sample_time: float | None) -> Future[Any]:
-        """Give the next run another stop time or another sample time; QuadvisError while one is going on."""
+    def refuse_times(self) -> None:
+        """Raise QuadvisError while a run is going on."""
         if self.running:
             raise QuadvisError("times cannot change in a run: stop it first")
+
+    def set_times(self, stop_time: float | None, sample_time: float | None) -> None:
+        """Give the next run another stop time or another sample time (s); `inf` is a run without end."""
+        from quadvis.target.rescale import lasting, rescaled
+
+        changed = self.diagram if sample_time is None else rescaled(self.diagram, sample_time)
         if stop_time is not None:
-            self._stop_time = read_duration(YamlScalar(_seconds(stop_time), False, "stop_time", 0, 0))
-        if sample_time is not None:
-            from quadvis.target.rescale import rescaled
-
-            self.diagram = rescaled(self.diagram, _seconds(sample_time))
+            fitting = lasting(changed, stop_time) if math.isfinite(stop_time) else None
+            self._stop_time, changed = (stop_time, changed) if fitting is None else (None, fitting)
         self.close()
-        return self.prepare()
-
-    def _timed(self) -> Diagram:
-        if self._stop_time is None:
-            return self.diagram
-        return replace(self.diagram, stop_time=self._stop_time)
+        self.diagram = changed
+        self.prepare().result()
 
     def _say(self, sentence: str) -> None:
         self.said.append(sentence)
@@ -178,27 +176,29 @@ class Application:
 
         The Future has the tick, its time, and what has changed: ``[{name, old, new}]``.
         """
-        changes = [each for name, value in values.items() for each in read_tuned(self.diagram, name, value)]
-        before = {(path, name): self.parameters.text(path, name) for path, name, _ in changes}
+        group = [each for name, value in values.items() for each in read_tuned(self.diagram, name, value)]
+        before = {(each.path, each.name): self.parameters.text(each.path, each.name) for each in group}
         told: Future[Any] = Future()
 
         def took(tick: int) -> None:
-            self.parameters.took(changes)
+            self.parameters.took(group)
             facts = [
-                {"name": f"{path}.{name}", "old": before[path, name], "new": self.parameters.text(path, name)}
-                for path, name, _ in changes
+                {"name": f"{path}.{name}", "old": old, "new": self.parameters.text(path, name)}
+                for (path, name), old in before.items()
             ]
             time = float(tick * self.diagram.graph.tick)
             self._event("tuned", tick=tick, time=time, changes=facts)
-            told.set_result({"tick": tick, "time": time, "changes": facts})
+            found = {"tick": tick, "time": time, "changes": facts}
+            old, new = ({each["name"]: each[which] for each in facts} for which in ("old", "new"))
+            told.set_result(Done(found, tick, old, new))
 
         session = self._session
-        if session is None or not session.running:
-            # nothing runs: the next run begins with these values, once they are found to be right
-            took_at_start = self.parameters.check(changes)
-            took(took_at_start)
+        if session is None or not self.running:
+            self.parameters.check(group)
+            if session is not None and session.running:
+                session.helm.tune(group)
+            took(0)  # the next run begins with them
             return told
-        waiting = session.helm.tune(changes)
 
         def done(future: Future[int]) -> None:
             problem = future.exception()
@@ -207,7 +207,7 @@ class Application:
             else:
                 took(future.result())
 
-        waiting.add_done_callback(done)
+        session.helm.tune(group).add_done_callback(done)
         return told
 
     def drawing(self) -> Future[Any]:
@@ -225,7 +225,3 @@ def _draw(diagram: Diagram, drawing: Future[Any]) -> None:
         drawing.set_result(draw_diagram(diagram))
     except Exception as error:
         drawing.set_exception(error)
-
-
-def _seconds(time: Any) -> str:
-    return time if isinstance(time, str) else f"{float(time)!r} s"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 from quadvis.diagram.diagram import Diagram
@@ -32,6 +32,8 @@ class Kernel:
         self._publish = publish
         self._born = time.monotonic()
         self._application: Application | None = None
+        # What takes long is done here, one after the other; the verbs are answered meanwhile.
+        self._worker = ThreadPoolExecutor(1, "target")
 
     def call(self, verb: str, arguments: Mapping[str, Any]) -> Any:
         """Do what a verb of the wire says."""
@@ -39,6 +41,10 @@ class Kernel:
 
     def close(self) -> None:
         """End a run, with its outputs at their safe values."""
+        application = self._application
+        if application is not None:
+            application.close()
+        self._worker.shutdown()
         if self._application is not None:
             self._application.close()
         self.store.close()
@@ -51,7 +57,7 @@ class Kernel:
         wish = application.diagram.on_host_loss
         self._event("the operator is lost", wish=wish)
         if wish == SAFE:
-            application.make_safe("the operator was lost")
+            application.make_safe()
         elif wish != CONTINUE:
             application.stop()
 
@@ -79,14 +85,22 @@ class Kernel:
 
         It is named by its name, or by the SHA-256 of its bundle, which is kept under its name then.
         """
-        if self._application is not None and self._application.running:
-            raise QuadvisError(f"{self._application.name} runs: stop it first")
+        self._refuse_running()
+        return self._worker.submit(self._load, application)
+
+    def _load(self, application: str) -> dict[str, Any]:
+        self._refuse_running()
         bundle = self._bundle(application)
         diagram = admit(bundle, self.store.place(bundle))
-        self.unload()
-        self._application = Application(bundle, diagram, self.store, self._publish)
+        self._unload()
+        self._application = made = Application(bundle, diagram, self.store, self._publish)
         self._event("loaded", application=bundle.name)
-        return self._application.prepare()
+        made.prepare().result()
+        return {"name": bundle.name, "variant": bundle.variant, "hash": bundle.hash}
+
+    def _refuse_running(self) -> None:
+        if self._application is not None and self._application.running:
+            raise QuadvisError(f"{self._application.name} runs: stop it first")
 
     def _bundle(self, application: str) -> Bundle:
         """Return an application by its name, or keep the one whose bundle has a SHA-256."""
@@ -94,12 +108,15 @@ class Kernel:
             return self.store.bundle(application)
         bundle = Bundle.parse(self.store.contents(application))
         if self._application is not None and self._application.name == bundle.name:
-            self.unload()
+            self._unload()
         self.store.add(bundle)
         return bundle
 
-    def unload(self) -> None:
+    def unload(self) -> Future[Any]:
         """End the run, if there is one, and forget the application that is loaded."""
+        return self._worker.submit(self._unload)
+
+    def _unload(self) -> None:
         if self._application is not None:
             self._application.close()
             self._application = None
@@ -115,7 +132,9 @@ class Kernel:
 
     def settime(self, StopTime: float | None, SampleTime: float | None) -> Future[Any]:  # noqa: N803
         """Give the next run another stop time, or another sample time (s)."""
-        return self._loaded.set_times(StopTime, SampleTime)
+        application = self._loaded
+        application.refuse_times()
+        return self._worker.submit(application.set_times, StopTime, SampleTime)
 
     def status(self) -> dict[str, Any]:
         """Return the state of the target, in xPC's words."""

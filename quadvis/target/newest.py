@@ -12,8 +12,7 @@ from quadvis.diagram.diagram import Diagram
 from quadvis.engine.taps import Tap
 from quadvis.errors import QuadvisError, quoted, sentence, suggestion
 from quadvis.graph.names import index_text, read_name
-from quadvis.output.recording import RecordedPort
-from quadvis.run.rows import ports
+from quadvis.output.recording import RecordedPort, ports
 
 
 class Value(NamedTuple):

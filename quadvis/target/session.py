@@ -12,7 +12,7 @@ from quadvis.diagram.diagram import Diagram
 from quadvis.engine.taps import Tap
 from quadvis.errors import QuadvisError
 from quadvis.machine.failures import surroundings
-from quadvis.realtime.helm import Helm
+from quadvis.realtime.helm import READY, Helm
 from quadvis.realtime.options import RealTime
 from quadvis.run.loops import Paced
 from quadvis.run.result import Result
@@ -20,9 +20,11 @@ from quadvis.run.session import recorded
 
 
 class Session:
-    """One run. ``ready`` is done when the processes can begin, ``over`` when all has ended. ``result`` is there if it has come to an end in order, ``problem`` says why if not.
+    """One run. ``ready`` is done when it can begin, ``over`` when all has ended.
 
-    ``announce`` takes sentences, ``ended`` is called when all is over; both in the session's thread.
+    ``result`` is there if it has come to an end in order, ``problem`` says why if not. ``announce`` takes
+    sentences, ``settle`` the first tick of which rows may still come, and ``ended`` is called when all is
+    over; all in the session's thread.
     """
 
     def __init__(
@@ -31,26 +33,35 @@ class Session:
         engine: str,
         log: Path,
         taps: Sequence[Tap],
+        stop_time: float | None,
         announce: Callable[[str], None],
-        ended: Callable[[], None],
         settle: Callable[[int], None],
+        ended: Callable[[], None],
     ) -> None:
-        self.diagram, self.log, self.helm = diagram, log, Helm()
+        self.diagram, self.log = diagram, log
+        self.helm = Helm(stop_time, self)
         self.ready: Future[None] = Future()
         self.over: Future[None] = Future()
-        self.helm.on_state = self._changed
-        self.helm.settle = settle
         self.result: Result | None = None
         self.problem = ""
         self._engine, self._taps = engine, taps
-        self._announce, self._ended = announce, ended
+        self._announce, self._settle, self._ended = announce, settle, ended
         self._thread = threading.Thread(target=self._perform, name="session", daemon=True)
         self._thread.start()
+
+    def entered(self, state: str) -> None:
+        """Hear of the run's state."""
+        if state == READY:
+            self.ready.set_result(None)
+
+    def settled(self, tick: int) -> None:
+        """Hear how far the rows are."""
+        self._settle(tick)
 
     @property
     def stopped(self) -> bool:
         """True if it was told to end before its stop time."""
-        return self.helm.stopped
+        return self.helm.is_stopped
 
     @property
     def running(self) -> bool:
@@ -76,7 +87,3 @@ class Session:
                 self.ready.set_exception(QuadvisError(self.problem or "it was stopped before it was ready"))
             self._ended()
             self.over.set_result(None)
-
-    def _changed(self) -> None:
-        if self.helm.state == "ready" and not self.ready.done():
-            self.ready.set_result(None)

@@ -27,7 +27,6 @@ def status(name: str, application: Application | None, session_time: float) -> d
     if application is None:
         return found
     diagram, session = application.diagram, application.session
-    judged = session is not None and not session.stopped  # a run that was stopped is not
     times = session.helm.times() if session is not None else {}
     tasks = [(computer, each) for computer, several in times.items() for each in several]
     found |= {
@@ -49,7 +48,7 @@ def status(name: str, application: Application | None, session_time: float) -> d
     }
     found |= _execution([each for _, each in tasks])
     result = application.result
-    if result is not None and judged:
+    if result is not None and result.flight is not None and not result.flight.early:
         found["Passed"] = result.passed
         found["Verdicts"] = [str(verdict) for verdict in result.outcome.verdicts]
         found["NotMet"] = [str(verdict) for verdict in result.outcome.verdicts if not verdict.met]

@@ -13,8 +13,8 @@ import hashlib
 import os
 import shutil
 from collections.abc import Iterable, Mapping
+from io import BufferedRandom
 from pathlib import Path
-from typing import BinaryIO
 
 from quadvis.errors import QuadvisError, quoted, sentence, suggestion
 from quadvis.target.bundle import DIGEST, NAME, Bundle, inner_path
@@ -34,7 +34,7 @@ class Store:
             (folder / name).mkdir(mode=0o700, parents=True, exist_ok=True)
         for left in (folder / "files").glob("*.part"):
             left.unlink()
-        self._partly: dict[str, BinaryIO] = {}
+        self._partly: dict[str, BufferedRandom] = {}
 
     # files
 
