@@ -62,9 +62,9 @@ def test_a_damaged_key_file_is_refused_and_not_quoted(change: str, folder: Path)
         "cut": text[:-20],
         "swapped": text.replace(pair.public.hex(), other.public.hex()),
         "empty": "",
-        "binary": "\udcff\udc00",
+        "binary": "\xff\xfe\x00",
     }[change]
-    path.write_bytes(new.encode("utf-8", "surrogateescape"))
+    path.write_bytes(new.encode("latin-1"))
     with pytest.raises(QuadvisError) as caught:
         own_key("anna")
     assert pair.private.hex()[:16] not in str(caught.value)
@@ -160,7 +160,8 @@ def test_a_target_is_pinned_and_another_key_is_refused_with_both_fingerprints(fo
     key, other = bytes.fromhex(KEY), bytes.fromhex(OTHER)
     known.pin("lab1", "10.0.0.1:22222", key)
     known.pin("lab1", "10.0.0.1:22222", key)
-    for name, address in (("lab1", "10.0.0.1:22222"), ("lab1", "10.0.0.2:22222"), ("lab2", "10.0.0.1:22222")):
+    places = (("lab1", "10.0.0.1:22222"), ("lab1", "10.0.0.2:22222"), ("lab2", "10.0.0.1:22222"))
+    for name, address in places:
         with pytest.raises(WrongTargetError) as caught:
             known.pin(name, address, other)
         assert fingerprint(key) in str(caught.value) and fingerprint(other) in str(caught.value)
@@ -190,11 +191,13 @@ def test_the_commands_make_show_allow_and_revoke(folder: Path, capsys: pytest.Ca
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["keys"], "ACTION is missing"), (["keys", "neu"], "cannot be 'neu'"), (["keys", "new"], "NAME is missing"),
-        (["keys", "allow", "bob"], "PUBLIC is missing"), (["keys", "allow", "bob", KEY], "--level is missing"),
+        (["keys"], "ACTION is missing"), (["keys", "neu"], "cannot be 'neu'"),
+        (["keys", "new"], "NAME is missing"), (["keys", "allow", "bob"], "PUBLIC is missing"),
+        (["keys", "allow", "bob", KEY], "--level is missing"),
         (["keys", "allow", "bob", KEY, "--level", "7"], "there is no level 7"),
         (["keys", "allow", "bob", "x", "--level", "3"], "is no public key"),
-        (["keys", "new", "bob", KEY], "takes no public key"), (["keys", "new", "bob", "--level", "0"], "takes no level"),
+        (["keys", "new", "bob", KEY], "takes no public key"),
+        (["keys", "new", "bob", "--level", "0"], "takes no level"),
         (["keys", "revoke", "bob"], "no host 'bob'"), (["keys", "forget", "lab"], "no target 'lab'"),
         (["keys", "show", "bob"], "there is no key 'bob'"), (["wire", "x"], "is one too many"),
     ],
