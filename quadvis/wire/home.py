@@ -26,7 +26,9 @@ def home() -> Path:
 def private_folder(path: Path) -> Path:
     """Return a folder that only its owner can open; make it if there is none. QuadvisError if others can."""
     try:
-        path.mkdir(mode=0o700, parents=True, exist_ok=True)
+        for each in (*reversed(path.parents), path):  # `parents=True` would leave those above open
+            if not each.exists():
+                each.mkdir(mode=0o700, exist_ok=True)
         _check(path, path.stat(), "folder", "700")
     except OSError as error:
         raise QuadvisError(f"cannot use the folder '{path}': {reason(error)}") from None
