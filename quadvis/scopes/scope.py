@@ -246,6 +246,7 @@ class SignalScope:
         self._last = self._first + (count - 1) * step
         self._filled = 0
         self._kept_ticks, self._kept = np.empty(count, np.int64), np.empty((count, self._width))
+        self._cycles = [cycle for cycle in self._cycles if self._seen(cycle)]
         self._cycles.append(Cycle(row, self._last + step, row))
 
     def _collect(self, end: int) -> None:

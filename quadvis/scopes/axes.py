@@ -1,0 +1,65 @@
+"""Axes with round numbers: 1, 2 or 5 times a power of ten apart."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+
+class Axis(NamedTuple):
+    """An axis from ``least`` to ``greatest``, with round numbers as multiples of ``step``."""
+
+    least: float
+    greatest: float
+    step: float
+
+    @property
+    def marks(self) -> list[float]:
+        """The round numbers on the axis."""
+        first, last = math.ceil(self.least / self.step - 1e-9), math.floor(self.greatest / self.step + 1e-9)
+        return [number * self.step for number in range(first, last + 1)]
+
+    def text(self, mark: float) -> str:
+        """Return a round number with as many decimals as its neighbours."""
+        return number_text(mark, self.step)
+
+    def place(self, value: float) -> float:
+        """Return where a value lies: 0 at the least, 1 at the greatest."""
+        return (value - self.least) / (self.greatest - self.least)
+
+
+def number_text(value: float, step: float) -> str:
+    """Return a number with the decimals that tell it from one that is ``step`` away."""
+    decimals = max(0, -math.floor(math.log10(step) + 1e-9))
+    if decimals > 6 or abs(value) >= 1e7:
+        digits = max(0, math.floor(math.log10(max(abs(value), step) / step) + 1e-9))
+        return f"{value:.{digits}e}" if abs(value) > step * 1e-6 else "0"
+    text = f"{value:.{decimals}f}"
+    return text.removeprefix("-") if not text.strip("-0.") else text
+
+
+def round_step(span: float, most: int) -> float:
+    """Return the least round step of which a span has at most ``most``."""
+    rough = span / max(1, most)
+    power = 10.0 ** math.floor(math.log10(rough))
+    return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= rough * (1 - 1e-9))
+
+
+def round_axis(least: float, greatest: float, most: int) -> Axis:
+    """Return an axis that reaches from one round number to another and holds all values between two."""
+    if not least < greatest:  # one value: a step up and one down
+        half = abs(least) / 2 or 1.0
+        least, greatest = least - half, greatest + half
+    step = round_step(greatest - least, most)
+    return Axis(
+        math.floor(least / step + 1e-9) * step,
+        math.ceil(greatest / step - 1e-9) * step,
+        step,
+    )
+
+
+def exact_axis(least: float, greatest: float, most: int) -> Axis:
+    """Return an axis with just these ends."""
+    if not least < greatest:
+        greatest = least + 1.0
+    return Axis(least, greatest, round_step(greatest - least, most))
