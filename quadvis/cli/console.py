@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from quadvis.errors import QuadvisError
@@ -22,10 +23,8 @@ def run_console(target: Target) -> int:
     from quadvis.cli.arguments import understood
     from quadvis.cli.options import parser
 
-    try:
+    with suppress(ImportError):
         import readline  # noqa: F401 - gives `input` a history
-    except ImportError:
-        pass
     prompt = f"{target.name}> " if sys.stdin.isatty() else ""
     code = 0
     while True:

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quadvis.errors import QuadvisError
-from quadvis.machine.status_line import ProgressLine
 from quadvis.machine.columns import table
+from quadvis.machine.status_line import ProgressLine
 from quadvis.units import Unit, format_quantity
 
 if TYPE_CHECKING:
@@ -94,7 +94,12 @@ def _task_row(task: dict[str, Any]) -> tuple[str, ...]:
         return f"{name} min {shown[0]}, avg {shown[1]}, max {shown[2]}"
 
     name = f"task {task['task']}" + (f" of {task['computer']}" if task["computer"] else "")
-    return name, f"{task['steps']} steps, {task['overruns']} overruns", spread("lateness"), spread("execution")
+    return (
+        name,
+        f"{task['steps']} steps, {task['overruns']} overruns",
+        spread("lateness"),
+        spread("execution"),
+    )
 
 
 def check_options(options: argparse.Namespace) -> None:

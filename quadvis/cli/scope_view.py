@@ -8,14 +8,15 @@ import shutil
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from quadvis.errors import QuadvisError
-from quadvis.host.scope import Samples
 from quadvis.machine.files import Kind, write_output
+from quadvis.scopes.package import Package
 
 if TYPE_CHECKING:
     from quadvis.host.target import Target
@@ -25,7 +26,7 @@ LIVE = 0.1  # s between two pictures
 HEIGHT = 16  # lines of a picture
 
 
-def acquire(tg: Target, signals: Sequence[str], settings: Mapping[str, Any], timeout: float) -> Samples:
+def acquire(tg: Target, signals: Sequence[str], settings: Mapping[str, Any], timeout: float) -> Package:
     """Return one package of a scope that is added for it and removed again."""
     scope = tg.addscope("host", signals=signals, **settings)
     try:
@@ -49,13 +50,13 @@ def live(tg: Target, signals: Sequence[str], settings: Mapping[str, Any]) -> Non
     count = settings["NumSamples"]
     piece = max(1, min(count, count // 20))
     scope = tg.addscope("host", signals=signals, **{**settings, "NumSamples": piece})
-    kept: list[Samples] = []
+    kept: list[Package] = []
     drawn = 0.0
     try:
         scope.start()
         for package in scope.packages(1e9):
             kept.append(package)
-            while sum(len(each.time) for each in kept) - len(kept[0].time) >= count:
+            while sum(len(each.times) for each in kept) - len(kept[0].times) >= count:
                 kept.pop(0)
             if time.monotonic() - drawn >= LIVE:
                 drawn = time.monotonic()
@@ -68,24 +69,23 @@ def live(tg: Target, signals: Sequence[str], settings: Mapping[str, Any]) -> Non
         scope.remove()
 
 
-def shown(samples: Samples) -> str:
+def shown(samples: Package) -> str:
     """Return samples as a picture of text that fits the terminal."""
+    from quadvis.machine.status_line import shows_colours
     from quadvis.scopes.panel import panel
 
     width, lines = shutil.get_terminal_size((100, 24))
-    return panel(
-        samples.time, samples.data, samples.names, samples.units, width=width, height=min(HEIGHT, lines - 3)
-    )
+    return panel(samples, width, min(HEIGHT, lines - 3), colours=shows_colours(sys.stdout))
 
 
-def written(samples: Samples, path: Path) -> str:
+def written(samples: Package, path: Path) -> str:
     """Write samples as a table, .csv, or as a picture, .png; return the path."""
     if path.suffix == ".csv":
         text = io.StringIO()
         rows = csv.writer(text, lineterminator="\n")
         units = [name if unit == "1" else f"{name} [{unit}]" for name, unit in _named(samples)]
         rows.writerow(["time [s]", *units])
-        rows.writerows(np.column_stack((samples.time, samples.data)).tolist())
+        rows.writerows(np.column_stack((samples.times, samples.samples)).tolist())
         write_output(path, CSV, text.getvalue())
     elif path.suffix == ".png":
         _picture(samples, path)
@@ -94,7 +94,7 @@ def written(samples: Samples, path: Path) -> str:
     return str(path)
 
 
-def _picture(samples: Samples, path: Path) -> None:
+def _picture(samples: Package, path: Path) -> None:
     import matplotlib
 
     matplotlib.use("agg")
@@ -102,9 +102,11 @@ def _picture(samples: Samples, path: Path) -> None:
 
     figure, axes = pyplot.subplots(figsize=(9, 4.5), layout="constrained")
     for column, (name, unit) in enumerate(_named(samples)):
-        axes.plot(samples.time, samples.data[:, column], label=name if unit == "1" else f"{name} [{unit}]")
-    if samples.trigger is not None and 0 <= samples.trigger < len(samples.time):
-        axes.axvline(samples.time[samples.trigger], color="0.6", linewidth=0.8)
+        axes.plot(
+            samples.times, samples.samples[:, column], label=name if unit == "1" else f"{name} [{unit}]"
+        )
+    if samples.trigger is not None and 0 <= samples.trigger < len(samples.times):
+        axes.axvline(samples.times[samples.trigger], color="0.6", linewidth=0.8)
     axes.set_xlabel("time [s]")
     axes.legend(loc="best", frameon=False)
     axes.grid(alpha=0.3)
@@ -114,14 +116,15 @@ def _picture(samples: Samples, path: Path) -> None:
     write_output(path, Kind("the picture", (b"\x89PNG",)), picture.getvalue())
 
 
-def _named(samples: Samples) -> list[tuple[str, str]]:
+def _named(samples: Package) -> list[tuple[str, str]]:
     return list(zip(samples.names, samples.units, strict=True))
 
 
-def _joined(kept: Sequence[Samples]) -> Samples:
+def _joined(kept: Sequence[Package]) -> Package:
     """Return packages that follow one another as one."""
-    last = kept[-1]
-    return Samples(
-        last.number, np.concatenate([each.time for each in kept]),
-        np.concatenate([each.data for each in kept]), last.names, last.units,
-    )  # fmt: skip
+    return replace(
+        kept[-1],
+        ticks=np.concatenate([each.ticks for each in kept]),
+        times=np.concatenate([each.times for each in kept]),
+        samples=np.concatenate([each.samples for each in kept]),
+    )

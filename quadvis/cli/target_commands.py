@@ -229,7 +229,7 @@ def _show_set(tg: Target, names: Sequence[str]) -> None:
 
 
 def _compare_sets(tg: Target, names: Sequence[str]) -> None:
-    for name, old, new in tg.compare(*_exactly(names, len(names) == 2 and 2 or 1, "compare NAME [NAME]")):
+    for name, old, new in tg.compare(*_exactly(names, 2 if len(names) == 2 else 1, "compare NAME [NAME]")):
         print(f"{name}: {_text(old)} -> {_text(new)}")
 
 

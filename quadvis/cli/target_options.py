@@ -32,7 +32,9 @@ def add_target_commands(add: Add, diagram_settings: Callable[[Parser], None], en
     get.add_argument("names", nargs="*", metavar="NAME", help="default: all parameters that can be tuned")
     get.add_argument("--json", action="store_true", help="print one JSON object")
     given = add("set", commands.set_parameters, "give parameters new values, all at one tick")
-    given.add_argument("values", nargs="+", metavar="NAME=VALUE", help="such as control.bandwidth='2.5 rad/s'")
+    given.add_argument(
+        "values", nargs="+", metavar="NAME=VALUE", help="such as control.bandwidth='2.5 rad/s'"
+    )
     scope = add("scope", commands.scope, "show signals of a target over time")
     _scope_options(scope)
     log = add("log", commands.log, "copy a log of a target to here")

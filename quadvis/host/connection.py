@@ -26,7 +26,7 @@ class Connection:
         self._subscriptions: dict[str, Subscription] = {}
 
     def request(self, verb: str, deadline: float = PATIENCE, **arguments: Any) -> Any:
-        """Return what the target answers to a verb within a time (s); QuadvisError with its sentence if not."""
+        """Return what the target answers to a verb in time (s); QuadvisError with its sentence if not."""
         return self._client.request(verb, deadline, **arguments)
 
     def operate(self, verb: str, deadline: float = PATIENCE, **arguments: Any) -> Any:
@@ -65,7 +65,7 @@ class Connection:
 
 
 def connect(name: str | None, say: Callable[[str], object] = lambda words: None) -> Connection:
-    """Return a connection to a target; without a name, to that of this machine, which is started if needed."""
+    """Return a connection to a target; without a name to that of this machine, started if needed."""
     from quadvis.host.local import LOCAL, started_here
     from quadvis.wire.meeting import meet
 

@@ -26,7 +26,9 @@ def started_here() -> None:
         return
     words = ["-m", "quadvis", "target", "--name", LOCAL, "--until-idle", str(UNUSED)]
     with tempfile.TemporaryFile() as output, open(os.devnull, "rb") as nothing:
-        files = [(os.POSIX_SPAWN_DUP2, file.fileno(), number) for number, file in enumerate((nothing, output))]
+        files = [
+            (os.POSIX_SPAWN_DUP2, file.fileno(), number) for number, file in enumerate((nothing, output))
+        ]
         files.append((os.POSIX_SPAWN_DUP2, output.fileno(), 2))
         # It belongs to nobody: it goes on when this process has ended.
         process = os.posix_spawn(
@@ -37,7 +39,9 @@ def started_here() -> None:
             if os.waitpid(process, os.WNOHANG)[0] and not _answers(path):  # another one may have been quicker
                 output.seek(0)
                 said = output.read().decode(errors="replace").strip().splitlines()
-                raise QuadvisError(f"the target of this machine cannot start{f': {said[-1]}' if said else ''}")
+                raise QuadvisError(
+                    f"the target of this machine cannot start{f': {said[-1]}' if said else ''}"
+                )
             if time.monotonic() > until:
                 raise QuadvisError(f"the target of this machine does not answer after {START:g} s")
             time.sleep(LOOK)

@@ -50,6 +50,11 @@ def pack(
         sources_of(diagram),
         diagram.hash,
         __version__,
+        dict(diagram.ports),
+        {
+            each: [[list(target) for target in knob.targets], list(knob.elsewhere)]
+            for each, knob in diagram.knobs.items()
+        },
         engine,
         computer,
     )

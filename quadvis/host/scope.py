@@ -5,13 +5,13 @@ from __future__ import annotations
 import queue
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.errors import QuadvisError
+from quadvis.scopes.package import Package
 
 if TYPE_CHECKING:
     from quadvis.host.connection import Connection
@@ -21,30 +21,14 @@ POLL = 0.05  # s between two questions for the status
 ROWS = 5_000  # samples in one message
 
 
-@dataclass(frozen=True)
-class Samples:
-    """One package of a scope: times (N,) in s, values (N, k), the names and units of the k traces.
-
-    ``number`` counts the packages of the scope, ``trigger`` is the index of the sample at the trigger, or
-    None. ``lost`` is how many rows a run left out inside.
-    """
-
-    number: int
-    time: NDArray[np.float64]
-    data: NDArray[np.float64]
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    trigger: int | None = None
-    lost: int = 0
-
-    @staticmethod
-    def read(header: Mapping[str, Any], array: Any) -> Samples:
-        """Read a package of a stream."""
-        rows = np.asarray(array, np.float64)
-        return Samples(
-            int(header["sequence"]), rows[:, 0], rows[:, 1:], tuple(header["names"]), tuple(header["units"]),
-            header.get("trigger"), int(header.get("lost", 0)),
-        )  # fmt: skip
+def read_package(header: Mapping[str, Any], array: Any) -> Package:
+    """Return a package from what the target says of it and its rows (N, 1 + k): a time (s) and k values."""
+    rows = np.asarray(array, np.float64)
+    ticks = np.rint(rows[:, 0] / header["tick"]).astype(np.int64)
+    return Package(
+        int(header["scope"]), int(header["sequence"]), ticks, rows[:, 0], rows[:, 1:],
+        tuple(header["names"]), tuple(header["units"]), header["trigger"], int(header["lost"]),
+    )  # fmt: skip
 
 
 class HostScope:
@@ -118,7 +102,7 @@ class HostScope:
         return self
 
     @property
-    def samples(self) -> Samples:
+    def package(self) -> Package:
         """The newest whole package; QuadvisError if there is none yet."""
         pieces: list[NDArray[np.float64]] = []
         while True:
@@ -127,21 +111,21 @@ class HostScope:
             rows = np.asarray(found["samples"], np.float64).reshape(-1, 1 + len(found["names"]))
             pieces.append(rows)
             if first + len(rows) >= found["count"] or not len(rows):
-                return Samples.read(found, np.concatenate(pieces))
+                return read_package(found, np.concatenate(pieces))
 
     @property
-    def Data(self) -> NDArray[np.float64]:  # noqa: N802 - xPC's name
+    def Data(self) -> NDArray[np.float64]:
         """The values (N, k) of the newest whole package."""
-        return self.samples.data
+        return self.package.samples
 
     @property
-    def Time(self) -> NDArray[np.float64]:  # noqa: N802 - xPC's name
+    def Time(self) -> NDArray[np.float64]:
         """Its times (N,) in s."""
-        return self.samples.time
+        return self.package.times
 
-    def packages(self, timeout: float = 10.0) -> Iterator[Samples]:
+    def packages(self, timeout: float = 10.0) -> Iterator[Package]:
         """Yield the packages as they come; ends after a time (s) without one."""
-        found: queue.SimpleQueue[Samples] = queue.SimpleQueue()
+        found: queue.SimpleQueue[Package] = queue.SimpleQueue()
         topic = f"scope/{self._number}"
         parts: list[Any] = []
 
@@ -150,7 +134,7 @@ class HostScope:
                 parts.clear()
             parts.append(array)
             if header["part"] == header["parts"] - 1 and len(parts) == header["parts"]:
-                found.put(Samples.read(header, np.concatenate(parts)))
+                found.put(read_package(header, np.concatenate(parts)))
 
         self._connection.subscribe(topic, take)
         try:

@@ -81,7 +81,7 @@ class Target:
         return self._connection.level
 
     def request(self, verb: str, **arguments: Any) -> Any:
-        """Return what the target answers to a verb of the wire, see `quadvis wire`; as the operator if needed."""
+        """Return what the target answers to a verb, see `quadvis wire`; as the operator if needed."""
         return self._connection.operate(verb, **arguments)
 
     def subscribe(self, topic: str, take: Callable[[Mapping[str, Any], Any], object]) -> None:
@@ -313,10 +313,7 @@ class Target:
         log = read_log(self.fetchlog())
         if signal is None:
             return log
-        if signal == "TimeLog":
-            rows = max((log.times(name) for name in log), key=len)
-        else:
-            rows = log[signal]
+        rows = max(map(log.times, log), key=len) if signal == "TimeLog" else log[signal]
         last = None if count is None else first - 1 + count * decimation
         found: NDArray[np.float64] = rows[first - 1 : last : decimation]
         return found

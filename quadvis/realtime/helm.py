@@ -129,8 +129,8 @@ class Helm:
     def stop(self, *, safe_first: bool = False) -> None:
         """Let the run end before its next step: an orderly end, with safe values, and no error.
 
-        With ``safe_first`` the guardian does not wait for that step. A run that is starting ends when it would
-        be ready.
+        With ``safe_first`` the guardian does not wait for that step. A run that is starting ends when it
+        would be ready.
         """
         with self._lock:
             self._stopped, self._safe = True, safe_first or self._safe

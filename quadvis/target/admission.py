@@ -5,9 +5,11 @@ from __future__ import annotations
 import hashlib
 import inspect
 import os
+from dataclasses import replace
 from pathlib import Path
 
 from quadvis.diagram.diagram import Diagram
+from quadvis.diagram.knobs import Knob
 from quadvis.diagram.load import load_text
 from quadvis.errors import QuadvisError, quoted
 from quadvis.graph.graph import Node
@@ -35,7 +37,29 @@ def admit(bundle: Bundle, place: Path) -> Diagram:
         raise QuadvisError(
             f"the diagram has no computer {quoted(bundle.computer)}; it has {', '.join(computers)}"
         )
-    return diagram
+    return replace(diagram, ports=_ports(bundle, diagram), knobs=_knobs(bundle, diagram))
+
+
+def _ports(bundle: Bundle, diagram: Diagram) -> dict[str, str]:
+    """Return the ports of parts whose signals are there."""
+    signals = {f"{node.path}.{port}" for node in diagram.graph.nodes for port in node.block.interface.outputs}
+    return {name: str(of) for name, of in bundle.ports.items() if str(of).partition("[")[0] in signals}
+
+
+def _knobs(bundle: Bundle, diagram: Diagram) -> dict[str, Knob]:
+    """Return the parameters of parts and of the diagram; QuadvisError if they mean what is not there."""
+    found = {}
+    for name, plain in bundle.knobs.items():
+        try:
+            targets, elsewhere = plain
+            knob = Knob(tuple((str(path), str(own)) for path, own in targets), tuple(map(str, elsewhere)))
+            known = all(own in diagram.graph[path].block.interface.params for path, own in knob.targets)
+        except (TypeError, ValueError, LookupError):
+            known = False
+        if not known:
+            raise QuadvisError(f"the bundle's parameter {quoted(name)} means none of the diagram's blocks")
+        found[name] = knob
+    return found
 
 
 def source_digest(made: type) -> str:

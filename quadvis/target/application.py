@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 from quadvis.diagram.diagram import Diagram
 from quadvis.errors import QuadvisError
 from quadvis.run.result import Result
-from quadvis.run.tuned import read_tuned
+from quadvis.run.tuned import new_values
 from quadvis.target.bundle import Bundle
 from quadvis.target.newest import Newest
-from quadvis.target.parameters import Parameters
+from quadvis.target.parameters import Parameters, as_written
 from quadvis.target.scopes import ApplicationScopes
 from quadvis.target.session import Session
 from quadvis.target.store import Store
@@ -29,8 +29,8 @@ STOPPED, LOADING, READY, RUNNING, STOPPING = "stopped", "loading", "ready", "run
 class Application:
     """One application. Its state is ``loading`` until its processes are ready, and then ``ready``.
 
-    A run goes from there to ``running`` and to ``stopped``; the next `start` begins anew. The values that were
-    tuned stay. ``problem`` says why the last run came to an early end, ``result`` is that of the last run.
+    A run goes from there to ``running`` and to ``stopped``; the next `start` begins anew. The values that
+    were tuned stay. ``problem`` says why the last run came to an early end, ``result`` is that of the last one.
     """
 
     def __init__(self, bundle: Bundle, diagram: Diagram, store: Store, publish: Publish) -> None:
@@ -86,7 +86,8 @@ class Application:
         self.problem, self.result, self.said = "", None, []
         self._session = Session(
             self.diagram, self.bundle.engine, self._store.next_log(self.name),
-            [*self.newest.taps, *self.scopes.taps], self._stop_time, self._say, self.scopes.settle, self._ended,
+            [*self.newest.taps, *self.scopes.taps], self._stop_time, self._say, self.scopes.settle,
+            self._ended,
         )  # fmt: skip
         if self.parameters.tuned:
             self._session.helm.tune(self.parameters.tuned)
@@ -176,7 +177,7 @@ class Application:
 
         The Future has the tick, its time, and what has changed: ``[{name, old, new}]``.
         """
-        group = [each for name, value in values.items() for each in read_tuned(self.diagram, name, value)]
+        group = new_values(self.diagram, {name: as_written(value) for name, value in values.items()})
         before = {(each.path, each.name): self.parameters.text(each.path, each.name) for each in group}
         told: Future[Any] = Future()
 

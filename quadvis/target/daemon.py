@@ -134,7 +134,7 @@ class Daemon:
         return found
 
 
-class _alone:  # noqa: N801 - a context
+class _alone:
     """Hold a lock on the folder of a target; QuadvisError if another process has it."""
 
     def __init__(self, folder: Path, name: str) -> None:

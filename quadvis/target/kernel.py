@@ -1,4 +1,4 @@
-"""The kernel: one application loaded, started, stopped, looked at and tuned, by the verbs of `quadvis.wire`."""
+"""The kernel: one application loaded, started, stopped, looked at and tuned, by the verbs of the wire."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.sections.on_host_loss import CONTINUE, SAFE
-from quadvis.errors import QuadvisError, quoted
+from quadvis.errors import QuadvisError
 from quadvis.target.admission import admit
 from quadvis.target.application import Application
 from quadvis.target.bundle import DIGEST, Bundle
@@ -130,7 +130,7 @@ class Kernel:
         """Stop the application: safe values, log closed. It stays loaded."""
         return self._loaded.stop()
 
-    def settime(self, StopTime: float | None, SampleTime: float | None) -> Future[Any]:  # noqa: N803
+    def settime(self, StopTime: float | None, SampleTime: float | None) -> Future[Any]:
         """Give the next run another stop time, or another sample time (s)."""
         application = self._loaded
         application.refuse_times()
@@ -171,7 +171,7 @@ class Kernel:
         return self._loaded.parameters.facts()[first : first + count]
 
     def getparam(self, names: Sequence[str]) -> dict[str, Any]:
-        """Return the values of parameters as a diagram writes them; of all that can be tuned if none is named."""
+        """Return values of parameters as a diagram writes them; of all that can be tuned if none is named."""
         parameters = self._loaded.parameters
         if not names:
             return {each["name"]: each["value"] for each in parameters.facts() if each["tunable"]}

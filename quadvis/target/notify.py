@@ -1,4 +1,4 @@
-"""What a service says to systemd: that it is ready, lives, and ends. Nothing if systemd has not started it."""
+"""What a service says to systemd, if it was started by it: that it is ready, that it lives, that it ends."""
 
 from __future__ import annotations
 

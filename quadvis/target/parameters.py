@@ -35,7 +35,7 @@ class Parameters:
         return [NewValue(path, name, value) for (path, name), value in self._tuned.items()]
 
     def check(self, group: Sequence[NewValue]) -> None:
-        """Check new values against the declarations and the values in force; ParameterError if one is wrong."""
+        """Check new values against declarations and the values in force; ParameterError if one is wrong."""
         graph = self._diagram.graph
         program = make_program(graph, self._diagram.seed)
         blocks = {node.path: node.block for node in graph.nodes}
@@ -113,7 +113,9 @@ class Parameters:
     def save(self, path: Path) -> None:
         """Write the present values of all that can be tuned as a parameter file of this name."""
         values = {
-            f"{node.path}.{name}": self.text(node.path, name) for node, name, param in self._all() if param.tune
+            f"{node.path}.{name}": self.text(node.path, name)
+            for node, name, param in self._all()
+            if param.tune
         }
         about = f"{self._diagram.name}, as tuned on the target; diagram {self._diagram.hash[:12]}"
         text = dump_yaml({"quadvis": 1, "name": path.stem, "doc": about, "set": values})
@@ -130,6 +132,11 @@ def read_set(path: Path) -> dict[str, Any]:
     if not isinstance(found, dict):
         raise QuadvisError(f"the parameter set {quoted(path.stem)} has no key 'set'")
     return found
+
+
+def as_written(value: Any) -> Any:
+    """Return a value of a set as a setting is written: ``{value: [1, 2], unit: m}`` as one text."""
+    return f"{{value: {value['value']}, unit: {value['unit']}}}" if isinstance(value, dict) else value
 
 
 def compared(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -35,6 +35,7 @@ class ApplicationScopes:
         self._publish = publish
         self._lock = threading.Lock()
         self._packages: dict[int, Package] = {}  # the newest of each scope
+        self._tick = float(diagram.graph.tick)
         source = ScopeSource.of(diagram.graph, diagram.ports)
         self._board = ScopeBoard(source, self._take, folder)
 
@@ -71,7 +72,7 @@ class ApplicationScopes:
         rows = max(1, PART // array.shape[1])
         parts = -(-len(array) // rows)
         for part in range(parts):
-            header = header_of(package) | {"part": part, "parts": parts}
+            header = self._header(package) | {"part": part, "parts": parts}
             self._publish(f"scope/{package.scope}", header, array[part * rows : (part + 1) * rows])
 
     # by the verbs
@@ -130,7 +131,7 @@ class ApplicationScopes:
             raise QuadvisError(f"scope {number} has no samples yet")
         part = slice(first, first + count)
         rows = np.column_stack((package.times[part], package.samples[part]))
-        return header_of(package) | {"count": len(package), "samples": rows.ravel().tolist()}
+        return self._header(package) | {"count": len(package), "samples": rows.ravel().tolist()}
 
     def _there(self, numbers: Sequence[int]) -> None:
         for number in numbers:
@@ -145,11 +146,10 @@ class ApplicationScopes:
             found |= {"Files": [path.name for path in file.paths], "Lost": file.lost, "Loss": file.loss}
         return found
 
-
-def header_of(package: Package) -> dict[str, Any]:
-    """Return what is to be said of a package beside its samples."""
-    return {
-        "scope": package.scope, "sequence": package.sequence, "first": package.first,
-        "names": list(package.names), "units": list(package.units), "trigger": package.trigger,
-        "lost": package.lost,
-    }  # fmt: skip
+    def _header(self, package: Package) -> dict[str, Any]:
+        """Return what is to be said of a package beside its samples; ``tick`` is the base tick (s)."""
+        return {
+            "scope": package.scope, "sequence": package.sequence, "tick": self._tick,
+            "names": list(package.names), "units": list(package.units), "trigger": package.trigger,
+            "lost": package.lost,
+        }  # fmt: skip

@@ -75,9 +75,7 @@ class Session:
     def _perform(self) -> None:
         try:
             loop = Paced(self.diagram, self._engine, self._announce, RealTime(), self.helm)
-            self.result = recorded(
-                self.diagram, loop, log=self.log, keep=(), taps=self._taps
-            )
+            self.result = recorded(self.diagram, loop, log=self.log, keep=(), taps=self._taps)
         except QuadvisError as error:
             self.problem = "; ".join([str(error), *getattr(error, "__notes__", ())])
         except Exception as error:

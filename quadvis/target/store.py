@@ -1,10 +1,10 @@
 """What a target keeps on its disk: files by their SHA-256, applications, parameter sets, logs.
 
- folder/files/<SHA-256>              contents of files, each once
- folder/applications/<name>/         bundle.json, and the folder `tree` as the diagram's blocks see it
- folder/sets/<name>/<set>.yaml       parameter sets of an application
- folder/scopes/<name>/               files of file scopes
- folder/logs/<name>-<number>.mcap    the logs of its runs
+folder/files/<SHA-256>              contents of files, each once
+folder/applications/<name>/         bundle.json, and the folder `tree` as the diagram's blocks see it
+folder/sets/<name>/<set>.yaml       parameter sets of an application
+folder/scopes/<name>/               files of file scopes
+folder/logs/<name>-<number>.mcap    the logs of its runs
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class Store:
         return reached
 
     def contents(self, digest: str) -> bytes:
-        """Return the contents of a small file; QuadvisError if it is not here, or too large to be a bundle."""
+        """Return the contents of a file; QuadvisError if it is not here, or too large to be a bundle."""
         path = self._file(digest)
         if not path.exists():
             raise QuadvisError(f"the file {quoted(digest)} is not on the target")

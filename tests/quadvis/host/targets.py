@@ -58,8 +58,8 @@ def running_target(*arguments: str, name: str = "lab", home: Path | None = None)
     }  # fmt: skip
     with (folder / "output.txt").open("w") as output:
         process = subprocess.Popen(
-            [sys.executable, "-m", "quadvis", "target", "--name", name, *arguments], env=environment, text=True,
-            stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True,
+            [sys.executable, "-m", "quadvis", "target", "--name", name, *arguments], env=environment,
+            text=True, stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True,
         )  # fmt: skip
     try:
         wait_for(lambda: (folder / "quadvis" / name).exists() or process.poll() is not None)

@@ -115,7 +115,9 @@ def test_no_path_leaves_the_folder(text: str) -> None:
     assert path.parts
 
 
-@pytest.mark.parametrize("path", ["../x", "/etc/passwd", "a/../../x", "", ".", "a\\..\\x", "a\0b", "a//b", "./a"])
+@pytest.mark.parametrize(
+    "path", ["../x", "/etc/passwd", "a/../../x", "", ".", "a\\..\\x", "a\0b", "a//b", "./a"]
+)
 def test_a_bundle_with_such_a_path_is_refused(path: str) -> None:
     bundle, _ = pack(quadvis.load(HOVER))
     plain = bundle.plain() | {"files": {path: "0" * 64}}
@@ -179,7 +181,9 @@ def test_another_text_than_the_hash_says_is_refused(store: Store) -> None:
 
 def test_an_unknown_application_is_named(store: Store) -> None:
     sent(store, HOVER)
-    with pytest.raises(QuadvisError, match="there is no application 'hovr' on the target; did you mean 'hover'"):
+    with pytest.raises(
+        QuadvisError, match="there is no application 'hovr' on the target; did you mean 'hover'"
+    ):
         store.bundle("hovr")
 
 
