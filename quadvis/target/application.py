@@ -30,7 +30,7 @@ class Application:
     """One application. Its state is ``loading`` until its processes are ready, and then ``ready``.
 
     A run goes from there to ``running`` and to ``stopped``; the next `start` begins anew. The values that
-    were tuned stay. ``problem`` says why the last run came to an early end, ``result`` is that of the last one.
+    were tuned stay. ``problem`` says why the last run came to an early end, ``result`` is its result.
     """
 
     def __init__(self, bundle: Bundle, diagram: Diagram, store: Store, publish: Publish) -> None:
