@@ -24,7 +24,10 @@ NEAR = 0.001  # s, while somebody waits for a tick
 
 
 class Steering:
-    """Does for the members of a run what a helm asks; without a helm the run begins by itself."""
+    """Does for the members of a run what a helm asks; without a helm the run begins by itself.
+
+    QuadvisError if the helm has steered another run.
+    """
 
     def __init__(self, helm: Helm | None, diagram: Diagram, changed: Callable[[Change], None]) -> None:
         self._helm, self._changed = helm, changed
@@ -35,12 +38,12 @@ class Steering:
         self._reached = 0
         self._late = _most_late(diagram.graph)
         self.ticks = diagram.ticks
+        if helm is not None:
+            helm.follow(self)
 
     def take_over(self, members: Sequence[Member]) -> None:
         """Steer these members, which have not begun."""
         self._members = members
-        if self._helm is not None:
-            self._helm.follow(self)
 
     @property
     def sources(self) -> list[int]:
@@ -55,7 +58,7 @@ class Steering:
     @property
     def tick(self) -> int:
         """The last tick that every computer has begun."""
-        return min(member.tick for member in self._members)
+        return min((member.tick for member in self._members), default=0)
 
     @property
     def time(self) -> float:

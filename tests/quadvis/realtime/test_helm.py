@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
+import os
+import signal
 import sys
 import threading
 import time
 from concurrent.futures import Future
+from contextlib import ExitStack
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,12 +22,12 @@ from quadvis import read_log, replay
 from quadvis.api import Diagram, load_text
 from quadvis.block import ParameterError
 from quadvis.engine.tuning import NewValue
-from quadvis.errors import DiagramError, QuadvisError
+from quadvis.errors import DiagramError, QuadvisError, RunError
 from quadvis.realtime.helm import ENDLESS, Helm
-from quadvis.run.loops import Paced
+from quadvis.run.loops import Paced, Takers
 from quadvis.run.result import Result
 from quadvis.run.session import recorded
-from tests.processes import wait_for
+from tests.processes import children, wait_for
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="real time is Linux's")
 
@@ -106,6 +111,9 @@ def value(path: str, name: str, number: object) -> NewValue:
 
 def tuned(steered: Steered, *values: NewValue) -> int:
     return steered.helm.tune(values).result(30)
+
+
+NOBODY = Takers([], [], lambda *_: None, lambda _: None, lambda *_: None)
 
 
 def changes(log: Path) -> list[tuple[int, str, str, str]]:
@@ -239,6 +247,27 @@ def test_a_run_that_has_not_begun_is_stopped_and_can_lose_a_process(tmp_path: Pa
     assert len(result["ramp.y"]) == 0
     with pytest.raises(QuadvisError, match="the run has ended"):
         waiting.result(0)
+
+
+def test_a_run_that_fails_says_so_to_those_who_wait_and_a_helm_steers_one_run(tmp_path: Path) -> None:
+    here: Any = SimpleNamespace(pid=os.getpid())
+    before = set(children(here))
+    with Steered(load_text(TEXT), log=tmp_path / "run.mcap") as steered:
+        helm = steered.helm
+        helm.begin()
+        wait_for(lambda: helm.tick > 3)
+        with pytest.raises(QuadvisError, match="has steered another run"):
+            Paced(load_text(TEXT), "python", None, CALM, helm).run(NOBODY, ExitStack())
+        assert helm.state == "running"
+        (application,) = set(children(here)) - before
+        os.kill(application, signal.SIGSTOP)
+        waiting = helm.tune([value("law", "factor", 5.0)])
+        os.kill(application, signal.SIGKILL)
+        with pytest.raises(RunError, match="was killed by SIGKILL"):
+            steered.end()
+    with pytest.raises(QuadvisError, match="the run has ended"):
+        waiting.result(0)
+    assert helm.state == "ended" and helm.tick > 3 and changes(tmp_path / "run.mcap") == []
 
 
 @pytest.mark.parametrize(
