@@ -34,8 +34,8 @@ class Curves(NamedTuple):
     def labels(self) -> list[str]:
         """The texts at the round numbers of the axis; the last one, at the top, has the unit."""
         texts = [self.axis.text(mark) for mark in self.axis.marks]
-        unit = _unit(self.unit)
-        return [*texts[:-1], f"{texts[-1]} {unit}".rstrip()] if texts else []
+        unit = f" {self.unit}" if _unit(self.unit) else ""
+        return [text + (unit if text is texts[-1] else " " * len(unit)) for text in texts]
 
 
 def panel(
@@ -177,9 +177,8 @@ def _filled(entries: Sequence[tuple[str, int]], width: int) -> list[str]:
 
 def _numbers(package: Package) -> list[str]:
     """Return a table: the newest value of each trace, and the least and greatest in the package."""
-    rows: list[tuple[str, ...]] = [
-        ("t", f"{package.times[-1]:.6g}" if len(package) else "", "s", "least", "greatest")
-    ]
+    time = f"{package.times[-1]:.6g}" if len(package) else ""
+    rows: list[tuple[str, ...]] = [("t", time, "s", "least", "greatest")]
     for column, (name, unit) in enumerate(zip(package.names, package.units, strict=True)):
         values = package.samples[:, column]
         known = values[np.isfinite(values)]
