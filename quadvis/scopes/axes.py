@@ -9,7 +9,7 @@ LARGEST = 1e300  # end of an axis: a span must be a number, too
 FINEST = 1e-12  # span of an axis against its values
 
 
-class Axis(NamedTuple):
+class TextAxis(NamedTuple):
     """An axis from ``least`` to ``greatest``, with round numbers as multiples of ``step``."""
 
     least: float
@@ -48,22 +48,22 @@ def round_step(span: float, most: int) -> float:
     return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= rough * (1 - 1e-9))
 
 
-def round_axis(least: float, greatest: float, most: int) -> Axis:
+def round_axis(least: float, greatest: float, most: int) -> TextAxis:
     """Return an axis that reaches from one round number to another and holds all values between two."""
     least, greatest = _apart(least, greatest)
     step = round_step(greatest - least, most)
-    return Axis(
+    return TextAxis(
         math.floor(least / step + 1e-9) * step,
         math.ceil(greatest / step - 1e-9) * step,
         step,
     )
 
 
-def exact_axis(least: float, greatest: float, most: int) -> Axis:
+def exact_axis(least: float, greatest: float, most: int) -> TextAxis:
     """Return an axis with just these ends."""
     if greatest - least <= 0.0:
         greatest = least + 1.0
-    return Axis(least, greatest, round_step(greatest - least, most))
+    return TextAxis(least, greatest, round_step(greatest - least, most))
 
 
 def _apart(least: float, greatest: float) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from quadvis.machine.columns import table
-from quadvis.scopes.axes import Axis, exact_axis, round_axis
+from quadvis.scopes.axes import TextAxis, exact_axis, round_axis
 from quadvis.scopes.braille import HIGH, STYLES, WIDE, DotGrid
 from quadvis.scopes.package import Package
 from quadvis.scopes.properties import NUMERICAL
@@ -28,7 +28,7 @@ class Curves(NamedTuple):
 
     unit: str
     columns: tuple[int, ...]
-    axis: Axis
+    axis: TextAxis
 
     @property
     def labels(self) -> list[str]:
@@ -91,7 +91,7 @@ def _curves(package: Package, unit: str, settings: ScopeSettings, most: int) -> 
 def _plot(
     package: Package,
     group: Curves,
-    times: Axis,
+    times: TextAxis,
     dots: DotGrid,
     margin: int,
     grid: bool,
@@ -130,7 +130,7 @@ def _coloured(text: str, trace: int) -> str:
     return f"\x1b[{COLOURS[trace % len(COLOURS)]}m{text}\x1b[0m"
 
 
-def _time_axis(package: Package, times: Axis, margin: int, inside: int) -> list[str]:
+def _time_axis(package: Package, times: TextAxis, margin: int, inside: int) -> list[str]:
     """Return the axis of the time with the trigger (▲), and its numbers."""
 
     def column_of(time: float) -> int:
