@@ -7,6 +7,7 @@ import threading
 from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from time import monotonic
 from typing import BinaryIO
 
@@ -96,9 +97,12 @@ class Sink:
         with self._changed:
             while self._waiting and not self.failure:
                 before = self._written
-                self._changed.wait(HUNG)
-                if self._waiting and self._written == before:
+                if not self._changed.wait_for(partial(self._moved, before), HUNG):
                     self._give_up("the disk takes nothing any more")
+
+    def _moved(self, before: int) -> bool:
+        """Return whether the disk has taken more than so many bytes, or will take no more."""
+        return self._written != before or not self._waiting or bool(self.failure)
 
     def close(self) -> None:
         """Write the waiting bytes and close the file; if the disk hangs, the file stays open."""

@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+LARGEST = 1e300  # end of an axis: a span must be a number, too
+FINEST = 1e-12  # span of an axis against its values
 
-class Axis(NamedTuple):
+
+class TextAxis(NamedTuple):
     """An axis from ``least`` to ``greatest``, with round numbers as multiples of ``step``."""
 
     least: float
@@ -45,21 +48,28 @@ def round_step(span: float, most: int) -> float:
     return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= rough * (1 - 1e-9))
 
 
-def round_axis(least: float, greatest: float, most: int) -> Axis:
+def round_axis(least: float, greatest: float, most: int) -> TextAxis:
     """Return an axis that reaches from one round number to another and holds all values between two."""
-    if not least < greatest:  # one value: a step up and one down
-        half = abs(least) / 2 or 1.0
-        least, greatest = least - half, greatest + half
+    least, greatest = _apart(least, greatest)
     step = round_step(greatest - least, most)
-    return Axis(
+    return TextAxis(
         math.floor(least / step + 1e-9) * step,
         math.ceil(greatest / step - 1e-9) * step,
         step,
     )
 
 
-def exact_axis(least: float, greatest: float, most: int) -> Axis:
+def exact_axis(least: float, greatest: float, most: int) -> TextAxis:
     """Return an axis with just these ends."""
-    if not least < greatest:
+    if greatest - least <= 0.0:
         greatest = least + 1.0
-    return Axis(least, greatest, round_step(greatest - least, most))
+    return TextAxis(least, greatest, round_step(greatest - least, most))
+
+
+def _apart(least: float, greatest: float) -> tuple[float, float]:
+    """Return the ends of an axis that holds two values: around them if they are the same but for rounding."""
+    least, greatest = (min(max(end, -LARGEST), LARGEST) for end in (least, greatest))
+    if greatest - least > max(abs(least), abs(greatest)) * FINEST + 1 / LARGEST:
+        return least, greatest
+    half = abs(least) / 2 or 1.0
+    return least - half, greatest + half

@@ -105,11 +105,11 @@ class ScopeBoard:
         settings = scope.settings
         if scope.running:
             return
+        settings.check_start(f"scope {number}", len(scope.plan.traces))
         if settings.TriggerMode == SCOPE and settings.TriggerScope not in self._scopes:
             raise QuadvisError(f"scope {number} waits for scope {settings.TriggerScope}, which is not there")
         if settings.TriggerMode == SCOPE and settings.TriggerScope == number:
             raise QuadvisError(f"scope {number} waits for itself; give another TriggerScope")
-        settings.check_start(f"scope {number}", len(scope.plan.traces))
         if settings.Type == FILE:
             if self._folder is None:
                 raise QuadvisError(f"scope {number} has no folder for its files; use a host scope")

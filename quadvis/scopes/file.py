@@ -44,7 +44,6 @@ class ScopeFile:
         self.full = False
         self._failure = ""
         self._lost = 0
-        self._packages = 0  # in the present file
         self._writer = self._open()
         if self._writer.size + self._row > scope.settings.MaxFileSize:
             self.close()
@@ -80,14 +79,13 @@ class ScopeFile:
 
     def close(self) -> None:
         """End the file; a second call does nothing."""
-        self._writer.close({"packages": str(self._packages), "left out": str(self._lost)})
+        self._writer.close({"left out": str(self._lost)})
 
     def _write(self, package: Package, part: slice) -> None:
         stamps = stamps_of(package.ticks[part], self._scope.tick)
         for index, columns in enumerate(self._columns):
             rows = np.ascontiguousarray(package.samples[part, columns]).view(np.int64)
             self._writer.write_rows(index, stamps, rows)
-        self._packages += 1
 
     def _next(self) -> None:
         """Begin the next file; without one the scope is at its end."""
@@ -105,7 +103,6 @@ class ScopeFile:
         path = self._folder / self._names.name(len(self.paths))
         synced = self._scope.settings.WriteMode == COMMIT
         writer = LogWriter(path, self._blocks, self._facts, synced)
-        self._packages = 0
         self.paths.append(path)
         return writer
 

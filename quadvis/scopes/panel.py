@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from quadvis.machine.columns import table
-from quadvis.scopes.axes import Axis, exact_axis, round_axis
+from quadvis.scopes.axes import TextAxis, exact_axis, round_axis
 from quadvis.scopes.braille import HIGH, STYLES, WIDE, DotGrid
 from quadvis.scopes.package import Package
 from quadvis.scopes.properties import NUMERICAL
@@ -28,14 +28,14 @@ class Curves(NamedTuple):
 
     unit: str
     columns: tuple[int, ...]
-    axis: Axis
+    axis: TextAxis
 
     @property
     def labels(self) -> list[str]:
         """The texts at the round numbers of the axis; the last one, at the top, has the unit."""
         texts = [self.axis.text(mark) for mark in self.axis.marks]
-        unit = _unit(self.unit)
-        return [*texts[:-1], f"{texts[-1]} {unit}".rstrip()] if texts else []
+        unit = f" {self.unit}" if _unit(self.unit) else ""
+        return [text + (unit if text is texts[-1] else " " * len(unit)) for text in texts]
 
 
 def panel(
@@ -91,7 +91,7 @@ def _curves(package: Package, unit: str, settings: ScopeSettings, most: int) -> 
 def _plot(
     package: Package,
     group: Curves,
-    times: Axis,
+    times: TextAxis,
     dots: DotGrid,
     margin: int,
     grid: bool,
@@ -130,7 +130,7 @@ def _coloured(text: str, trace: int) -> str:
     return f"\x1b[{COLOURS[trace % len(COLOURS)]}m{text}\x1b[0m"
 
 
-def _time_axis(package: Package, times: Axis, margin: int, inside: int) -> list[str]:
+def _time_axis(package: Package, times: TextAxis, margin: int, inside: int) -> list[str]:
     """Return the axis of the time with the trigger (▲), and its numbers."""
 
     def column_of(time: float) -> int:
@@ -177,9 +177,8 @@ def _filled(entries: Sequence[tuple[str, int]], width: int) -> list[str]:
 
 def _numbers(package: Package) -> list[str]:
     """Return a table: the newest value of each trace, and the least and greatest in the package."""
-    rows: list[tuple[str, ...]] = [
-        ("t", f"{package.times[-1]:.6g}" if len(package) else "", "s", "least", "greatest")
-    ]
+    time = f"{package.times[-1]:.6g}" if len(package) else ""
+    rows: list[tuple[str, ...]] = [("t", time, "s", "least", "greatest")]
     for column, (name, unit) in enumerate(zip(package.names, package.units, strict=True)):
         values = package.samples[:, column]
         known = values[np.isfinite(values)]
