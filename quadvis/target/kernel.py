@@ -122,9 +122,17 @@ class Kernel:
             self._application = None
             self._event("unloaded")
 
-    def start(self) -> Future[Any]:
-        """Start the application."""
-        return self._loaded.start()
+    def start(self, at: int | None) -> Future[Any]:
+        """Start the application, at an instant of this machine's monotonic clock (ns) if one is given."""
+        return self._loaded.start(at)
+
+    def clock(self) -> int:
+        """Return this machine's monotonic clock (ns)."""
+        return time.monotonic_ns()
+
+    def align(self, shift: int) -> None:
+        """Move the ticks of the run by so much since its start (ns), slowly."""
+        self._loaded.align(shift)
 
     def stop(self) -> Future[Any]:
         """Stop the application: safe values, log closed. It stays loaded."""
