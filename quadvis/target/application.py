@@ -12,7 +12,7 @@ from quadvis.diagram.diagram import Diagram
 from quadvis.errors import QuadvisError
 from quadvis.run.result import Result
 from quadvis.run.tuned import new_values
-from quadvis.target.bundle import Bundle
+from quadvis.target.bundle import ApplicationBundle
 from quadvis.target.newest import Newest
 from quadvis.target.parameters import Parameters, as_written
 from quadvis.target.scopes import ApplicationScopes
@@ -33,7 +33,7 @@ class Application:
     were tuned stay. ``problem`` says why the last run came to an early end, ``result`` is its result.
     """
 
-    def __init__(self, bundle: Bundle, diagram: Diagram, store: Store, publish: Publish) -> None:
+    def __init__(self, bundle: ApplicationBundle, diagram: Diagram, store: Store, publish: Publish) -> None:
         self.bundle, self.diagram = bundle, diagram
         self.parameters = Parameters(diagram)
         self.newest = Newest(diagram)
