@@ -20,7 +20,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from multiprocessing import parent_process
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Any, NamedTuple
 
 from quadvis.diagram.load import load_text
 from quadvis.diagram.sections.on_host_loss import CONTINUE
@@ -46,6 +46,7 @@ from quadvis.realtime.pacer import Ended, Pacer
 from quadvis.realtime.schedule import Schedule
 from quadvis.realtime.streams import RowStream
 from quadvis.realtime.system import SHARE, Grants, ask_all, raise_thread, wake_up_time
+from quadvis.realtime.warm import warm
 
 GRACE = 2.0  # s that a step has to end, once it was asked to
 
@@ -54,8 +55,8 @@ GRACE = 2.0  # s that a step has to end, once it was asked to
 class Setup:
     """What an application needs: a resolved diagram, how to run it, what it shares with its supervisor.
 
-    ``computer`` is the one whose blocks it runs, "" in a diagram without computers. ``lines`` has what the
-    ends of its links are opened with, by the names of the links.
+    ``computer`` is the one whose blocks it runs, "" in a diagram without computers. ``lines`` has the words
+    of its links in memory, by their names.
     """
 
     text: str
@@ -72,6 +73,17 @@ class Setup:
     link: Connection
     devices: PortBindings
     lines: Mapping[str, Any]
+
+
+class Supply(NamedTuple):
+    """What an application waits for before it opens its blocks, since other processes make it.
+
+    ``lines`` has what the ends of its other links are opened with, by the names of the links; ``ports`` the
+    ptys of its input devices, by their paths.
+    """
+
+    lines: Mapping[str, Any]
+    ports: Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -166,11 +178,12 @@ class _Application:
         names, overload = [task.name for task in part.tasks], diagram.overload_of(setup.computer)
         limits, clock = [overload.of(name) for name in names], MonotonicClock()
         pacer = Pacer(schedule, names, limits, shared, clock, lambda: engine.hold_safe())
+        supply: Supply = setup.link.recv()
         with ExitStack() as stack:
-            carriers = open_carriers(part, setup.lines)
+            carriers = open_carriers(part, {**setup.lines, **supply.lines})
             stack.callback(close_all, carriers.values())
             engine = self._engine = Engine(live(part, carriers), diagram.seed, pacer)
-            setup.devices.bind(engine)
+            setup.devices.bind(engine, supply.ports)
             if setup.wishes.profile:
                 engine.measure()
             choice = choose(engine, diagram.ticks, setup.engine, setup.link.send, paced=True)
@@ -184,6 +197,7 @@ class _Application:
             stack.enter_context(diagram.guarded())
             stack.enter_context(engine)
             stack.callback(self._leave)
+            warm(engine, choice)
             grants = ask_all(setup.wishes)
             if native:
                 clock.hear_signals()

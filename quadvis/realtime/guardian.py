@@ -14,7 +14,7 @@ import signal
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
 from multiprocessing.connection import Connection
@@ -62,7 +62,8 @@ class Standing(NamedTuple):
 class GuardianSetup:
     """What the guardian needs: ``words`` has an outbox for each of the ``ports``, in their order.
 
-    ``supervisor`` is the process that started it, ``on_host_loss`` what its death means.
+    Its process starts without ports, and takes them from the ``link``. ``supervisor`` is the process that
+    started it, ``on_host_loss`` what its death means.
     """
 
     ports: tuple[OutputPort, ...]
@@ -275,7 +276,13 @@ def guard(setup: GuardianSetup) -> None:
     """Be the guardian: the whole life of its process."""
     os.setsid()  # no terminal stops it (Ctrl-Z) or kills it
     leave_to_parent()
-    guardian = Guardian(setup)
+    try:
+        ports = setup.link.recv()
+    except EOFError:  # the supervisor has ended
+        return
+    if isinstance(ports, Order):  # the run ends before it has begun
+        return
+    guardian = Guardian(replace(setup, ports=ports))
 
     def end(*_: object) -> None:
         guardian.told_to_end = True

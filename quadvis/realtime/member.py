@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
 from multiprocessing.process import BaseProcess
@@ -17,7 +18,7 @@ from quadvis.errors.caller import IS_COMMAND
 from quadvis.graph.graph import Graph
 from quadvis.native.choice import Announce
 from quadvis.realtime import control, times
-from quadvis.realtime.application import Ending, Ready, Setup, perform
+from quadvis.realtime.application import Ending, Ready, Setup, Supply, perform
 from quadvis.realtime.control import SharedMemory
 from quadvis.realtime.devices import PortBindings, guards_all
 from quadvis.realtime.flight import Share
@@ -39,7 +40,8 @@ LeftOut = Callable[[str, Words], None]  # takes a computer, and its ticks that w
 class Member:
     """One application: its process, the words that it shares, and the rows that come from it.
 
-    ``part`` is the graph of the computer, with the base tick of the whole. ``ready`` is what the application
+    ``part`` is the graph of the computer, with the base tick of the whole; ``lines`` has the words of its
+    links in memory. ``ready`` is what the application
     said before its run, ``ending`` what it said after it.
     """
 
@@ -54,12 +56,12 @@ class Member:
         taps: Sequence[Tap],
         left_out: LeftOut,
         devices: PortBindings,
+        lines: Mapping[str, Any],
         announce: Announce,
     ) -> None:
         self.computer, self._part, self._announce = computer, part, announce
         self._left_out = left_out
         self._limits = diagram.overload_of(computer)
-        self._lines: dict[str, Any] = {}  # what it opens the ends of its links with
         self._streams = streams_of(part, taps)
         streams = tuple(stream for stream, _ in self._streams)
         rings = [stream.ring for stream in streams]
@@ -72,25 +74,26 @@ class Member:
         setup = Setup(
             diagram.resolved, str(diagram.path.parent), diagram.path.name, diagram.own_blocks,
             IS_COMMAND.get(), computer, engine, wishes, count, streams, words, self._theirs, devices,
-            self._lines,
+            lines,
         )  # fmt: skip
         self.patience = Patience.of(computer, words, Schedule.of(part), self._limits, diagram.ticks)
         name = f"application {computer}".rstrip()
         self.process: BaseProcess = context.Process(target=perform, args=(setup,), name=name)
-        self._listening = True
+        self._listening, self._supplied = True, False
         self.ready: Ready | None = None
         self.ending: Ending | None = None
         self._warned, self._overruns = 0.0, [0] * count
 
-    def start(self, lines: Mapping[str, Any]) -> int:
-        """Start the process, which gets ready to run and waits; return its number.
-
-        ``lines`` has what it opens the ends of its links with.
-        """
-        self._lines.update(lines)
+    def start(self) -> None:
+        """Start the process, which loads the diagram and waits for its `supply`."""
         self.process.start()
         self._theirs.close()
-        return self.process.pid or 0
+
+    def supply(self, lines: Mapping[str, Any], ports: Mapping[str, str]) -> None:
+        """Let the application open its blocks, and get ready to run; see `Supply`."""
+        self._supplied = True
+        with suppress(OSError):  # it may have ended
+            self._link.send(Supply(lines, ports))
 
     def begin(self, instant: int) -> None:
         """Let the application run from an instant (ns) of the monotonic clock on."""
@@ -131,8 +134,8 @@ class Member:
 
     @property
     def ended_silently(self) -> bool:
-        """True if the application has ended without a word, and so perhaps without its safe values."""
-        return self.ending is None and self.process.exitcode is not None
+        """True if it has opened blocks and ended without a word, and so perhaps without its safe values."""
+        return self._supplied and self.ending is None and self.process.exitcode is not None
 
     @property
     def is_guarded(self) -> bool:

@@ -92,6 +92,7 @@ class _Supervisor:
                     own,
                     left_out,
                     bindings,
+                    self._lines.shared(computer),
                     announce,
                 )
             )
@@ -146,19 +147,22 @@ class _Supervisor:
         return [*self._unsafe, *([UNSAFE] if not all(member.is_guarded for member in silent) else [])]
 
     def _start(self) -> None:
-        """Start all processes, those first on which others depend."""
+        """Start all processes at once; the applications open no block before the guardian has the ports."""
         self._cables.start()
+        guardian = self._devices.start([member.patience for member in self._members])
+        with launching():
+            for member in self._members:
+                member.start()
+        self._cables.make()
         self._lines.lay(self._cables.ends)
-        guardian = self._devices.start(
-            self._cables.ends, [member.patience for member in self._members], self._announce
-        )
         if guardian is not None:
             self._cables.watch(guardian)
-        with launching():
-            for place, member in enumerate(self._members):
-                process = member.start(self._lines.of(member.computer))
-                self._devices.watch(process, place)
-                self._cables.watch(process)
+        self._devices.open(self._cables.ends, self._announce)
+        for place, member in enumerate(self._members):
+            process = member.process.pid or 0
+            self._devices.watch(process, place)
+            self._cables.watch(process)
+            member.supply(self._lines.of(member.computer), self._devices.ports)
 
     def _close(self) -> list[str]:
         """End what the applications needed; return a sentence for each port that may be unsafe."""
