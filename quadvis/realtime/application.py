@@ -40,10 +40,11 @@ from quadvis.realtime.control import SharedMemory
 from quadvis.realtime.crew import Crew, lead
 from quadvis.realtime.devices import PortBindings
 from quadvis.realtime.hold_ups import hold_ups
+from quadvis.realtime.last_ticks import LastTicks
 from quadvis.realtime.lifeline import Lifeline
 from quadvis.realtime.options import RealTime
 from quadvis.realtime.pacer import Ended, Pacer
-from quadvis.realtime.schedule import Schedule
+from quadvis.realtime.schedule import NANOSECONDS, Schedule
 from quadvis.realtime.streams import RowStream
 from quadvis.realtime.system import SHARE, Grants, ask_all, raise_thread, wake_up_time
 from quadvis.realtime.warm import warm
@@ -73,6 +74,7 @@ class Setup:
     link: Connection
     devices: PortBindings
     lines: Mapping[str, Any]
+    last_ticks: LastTicks
 
 
 class Supply(NamedTuple):
@@ -217,7 +219,10 @@ class _Application:
             pacer.finish()
             if crew is not None:
                 pacer.conclude(crew.rest, diagram.ticks)
-            shared.control[control.LEFT] = control.AT_STOP_TIME
+            remaining = schedule.deadline(diagram.ticks) - clock.now()
+            setup.last_ticks.stay(remaining / NANOSECONDS, schedule.interval / NANOSECONDS, pacer.live)
+            if shared.control[control.END]:
+                raise Ended
         return Ending(unsafe=pacer.unsafe, profile=engine.profile() if setup.wishes.profile else None)
 
     def _crew(self, part: Graph, choice: Choice, pacer: Pacer) -> Crew | None:
@@ -238,8 +243,7 @@ class _Application:
 
     def _leave(self) -> None:
         """Let the guardian know that no step follows, and nothing interrupt the closing of the blocks."""
-        words = self._shared.control
-        words[control.LEFT] = words[control.LEFT] or control.EARLY
+        self._shared.control[control.LEFT] = 1
         self._signals.close()
 
     def ended_early(self, error: BaseException) -> Ending:

@@ -16,11 +16,11 @@ TICK = 1  # by the loop: the tick whose step began last
 BEGUN = (
     2  # by the loop: when the step began that is running (ns since the start, at least 1); 0 between steps
 )
-DONE = 3  # by the loop: the number of steps
+DONE = 3  # by the loop: grows with each step, and after the last one while the loop waits for others
 END = 4  # by either: not 0 if the run is to end before its next step
-LEFT = 5  # by the loop: not 0 once it runs no more steps
-EARLY, AT_STOP_TIME = 1, 2  # what LEFT says
+LEFT = 5  # by the loop: not 0 once it runs no more steps, and no other loop does at the stop time
 SAFE = 6  # by the loop: not 0 once the outputs are to hold their safe values to the end
+RESTING = 7  # by the loop: when it began to wait for tasks that run by themselves, as BEGUN; 0 else
 LIFELINE = slice(8, 8 + lifeline.SIZE)  # of the loop's thread
 WORDS = LIFELINE.stop
 LEFT_OUT = (

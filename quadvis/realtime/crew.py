@@ -50,6 +50,7 @@ class Crew:
         self._native = choice.engine == NATIVE
         program = interpreter.program
         self._names = [task.name for task in program.tasks]
+        self._pause = float(program.tasks[0].period) / 2  # s
         self._tasks = {block.path: block.task for block in program.blocks}
         self._crew, self._kept = crew_words(program)
         self._memory = self.memory.raw.cast("q")
@@ -129,11 +130,16 @@ class Crew:
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
-    def rest(self) -> None:
-        """Let all steps end that have begun or are due, and the threads after them."""
+    def rest(self, live: Callable[[], object]) -> None:
+        """Let all steps end that have begun or are due, and the threads after them.
+
+        Meanwhile call ``live`` at least once in a period of the fastest task.
+        """
         self._end(AT_REST)
         for thread in self._threads:
-            thread.join()
+            while thread.is_alive():
+                thread.join(self._pause)
+                live()
         if self._error is not None:
             raise self._error
 

@@ -77,10 +77,10 @@ class Devices:
             ports = [self._output_port(path, device, ends) for path, device in self._outputs.items()]
             self._guard.open(ports, announce)
 
-    def watch(self, process: int, loop: int) -> None:
-        """Let the guardian watch an application, and the loop of this place among the patiences."""
+    def watch(self, process: int) -> None:
+        """Let the guardian watch an application."""
         if self._guard is not None:
-            self._guard.watch(process, loop)
+            self._guard.watch(process)
 
     @property
     def sources(self) -> list[Connection | int]:

@@ -78,13 +78,9 @@ class Guard:
                 raise RunError(said.reason, block=said.block)
         raise RunError(f"the guardian was not ready after {START:g} s")
 
-    def watch(self, process: int, loop: int | None = None) -> None:
-        """Let it watch an application: when that ends, safe frames are sent.
-
-        ``loop`` is the place of its loop among the patiences. At the stop time the loops may end one by one;
-        safe frames are sent when all have.
-        """
-        self._say(Watch(process, loop))
+    def watch(self, process: int) -> None:
+        """Let it watch an application: when that ends, safe frames are sent."""
+        self._say(Watch(process))
 
     def make_safe(self) -> None:
         """Let it send safe frames at once, and from now on."""

@@ -84,10 +84,9 @@ class Order(Enum):
 
 @dataclass(frozen=True)
 class Watch:
-    """The supervisor names an application: its process, and the place of its loop among the patiences."""
+    """The supervisor names the process of an application."""
 
     process: int
-    loop: int | None = None
 
 
 @dataclass(frozen=True)
@@ -139,7 +138,6 @@ class Guardian:
         self._looked = looked(setup.words)
         self._hearts = [Heartbeat(patience, time.monotonic_ns) for patience in setup.patiences]
         self._supervisor, self._applications = Lives(), Lives()
-        self._loops: dict[int, int | None] = {}  # of the applications, by process
         self._supervisor.watch(setup.supervisor)
         shortest = min([patience.allowed // LOOKS for patience in setup.patiences], default=LONGEST_LOOK)
         self._look_every = min(max(shortest, SHORTEST_LOOK), LONGEST_LOOK)
@@ -201,7 +199,7 @@ class Guardian:
         self._supervisor.look()
         self._applications.look()
         host_lost = self._supervisor.any_ended and self._setup.on_host_loss == SAFE
-        if host_lost or any(not self._has_finished(process) for process in self._applications.ended):
+        if host_lost or self._applications.any_ended:
             self._make_safe()
         if self.told_to_end and not self.safe:
             self._make_safe(Alarm("the guardian was told to end"))
@@ -209,7 +207,7 @@ class Guardian:
             heart.hold_on(self._setup.standing.priority)
         signs = [(heart.look(), heart) for heart in self._hearts] if not self.safe else []
         kinds = {sign for sign, _ in signs}
-        if Sign.ENDS in kinds or kinds == {Sign.FINISHED}:
+        if Sign.ENDS in kinds:
             self._make_safe()
         for sign, heart in signs:
             if sign is Sign.HANGS and not self.safe:
@@ -219,18 +217,12 @@ class Guardian:
             self._hurry()
         self._paused = paused
 
-    def _has_finished(self, process: int) -> bool:
-        """Return whether the loop of an application has reached the stop time."""
-        loop = self._loops[process]
-        return loop is not None and self._hearts[loop].has_finished
-
     def _listen(self) -> None:
         """Take what the supervisor says."""
         try:
             while self._listening and self._link.poll():
                 said = self._link.recv()
                 if isinstance(said, Watch):
-                    self._loops[said.process] = said.loop
                     self._applications.watch(said.process)
                 else:
                     self._make_safe()

@@ -23,6 +23,7 @@ from quadvis.realtime.control import SharedMemory
 from quadvis.realtime.devices import PortBindings, guards_all
 from quadvis.realtime.flight import Share
 from quadvis.realtime.heartbeat import Patience
+from quadvis.realtime.last_ticks import LastTicks
 from quadvis.realtime.lifeline import Lifeline
 from quadvis.realtime.options import RealTime
 from quadvis.realtime.ring import RecordRing, Words
@@ -57,6 +58,7 @@ class Member:
         left_out: LeftOut,
         devices: PortBindings,
         lines: Mapping[str, Any],
+        last_ticks: LastTicks,
         announce: Announce,
     ) -> None:
         self.computer, self._part, self._announce = computer, part, announce
@@ -74,9 +76,9 @@ class Member:
         setup = Setup(
             diagram.resolved, str(diagram.path.parent), diagram.path.name, diagram.own_blocks,
             IS_COMMAND.get(), computer, engine, wishes, count, streams, words, self._theirs, devices,
-            lines,
+            lines, last_ticks,
         )  # fmt: skip
-        self.patience = Patience.of(computer, words, Schedule.of(part), self._limits, diagram.ticks)
+        self.patience = Patience.of(computer, words, Schedule.of(part), self._limits)
         name = f"application {computer}".rstrip()
         self.process: BaseProcess = context.Process(target=perform, args=(setup,), name=name)
         self._listening, self._supplied = True, False
@@ -194,7 +196,7 @@ class Member:
 
         That is ``patience``, or longer if the diagram allows longer steps.
         """
-        begun = self._control[control.BEGUN]
+        begun = self._control[control.BEGUN] or self._control[control.RESTING]
         tasks = [(self._limits.of(task.name), float(task.period)) for task in self._part.tasks]
         longest = max(patience, *((limits.max + 1) * period for limits, period in tasks))
         lasting = any(limits.action == WARN for limits, _ in tasks)

@@ -116,14 +116,19 @@ class Pacer:
         """Count the step that has ended."""
         pacing.finish(self._plan, self._control, self._times, self.clock.now())
 
-    def conclude(self, rest: Callable[[], None], end: int) -> None:
+    def live(self) -> bool:
+        """Give a sign of life while no step runs; return whether the run goes on."""
+        self._control[control.DONE] += 1
+        return not self._control[control.END]
+
+    def conclude(self, rest: Callable[[Callable[[], object]], None], end: int) -> None:
         """Let ``rest`` wait for the tasks that run by themselves; count ticks never dispatched.
 
-        A wait that takes too long is a step that does so.
+        It calls what it is given again and again. A wait that takes too long is a step that does so.
         """
-        self._control[control.BEGUN] = max(1, self.clock.now())
-        rest()
-        self._control[control.BEGUN] = 0
+        self._control[control.RESTING] = max(1, self.clock.now())
+        rest(self.live)
+        self._control[control.RESTING] = 0
         for task in range(1, self._crew[dispatch.COUNT]):
             row = plans.HEAD + plans.ROW * task
             rhythm = self._plan[row + plans.EVERY], self._plan[row + plans.OFFSET]

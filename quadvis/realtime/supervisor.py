@@ -18,6 +18,7 @@ from quadvis.realtime.cables import Cables
 from quadvis.realtime.devices import Devices
 from quadvis.realtime.flight import Flight
 from quadvis.realtime.guardian import Standing
+from quadvis.realtime.last_ticks import LastTicks
 from quadvis.realtime.lines import Lines
 from quadvis.realtime.member import LeftOut, Member
 from quadvis.realtime.options import RealTime
@@ -77,7 +78,8 @@ class _Supervisor:
         self._lines = Lines(context, diagram.links)
         self._cables = Cables(context, [*self._devices.cables, *self._lines.cables], priority)
         self._members = []
-        for computer in diagram.graph.computers:
+        last_ticks = context.RawArray("q", len(diagram.graph.computers))
+        for place, computer in enumerate(diagram.graph.computers):
             part = diagram.graph.part_of(computer)
             own = [tap for tap in taps if tap.block in part]
             bindings = self._devices.bindings
@@ -93,6 +95,7 @@ class _Supervisor:
                     left_out,
                     bindings,
                     self._lines.shared(computer),
+                    LastTicks(last_ticks, place),
                     announce,
                 )
             )
@@ -158,9 +161,9 @@ class _Supervisor:
         if guardian is not None:
             self._cables.watch(guardian)
         self._devices.open(self._cables.ends, self._announce)
-        for place, member in enumerate(self._members):
+        for member in self._members:
             process = member.process.pid or 0
-            self._devices.watch(process, place)
+            self._devices.watch(process)
             self._cables.watch(process)
             member.supply(self._lines.of(member.computer), self._devices.ports)
 
