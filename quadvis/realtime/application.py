@@ -68,7 +68,7 @@ class Setup:
     computer: str
     engine: str
     wishes: RealTime
-    tasks: int
+    rooms: tuple[int, ...]
     streams: tuple[RowStream, ...]
     words: Any
     link: Connection
@@ -165,7 +165,7 @@ class _Application:
 
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
-        self._shared = SharedMemory(setup.words, setup.tasks, [stream.ring for stream in setup.streams])
+        self._shared = SharedMemory(setup.words, setup.rooms, [stream.ring for stream in setup.streams])
         self._signals = _Signals(self._shared.control)
         self._engine: Engine | None = None
         self._start = 0

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from quadvis.realtime import lifeline, times
+from quadvis.realtime.notes import Notes
 from quadvis.realtime.ring import RecordRing
 
 START = 0  # by the loop: the instant of the start on the monotonic clock (ns); 0 before
@@ -23,34 +24,31 @@ SAFE = 6  # by the loop: not 0 once the outputs are to hold their safe values to
 RESTING = 7  # by the loop: when it began to wait for tasks that run by themselves, as BEGUN; 0 else
 LIFELINE = slice(8, 8 + lifeline.SIZE)  # of the loop's thread
 WORDS = LIFELINE.stop
-LEFT_OUT = (
-    4096,
-    2,
-)  # the ring of the ticks that the loop leaves out: its room, and its records, first and count
 
 
 class SharedMemory:
-    """The words of a real-time run: of control, of the times of each task, and of the rings.
+    """The words of a real-time run: of control, of the times of each task, of the rings, and of the notes.
 
-    ``left_out`` is the ring of the ticks that the loop leaves out.
+    ``rooms`` has for how many steps of each task the notes have room.
     """
 
-    def __init__(self, words: Any, tasks: int, rings: Sequence[tuple[int, int]]) -> None:
+    def __init__(self, words: Any, rooms: Sequence[int], rings: Sequence[tuple[int, int]]) -> None:
         """Divide the ``words``; ``rings`` are the records that each has room for, and their widths."""
-        view = memoryview(words).cast("B").cast("q")
+        view, tasks = memoryview(words).cast("B").cast("q"), len(rooms)
         self.control = view[:WORDS]
         ends = [WORDS + times.WORDS * (task + 1) for task in range(tasks)]
         self.times = view[WORDS : WORDS + times.WORDS * tasks]
         self.tasks = [view[end - times.WORDS : end] for end in ends]
-        made = []
+        self.rings = []
         start = WORDS + times.WORDS * tasks
-        for room, width in (*rings, LEFT_OUT):
+        for room, width in rings:
             size = RecordRing.size(room, width)
-            made.append(RecordRing(view[start : start + size], room, width))
+            self.rings.append(RecordRing(view[start : start + size], room, width))
             start += size
-        self.rings, self.left_out = made[:-1], made[-1]
+        self.notes = Notes(view[start : start + Notes.size(rooms)], rooms)
 
     @staticmethod
-    def size(tasks: int, rings: Sequence[tuple[int, int]]) -> int:
+    def size(rooms: Sequence[int], rings: Sequence[tuple[int, int]]) -> int:
         """Return the number of words."""
-        return WORDS + times.WORDS * tasks + sum(RecordRing.size(*ring) for ring in (*rings, LEFT_OUT))
+        all_rings = sum(RecordRing.size(*ring) for ring in rings)
+        return WORDS + times.WORDS * len(rooms) + all_rings + Notes.size(rooms)

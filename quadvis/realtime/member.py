@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
@@ -25,17 +25,17 @@ from quadvis.realtime.flight import Share
 from quadvis.realtime.heartbeat import Patience
 from quadvis.realtime.last_ticks import LastTicks
 from quadvis.realtime.lifeline import Lifeline
+from quadvis.realtime.note_taker import NoteTaker
 from quadvis.realtime.options import RealTime
-from quadvis.realtime.ring import RecordRing, Words
+from quadvis.realtime.ring import RecordRing
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
-from quadvis.realtime.streams import RowStream, streams_of
+from quadvis.realtime.streams import RowStream, room_for, streams_of
 from quadvis.realtime.times import TaskTimes
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
 
 WARNED = 1.0  # s between two warnings
-LeftOut = Callable[[str, Words], None]  # takes a computer, and its ticks that were left out: first, count
 
 
 class Member:
@@ -55,27 +55,27 @@ class Member:
         wishes: RealTime,
         engine: str,
         taps: Sequence[Tap],
-        left_out: LeftOut,
+        taker: NoteTaker,
         devices: PortBindings,
         lines: Mapping[str, Any],
         last_ticks: LastTicks,
         announce: Announce,
     ) -> None:
         self.computer, self._part, self._announce = computer, part, announce
-        self._left_out = left_out
+        self._taker = taker
         self._limits = diagram.overload_of(computer)
         self._streams = streams_of(part, taps)
         streams = tuple(stream for stream, _ in self._streams)
         rings = [stream.ring for stream in streams]
-        count = len(part.tasks)
-        words = context.RawArray("q", SharedMemory.size(count, rings))
-        self._shared = SharedMemory(words, count, rings)
+        rooms = tuple(room_for(task.period) for task in part.tasks)
+        words = context.RawArray("q", SharedMemory.size(rooms, rings))
+        self._shared = SharedMemory(words, rooms, rings)
         self._control = self._shared.control
         Lifeline(self._control[control.LIFELINE]).make()
         self._link, self._theirs = context.Pipe()
         setup = Setup(
             diagram.resolved, str(diagram.path.parent), diagram.path.name, diagram.own_blocks,
-            IS_COMMAND.get(), computer, engine, wishes, count, streams, words, self._theirs, devices,
+            IS_COMMAND.get(), computer, engine, wishes, rooms, streams, words, self._theirs, devices,
             lines, last_ticks,
         )  # fmt: skip
         self.patience = Patience.of(computer, words, Schedule.of(part), self._limits)
@@ -84,7 +84,7 @@ class Member:
         self._listening, self._supplied = True, False
         self.ready: Ready | None = None
         self.ending: Ending | None = None
-        self._warned, self._overruns = 0.0, [0] * count
+        self._warned, self._overruns = 0.0, [0] * len(rooms)
 
     def start(self) -> None:
         """Start the process, which loads the diagram and waits for its `supply`."""
@@ -125,7 +125,7 @@ class Member:
     def lost(self) -> int:
         """How many rows found no room on the way here."""
         rows = sum(len(stream.blocks) * ring.lost for (stream, _), ring in self._rings)
-        return rows + self._shared.left_out.lost
+        return rows + self._shared.notes.left_out.lost + self._shared.notes.releases.lost
 
     @property
     def failed(self) -> bool:
@@ -149,12 +149,16 @@ class Member:
         self._control[control.END] = 1
 
     def take(self, *, last: bool = False) -> None:
-        """Hand on the ticks that were left out, and the rows that have come.
+        """Hand on what the loop has noted, and the rows that have come.
 
-        Of both, what the loop has noted before a row that is handed on: the rows are taken first.
+        Of both, what it has noted before a row that is handed on: the rows are taken first.
         """
         found = [(stream, taps, ring.take(last=last)) for (stream, taps), ring in self._rings]
-        self._left_out(self.computer, self._shared.left_out.take(last=last))
+        notes = self._shared.notes
+        self._taker.left_out(self.computer, notes.left_out.take(last=last))
+        self._taker.releases(self.computer, notes.releases.take(last=last))
+        for task, ring in zip(self._part.tasks, notes.times, strict=True):
+            self._taker.times(self.computer, task.name, ring.take(last=last))
         for stream, taps, records in found:
             stream.hand_on(records, taps)
 

@@ -3,7 +3,7 @@
 All is done in whole numbers, by plain functions of words that can be indexed. Python runs them for the
 interpreter, and numba compiles the same functions for the compiled loop, so the two cannot differ. ``plan``
 is laid out by `plan`, ``shared`` by `control`, ``tasks`` are the words of all tasks as `times` has them,
-``left_out`` those of the ring of ticks that are left out, ``crew`` and ``memory`` are those of `dispatch`.
+``noted`` those of the rings of `notes`, ``crew`` and ``memory`` are those of `dispatch`.
 Instants are nanoseconds since the start.
 """
 
@@ -18,6 +18,7 @@ from quadvis.realtime import clocks, control, dispatch, times
 from quadvis.realtime.clocks import now, signalled, sleep
 from quadvis.realtime.dispatch import release
 from quadvis.realtime.grid import deadline, due_in, following, latest
+from quadvis.realtime.notes import put_left_out, put_times
 from quadvis.realtime.overload import ENDING, FAULTED, OVERLOADED, SIGNAL, missed, worse
 from quadvis.realtime.plan import (
     BEGUN,
@@ -29,6 +30,8 @@ from quadvis.realtime.plan import (
     IN_A_ROW,
     INSTANT,
     LATE,
+    NOTED,
+    NOTES_ROOM,
     OFFSET,
     OWN,
     ROW,
@@ -39,12 +42,11 @@ from quadvis.realtime.plan import (
     TICK,
     WAITING,
 )  # fmt: skip
-from quadvis.realtime.ring import put_pair
 from quadvis.realtime.times import bin_of, count
 
 
 def wait(
-    plan: Any, shared: Any, tasks: Any, left_out: Any, clock: Any, crew: Any, memory: Any, tick: int, end: int
+    plan: Any, shared: Any, tasks: Any, noted: Any, clock: Any, crew: Any, memory: Any, tick: int, end: int
 ) -> int:
     """Wait until a tick from ``tick`` on may run, which ``plan[WAITING]`` is then, at most ``end``.
 
@@ -52,7 +54,7 @@ def wait(
     """
     if plan[WAITING] < 0:
         instant = now(clock)
-        finish(plan, shared, tasks, instant)
+        finish(plan, shared, tasks, noted, instant)
         plan[WAITING], plan[INSTANT], plan[COUNTED_TO] = following(plan, tick, instant), instant, tick
     chosen, instant = plan[WAITING], plan[INSTANT]
     if chosen < end:
@@ -74,12 +76,12 @@ def wait(
     chosen = min(chosen, end)
     plan[WAITING] = chosen
     if chosen > plan[COUNTED_TO]:
-        answer = _skip(plan, shared, tasks, left_out, chosen)
+        answer = _skip(plan, shared, tasks, noted, chosen)
         if answer != GO:
             return answer
     if chosen < end:
         if plan[OWN] < plan[TASKS]:
-            answer = release(plan, shared, tasks, crew, memory, chosen)
+            answer = release(plan, shared, tasks, noted, crew, memory, chosen)
             if answer != GO:
                 return answer
         _begin(plan, shared, chosen, instant)
@@ -96,7 +98,7 @@ def _begin(plan: Any, shared: Any, tick: int, instant: int) -> None:
     shared[control.BEGUN] = max(1, instant)
 
 
-def finish(plan: Any, shared: Any, tasks: Any, instant: int) -> None:
+def finish(plan: Any, shared: Any, tasks: Any, noted: Any, instant: int) -> None:
     """Count the step that has ended, if one was running; its times are those of each task in it."""
     if plan[STEPPING] == 0:
         return
@@ -109,6 +111,8 @@ def finish(plan: Any, shared: Any, tasks: Any, instant: int) -> None:
             tasks[words + times.STEPS] += 1
             count(tasks, words + times.LATENESS, late, late_bin)
             count(tasks, words + times.TET, taken, taken_bin)
+            overruns = tasks[words + times.OVERRUNS]
+            put_times(noted, plan[row + NOTED], plan[row + NOTES_ROOM], plan[TICK], late, taken, overruns)
             plan[row + IN_A_ROW] = 0
             if tasks[words + times.STEPS] <= plan[row + STARTUP]:
                 plan[STARTING] = 1
@@ -116,17 +120,17 @@ def finish(plan: Any, shared: Any, tasks: Any, instant: int) -> None:
     shared[control.BEGUN] = 0
 
 
-def _skip(plan: Any, shared: Any, tasks: Any, left_out: Any, stop: int) -> int:
+def _skip(plan: Any, shared: Any, tasks: Any, noted: Any, stop: int) -> int:
     """Note that the ticks before ``stop`` are left out, and count the overruns; return what follows."""
     start, plan[COUNTED_TO] = plan[COUNTED_TO], stop
-    answer, noted = GO, False
+    answer, done = GO, False
     for task in range(plan[OWN]):
         row = HEAD + ROW * task
         found = due_in(plan[row + EVERY], plan[row + OFFSET], start, stop)
         if found > 0:
-            if not noted:
-                put_pair(left_out, control.LEFT_OUT[0], start, stop - start)
-                noted = True
+            if not done:
+                put_left_out(noted, start, stop - start)
+                done = True
             tasks[times.WORDS * task + times.OVERRUNS] += found
             answer = worse(answer, missed(plan, shared, task, found, start, plan[STARTING]))
             if answer == OVERLOADED:
@@ -135,11 +139,11 @@ def _skip(plan: Any, shared: Any, tasks: Any, left_out: Any, stop: int) -> int:
 
 
 def pace(
-    steering: Any, plan: Any, shared: Any, tasks: Any, left_out: Any, clock: Any, crew: Any, memory: Any
+    steering: Any, plan: Any, shared: Any, tasks: Any, noted: Any, clock: Any, crew: Any, memory: Any
 ) -> None:
     """Wait as the clock of the compiled loop, whose control words are ``steering``."""
     steering[loop.PAUSE] = wait(
-        plan, shared, tasks, left_out, clock, crew, memory, steering[loop.TICK], steering[loop.UNTIL]
+        plan, shared, tasks, noted, clock, crew, memory, steering[loop.TICK], steering[loop.UNTIL]
     )
     if steering[loop.PAUSE] == GO:
         steering[loop.TICK] = plan[WAITING]

@@ -20,7 +20,8 @@ from quadvis.realtime.flight import Flight
 from quadvis.realtime.guardian import Standing
 from quadvis.realtime.last_ticks import LastTicks
 from quadvis.realtime.lines import Lines
-from quadvis.realtime.member import LeftOut, Member
+from quadvis.realtime.member import Member
+from quadvis.realtime.note_taker import NoteTaker
 from quadvis.realtime.options import RealTime
 
 if TYPE_CHECKING:
@@ -38,19 +39,19 @@ def supervise(
     wishes: RealTime,
     engine: str,
     taps: Sequence[Tap],
-    left_out: LeftOut,
+    taker: NoteTaker,
     tend: Callable[[float, float], None],
     announce: Announce | None = None,
 ) -> Flight:
     """Run a diagram in real time to its stop time, each computer in a process of its own.
 
-    ``wishes`` have been checked. ``taps`` take rows here, ``left_out`` the ticks that a computer has left
-    out, before the rows of later ticks. ``tend`` is called again and again while it runs, with the time of
+    ``wishes`` have been checked. ``taps`` take rows here, ``taker`` what the loops note,
+    before the rows of later ticks. ``tend`` is called again and again while it runs, with the time of
     the last tick and the time since the start (s). RunError if a block fails, if the tasks have too many
     overruns, if a step does not end, or if a process is killed. However this ends, all processes have ended
     then, and all rows have been handed on.
     """
-    supervisor = _Supervisor(diagram, wishes, engine, taps, left_out, announce or _nothing)
+    supervisor = _Supervisor(diagram, wishes, engine, taps, taker, announce or _nothing)
     try:
         return supervisor.follow(tend)
     except BaseException as error:
@@ -66,7 +67,7 @@ class _Supervisor:
         wishes: RealTime,
         engine: str,
         taps: Sequence[Tap],
-        left_out: LeftOut,
+        taker: NoteTaker,
         announce: Announce,
     ) -> None:
         context = multiprocessing.get_context("spawn")
@@ -92,7 +93,7 @@ class _Supervisor:
                     asked[computer],
                     engine,
                     own,
-                    left_out,
+                    taker,
                     bindings,
                     self._lines.shared(computer),
                     LastTicks(last_ticks, place),

@@ -22,7 +22,7 @@ from quadvis.realtime.control import SharedMemory
 from quadvis.realtime.crew import Crew, lead
 from quadvis.realtime.pacer import Pacer
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
-from quadvis.realtime.streams import RowStream
+from quadvis.realtime.streams import RowStream, room_for
 from quadvis.realtime.times import TaskTimes
 
 WARN = OverloadLimits(action="warn")
@@ -133,8 +133,9 @@ class Paced:
     ) -> None:
         graph, self._clock = diagram.graph, clock
         rings = [stream.ring for stream in streams]
-        words = np.zeros(SharedMemory.size(len(graph.tasks), rings), np.int64)
-        self.shared = SharedMemory(words, len(graph.tasks), rings)
+        rooms = [room_for(task.period) for task in graph.tasks]
+        words = np.zeros(SharedMemory.size(rooms, rings), np.int64)
+        self.shared = SharedMemory(words, rooms, rings)
         self.schedule = Schedule.of(graph)
         self._tasks = graph.tasks
         names = [task.name for task in graph.tasks]

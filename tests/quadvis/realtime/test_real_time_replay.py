@@ -38,6 +38,9 @@ blocks:
   delayed: {block: signal.gain, rate: slow, in: {u: {from: integral.y, across: delay}}}
 log: {every: {fast: 4}}
 """
+BACK = """\
+  back: {block: signal.gain, rate: fast, in: {u: {from: delayed.y, across: newest}}}
+  sum: {block: signal.sum, rate: fast, in: {a: back.y,"""
 COUNTER = '''
 """A block that reads a clock, which never says the same twice, and sometimes too slowly."""
 
@@ -100,6 +103,57 @@ def test_a_run_with_overruns_is_the_same_to_the_bit() -> None:
         replay(rewritten(log, without("/_replay/left_out", longest)))
 
 
+DRAG = '''
+"""A block that is sometimes too slow for its task."""
+
+import time as clock
+
+from quadvis.block import Block, In, Out, State
+
+
+class Drag(Block, numeric=False):
+    """Adds up its input."""
+
+    u = In(unit="m")
+    y = Out(unit="m")
+    count = State()
+    sum = State()
+
+    def output(self, u):
+        if self.count in (2, 5, 6):
+            clock.sleep(0.09)
+        return self.sum + u
+
+    def update(self, u):
+        self.count += 1.0
+        self.sum += u
+'''
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="real time is Linux's")
+def test_tasks_that_run_by_themselves_are_the_same_to_the_bit_with_what_each_missed() -> None:
+    Path("blocks/own/drag.py").write_text(DRAG)
+    text = TEXT.replace("seed: 7", "seed: 7\ntasking: multi").replace("across: hold", "across: newest")
+    text = text.replace("  delayed: {block: signal.gain,", "  delayed: {block: own.drag,")
+    text = text.replace("  sum: {block: signal.sum, rate: fast, in: {a: noise.y,", BACK)
+    text = text.replace("from: integral.y, across: delay", "from: sum.y, across: newest")
+    Path("flight.yaml").write_text(text)
+    result = quadvis.load("flight.yaml").run(log="run.mcap", real_time=CALM)
+    assert result.flight is not None
+    tasks = {each.task: each for each in result.flight.shares[0].tasks}
+    assert tasks["slow"].overruns >= 2 and tasks["fast"].overruns >= 3 * 4
+    log = read_log("run.mcap")
+    missed = log.hidden.arrays("/_replay/releases")[1]
+    assert missed[:, 2].sum() == sum(each.overruns for each in result.flight.shares[0].tasks[1:])
+    assert len(log["delayed.y"]) == tasks["slow"].steps
+    for name, task in tasks.items():
+        assert len(log[f"_times/{name}.lateness"]) == task.steps
+    found = replay(log, output="new.mcap")
+    assert found.same and found.whole
+    assert replay("new.mcap").same
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="real time is Linux's")
 @pytest.mark.parametrize("via", ["memory", "serial, baud: 230400"])
@@ -154,6 +208,6 @@ def test_the_loop_notes_each_run_of_ticks_that_it_leaves_out() -> None:
     ran: list[int] = []
     paced.engine.observe("continuous", ran.append)
     paced.run(60)
-    found = np.array(paced.shared.left_out.take(last=True))
+    found = np.array(paced.shared.notes.left_out.take(last=True))
     missed = [tick for first, count in found.tolist() for tick in range(first, first + count)]
     assert len(found) == 2 and sorted(missed + ran) == list(range(60))
