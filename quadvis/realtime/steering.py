@@ -134,14 +134,20 @@ class Steering:
         if self._helm is not None:
             self._helm.end()
 
-    def early(self, *, stopped: bool) -> str:
-        """Say how a run that has no error came to end at another time than its diagram says; "" if not."""
+    def early(self, *, stopped: bool) -> tuple[str, float | None]:
+        """Return why a run without an error has another end than its diagram says, and its duration (s).
+
+        That of a run that was stopped is the time of the last tick that a computer has begun. ("", None) if
+        the end is as the diagram says.
+        """
         if stopped:
+            time = float(max(member.tick for member in self._members) * self._period)
             begun = any(member.running for member in self._members)
-            return f"it was stopped at t = {self.time:.9g} s" if begun else "it was stopped before its start"
+            return f"it was stopped at t = {time:.9g} s" if begun else "it was stopped before its start", time
         if self.ticks == self._written:
-            return ""
-        return f"its stop time was set to {time_text((self.ticks - 1) * self._period)}"
+            return "", None
+        end = (self.ticks - 1) * self._period
+        return f"its stop time was set to {time_text(end)}", float(end)
 
     def _wanted_ticks(self, stop_time: Fraction | float | None) -> int:
         if stop_time is None:

@@ -156,7 +156,7 @@ class Tuner:
         return getattr(part[tunable.path].block, tunable.name)
 
 
-def room_for(part: Graph) -> int:
+def box_room(part: Graph) -> int:
     """Return how many words a box needs that has new values of all tunable parameters of a graph."""
     found = 0
     for node in part.nodes:

@@ -180,7 +180,8 @@ def told(engine: str, takes: dict[int, float], late: dict[int, float], limits: O
         bytes(paced.shared.control),
         clock.instant,
         message,
-        (paced.shared.left_out.take(last=True).tolist()),
+        (paced.shared.notes.left_out.take(last=True).tolist()),
+        [ring.take(last=True).tolist() for ring in paced.shared.notes.times],
     )
 
 
