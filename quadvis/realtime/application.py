@@ -185,7 +185,9 @@ class _Application:
         schedule = Schedule.of(part)
         names, overload = [task.name for task in part.tasks], diagram.overload_of(setup.computer)
         limits, clock = [overload.of(name) for name in names], MonotonicClock()
-        pacer = self._pacer = Pacer(schedule, names, limits, shared, clock, lambda: engine.hold_safe())
+        pacer = self._pacer = Pacer(
+            schedule, names, limits, shared, clock, lambda: engine.hold_safe(), setup.computer
+        )
         supply: Supply = setup.link.recv()
         with ExitStack() as stack:
             carriers = open_carriers(part, {**setup.lines, **supply.lines})

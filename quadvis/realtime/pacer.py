@@ -34,9 +34,10 @@ class Pacer:
     the loop wakes too late for, is left out: the run goes on with a later tick of the same grid, and the
     tasks that were due there have an overrun.
 
-    ``names`` and ``limits`` are those of the tasks. ``save`` is called where overruns are to make the outputs
-    safe; ``unsafe`` says then why. The interpreter asks `wait`; the compiled loop calls the machine code at
-    ``address``, which does the same (`quadvis.native.clock.MachineClock`).
+    ``names`` and ``limits`` are those of the tasks, ``computer`` is the name of theirs for messages. ``save``
+    is called where overruns are to make the outputs safe; ``unsafe`` says then why. The interpreter asks
+    `wait`; the compiled loop calls the machine code at ``address``, which does the same
+    (`quadvis.native.clock.MachineClock`).
     """
 
     def __init__(
@@ -47,8 +48,10 @@ class Pacer:
         shared: SharedMemory,
         clock: Timekeeper,
         save: Callable[[], None] | None = None,
+        computer: str = "",
     ) -> None:
         self._names, self._limits, self._save = names, limits, save
+        self._of = f" of '{computer}'" if computer else ""
         self.unsafe = ""
         self._plan = make_plan(schedule, limits, shared.notes.rooms)
         self._control: Any = shared.control
@@ -168,7 +171,7 @@ class Pacer:
         """Return which limit of which task has been exceeded."""
         plan = self._plan
         task, found = plan[plans.EXCEEDED], plan[plans.FOUND]
-        limits, name = self._limits[task], f"task '{self._names[task]}'"
+        limits, name = self._limits[task], f"task '{self._names[task]}'{self._of}"
         overruns = counted(found, "overrun")
         if plan[plans.LIMIT] == plans.IN_ALL:
             return f"{name}: overload limit ({limits.max}) exceeded with {overruns}"

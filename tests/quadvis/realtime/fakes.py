@@ -131,6 +131,7 @@ class Paced:
         limits: OverloadLimits = WARN,
         streams: Sequence[RowStream] = (),
         engine: str = "python",
+        computer: str = "",
     ) -> None:
         graph, self._clock = diagram.graph, clock
         rings = [stream.ring for stream in streams]
@@ -141,7 +142,9 @@ class Paced:
         self._tasks = graph.tasks
         names = [task.name for task in graph.tasks]
         each = [limits.of(name) for name in names]
-        self.pacer = Pacer(self.schedule, names, each, self.shared, clock, lambda: self.engine.hold_safe())
+        self.pacer = Pacer(
+            self.schedule, names, each, self.shared, clock, lambda: self.engine.hold_safe(), computer
+        )
         self.engine = Engine(graph, diagram.seed, self.pacer)
         self.pacer.write_into(self.engine.memory)
         native, choice = engine == NATIVE, choose(self.engine, 10**9, engine)

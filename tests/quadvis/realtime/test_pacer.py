@@ -274,6 +274,13 @@ def test_the_limits_of_xpc_target(limits: OverloadLimits, takes: dict[int, float
     assert bool(overloaded(takes, limits)) == stops
 
 
+def test_where_there_are_computers_an_overload_names_its_own() -> None:
+    paced = Paced(diagram(), FakeClock(), OverloadLimits(startup=0), computer="world")
+    busy(paced, paced.pacer.clock, {10: 1.5})
+    with pytest.raises(RunError, match=r"task 'fast' of 'world': overload limit \(0\) exceeded"):
+        paced.run(20)
+
+
 def test_the_first_steps_of_a_slow_task_may_last() -> None:
     """Ticks 2 and 7 are its first two, when the fast task has long left its own."""
     assert overloaded({2: 3.5, 7: 30.5}, OverloadLimits(startup=2), TWO) == ""
