@@ -13,7 +13,7 @@ from quadvis.realtime.helm import ENDLESS, READY, RUNNING, Helm
 from quadvis.realtime.member import Member
 from quadvis.realtime.ring import Words
 from quadvis.realtime.times import TaskTimes
-from quadvis.realtime.tuner import Tuner
+from quadvis.realtime.tuner import BEFORE, Tuner
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
@@ -85,15 +85,14 @@ class Steering:
 
     def begin(self) -> None:
         """Give the members what they need before their first tick."""
+        if self._helm is not None and self._tuner is not None:
+            self.ticks = self._wanted_ticks(self._helm.stop_time)
+            for member in self._members:
+                member.end_at(self.ticks)
+            self.look()
+            self._tuner.send(BEFORE)
+            self._helm.enter(RUNNING)
         self._begun = True
-        if self._helm is None or self._tuner is None:
-            return
-        self.ticks = self._wanted_ticks(self._helm.stop_time)
-        for member in self._members:
-            member.end_at(self.ticks)
-        self.look()
-        self._tuner.send(-1)
-        self._helm.enter(RUNNING)
 
     def look(self) -> None:
         """Take what the helm wants."""
