@@ -115,14 +115,19 @@ class Steering:
         if self._helm is not None:
             self._helm.end()
 
-    def early(self, *, stopped: bool) -> str:
-        """Say how a run that has no error came to end at another time than its diagram says; "" if not."""
-        if stopped:
+    def early(self) -> tuple[str, float | None]:
+        """Say how a run without an error came to end at another time than its diagram says, and when (s).
+
+        That is "" and None if it did not.
+        """
+        if any(member.stopped for member in self._members):
             begun = any(member.running for member in self._members)
-            return f"it was stopped at t = {self.time:.9g} s" if begun else "it was stopped before its start"
+            words = f"it was stopped at t = {self.time:.9g} s" if begun else "it was stopped before its start"
+            return words, self.time
         if self.ticks == self._written:
-            return ""
-        return f"its stop time was set to {time_text((self.ticks - 1) * self._period)}"
+            return "", None
+        end = (self.ticks - 1) * self._period
+        return f"its stop time was set to {time_text(end)}", float(end)
 
     def _wanted_ticks(self, stop_time: Fraction | float | None) -> int:
         if stop_time is None:
