@@ -152,12 +152,10 @@ class _Supervisor:
         tend(min(member.time for member in self._members), first.now)
         for member in self._members:
             member.warn(last=True)
-        early, duration = self._steering.early(stopped=any(member.stopped for member in self._members))
         return Flight(
             tuple(member.share() for member in self._members),
             sum(member.lost for member in self._members),
-            early,
-            duration,
+            *self._steering.early(),
         )
 
     def end(self) -> list[str]:
