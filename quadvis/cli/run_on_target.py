@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +48,44 @@ def run_on_target(diagram: Diagram, log: Path | None, options: argparse.Namespac
     if found["Problem"]:
         print(found["Problem"], file=sys.stderr)
     return 0 if found.get("Passed") else FAILED
+
+
+def run_on_several(diagram: Diagram, log: Path | None, options: argparse.Namespace) -> int:
+    """Fly a diagram on several targets, each as one of its computers; as `run_on_target` besides.
+
+    The logs go into a folder with the name of the log, without its ending.
+    """
+    from quadvis.host.several import Several, read_places
+    from quadvis.host.target import Target
+
+    with ExitStack() as stack:
+        places = read_places(options.on)
+        targets = {name: stack.enter_context(Target(place)) for name, place in places.items()}
+        several = stack.enter_context(Several(diagram, targets))
+        several.load(options.engine)
+        several.start()
+        try:
+            with ProgressLine(diagram.duration) as progress:
+                several.wait(progress)
+        except KeyboardInterrupt:
+            several.stop()
+            raise
+        folder = (log or Path("runs/several.mcap")).with_suffix("")
+        folder.mkdir(parents=True, exist_ok=True)
+        logs = several.logs(folder)
+        outcome = several.judge(logs)
+        tasks = {name: target.Tasks for name, target in targets.items()}
+    print(f"{diagram.name} on {', '.join(f'{name} ({place})' for name, place in places.items())}")
+    for verdict in outcome.verdicts:
+        print(f"  {verdict}")
+    for line in table([_task_row(task) for each in tasks.values() for task in each]):
+        print(f"  {line}")
+    for name, offset in several.offsets.items():
+        print(f"  clock of {name}: known to {format_quantity(offset.error / 1e9, SECOND, 2)}")
+    met = sum(verdict.met for verdict in outcome.verdicts)
+    print(f"{'PASSED' if outcome.passed else 'FAILED'}: {met} of {len(outcome.verdicts)} expectations met")
+    print(f"logs: {folder}")
+    return 0 if outcome.passed else FAILED
 
 
 def _wait(tg: Target, diagram: Diagram) -> None:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from quadvis.wire.subscription import Subscription
 
 
-class Connection:
+class HostConnection:
     """A connection to one target; any thread may use it.
 
     ``name`` is that of the target, ``level`` what this host's key may do there.
@@ -64,7 +64,7 @@ class Connection:
         self._client.close()
 
 
-def connect(name: str | None, say: Callable[[str], object] = lambda words: None) -> Connection:
+def connect(name: str | None, say: Callable[[str], object] = lambda words: None) -> HostConnection:
     """Return a connection to a target; without a name to that of this machine, started if needed."""
     from quadvis.host.local import LOCAL, started_here
     from quadvis.wire.meeting import meet
@@ -72,4 +72,4 @@ def connect(name: str | None, say: Callable[[str], object] = lambda words: None)
     if name is None:
         started_here()
         name = LOCAL
-    return Connection(meet(name, say=say))
+    return HostConnection(meet(name, say=say))

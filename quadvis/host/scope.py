@@ -14,7 +14,7 @@ from quadvis.errors import QuadvisError
 from quadvis.scopes.package import Package
 
 if TYPE_CHECKING:
-    from quadvis.host.connection import Connection
+    from quadvis.host.connection import HostConnection
 
 FINISHED = "Finished"
 POLL = 0.05  # s between two questions for the status
@@ -38,10 +38,10 @@ class HostScope:
     a scope that acquires needs `stop` first, where xPC needs it.
     """
 
-    _connection: Connection
+    _connection: HostConnection
     _number: int
 
-    def __init__(self, connection: Connection, number: int) -> None:
+    def __init__(self, connection: HostConnection, number: int) -> None:
         self.__dict__["_connection"], self.__dict__["_number"] = connection, number
 
     @property

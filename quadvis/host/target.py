@@ -10,7 +10,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from quadvis.errors import QuadvisError, sentence, suggestion
-from quadvis.host.connection import Connection, connect
+from quadvis.host.connection import HostConnection, connect
 from quadvis.host.scope import HostScope
 from quadvis.machine.columns import table
 from quadvis.units import Unit, format_quantity
@@ -53,9 +53,9 @@ class Target:
     QuadvisError says in a sentence why something is refused, or that the target does not answer.
     """
 
-    _connection: Connection
+    _connection: HostConnection
 
-    def __init__(self, name: str | None = None, *, connection: Connection | None = None) -> None:
+    def __init__(self, name: str | None = None, *, connection: HostConnection | None = None) -> None:
         self.__dict__["_connection"] = connection or connect(name)
 
     def __enter__(self) -> Self:
@@ -328,7 +328,13 @@ def _loaded(what: str | Path | Diagram, variant: str | None, settings: Given, pa
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value.tolist() if hasattr(value, "tolist") else value for name, value in values.items()}
+    """Return values as they can be sent: no numpy, and no maps, for which there are texts."""
+    from quadvis.target.parameters import as_written
+
+    return {
+        name: value.tolist() if hasattr(value, "tolist") else as_written(value)
+        for name, value in values.items()
+    }
 
 
 def _shown(name: str, value: Any) -> str:

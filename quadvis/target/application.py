@@ -12,7 +12,7 @@ from quadvis.diagram.diagram import Diagram
 from quadvis.errors import QuadvisError
 from quadvis.run.result import Result
 from quadvis.run.tuned import new_values
-from quadvis.target.bundle import Bundle
+from quadvis.target.bundle import ApplicationBundle
 from quadvis.target.newest import Newest
 from quadvis.target.parameters import Parameters, as_written
 from quadvis.target.scopes import ApplicationScopes
@@ -33,7 +33,7 @@ class Application:
     were tuned stay. ``problem`` says why the last run came to an early end, ``result`` is its result.
     """
 
-    def __init__(self, bundle: Bundle, diagram: Diagram, store: Store, publish: Publish) -> None:
+    def __init__(self, bundle: ApplicationBundle, diagram: Diagram, store: Store, publish: Publish) -> None:
         self.bundle, self.diagram = bundle, diagram
         self.parameters = Parameters(diagram)
         self.newest = Newest(diagram)
@@ -93,8 +93,8 @@ class Application:
             self._session.helm.tune(self.parameters.tuned)
         return self._session.ready
 
-    def start(self) -> Future[Any]:
-        """Start a run; QuadvisError if one is going on."""
+    def start(self, at: int | None = None) -> Future[Any]:
+        """Start a run, at an instant (ns) if one is given; QuadvisError if one is going on."""
         if self.running:
             raise QuadvisError(f"{self.name} runs already")
         ready = self._session.ready if self.state in (LOADING, READY) else self.prepare()  # type: ignore[union-attr]
@@ -107,7 +107,7 @@ class Application:
             if problem is not None:
                 begun.set_exception(problem)
             else:
-                session.helm.begin()
+                session.helm.begin(at)
                 self._event("started")
                 begun.set_result(session.log.stem)
 
@@ -121,6 +121,11 @@ class Application:
             raise QuadvisError(f"{self.name} does not run")
         session.helm.stop()
         return session.over
+
+    def align(self, shift: int) -> None:
+        """Move the ticks of the run by so much since its start (ns), slowly."""
+        if self._session is not None:
+            self._session.helm.align(shift)
 
     def make_safe(self) -> None:
         """Give all outputs their safe values at once, and stop the run."""

@@ -23,7 +23,7 @@ MOST_FILES = 10_000
 
 
 @dataclass(frozen=True)
-class Bundle:
+class ApplicationBundle:
     """A resolved diagram with what it needs.
 
     ``place`` is where its file lies in the bundle's folder, ``files`` the SHA-256 of the other files there by
@@ -58,7 +58,7 @@ class Bundle:
         return json.dumps(self.plain(), sort_keys=True).encode()
 
     @staticmethod
-    def parse(data: bytes) -> Bundle:
+    def parse(data: bytes) -> ApplicationBundle:
         """Read a bundle's file of unknown origin; QuadvisError if anything is not as it must be."""
         try:
             plain = json.loads(data)
@@ -66,16 +66,16 @@ class Bundle:
             plain = None
         if not isinstance(plain, dict):
             raise QuadvisError("this file is no bundle")
-        return Bundle.read(plain)
+        return ApplicationBundle.read(plain)
 
     @staticmethod
-    def read(plain: Mapping[str, Any]) -> Bundle:
+    def read(plain: Mapping[str, Any]) -> ApplicationBundle:
         """Read it from plain data of unknown origin; QuadvisError if anything is not as it must be."""
         if plain.get("format") != FORMAT:
             raise QuadvisError(
                 f"this is no bundle of format {FORMAT}: use the same quadvis on host and target"
             )
-        given = {name: plain.get(name) for name in Bundle.__dataclass_fields__}
+        given = {name: plain.get(name) for name in ApplicationBundle.__dataclass_fields__}
         texts = ("name", "variant", "text", "place", "hash", "version", "engine", "computer")
         for name in texts:
             if not isinstance(given[name], str):
@@ -86,7 +86,7 @@ class Bundle:
         for name in ("ports", "knobs"):
             if not isinstance(given[name], dict):
                 raise QuadvisError(f"the bundle's {name!r} must be a map")
-        made = Bundle(**given)  # type: ignore[arg-type]
+        made = ApplicationBundle(**given)  # type: ignore[arg-type]
         if not NAME.fullmatch(made.name):
             raise QuadvisError(
                 f"{quoted(made.name)} is no name of an application: use letters, digits, _ . -"

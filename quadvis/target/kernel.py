@@ -12,7 +12,7 @@ from quadvis.diagram.sections.on_host_loss import CONTINUE, SAFE
 from quadvis.errors import QuadvisError
 from quadvis.target.admission import admit
 from quadvis.target.application import Application
-from quadvis.target.bundle import DIGEST, Bundle
+from quadvis.target.bundle import DIGEST, ApplicationBundle
 from quadvis.target.parameters import compared, read_set
 from quadvis.target.status import status
 from quadvis.target.store import Store
@@ -102,11 +102,11 @@ class Kernel:
         if self._application is not None and self._application.running:
             raise QuadvisError(f"{self._application.name} runs: stop it first")
 
-    def _bundle(self, application: str) -> Bundle:
+    def _bundle(self, application: str) -> ApplicationBundle:
         """Return an application by its name, or keep the one whose bundle has a SHA-256."""
         if not DIGEST.fullmatch(application):
             return self.store.bundle(application)
-        bundle = Bundle.parse(self.store.contents(application))
+        bundle = ApplicationBundle.parse(self.store.contents(application))
         if self._application is not None and self._application.name == bundle.name:
             self._unload()
         self.store.add(bundle)
@@ -122,9 +122,17 @@ class Kernel:
             self._application = None
             self._event("unloaded")
 
-    def start(self) -> Future[Any]:
-        """Start the application."""
-        return self._loaded.start()
+    def start(self, at: int | None) -> Future[Any]:
+        """Start the application, at an instant of this machine's monotonic clock (ns) if one is given."""
+        return self._loaded.start(at)
+
+    def clock(self) -> int:
+        """Return this machine's monotonic clock (ns)."""
+        return time.monotonic_ns()
+
+    def align(self, shift: int) -> None:
+        """Move the ticks of the run by so much since its start (ns), slowly."""
+        self._loaded.align(shift)
 
     def stop(self) -> Future[Any]:
         """Stop the application: safe values, log closed. It stays loaded."""

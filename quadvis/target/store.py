@@ -17,7 +17,7 @@ from io import BufferedRandom
 from pathlib import Path
 
 from quadvis.errors import QuadvisError, quoted, sentence, suggestion
-from quadvis.target.bundle import DIGEST, NAME, Bundle, inner_path
+from quadvis.target.bundle import DIGEST, NAME, ApplicationBundle, inner_path
 
 MOST_BYTES = 256_000_000  # of a file
 MOST_BUNDLE = 4_000_000
@@ -106,7 +106,7 @@ class Store:
         """The names of all applications."""
         return sorted(path.parent.name for path in (self.folder / "applications").glob("*/bundle.json"))
 
-    def add(self, bundle: Bundle) -> None:
+    def add(self, bundle: ApplicationBundle) -> None:
         """Keep an application, in the place of one of the same name; its files must be here."""
         if absent := self.missing(bundle.files.values()):
             name = next(name for name, digest in bundle.files.items() if digest in absent)
@@ -124,16 +124,16 @@ class Store:
         shutil.rmtree(home, ignore_errors=True)
         fresh.replace(home)
 
-    def bundle(self, name: str) -> Bundle:
+    def bundle(self, name: str) -> ApplicationBundle:
         """Return an application that is kept here; QuadvisError if there is none of this name."""
         path = self._home(name) / "bundle.json"
         try:
-            return Bundle.parse(path.read_bytes())
+            return ApplicationBundle.parse(path.read_bytes())
         except FileNotFoundError:
             problem = f"there is no application {quoted(name)} on the target"
             raise QuadvisError(sentence(problem, suggestion(name, self.applications))) from None
 
-    def place(self, bundle: Bundle) -> Path:
+    def place(self, bundle: ApplicationBundle) -> Path:
         """Return where the diagram of an application stands."""
         return self._home(bundle.name) / "tree" / bundle.place
 

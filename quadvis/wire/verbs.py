@@ -52,13 +52,15 @@ _TOPIC = argument.text(40, "[a-z]+(/[0-9]{1,4})?", "a topic such as 'state' or '
 _ID = argument.whole(1, 9999)
 _COUNT = argument.whole(0, 2**53)
 _TIME = argument.number(0, math.inf, "a time of at least 0 s, which may be infinite")
+_INSTANT = argument.whole(0, 2**62)
+_SHIFT = argument.whole(-(10**10), 10**10)
 _PERIOD = argument.number(1e-6, 1e6, "a time from 1e-6 to 1e6 s")
 
 _TOKEN = Argument("token", argument.text(32, "[0-9a-f]{32}", "the token of the lease"), "what 'lease' gave")
 _FIRST = Argument("first", _COUNT, "the first of them, from 0", 0)
 _SET = Argument("name", _SET_NAME, "the name of the set")
 _VALUES = Argument("values", argument.map_of(argument.SETTING, 1000), "new values by name")
-_NAMES = Argument("names", argument.list_of(_NAME, 1000), "their names")
+_NAMES = Argument("names", argument.list_of(_NAME, 1000, 0), "their names; all if there are none")
 _IDS = Argument("ids", argument.list_of(_ID, 100), "numbers of scopes")
 _ID_OF_SCOPE = Argument("id", _ID, "the number of the scope")
 _TOPICS = Argument("topics", argument.list_of(_TOPIC, SUBSCRIPTIONS), "the topics")
@@ -85,7 +87,12 @@ _DECLARED = (
     Verb("load", 0, "load an application, stopped", "a map of facts about it",
          (Argument("application", _NAME, "its name, or the SHA-256 of its bundle"),), LEASED, CHANGES),
     Verb("unload", 0, "remove the application", "nil", (), LEASED, CHANGES),
-    Verb("start", 1, "start the application", "nil", (), LEASED, CHANGES),
+    Verb("start", 1, "start the application", "the name of the log",
+         (Argument("at", argument.or_none(_INSTANT), "when, on the target's monotonic clock (ns)", None),),
+         LEASED, CHANGES),
+    Verb("clock", 3, "read the target's monotonic clock", "nanoseconds"),
+    Verb("align", 0, "move the ticks of the run, slowly, to where they are due by the host's clock", "nil",
+         (Argument("shift", _SHIFT, "by how much in all since the start (ns)"),), LEASED),
     Verb("stop", 1, "stop the application, which stays loaded", "nil", (), LEASED, CHANGES),
     Verb("signals", 3, "the signals of the application", "a list of maps", (_FIRST, _some(4000))),
     Verb("getsignal", 3, "present values of signals", "a map of name to value", (_NAMES,)),

@@ -11,7 +11,7 @@ import quadvis
 from quadvis.errors import QuadvisError
 from quadvis.host.packing import pack
 from quadvis.target.admission import admit
-from quadvis.target.bundle import FORMAT, Bundle, inner_path
+from quadvis.target.bundle import FORMAT, ApplicationBundle, inner_path
 from quadvis.target.store import MOST_BYTES, PARTLY, Store
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -29,7 +29,7 @@ def digest_of(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def sent(store: Store, path: Path, **more: str) -> Bundle:
+def sent(store: Store, path: Path, **more: str) -> ApplicationBundle:
     """Send a diagram into a store, as a host does."""
     bundle, paths = pack(quadvis.load(path, **more))
     for digest in store.missing(bundle.files.values()):
@@ -122,7 +122,7 @@ def test_a_bundle_with_such_a_path_is_refused(path: str) -> None:
     bundle, _ = pack(quadvis.load(HOVER))
     plain = bundle.plain() | {"files": {path: "0" * 64}}
     with pytest.raises(QuadvisError, match="leaves the folder"):
-        Bundle.read(plain)
+        ApplicationBundle.read(plain)
 
 
 @pytest.mark.parametrize(
@@ -139,25 +139,25 @@ def test_a_bundle_with_such_a_path_is_refused(path: str) -> None:
 def test_a_wrong_bundle_is_refused(change: dict[str, object], words: str) -> None:
     plain = pack(quadvis.load(HOVER))[0].plain() | change
     with pytest.raises(QuadvisError, match=words):
-        Bundle.read(plain)
+        ApplicationBundle.read(plain)
     with pytest.raises(QuadvisError, match=words):
-        Bundle.parse(json.dumps(plain).encode())
+        ApplicationBundle.parse(json.dumps(plain).encode())
 
 
 @given(st.binary(max_size=200))
 def test_anything_else_is_no_bundle(data: bytes) -> None:
     with pytest.raises(QuadvisError):
-        Bundle.parse(data)
+        ApplicationBundle.parse(data)
 
 
 def test_a_bundle_is_the_same_as_data() -> None:
     bundle, _ = pack(quadvis.load(HOVER))
-    assert Bundle.parse(bundle.data) == bundle
+    assert ApplicationBundle.parse(bundle.data) == bundle
 
 
 def test_a_block_with_another_source_is_refused(store: Store) -> None:
     bundle = sent(store, HOVER)
-    other = Bundle.read(bundle.plain() | {"sources": {**bundle.sources, "vision.pose_n_points": "0" * 64}})
+    other = ApplicationBundle.read(bundle.plain() | {"sources": {**bundle.sources, "vision.pose_n_points": "0" * 64}})
     with pytest.raises(QuadvisError, match=r"'vision.pose_n_points' is not the same on host and target"):
         admit(other, store.place(other))
 
@@ -167,14 +167,14 @@ def test_a_diagram_that_names_a_file_outside_is_refused(store: Store, tmp_path: 
     secret.write_bytes((ROOT / "diagrams/calib/camera.yaml").read_bytes())
     bundle = sent(store, HOVER)
     text = bundle.text.replace("calibration: calib/camera.yaml", f"calibration: {secret}")
-    other = Bundle.read(bundle.plain() | {"text": text})
+    other = ApplicationBundle.read(bundle.plain() | {"text": text})
     with pytest.raises(QuadvisError, match="outside the application's folder"):
         admit(other, store.place(other))
 
 
 def test_another_text_than_the_hash_says_is_refused(store: Store) -> None:
     bundle = sent(store, HOVER)
-    other = Bundle.read(bundle.plain() | {"text": bundle.text.replace("seed: 2", "seed: 3")})
+    other = ApplicationBundle.read(bundle.plain() | {"text": bundle.text.replace("seed: 2", "seed: 3")})
     with pytest.raises(QuadvisError, match="reads otherwise"):
         admit(other, store.place(other))
 
