@@ -67,13 +67,14 @@ class Client:
         self.close()
 
     def connect(self, timeout: float = PATIENCE) -> dict[str, Any]:
-        """Wait for the connection and return what the target says of itself.
+        """Wait for the connection (s) and return what the target says of itself.
 
         NoAnswerError, WrongTargetError, NotAllowedError or BusyError say why there is none.
         """
-        if self._courier.wait(timeout) != CONNECTED:
-            raise self._trouble()
-        hello: dict[str, Any] = self.request("hello", timeout)
+        end = time.monotonic() + timeout
+        if self._courier.wait(timeout * 0.75) != CONNECTED:
+            raise self._trouble(max(0.1, end - time.monotonic()))
+        hello: dict[str, Any] = self.request("hello", max(0.1, end - time.monotonic()))
         return hello
 
     def request(self, cmd: str, deadline: float = PATIENCE, **args: Any) -> Any:
@@ -171,8 +172,8 @@ class Client:
         for subscription in self._subscriptions:
             subscription.end(GoneError(f"the connection to {self.name} is closed"))
 
-    def _trouble(self) -> WireError:
-        """Return why there is no connection."""
+    def _trouble(self, patience: float = 1.0) -> WireError:
+        """Return why there is no connection; a target that may have another key is asked for it."""
         state = self._courier.state()
         if state == DENIED:
             mine = "" if self._pair is None else self._pair.public.hex()
@@ -185,7 +186,7 @@ class Client:
             return BusyError(f"{self.name} has no room for another connection; close one")
         if not self.address.path and self._public:
             try:
-                _, public = introduced(self.address, 1.0)
+                _, public = introduced(self.address, patience)
                 check_same(KnownTarget(self.name, str(self.address), self._public), public)
             except (NoAnswerError, WrongTargetError) as error:
                 return type(error)(

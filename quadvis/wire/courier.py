@@ -135,6 +135,8 @@ class Courier:
     def state(self, socket: str = CONTROL) -> str:
         """Return the state of a connection."""
         end = self._ends.get(socket)
+        if self._closing:
+            return LOST
         return CONNECTING if end is None else end.state
 
     @property
