@@ -97,6 +97,9 @@ class Client:
 
     def send(self, cmd: str, deadline: float = PATIENCE, **args: Any) -> Future[Reply]:
         """Send a request and return at once; a wrong verb or argument raises WireError before."""
+        return self._send(cmd, deadline, args)
+
+    def _send(self, cmd: str, deadline: float, args: dict[str, Any], *, first: bool = False) -> Future[Reply]:
         verb = find_verb(cmd, STREAM if cmd in ("subscribe", "unsubscribe") else CONTROL)
         checked(verb, args)
         if self._closed:
@@ -107,7 +110,7 @@ class Client:
             self._waiting[number] = future
         future.add_done_callback(lambda _: self._waiting.pop(number, None))
         data = pack_request(Request(number, cmd, args, deadline))
-        self._courier.post(data, lambda: not future.done(), verb.socket)
+        self._courier.post(data, lambda: not future.done(), verb.socket, first=first)
         return future
 
     def operate(self, on_lost: Callable[[WireError], object] = lambda error: None) -> None:
@@ -231,6 +234,9 @@ class Client:
             self._fail(
                 NoAnswerError(f"the connection to {self.name} is lost; what was asked for may have been done")
             )
+        if socket == CONTROL and state == CONNECTED and self._token:
+            self._next_renewal = 0.0  # the lease comes along to the new connection before any request
+            self._beat()
         if socket == STREAM and state == CONNECTED:
             with self._lock:
                 topics = sorted({topic for each in self._subscriptions for topic in each.topics})
@@ -263,7 +269,7 @@ class Client:
             else:
                 self._next_renewal = now + RENEWAL
                 token = self._token
-                self.send("renew", LEASE, token=token).add_done_callback(
+                self._send("renew", LEASE, {"token": token}, first=True).add_done_callback(
                     lambda d: self._renewed(now, token, d)
                 )
                 return RENEWAL / 4

@@ -1,8 +1,8 @@
 """One ROUTER socket of a target: it opens, bounds who is connected, and gives each message with its sender.
 
-ZeroMQ itself accepts any number of TCP connections that never show a key, each of which is a descriptor of this
-process. Its monitor tells of each; beyond a number we shut the oldest of those that are still too young to be
-cut off by ZeroMQ. A host whose key was let in comes from an address that is spared if there is another one.
+ZeroMQ itself accepts any number of TCP connections that never show a key, each of which is a descriptor of
+this process. Its monitor tells of each; beyond a number we shut the oldest of those that are too young to
+be cut off by ZeroMQ. The address from which a key was let in of late is spared if there is another one.
 """
 
 from __future__ import annotations
@@ -74,6 +74,7 @@ class Entrance:
         self.monitor = made.get_monitor_socket(_EVENTS)
         self.outbox = Outbox(made)
         self.place: int | str = 0
+        self.shut = 0  # connections that were too many
         self._open: dict[int, _Connection] = {}  # by descriptor, as the monitor tells
         self._let_in: deque[tuple[float, str, str]] = deque()  # when which key, from where, of late
 
@@ -89,7 +90,7 @@ class Entrance:
             self.socket.ipv6 = True
         with suppress(OSError, AttributeError):  # Linux: who is silent is not even accepted
             listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_DEFER_ACCEPT, math.ceil(HANDSHAKE))
-        listener.listen(CONNECTIONS)
+        listener.listen(2 * HALF_OPEN)  # a short queue would keep good hosts waiting in an attack
         self.socket.setsockopt(zmq.USE_FD, listener.detach())  # the address below is not used
         self.socket.bind(f"tcp://127.0.0.1:{self.place}")
 
@@ -120,6 +121,7 @@ class Entrance:
         ]
         for _, _, descriptor in sorted(found)[:excess]:
             self._open[descriptor].shut = True
+            self.shut += 1
             with suppress(OSError), self._connection(descriptor) as connection:
                 connection.shutdown(socket.SHUT_RDWR)
 

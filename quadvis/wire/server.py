@@ -108,6 +108,7 @@ class Server:
                 "a target needs a key to listen at a port; make one with 'quadvis keys new NAME'"
             )
         control, introductions, stream = listeners(host, port)
+        first = int(control.getsockname()[1])
         pair = None if insecure else self._pair
         for entrance, listener in zip(self._two_entrances(pair), (control, stream), strict=True):
             entrance.open_port(listener)
@@ -116,7 +117,7 @@ class Server:
         else:
             introductions.listen(limits.CONNECTIONS)
             self._introductions.append(introductions)
-        return int(control.getsockname()[1])
+        return first
 
     def _two_entrances(self, pair: KeyPair | None) -> list[Entrance]:
         number = len(self._entrances)
@@ -154,6 +155,7 @@ class Server:
         return {
             "counts": self.counts.all(),
             "connections": [entrance.count() for entrance in self._entrances],
+            "shut": sum(entrance.shut for entrance in self._entrances),
             "subscribers": list(self._feed.subscribers()),
             "audit_lost": 0 if self._audit is None else self._audit.lost,
         }

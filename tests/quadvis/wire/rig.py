@@ -185,7 +185,7 @@ class Proxy:
         self._open.clear()
 
     def close(self) -> None:
-        self._listener.close()
+        with_shutdown(self._listener)  # else the thread that waits there takes one more
         self.cut()
 
 
