@@ -132,7 +132,9 @@ def test_connections_that_show_no_key_are_bounded_and_cost_nobody_a_connection(r
         for _ in range(3 * HALF_OPEN):
             connection = open_connections.enter_context(socket.create_connection(("127.0.0.1", rig.port)))
             connection.sendall(GREETING[:12])
-        until(lambda: anna.request("status", 20)["wire"]["shut"] >= 3 * HALF_OPEN + 1 - HALF_OPEN - CONNECTIONS)
+        until(
+            lambda: anna.request("status", 20)["wire"]["shut"] >= 3 * HALF_OPEN + 1 - HALF_OPEN - CONNECTIONS
+        )
         assert rig.server.counts["let in"] == 2, "anna had to connect again"
     assert rig.client("bob").request("hello")["key"] == "bob"
     rig.server.publish("state", {})
