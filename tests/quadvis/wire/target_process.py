@@ -1,13 +1,16 @@
 """A target in a process of its own, for tests: `python -m tests.quadvis.wire.target_process FOLDER KEY...`.
 
-It lets in the keys with the levels 0, 1, ...; `startscope` publishes 200 packages of 64 KiB. It ends with its
-standard input.
+It lets in the keys with the levels 0, 1, ...; `startscope` publishes 1000 packages of 4 KiB, one each ms.
+It ends with its standard input.
 """
 
 from __future__ import annotations
 
 import sys
+import threading
+import time
 from collections.abc import Mapping
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +22,8 @@ from quadvis.wire.server import Server
 from quadvis.wire.who import Who
 from tests.quadvis.wire.rig import Echo
 
-SAMPLES = np.zeros((1024, 8))
+PACKAGES = 1000
+SAMPLES = np.zeros((64, 8))
 
 
 class Scopes(Echo):
@@ -29,13 +33,17 @@ class Scopes(Echo):
 
     def __call__(self, verb: str, args: Mapping[str, Any], who: Who) -> Any:
         self.calls.clear()
-        if verb == "startscope":
-            for _ in range(100):
-                self.server.publish("scope/1", {}, SAMPLES)
-            self.server._feed.deliver(self.server._present)
-            for _ in range(100):
-                self.server.publish("scope/1", {}, SAMPLES)
-        return super().__call__(verb, args, who)
+        if verb != "startscope":
+            return super().__call__(verb, args, who)
+        done: Future[None] = Future()
+        threading.Thread(target=self.publish, args=(done,), daemon=True).start()
+        return done
+
+    def publish(self, done: Future[None]) -> None:
+        for _ in range(PACKAGES):
+            self.server.publish("scope/1", {}, SAMPLES)
+            time.sleep(0.001)
+        done.set_result(None)
 
 
 def main(folder: Path, *keys: str) -> None:

@@ -25,6 +25,7 @@ from quadvis.wire.meeting import meet
 from quadvis.wire.messages import read_reply
 from quadvis.wire.refusals import WireError
 from tests.quadvis.wire.rig import Rig, proxied, request, until
+from tests.quadvis.wire.target_process import PACKAGES
 from tests.stages import mostly_slow
 
 ENOUGH = 5.0  # MB by which attacks may let a target grow
@@ -205,8 +206,9 @@ class TargetProcess:
         return int(text.split()[1]) * os.sysconf("SC_PAGESIZE") / 1e6
 
     def close(self) -> None:
-        assert self.process.stdin is not None
+        assert self.process.stdin is not None and self.process.stdout is not None
         self.process.stdin.close()
+        self.process.stdout.close()
         assert self.process.wait(60) == 0
 
 
@@ -296,20 +298,15 @@ def test_a_host_that_does_not_read_costs_little_and_nobody_else_a_sample(target:
         slow.send(request("subscribe", topics=["scope/1"]))
         until(lambda: good.request("status", 20)["wire"]["subscribers"], 60)
         scope = good.subscribe("scope/1", size=100_000)
-        good.request("startscope", 60, ids=[1])  # 200 packages of 64 KiB, see target_process
-        for _ in range(200):
-            scope.take(60)
+        good.request("startscope", 60, ids=[1])
         before = target.memory()
-        for _ in range(5):
+        for _ in range(4):
             good.request("startscope", 60, ids=[1])
-            for _ in range(200):
-                scope.take(60)
+        for _ in range(5 * PACKAGES):
+            scope.take(60)
         assert target.memory() - before < ENOUGH
         assert scope.missed == 0
-        (stuck,) = (
-            each for each in good.request("status", 20)["wire"]["subscribers"] if each["host"] == "host3"
-        )
-        assert stuck["dropped"] > 500
+        assert good.request("status", 20)["wire"]["dropped"] > 50  # until it was taken for dead
     good.close()
 
 
