@@ -24,6 +24,7 @@ from quadvis.wire.refusals import BadError, BusyError, GoneError, RefusedError, 
 from quadvis.wire.verbs import CONTROL, Verb, check_level, checked, find_verb
 from quadvis.wire.who import Who
 
+_MOST_WARNED = 1000
 Send = Callable[[bytes], object]
 Handle = Callable[[str, Mapping[str, Any], Who], Any]
 
@@ -224,6 +225,8 @@ class Desk:
         self.counts.add("dropped")
         if who.payer in self._warned:
             return
+        if len(self._warned) > _MOST_WARNED:
+            self._warned.clear()
         self._warned.add(who.payer)
         try:
             number = read_request(data).id
