@@ -136,7 +136,8 @@ class Steering:
     def early(self) -> tuple[str, float | None]:
         """Say how a run without an error came to end at another time than its diagram says, and when (s).
 
-        That is "" and None if it did not. A run that was stopped ended at the last tick that a computer began.
+        That is "" and None if it did not. A run that was stopped ended at the last tick that a computer has
+        begun.
         """
         if any(member.stopped for member in self._members):
             begun = any(member.running for member in self._members)
