@@ -16,7 +16,7 @@ engine, real_time_factor, log, lost (what the log lacks, and why);
 real_time (null for a simulation): {lost_rows, computers: [{computer (null if the diagram names none), engine,
 granted, not_granted, unsafe (why its outputs were made safe, or null),
 tasks: {name: {period_s, steps, overruns,
-lateness and execution: {min_s, mean_s, max_s, p99_s, p99.9_s}}}}]};
+lateness and execution: {min_s, mean_s, max_s, p99_s, p99.9_s, histogram: [{from_s, to_s, count}]}}}}]};
 summary: {label: {signal, unit, and the statistics by name, final of a vector as a list}};
 expect: [{expectation, signal, kind, unit, limit, found, met, lack (why the run cannot be judged)}];
 margins: the number of expectations that only 'quadvis analyse' judges;
@@ -152,6 +152,11 @@ def parser() -> Parser:
     )
     plot = add("plot", commands.plot, "draw the figures that a log's diagram declares, as PNG")
     plot.add_argument("log", metavar="LOG")
+    plot.add_argument(
+        "--times",
+        action="store_true",
+        help="draw the lateness and execution times of a real-time run's tasks",
+    )
     plot.add_argument("--output", "-o", metavar="FOLDER", help="default: beside the log")
     schema = add("schema", commands.schema, "print the JSON schema of diagrams, for editors")
     schema.add_argument("--output", "-o", metavar="PATH", help="default: standard output")

@@ -74,7 +74,9 @@ class Helm:
     many ticks as its engine counts exactly, at most 1e9 s. ``watch`` hears of the run.
     """
 
-    def __init__(self, stop_time: str | float | Fraction | None = None, watch: RunWatch | None = None) -> None:
+    def __init__(
+        self, stop_time: str | float | Fraction | None = None, watch: RunWatch | None = None
+    ) -> None:
         self._watch = watch
         self._lock = threading.Lock()
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)

@@ -14,7 +14,7 @@ from quadvis.realtime.helm import ENDLESS, READY, RUNNING, Helm
 from quadvis.realtime.member import Member
 from quadvis.realtime.ring import Words
 from quadvis.realtime.times import TaskTimes
-from quadvis.realtime.tuner import Tuner
+from quadvis.realtime.tuner import BEFORE, Tuner
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
@@ -88,15 +88,14 @@ class Steering:
 
     def begin(self) -> None:
         """Give the members what they need before their first tick."""
+        if self._helm is not None and self._tuner is not None:
+            self.ticks = self._wanted_ticks(self._helm.stop_time)
+            for member in self._members:
+                member.end_at(self.ticks)
+            self.look()
+            self._tuner.send(BEFORE)
+            self._helm.enter(RUNNING)
         self._begun = True
-        if self._helm is None or self._tuner is None:
-            return
-        self.ticks = self._wanted_ticks(self._helm.stop_time)
-        for member in self._members:
-            member.end_at(self.ticks)
-        self.look()
-        self._tuner.send(-1)
-        self._helm.enter(RUNNING)
 
     def look(self) -> None:
         """Take what the helm wants."""
@@ -134,14 +133,20 @@ class Steering:
         if self._helm is not None:
             self._helm.end()
 
-    def early(self, *, stopped: bool) -> str:
-        """Say how a run that has no error came to end at another time than its diagram says; "" if not."""
-        if stopped:
+    def early(self) -> tuple[str, float | None]:
+        """Say how a run without an error came to end at another time than its diagram says, and when (s).
+
+        That is "" and None if it did not. A run that was stopped ended at the last tick that a computer has
+        begun.
+        """
+        if any(member.stopped for member in self._members):
             begun = any(member.running for member in self._members)
-            return f"it was stopped at t = {self.time:.9g} s" if begun else "it was stopped before its start"
+            time = float(max(member.tick for member in self._members) * self._period)
+            return f"it was stopped at t = {time:.9g} s" if begun else "it was stopped before its start", time
         if self.ticks == self._written:
-            return ""
-        return f"its stop time was set to {time_text((self.ticks - 1) * self._period)}"
+            return "", None
+        end = (self.ticks - 1) * self._period
+        return f"its stop time was set to {time_text(end)}", float(end)
 
     def _wanted_ticks(self, stop_time: Fraction | float | None) -> int:
         if stop_time is None:

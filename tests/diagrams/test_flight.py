@@ -50,6 +50,16 @@ def test_check_says_what_desk_and_bench_share(capsys: pytest.CaptureFixture[str]
     )
 
 
+def test_a_bad_line_of_circles_fails_the_flight(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.yaml"
+    line = "links: {circle_line: {from: vision_pc, to: target, via: serial, baud: 115200, flips: 0.001}}"
+    bad.write_text(f"quadvis: 1\nname: bad\nbase: {FLIGHT}\n{line}\n")
+    for path, met in ((FLIGHT, True), (bad, False)):
+        verdicts = quadvis.load(path, stop_time="4 s").run().outcome.verdicts
+        counters = [each for each in verdicts if "circle_line" in str(each)]
+        assert len(counters) == 2 and all(each.met for each in counters) == met
+
+
 @pytest.mark.slow
 def test_the_bench_flies_as_the_desk_does_and_is_replayed_to_the_bit(tmp_path: Path) -> None:
     """On a machine that others use ticks are lost, so the flight is judged coarsely."""

@@ -180,7 +180,8 @@ def told(engine: str, takes: dict[int, float], late: dict[int, float], limits: O
         bytes(paced.shared.control),
         clock.instant,
         message,
-        (paced.shared.left_out.take(last=True).tolist()),
+        (paced.shared.notes.left_out.take(last=True).tolist()),
+        [ring.take(last=True).tolist() for ring in paced.shared.notes.times],
     )
 
 
@@ -271,6 +272,13 @@ def test_a_loop_that_wakes_late_says_so() -> None:
 )
 def test_the_limits_of_xpc_target(limits: OverloadLimits, takes: dict[int, float], stops: bool) -> None:
     assert bool(overloaded(takes, limits)) == stops
+
+
+def test_where_there_are_computers_an_overload_names_its_own() -> None:
+    paced = Paced(diagram(), FakeClock(), OverloadLimits(startup=0), computer="world")
+    busy(paced, paced.pacer.clock, {10: 1.5})
+    with pytest.raises(RunError, match=r"task 'fast' of 'world': overload limit \(0\) exceeded"):
+        paced.run(20)
 
 
 def test_the_first_steps_of_a_slow_task_may_last() -> None:
