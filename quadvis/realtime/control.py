@@ -25,7 +25,8 @@ SAFE = 6  # by the loop: not 0 once the outputs are to hold their safe values to
 RESTING = 7  # by the loop: when it began to wait for tasks that run by themselves, as BEGUN; 0 else
 LIFELINE = slice(8, 8 + lifeline.SIZE)  # of the loop's thread
 TICKS = LIFELINE.stop  # by the supervisor, before the start: at how many ticks the run ends
-WORDS = TICKS + 1
+SHIFT = TICKS + 1  # by the supervisor: how much (ns) later than after its start each tick is due
+WORDS = SHIFT + 1
 
 
 class SharedMemory:

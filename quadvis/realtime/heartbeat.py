@@ -82,7 +82,8 @@ class Heartbeat:
     def look(self) -> Sign:
         """Return what the loop does."""
         words, now = self._control, self._now()
-        start, begun, done = words[control.START], words[control.BEGUN], words[control.DONE]
+        start = words[control.START] + words[control.SHIFT]
+        begun, done = words[control.BEGUN], words[control.DONE]
         if words[control.END] or words[control.SAFE] or words[control.LEFT] or self._has_died:
             return Sign.ENDS
         if not start:

@@ -83,6 +83,8 @@ class Helm:
         self._wanted: list[Wanted] = []
         self._begun = self._stopped = self._safe = False
         self._state = STARTING
+        self._instant: int | None = None
+        self.shift = 0
         self._progress: Progress = Stand()
         self._stop_time: Fraction | float | None = None
         self.stop_time = stop_time
@@ -122,11 +124,18 @@ class Helm:
                 raise QuadvisError("the run has begun, so its stop time stands; stop it instead")
             self._stop_time = found
 
-    def begin(self) -> None:
-        """Let the run begin as soon as it is ready."""
+    def begin(self, instant: int | None = None) -> None:
+        """Let the run begin as soon as it is ready, or at an instant (ns) of the monotonic clock."""
         with self._lock:
-            self._begun = True
+            self._begun, self._instant = True, instant
             self._call()
+
+    def align(self, shift: int) -> None:
+        """Let each tick be due so much (ns) later than it was by the start.
+
+        The loops come there slowly, by half a millisecond a second, so that no tick is lost.
+        """
+        self.shift = shift
 
     def stop(self, *, safe_first: bool = False) -> None:
         """Let the run end before its next step: an orderly end, with safe values, and no error.
@@ -170,6 +179,11 @@ class Helm:
     def is_begun(self) -> bool:
         """True once the run may begin."""
         return self._begun
+
+    @property
+    def instant(self) -> int | None:
+        """When the run is to begin (ns); None for as soon as it is ready."""
+        return self._instant
 
     @property
     def is_stopped(self) -> bool:

@@ -101,6 +101,10 @@ class Member:
         with suppress(OSError):  # it may have ended
             self._link.send(Supply(lines, ports))
 
+    def shift(self, shift: int) -> None:
+        """Let each tick be due so much (ns) later than by the start."""
+        self._control[control.SHIFT] = shift
+
     def end_at(self, ticks: int) -> None:
         """Let the application end after so many ticks, before it begins."""
         self._control[control.TICKS] = ticks
@@ -149,7 +153,8 @@ class Member:
     @property
     def now(self) -> float:
         """The time since the start (s)."""
-        return max(0, time.monotonic_ns() - self._control[control.START]) / NANOSECONDS
+        start = self._control[control.START] + self._control[control.SHIFT]
+        return max(0, time.monotonic_ns() - start) / NANOSECONDS
 
     @property
     def lost(self) -> int:

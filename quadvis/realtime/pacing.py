@@ -17,7 +17,7 @@ from quadvis.native.routine import Routine
 from quadvis.realtime import box as box_words
 from quadvis.realtime import clocks, control, dispatch, times
 from quadvis.realtime.box import NUMBER, check
-from quadvis.realtime.clocks import now, signalled, sleep
+from quadvis.realtime.clocks import follow, now, signalled, sleep
 from quadvis.realtime.dispatch import at_rest, release
 from quadvis.realtime.grid import deadline, due_in, following, latest
 from quadvis.realtime.notes import put_group, put_left_out, put_times
@@ -57,6 +57,7 @@ def wait(
     Return `GO`, and the step has begun; or why it has not: then the wait goes on when it is called again.
     """
     if plan[WAITING] < 0:
+        follow(clock, shared[control.SHIFT])
         instant = now(clock)
         finish(plan, shared, tasks, noted, instant)
         plan[WAITING], plan[INSTANT], plan[COUNTED_TO] = following(plan, tick, instant), instant, tick

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -19,6 +20,8 @@ from quadvis.realtime.tuner import BEFORE, Tuner
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
 
+PACE = 5e-4  # by how much of the time the ticks may be moved
+LONGEST_MOVE = 10**8  # ns for which they are moved at once, at most
 LOOK = 0.02  # s between two looks at the rings
 NEAR = 0.001  # s, while somebody waits for a tick
 
@@ -36,6 +39,7 @@ class Steering:
         self._tuner: Tuner | None = None
         self._begun = False
         self._reached = 0
+        self._shift, self._moved = 0, time.monotonic_ns()
         self._late = _most_late(diagram.graph)
         self.ticks = diagram.ticks
         if helm is not None:
@@ -97,14 +101,30 @@ class Steering:
             self._helm.enter(RUNNING)
         self._begun = True
 
+    @property
+    def instant(self) -> int | None:
+        """When the members are to begin (ns); None for as soon as they are ready."""
+        return self._helm.instant if self._helm is not None else None
+
     def look(self) -> None:
         """Take what the helm wants."""
         if self._helm is None or self._tuner is None:
             return
+        if self._helm.shift != self._shift:
+            self._approach(self._helm.shift)
         for wanted in self._helm.take():
             self._tuner.offer(wanted, self.tick)
         if self._begun:
             self._tuner.send(max(member.tick for member in self._members))
+
+    def _approach(self, wanted: int) -> None:
+        """Move the ticks of the members towards a shift, as fast as they may."""
+        now = time.monotonic_ns()
+        most = int(min(now - self._moved, LONGEST_MOVE) * PACE)
+        self._moved = now
+        self._shift += max(-most, min(most, wanted - self._shift))
+        for member in self._members:
+            member.shift(self._shift)
 
     def settle(self, reached: int, *, last: bool = False) -> None:
         """Note how far the rows are that have been handed on, after a look at the rings.
@@ -141,8 +161,8 @@ class Steering:
         """
         if any(member.stopped for member in self._members):
             begun = any(member.running for member in self._members)
-            time = float(max(member.tick for member in self._members) * self._period)
-            return f"it was stopped at t = {time:.9g} s" if begun else "it was stopped before its start", time
+            last = float(max(member.tick for member in self._members) * self._period)
+            return f"it was stopped at t = {last:.9g} s" if begun else "it was stopped before its start", last
         if self.ticks == self._written:
             return "", None
         end = (self.ticks - 1) * self._period

@@ -219,7 +219,7 @@ class _Supervisor:
     def _begin(self) -> None:
         """Let all applications run, from one instant on."""
         self._steering.begin()
-        start = time.monotonic_ns() + LEAD
+        start = self._steering.instant or time.monotonic_ns() + LEAD
         for member in self._members:
             member.begin(start)
 

@@ -59,12 +59,17 @@ class FakeClock:
         self.sleeps = 0
         self._functions = C_FUNCTION(self._get), C_FUNCTION(self._wait)
         self.words = machine_words(*self._functions)
-        self.words[clocks.START] = BEFORE
+        self.words[clocks.START] = self.words[clocks.BASE] = BEFORE
+        self.shift = 0
 
     def now(self) -> int:
-        return self.instant
+        return self.instant - self.shift
+
+    def follow(self, shift: int) -> None:
+        self.shift = shift
 
     def sleep(self, until: int) -> None:
+        until += self.shift
         self.instant = max(self.instant, until) + self.late.get(self.sleeps, 0)
         self.sleeps += 1
 
@@ -74,7 +79,7 @@ class FakeClock:
 
     def _wait(self, _: int, __: int, place: int, ___: int) -> int:
         until = Timespec.from_address(place).value - BEFORE
-        self.sleep(until)
+        self.sleep(until - self.shift)
         return 0 if self.instant >= until else errno.EINTR
 
 
