@@ -238,7 +238,8 @@ def test_a_run_without_end_is_stopped(text: str, engine: str) -> None:
         steered.helm.stop()
         result = steered.end()
     assert result.flight is not None and "stopped at" in result.flight.early
-    assert result.times("ramp.y")[-1] == steered.helm.time >= 0.15
+    # Tasks in threads may not have begun the last tick for which they were released.
+    assert result.times("integral.y")[-1] == steered.helm.time >= 0.15
 
 
 def test_a_run_that_has_not_begun_is_stopped_and_can_lose_a_process(tmp_path: Path) -> None:
