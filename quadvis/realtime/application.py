@@ -35,6 +35,7 @@ from quadvis.machine.interrupts import leave_to_parent
 from quadvis.native.choice import NATIVE, PYTHON, Choice, choose, interpreted, use
 from quadvis.native.executor import last_exact
 from quadvis.realtime import control
+from quadvis.realtime.captures import Captures
 from quadvis.realtime.clocks import MonotonicClock
 from quadvis.realtime.control import SharedMemory
 from quadvis.realtime.crew import Crew, lead
@@ -171,6 +172,8 @@ class _Application:
             stack.callback(close_all, carriers.values())
             engine = self._engine = Engine(live(part, carriers), diagram.seed, pacer)
             setup.devices.bind(engine)
+            captures = stack.enter_context(Captures(engine, clock))
+            captures.start()
             if setup.wishes.profile:
                 engine.measure()
             choice = choose(engine, diagram.ticks, setup.engine, setup.link.send, paced=True)
@@ -181,6 +184,8 @@ class _Application:
             for stream, ring in zip(setup.streams, shared.rings, strict=True):
                 stream.put_into(ring, engine, native)
             engine.prepare()
+            for note in captures.wait():
+                setup.link.send(note)
             stack.enter_context(diagram.guarded())
             stack.enter_context(engine)
             stack.callback(self._leave)

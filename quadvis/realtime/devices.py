@@ -8,7 +8,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
 from typing import Any
 
-from quadvis.block import CABLE, Block, Device, Input, Output
+from quadvis.block import CABLE, Block, Device, Input, LineDevice, Output
 from quadvis.engine.engine import Engine
 from quadvis.graph.devices import devices
 from quadvis.graph.graph import Graph
@@ -100,7 +100,7 @@ class Devices:
         """End everything; a sentence for each port that may be without its safe frames."""
         return self._guard.close() if self._guard is not None else []
 
-    def _all(self) -> Iterator[Device]:
+    def _all(self) -> Iterator[LineDevice]:
         yield from self._outputs.values()
         yield from self._inputs.values()
 
