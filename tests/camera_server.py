@@ -21,7 +21,9 @@ def painted(number: int, size: tuple[int, int] = SIZE) -> np.ndarray[Any, Any]:
     """Return a picture (height, width, 3) that shows a number: a column for each bit, bright for 1."""
     width, height = size
     bits = np.array([230 if number >> bit & 1 else 25 for bit in range(BITS)], np.uint8)
-    return np.ascontiguousarray(np.broadcast_to(bits[np.arange(width) * BITS // width, None], (height, width, 3)))
+    return np.ascontiguousarray(
+        np.broadcast_to(bits[np.arange(width) * BITS // width, None], (height, width, 3))
+    )
 
 
 def shown(pixels: np.ndarray[Any, Any]) -> int:
@@ -40,6 +42,12 @@ def jpeg(number: int, size: tuple[int, int] = SIZE) -> bytes:
 def coded(pixels: np.ndarray[Any, Any]) -> bytes:
     """Return pixels as JPEG."""
     return bytes(cv2.imencode(".jpg", pixels)[1].tobytes())
+
+
+def part(data: bytes) -> bytes:
+    """Return a picture as one part of a stream of pictures."""
+    head = b"--%s\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % (BOUNDARY, len(data))
+    return head + data + b"\r\n"
 
 
 class CameraServer:
@@ -108,7 +116,5 @@ class CameraServer:
     def _send(self, out: Any) -> None:
         with self._lock:
             number, self.sent = self.sent, self.sent + 1
-        data = self.make(number)
-        head = b"--%s\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % (BOUNDARY, len(data))
-        out.write(head + data + b"\r\n")
+        out.write(part(self.make(number)))
         out.flush()

@@ -30,8 +30,8 @@ class Camera(CapturedInput):
     camera is taken again: name it by its path in /dev/v4l/by-id or by-path. A number is taken only if there
     is one camera.
 
-    A FIFO ends a JPEG where the next one begins, so its pictures are one period late: see ``delay``. A video
-    file in the place of a camera comes at its own rate, again and again.
+    A FIFO carries pictures as HTTP does, each with a head that gives its length. A video file in the place of
+    a camera comes at its own rate, again and again.
     """
 
     port_example = "/dev/v4l/by-id/NAME"

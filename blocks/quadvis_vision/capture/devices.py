@@ -20,6 +20,7 @@ from quadvis.machine.serial_port import PortError
 SYSTEM = Path("/")
 URL = re.compile(r"[a-zA-Z][a-zA-Z0-9+.-]*://")
 LINKS = ("by-id", "by-path")
+NAME = 200  # characters of a camera's name in a message: what tells two of one make apart stands last
 START_OF_EXPOSURE = {"uvcvideo"}  # drivers whose stamps are the start of the exposure; others stamp its end
 
 
@@ -60,7 +61,7 @@ def lasting_name(device: str, system: Path = SYSTEM) -> str:
         return next((camera.lasting for camera in known if camera.node == device), device)
     node = str(system / "dev" / f"video{device}")
     if len(known) > 1:
-        names = ", ".join(quoted(camera.lasting) for camera in known)
+        names = ", ".join(named(camera.lasting) for camera in known)
         problem = f"camera {device} may be another one after each start, since there are {len(known)}"
         raise PortError(sentence(problem, f"name one of {names}"))
     return next((camera.lasting for camera in known if camera.node == node), node)
@@ -74,9 +75,14 @@ def missing(device: str, system: Path = SYSTEM) -> str:
         return str(error)
     if is_url(device) or os.path.exists(device):
         return ""
-    there = ", ".join(quoted(camera.lasting) for camera in cameras(system))
+    there = ", ".join(named(camera.lasting) for camera in cameras(system))
     remedy = "plug it in, or give the path of another one" + (f", such as {there}" if there else "")
-    return sentence(f"camera {quoted(device)} is missing", remedy)
+    return sentence(f"camera {named(device)} is missing", remedy)
+
+
+def named(device: str) -> str:
+    """Return the name of a camera for a message."""
+    return quoted(device, NAME)
 
 
 def is_url(device: str) -> bool:

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from quadvis.errors import quoted
-from quadvis_vision.capture.devices import is_driver, is_file, is_url, stamps_start
+from quadvis_vision.capture.devices import is_driver, is_file, is_url, named, stamps_start
 from quadvis_vision.capture.request import RATE, CameraRequest
 from quadvis_vision.pictures.drawing import is_picture
 from quadvis_vision.pictures.formats import FormatFault, layout
@@ -63,7 +62,7 @@ class CameraSource:
         self.by_driver = is_driver(device)
         self.paced = not self.by_driver and is_file(device)
         if not (is_url(device) or os.path.exists(device)):
-            raise NoPicture(f"{quoted(device)} is missing")
+            raise NoPicture(f"{named(device)} is missing")
         opening, reading = (OPEN_DRIVER, READ_DRIVER) if self.by_driver else (OPEN, READ)
         self.read_limit = max(reading, SLOWEST / request.rate if request.rate else 0.0)
         limits = [
@@ -76,7 +75,7 @@ class CameraSource:
         else:
             self.capture = cv2.VideoCapture(device, cv2.CAP_FFMPEG, limits)
         if not self.capture.isOpened():
-            raise NoPicture(f"{quoted(device)} does not answer, or is no camera")
+            raise NoPicture(f"{named(device)} does not answer, or is no camera")
         self.back_end = self.capture.getBackendName()
         self._set_up()
         self.raw = self._ask_for_jpeg()
@@ -116,9 +115,7 @@ class CameraSource:
         """What the camera is, and where its stamps come from, once a picture has been taken."""
         end = "start" if self._starts else "end"
         clock = f"by the driver, at the {end} of the exposure" if self._stamped else "by the read"
-        return (
-            f"{quoted(self._device)} by {self.back_end}, {self.rate:.3g} pictures a second, stamped {clock}"
-        )
+        return f"{named(self._device)} by {self.back_end}, {self.rate:.3g} pictures a second, stamped {clock}"
 
     def take(self) -> Taken:
         """Take the next picture as it comes; NoPicture if none comes in time."""
@@ -127,7 +124,7 @@ class CameraSource:
         found = self.capture.grab()
         now = time.monotonic_ns()
         if not found:
-            raise NoPicture(f"{quoted(self._device)} gives no pictures any more")
+            raise NoPicture(f"{named(self._device)} gives no pictures any more")
         instant = self._instant(now)
         found, raw = self.capture.retrieve()
         return Taken(raw if found else None, instant)

@@ -19,6 +19,7 @@ from quadvis_vision.capture.source import CameraSource, NoPicture, Taken, Unusab
 
 AGAIN = 0.1  # s before a camera that is lost is tried again
 SETTLED = 0.001  # s without a newer picture, after which the newest one is not in the middle of a burst
+SURELY = 3  # pictures of another size in a row, after which a start need not wait for a right one
 LOOK = 0.5  # s between two looks at the settings
 GIVEN_UP = 2.0  # s that the other thread has to end
 
@@ -62,6 +63,7 @@ class CameraWorker:
     def __init__(self, post: Post, request: CameraRequest, opener: Opener = CameraSource) -> None:
         self._post, self._request, self._opener = post, request, opener
         self._unlike = ""
+        self._wrong = 0  # pictures of another size in a row
 
     def serve(self) -> None:
         """Open the camera and take its pictures until it gives none; then return, to be called again."""
@@ -106,9 +108,11 @@ class CameraWorker:
             try:
                 pixels = self._pixels(taken, camera.raw)
             except Unusable as fault:
+                self._wrong += isinstance(fault, WrongSize)
                 post.refuse()
-                post.say(REFUSING, str(fault), hopeless=isinstance(fault, WrongSize))
+                post.say(REFUSING, str(fault), hopeless=self._wrong >= SURELY)
                 continue
+            self._wrong = 0
             post.put(taken.instant, count - post.words[REFUSED], packed(pixels))
             post.say(UNLIKE if self._unlike else GOOD, self._unlike or camera.note)
 

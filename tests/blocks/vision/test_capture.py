@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from quadvis.machine.capture import GOOD, OPENING, REFUSING, Capture
 from quadvis.machine.serial_port import PortError
 from quadvis_vision.capture.pixels import unpacked
 from quadvis_vision.capture.request import CameraRequest
-from tests.camera_server import SIZE, CameraServer, jpeg, shown
+from tests.camera_server import SIZE, CameraServer, jpeg, part, shown
 
 PATIENCE = 30.0  # s; whoever waits longer hangs
 
@@ -70,7 +71,7 @@ def capturing(device: str, **wanted: Any) -> Iterator[Seen]:
 
 
 def rising(numbers: list[int]) -> bool:
-    return all(before < after for before, after in zip(numbers, numbers[1:], strict=False))
+    return all(before < after for before, after in pairwise(numbers))
 
 
 def test_pictures_come_whole_and_in_order_and_those_between_are_counted() -> None:
@@ -202,7 +203,7 @@ def feeding(path: Path, writing: threading.Event) -> Iterator[None]:
                 continue
             try:
                 fifo = os.open(path, os.O_WRONLY | os.O_NONBLOCK) if fifo is None else fifo
-                os.write(fifo, jpeg(number))
+                os.write(fifo, part(jpeg(number)))
                 number += 1
             except OSError:  # nobody reads now, or the reader is late
                 pass
@@ -259,7 +260,9 @@ time.sleep(1000)
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
 def test_no_process_outlives_its_reader(number: signal.Signals) -> None:
     with CameraServer() as server:
-        reader = subprocess.Popen([sys.executable, "-c", READER, server.url], stdout=subprocess.PIPE, text=True)
+        reader = subprocess.Popen(
+            [sys.executable, "-c", READER, server.url], stdout=subprocess.PIPE, text=True
+        )
         assert reader.stdout is not None
         keeper = int(reader.stdout.readline())
         workers = children(keeper)
