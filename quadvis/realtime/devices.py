@@ -10,6 +10,7 @@ from typing import Any
 
 from quadvis.block import CABLE, Block, Device, Input, LineDevice, Output
 from quadvis.engine.engine import Engine
+from quadvis.errors import RunError
 from quadvis.graph.devices import devices
 from quadvis.graph.graph import Graph
 from quadvis.native.choice import Announce
@@ -48,8 +49,9 @@ class Devices:
 
     def __init__(self, context: SpawnContext, graph: Graph, on_host_loss: str, standing: Standing) -> None:
         self._context, self._on_host_loss, self._standing = context, on_host_loss, standing
-        self._outputs = {path: device for path, device in devices(graph) if isinstance(device, Output)}
-        self._inputs = {path: device for path, device in devices(graph) if isinstance(device, Input)}
+        self._devices = list(devices(graph))
+        self._outputs = {path: device for path, device in self._devices if isinstance(device, Output)}
+        self._inputs = {path: device for path, device in self._devices if isinstance(device, Input)}
         words = context.RawArray("q", words_for(len(self._outputs))) if self._outputs else None
         boxes = {path: number for number, path in enumerate(self._outputs)}
         self._ports: dict[str, str] = {}  # filled when the cables are made
@@ -76,6 +78,12 @@ class Devices:
         )
         self._guard.start(announce)
         return self._guard.process.pid
+
+    def missing(self) -> Iterator[str]:
+        """Yield a sentence for each device whose port is surely not there."""
+        for path, device in self._devices:
+            if words := device.missing():
+                yield str(RunError(words, block=path))
 
     def watch(self, process: int, loop: int) -> None:
         """Let the guardian watch an application, and the loop of this place among the patiences."""

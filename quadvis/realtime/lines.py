@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from multiprocessing.context import SpawnContext
 from typing import Any
 
 from quadvis.links.link import MEMORY, SERIAL, Link
-from quadvis.machine.serial_port import Line
+from quadvis.machine.serial_port import Line, missing_port
 from quadvis.realtime.cables import Cable, Ends
 
 LOCAL = "127.0.0.1"
@@ -48,6 +48,13 @@ class Lines:
                 self.receiving[link.name] = link.ports[1] or made.b
             elif link.via != MEMORY:
                 self.sending[link.name] = self.receiving[link.name] = _address(link.address)
+
+    def missing(self) -> Iterator[str]:
+        """Yield a sentence for each port of a link that is not there."""
+        for link in self._links:
+            for port in dict.fromkeys(filter(None, link.ports)):
+                if words := missing_port(port):
+                    yield f"link '{link.name}': {words}"
 
     def of(self, computer: str) -> dict[str, Any]:
         """Return what one computer opens the ends of its links with."""

@@ -149,9 +149,7 @@ class _Supervisor:
         """Start all processes, those first on which others depend."""
         self._cables.start()
         self._lines.lay(self._cables.ends)
-        guardian = self._devices.start(
-            self._cables.ends, [member.patience for member in self._members], self._announce
-        )
+        guardian = self._start_devices()
         if guardian is not None:
             self._cables.watch(guardian)
         with launching():
@@ -159,6 +157,24 @@ class _Supervisor:
                 process = member.start(self._lines.of(member.computer))
                 self._devices.watch(process, place)
                 self._cables.watch(process)
+
+    def _start_devices(self) -> int | None:
+        """Let the outputs have their initial frames; RunError has a sentence for each port that is missing.
+
+        So the outputs that are there are safe before anything else is found to be missing.
+        """
+        patiences = [member.patience for member in self._members]
+        refusal = ""
+        try:
+            guardian = self._devices.start(self._cables.ends, patiences, self._announce)
+        except RunError as error:
+            guardian, refusal = None, str(error)
+        missing = [*self._devices.missing(), *self._lines.missing()]
+        if refusal and refusal not in missing:
+            missing.insert(0, refusal)
+        if missing:
+            raise RunError("\n".join(missing))
+        return guardian
 
     def _close(self) -> list[str]:
         """End what the applications needed; return a sentence for each port that may be unsafe."""
