@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Counted, Input, Line, Out, Param, units_of
+from quadvis.block import Counted, Input, Line, Out, Param
 from quadvis.links.frame import Decoder
 from quadvis.links.message import Message, MessageSignal
 

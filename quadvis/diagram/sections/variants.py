@@ -14,7 +14,13 @@ from quadvis.diagram.sections.without import Without, kept, names_schema, read_n
 from quadvis.document import YamlMap, YamlNode
 from quadvis.errors import Faults, Place
 
-REPLACED = ("log", "analyse", "expect", "summary", "figures")  # sections that a variant may have in place of the diagram's
+REPLACED = (
+    "log",
+    "analyse",
+    "expect",
+    "summary",
+    "figures",
+)  # sections that a variant may have in place of the diagram's
 WITHOUT_KEYS = ("blocks", "computers", "links")
 VARIANT_KEYS = ("doc", "base", "slots", "params", "without", *REPLACED)
 
@@ -50,7 +56,8 @@ class VariantsSection(FileSection[Variants]):
         "`name: {slots: {block: {...}}}`: other blocks for those marked `slot: true`, which give the outputs "
         "that are read; `base: other` takes those of another variant first; `in`, `rate` and `at`, if left "
         "out, are those of the block replaced; `params` have other values, `without: {blocks: [names]}` "
-        "(and `computers`, `links`) takes away, `log`, `analyse`, `expect`, `summary` and `figures` stand in the place of the diagram's"
+        "(and `computers`, `links`) takes away, `log`, `analyse`, `expect`, `summary` and `figures` stand in "
+        "the place of the diagram's"
     )
 
     def read(self, node: YamlNode | None, faults: Faults) -> Variants:
