@@ -1,7 +1,7 @@
 """A device that a process of its own reads, since the calls of its driver may block: a camera, for example.
 
 The block says what is to be captured. A real-time run starts the process before its first step, waits for
-the first record, and gives the block a `Source`. A step then takes the newest record and never waits.
+the first record, and gives the block a `RecordSource`. A step then takes the newest record and never waits.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class SourceRecord(NamedTuple):
     payload: memoryview
 
 
-class Source(Protocol):
+class RecordSource(Protocol):
     """A capture that has begun, as the block sees it."""
 
     status: int
@@ -36,7 +36,7 @@ class Source(Protocol):
         """Return the newest record with ``after`` < stamp < ``time`` (s); None if there is none."""
 
 
-class NoSource:
+class NoRecords:
     """What the block has outside real-time runs: nothing comes."""
 
     status, refused, text = OPENING, 0, ""
@@ -67,7 +67,7 @@ class CapturedInput(Device):
         "refused; 3: a setting no longer holds; 4: the process has ended",
     )
 
-    source: Source = NoSource()  # what a real-time run gives to its own block
+    source: RecordSource = NoRecords()  # what a real-time run gives to its own block
 
     def capture(self) -> CaptureRequest:
         """Return what is to be captured."""
@@ -103,5 +103,5 @@ class CapturedInput(Device):
     def close(self) -> None:
         """End; PortError if the device is not there at the end, or does not keep its settings."""
         source = self.source
-        if not isinstance(source, NoSource) and source.status in LOST:
+        if not isinstance(source, NoRecords) and source.status in LOST:
             raise PortError(source.text or "the process that captures has ended")

@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from quadvis.errors import QuadvisError, counted, sentence
-from quadvis.machine.capture import Capture, CapturedRecord
+from quadvis.machine.capture import CapturedRecord
+from quadvis.machine.capture_process import CaptureProcess
 from quadvis.machine.files import PNG, check_output, write_output
 from quadvis.machine.status_line import StatusLine
 
@@ -55,7 +56,7 @@ def _list() -> int:
 
 
 @contextmanager
-def _pictures(options: argparse.Namespace) -> Iterator[tuple[Capture, Iterator[Seen]]]:
+def _pictures(options: argparse.Namespace) -> Iterator[tuple[CaptureProcess, Iterator[Seen]]]:
     """Open a camera; yield its capture and its pictures, the newest each time, until it is lost."""
     from quadvis_vision.capture.devices import lasting_name, missing
     from quadvis_vision.capture.request import CameraRequest
@@ -63,13 +64,13 @@ def _pictures(options: argparse.Namespace) -> Iterator[tuple[Capture, Iterator[S
     if words := missing(options.device):
         raise QuadvisError(words)
     request = CameraRequest(lasting_name(options.device), options.size)
-    with closing(Capture(multiprocessing.get_context("spawn"), request.capture())) as capture:
+    with closing(CaptureProcess(multiprocessing.get_context("spawn"), request.capture())) as capture:
         capture.start()
         capture.wait()
         yield capture, _newest(capture)
 
 
-def _newest(capture: Capture) -> Iterator[Seen]:
+def _newest(capture: CaptureProcess) -> Iterator[Seen]:
     from quadvis_vision.capture.pixels import unpacked
 
     last, until = -1, time.monotonic() + PATIENCE
@@ -176,7 +177,7 @@ def _sit(options: argparse.Namespace, board: Any) -> Any:
     with _pictures(options) as (_, pictures), StatusLine() as line:
         seen = next(pictures)
         sitting = Sitting(board, (seen.pixels.shape[1], seen.pixels.shape[0]))
-        until, views = time.monotonic() + options.idle, lambda: counted(sitting.count, "view")
+        until = time.monotonic() + options.idle
         try:
             while not sitting.is_complete and time.monotonic() < until:
                 picture = grey(seen.pixels)
@@ -188,7 +189,7 @@ def _sit(options: argparse.Namespace, board: Any) -> Any:
                         f"{counted(sitting.count, 'view')}; {missing or 'all places and tilts are there'}"
                     )
                 elif line.shown:
-                    line.show(f"{views()}; {answer.value}; {missing}")
+                    line.show(f"{_views(sitting)}; {answer.value}; {missing}")
                 seen = next(pictures)
         except KeyboardInterrupt:
             if sitting.count < 3:
@@ -200,3 +201,7 @@ def _sit(options: argparse.Namespace, board: Any) -> Any:
         )
         raise QuadvisError(sentence(problem, "it takes 3 or more; count the inner corners of your board"))
     return sitting
+
+
+def _views(sitting: Any) -> str:
+    return counted(sitting.count, "view")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from quadvis.cli import camera as cameras
 from quadvis.cli import commands
 from quadvis.cli.arguments import Parser
 from quadvis.cli.tool import dimensions, positive
@@ -153,7 +152,7 @@ def parser() -> Parser:
     schema.add_argument("--output", "-o", metavar="PATH", help="default: standard output")
     _own_block_option(schema)
     _camera_options(
-        add("camera", cameras.camera, "list cameras, show what one sees, or calibrate it", CAMERA_HELP)
+        add("camera", commands.camera, "list cameras, show what one sees, or calibrate it", CAMERA_HELP)
     )
     cache = add("cache", commands.cache, "say where compiled blocks are kept, and how large they are")
     cache.add_argument("--clear", action="store_true", help="remove them all")

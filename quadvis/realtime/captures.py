@@ -11,7 +11,7 @@ from quadvis.block import CapturedInput, SourceRecord
 from quadvis.engine.engine import Engine
 from quadvis.errors import RunError
 from quadvis.graph.devices import devices
-from quadvis.machine.capture import Capture
+from quadvis.machine.capture_process import CaptureProcess
 from quadvis.machine.serial_port import PortError
 from quadvis.realtime.schedule import NANOSECONDS
 
@@ -25,7 +25,7 @@ class Start(Protocol):
 class RunSource:
     """A capture as its block sees it: stamps are in run time."""
 
-    def __init__(self, capture: Capture, clock: Start) -> None:
+    def __init__(self, capture: CaptureProcess, clock: Start) -> None:
         self._capture, self._clock = capture, clock
 
     def newest(self, time: float, after: float) -> SourceRecord | None:
@@ -57,11 +57,11 @@ class Captures:
 
     def __init__(self, engine: Engine, clock: Start) -> None:
         context = multiprocessing.get_context("spawn")
-        self._begun: dict[str, Capture] = {}
+        self._begun: dict[str, CaptureProcess] = {}
         for path, device in devices(engine.graph):
             if isinstance(device, CapturedInput):
                 with _named(path):
-                    self._begun[path] = Capture(context, device.capture())
+                    self._begun[path] = CaptureProcess(context, device.capture())
                 engine.bound(path).source = RunSource(self._begun[path], clock)
 
     def start(self) -> None:

@@ -17,7 +17,7 @@ UNIT_OF_EXPOSURE = 1e-4  # s: V4L2_CID_EXPOSURE_ABSOLUTE counts in these
 MANUAL = 1.0  # V4L2_EXPOSURE_MANUAL; 0 and 3 are automatic
 
 
-class Setting(NamedTuple):
+class CameraSetting(NamedTuple):
     """One setting: the property of OpenCV, the number wanted there, and what a message shows.
 
     ``scale`` is one count of the driver in ``unit``; a setting with ``exact`` allows no rounding.
@@ -41,22 +41,22 @@ class Setting(NamedTuple):
         return format_quantity(value * self.scale, Unit.parse(self.unit), 3)
 
 
-def settings_of(request: CameraRequest) -> Iterator[Setting]:
+def settings_of(request: CameraRequest) -> Iterator[CameraSetting]:
     """Yield the settings that are wanted, in the order in which they are set."""
     import cv2
 
     if request.exposure is not None:
-        yield Setting("manual exposure", cv2.CAP_PROP_AUTO_EXPOSURE, MANUAL, exact=True)
+        yield CameraSetting("manual exposure", cv2.CAP_PROP_AUTO_EXPOSURE, MANUAL, exact=True)
         counts = request.exposure / UNIT_OF_EXPOSURE
-        yield Setting("exposure", cv2.CAP_PROP_EXPOSURE, counts, UNIT_OF_EXPOSURE, "s")
+        yield CameraSetting("exposure", cv2.CAP_PROP_EXPOSURE, counts, UNIT_OF_EXPOSURE, "s")
     if request.gain is not None:
-        yield Setting("gain", cv2.CAP_PROP_GAIN, request.gain)
+        yield CameraSetting("gain", cv2.CAP_PROP_GAIN, request.gain)
     if request.white_balance is not None:
-        yield Setting("fixed white balance", cv2.CAP_PROP_AUTO_WB, 0.0, exact=True)
-        yield Setting("white_balance", cv2.CAP_PROP_WB_TEMPERATURE, request.white_balance, 1.0, "K")
+        yield CameraSetting("fixed white balance", cv2.CAP_PROP_AUTO_WB, 0.0, exact=True)
+        yield CameraSetting("white_balance", cv2.CAP_PROP_WB_TEMPERATURE, request.white_balance, 1.0, "K")
 
 
-def apply(camera: Any, back_end: str, wanted: list[Setting]) -> str:
+def apply(camera: Any, back_end: str, wanted: list[CameraSetting]) -> str:
     """Set a camera up; return a sentence on the first setting that it does not take, or ""."""
     for setting in wanted:
         if not camera.set(setting.property, setting.wanted):
@@ -66,7 +66,7 @@ def apply(camera: Any, back_end: str, wanted: list[Setting]) -> str:
     return unlike(camera, back_end, wanted)
 
 
-def unlike(camera: Any, back_end: str, wanted: list[Setting]) -> str:
+def unlike(camera: Any, back_end: str, wanted: list[CameraSetting]) -> str:
     """Return a sentence on the first setting that does not hold, or ""."""
     for setting in wanted:
         got = camera.get(setting.property)

@@ -41,7 +41,7 @@ class WrongSize(Unusable):
 
 
 @dataclass(frozen=True)
-class Taken:
+class TakenPicture:
     """What a camera gave: bytes of a JPEG or pixels, and the middle of its exposure (ns, monotonic clock)."""
 
     raw: Any
@@ -117,7 +117,7 @@ class CameraSource:
         clock = f"by the driver, at the {end} of the exposure" if self._stamped else "by the read"
         return f"{named(self._device)} by {self.back_end}, {self.rate:.3g} pictures a second, stamped {clock}"
 
-    def take(self) -> Taken:
+    def take(self) -> TakenPicture:
         """Take the next picture as it comes; NoPicture if none comes in time."""
         self._pace()
         self._calling(self.read_limit + MARGIN)
@@ -127,7 +127,7 @@ class CameraSource:
             raise NoPicture(f"{named(self._device)} gives no pictures any more")
         instant = self._instant(now)
         found, raw = self.capture.retrieve()
-        return Taken(raw if found else None, instant)
+        return TakenPicture(raw if found else None, instant)
 
     def _pace(self) -> None:
         """Let the pictures of a file come at their rate."""

@@ -15,7 +15,7 @@ from quadvis.machine.capture import GOOD, OPENING, REFUSED, REFUSING, UNLIKE, Po
 from quadvis_vision.capture.pixels import HEADER, packed
 from quadvis_vision.capture.request import CameraRequest
 from quadvis_vision.capture.settings import apply, settings_of, unlike
-from quadvis_vision.capture.source import CameraSource, NoPicture, Taken, Unusable, WrongSize, decoded
+from quadvis_vision.capture.source import CameraSource, NoPicture, TakenPicture, Unusable, WrongSize, decoded
 
 AGAIN = 0.1  # s before a camera that is lost is tried again
 SETTLED = 0.001  # s without a newer picture, after which the newest one is not in the middle of a burst
@@ -31,10 +31,10 @@ class Newest:
 
     def __init__(self) -> None:
         self._condition = threading.Condition()
-        self._held: tuple[int, Taken] | None = None
+        self._held: tuple[int, TakenPicture] | None = None
         self.ended = False
 
-    def put(self, count: int, taken: Taken) -> None:
+    def put(self, count: int, taken: TakenPicture) -> None:
         """Put a picture, so many having been taken with it, in the place of the one before."""
         with self._condition:
             self._held = count, taken
@@ -46,7 +46,7 @@ class Newest:
             self.ended = True
             self._condition.notify()
 
-    def get(self) -> tuple[int, Taken] | None:
+    def get(self) -> tuple[int, TakenPicture] | None:
         """Wait for a picture that no other one follows at once; None at the end."""
         with self._condition:
             while self._held is None and not self.ended:
@@ -116,7 +116,7 @@ class CameraWorker:
             post.put(taken.instant, count - post.words[REFUSED], packed(pixels))
             post.say(UNLIKE if self._unlike else GOOD, self._unlike or camera.note)
 
-    def _pixels(self, taken: Taken, jpeg: bool) -> Any:
+    def _pixels(self, taken: TakenPicture, jpeg: bool) -> Any:
         """Return the pixels of a picture; Unusable if it is refused."""
         pixels = decoded(taken.raw, self._request.size, jpeg)
         if pixels.nbytes + HEADER > self._post.room:

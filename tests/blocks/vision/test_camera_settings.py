@@ -15,7 +15,7 @@ from quadvis.machine.capture import GOOD, HOPELESS, STATUS, UNLIKE, Post
 from quadvis_vision.capture import worker
 from quadvis_vision.capture.request import CameraRequest
 from quadvis_vision.capture.settings import apply, settings_of, unlike
-from quadvis_vision.capture.source import NoPicture, Taken, Unusable, decoded
+from quadvis_vision.capture.source import NoPicture, TakenPicture, Unusable, decoded
 from quadvis_vision.capture.worker import CameraWorker
 from tests.camera_server import SIZE, jpeg, painted, shown
 
@@ -73,12 +73,12 @@ class FakeCamera:
         self.capture, self._post, self.closed = driver, post, False
         self.seen: list[int] = []
 
-    def take(self) -> Taken:
+    def take(self) -> TakenPicture:
         if len(self.seen) == TAKES:
             raise NoPicture("it ends")
         self.seen.append(int(self._post.words[STATUS]))
         time.sleep(0.002)
-        return Taken(painted(len(self.seen)), len(self.seen))
+        return TakenPicture(painted(len(self.seen)), len(self.seen))
 
     def close(self) -> None:
         self.closed = True

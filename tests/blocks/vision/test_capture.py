@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadvis.machine.capture import GOOD, OPENING, REFUSING, Capture
+from quadvis.machine.capture import GOOD, OPENING, REFUSING
+from quadvis.machine.capture_process import CaptureProcess
 from quadvis.machine.serial_port import PortError
 from quadvis_vision.capture.pixels import unpacked
 from quadvis_vision.capture.request import CameraRequest
@@ -30,7 +31,7 @@ PATIENCE = 30.0  # s; whoever waits longer hangs
 class Seen:
     """What comes of a capture: the numbers that the pictures show, and those that they are given."""
 
-    def __init__(self, capture: Capture) -> None:
+    def __init__(self, capture: CaptureProcess) -> None:
         self.capture = capture
         self.shown: list[int] = []
         self.numbers: list[int] = []
@@ -58,9 +59,9 @@ class Seen:
 
 @contextmanager
 def capturing(device: str, **wanted: Any) -> Iterator[Seen]:
-    """Capture from a device of which the first picture has come."""
+    """CaptureProcess from a device of which the first picture has come."""
     request = CameraRequest(device, **{"size": SIZE, **wanted})
-    capture = Capture(multiprocessing.get_context("spawn"), request.capture())
+    capture = CaptureProcess(multiprocessing.get_context("spawn"), request.capture())
     capture.start()
     try:
         capture.wait()
@@ -245,10 +246,10 @@ def test_after_a_loss_only_the_camera_of_the_same_name_is_taken(tmp_path: Path) 
 
 READER = """
 import multiprocessing, sys, time
-from quadvis.machine.capture import Capture
+from quadvis.machine.capture_process import CaptureProcess
 from quadvis_vision.capture.request import CameraRequest
 
-capture = Capture(multiprocessing.get_context("spawn"), CameraRequest(sys.argv[1]).capture())
+capture = CaptureProcess(multiprocessing.get_context("spawn"), CameraRequest(sys.argv[1]).capture())
 capture.start()
 capture.wait()
 print(capture.process.pid, flush=True)

@@ -64,7 +64,7 @@ def test_a_tilt_is_named_by_the_side_that_is_away(turned: tuple[float, float], h
 def test_what_is_missing_is_said_in_words() -> None:
     coverage = Coverage(BOARD, SIZE)
     assert coverage.words().startswith("the board was nowhere upper left, upper, upper right, left, middle,")
-    coverage.add(corners(view(0, 0, CLOSE)))
+    coverage.add(corners(view(0, 0, FAR)))
     regions, ways = coverage.missing
     assert "middle" not in regions and ways == [*TILTS, NEAR]
     assert NEAR in coverage.shows(corners(view(0, 0, 0.26)))
