@@ -2,7 +2,7 @@
 
 It takes thrusts from an SBUS line, sends an inertial unit's frames over another line, and serves what the
 craft's camera sees. The craft is held until the commands would let it hover, since it takes a while until the
-first picture has been searched; after the safe command it is no longer watched.
+first picture has been searched.
 """
 
 from __future__ import annotations
@@ -27,9 +27,8 @@ DIAGRAMS = Path(__file__).parents[2] / "diagrams"
 TICK = 0.01  # s, of the inertial unit
 PICTURES = 10  # ticks between two pictures
 MOST = 2.0  # N, the highest command on the line
-HOVER, IDLE = 1.22625, 0.2  # N
+HOVER = 1.22625  # N
 NEAR, CALM = 0.3, 30  # N from the hover, for so many commands, before the craft is let go
-ENDED = 10  # safe commands in a row, since a guardian sends some when a loop is late
 WORLD = """
 quadvis: 1
 name: world
@@ -57,7 +56,8 @@ expect: []
 class World:
     """The world, from the beginning of the context to its end.
 
-    ``positions`` are those of each tick (m) from when the craft is let go to the safe command.
+    ``positions`` are those of each tick (m) from when the craft is let go, ``latest`` is the greatest
+    lateness of these ticks (s).
     """
 
     def __init__(self, folder: Path) -> None:
@@ -72,7 +72,7 @@ class World:
         self._pixels: Any = None
         self._shown = threading.Condition()
         self.positions: list[Any] = []
-        self.commands = 0
+        self.commands, self.latest = 0, 0.0
         self.error: BaseException | None = None
 
     def __enter__(self) -> World:
@@ -110,7 +110,7 @@ class World:
             self.error = error
 
     def _go_on(self, run: Any) -> None:
-        received, moved, calm, idle = bytearray(), False, 0, 0
+        received, moved, calm = bytearray(), False, 0
         tick, due = 0, time.monotonic()
         while not self._ended.is_set():
             thrust = self._newest(received)
@@ -121,11 +121,8 @@ class World:
                 run["thrust.value"] = thrust
             if moved and calm >= CALM:
                 run.advance(TICK)
-                if thrust is not None:
-                    idle = idle + 1 if np.abs(thrust - IDLE).max() < 2 * MOST / SPAN else 0
-                if idle == ENDED:
-                    break
                 self.positions.append(np.array(run["craft.position"]))
+                self.latest = max(self.latest, time.monotonic() - due)
             self._send(run, tick)
             if tick % PICTURES == 0:
                 with self._shown:

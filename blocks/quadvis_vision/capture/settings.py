@@ -41,10 +41,15 @@ class CameraSetting(NamedTuple):
         return format_quantity(value * self.scale, Unit.parse(self.unit), 3)
 
 
-def settings_of(request: CameraRequest) -> Iterator[CameraSetting]:
-    """Yield the settings that are wanted, in the order in which they are set."""
+def settings_of(request: CameraRequest, by_driver: bool) -> Iterator[CameraSetting]:
+    """Yield the settings that are wanted, in the order in which they are set.
+
+    The rate is set ``by_driver`` alone: a stream or a file has its own.
+    """
     import cv2
 
+    if request.rate and by_driver:
+        yield CameraSetting("fps", cv2.CAP_PROP_FPS, request.rate, 1.0, "Hz")
     if request.exposure is not None:
         yield CameraSetting("manual exposure", cv2.CAP_PROP_AUTO_EXPOSURE, MANUAL, exact=True)
         counts = request.exposure / UNIT_OF_EXPOSURE

@@ -86,7 +86,7 @@ class CameraSource:
         self.rate = request.rate or (rate if 0 < rate <= 1000 else RATE)
 
     def _set_up(self) -> None:
-        """Ask a driver for few buffers, the size and the rate; a stream cannot be asked."""
+        """Ask a driver for few buffers and the size; a stream cannot be asked."""
         import cv2
 
         if not self.by_driver:
@@ -97,8 +97,6 @@ class CameraSource:
         if self._request.size:
             self.capture.set(cv2.CAP_PROP_FRAME_WIDTH, self._request.size[0])
             self.capture.set(cv2.CAP_PROP_FRAME_HEIGHT, self._request.size[1])
-        if self._request.rate:
-            self.capture.set(cv2.CAP_PROP_FPS, self._request.rate)
 
     def _ask_for_jpeg(self) -> bool:
         """Ask for the bytes of JPEG, if the camera gives JPEG; return whether it does."""

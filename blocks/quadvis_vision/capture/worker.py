@@ -72,7 +72,7 @@ class CameraWorker:
         except NoPicture as error:
             self._post.say(OPENING, str(error))
             return
-        wanted = [*settings_of(self._request)]
+        wanted = [*settings_of(self._request, camera.by_driver)]
         self._post.calling(camera.read_limit)
         refusal = apply(camera.capture, camera.back_end, wanted)
         if refusal:

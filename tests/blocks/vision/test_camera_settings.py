@@ -67,7 +67,7 @@ class FallsBack(Driver):
 class FakeCamera:
     """An open camera over a driver."""
 
-    back_end, read_limit, raw, note = "V4L2", 1.0, False, "a fake"
+    back_end, read_limit, raw, note, by_driver = "V4L2", 1.0, False, "a fake", True
 
     def __init__(self, driver: Driver, post: Post) -> None:
         self.capture, self._post, self.closed = driver, post, False
@@ -124,12 +124,25 @@ def test_a_driver_that_falls_back_later_is_reported(monkeypatch: pytest.MonkeyPa
 @given(st.floats(1e-4, 1.0), st.floats(-0.09, 0.09))
 def test_a_driver_may_round(exposure: float, share: float) -> None:
     driver = Driver()
-    wanted = [*settings_of(CameraRequest("fake", exposure=exposure))]
+    wanted = [*settings_of(CameraRequest("fake", exposure=exposure), by_driver=True)]
     assert apply(driver, "V4L2", wanted) == ""
     driver.values[cv2.CAP_PROP_EXPOSURE] = exposure * 1e4 * (1 + share)
     assert unlike(driver, "V4L2", wanted) == ""
     driver.values[cv2.CAP_PROP_EXPOSURE] = exposure * 2e4 + 1
     assert "exposure was set to" in unlike(driver, "V4L2", wanted)
+
+
+def test_a_rate_that_a_driver_does_not_keep_is_refused_and_that_of_a_stream_is_its_own() -> None:
+    class Slow(Driver):
+        def get(self, what: int) -> float:
+            return 15.0 if what == cv2.CAP_PROP_FPS else super().get(what)
+
+    request = CameraRequest("fake", rate=30.0)
+    wanted = [*settings_of(request, by_driver=True)]
+    assert (
+        apply(Slow(), "V4L2", wanted) == "fps was set to 30 Hz and is 15 Hz, says V4L2; give a value it takes"
+    )
+    assert [*settings_of(request, by_driver=False)] == []
 
 
 def array_of(data: bytes) -> Any:
