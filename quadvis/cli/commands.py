@@ -239,6 +239,13 @@ def _plain_faults(faults: Iterable[Fault]) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
+def camera(options: argparse.Namespace) -> int:
+    """List the cameras, show what one sees, or calibrate it."""
+    from quadvis.cli.camera import camera as perform
+
+    return perform(options)
+
+
 def list_blocks(options: argparse.Namespace) -> int:
     """Print all blocks, and the files that come with quadvis; 2 if a library cannot be loaded."""
     from quadvis.library.describe import catalogue_lines, facts

@@ -36,6 +36,7 @@ from quadvis.machine.interrupts import leave_to_parent
 from quadvis.native.choice import NATIVE, PYTHON, Choice, choose, interpreted, use
 from quadvis.native.executor import last_exact
 from quadvis.realtime import control
+from quadvis.realtime.captures import Captures
 from quadvis.realtime.clocks import MonotonicClock
 from quadvis.realtime.control import SharedMemory
 from quadvis.realtime.crew import Crew, lead
@@ -45,6 +46,7 @@ from quadvis.realtime.last_ticks import LastTicks
 from quadvis.realtime.lifeline import Lifeline
 from quadvis.realtime.options import RealTime
 from quadvis.realtime.pacer import Ended, Pacer
+from quadvis.realtime.pictures import PictureBox, picture_signals
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
 from quadvis.realtime.streams import RowStream
 from quadvis.realtime.system import SHARE, Grants, ask_all, raise_thread, wake_up_time
@@ -58,8 +60,8 @@ class Setup:
     """What an application needs: a resolved diagram, how to run it, what it shares with its supervisor.
 
     ``computer`` is the one whose blocks it runs, "" in a diagram without computers. ``rooms`` are those of
-    the notes, and ``box`` that of the parameter box. ``lines`` has the words of its links in memory, by their
-    names.
+    the notes, ``box`` that of the parameter box; ``pictures`` are the words of the picture box, if there is
+    one. ``lines`` has the words of its links in memory, by their names.
     """
 
     text: str
@@ -78,6 +80,7 @@ class Setup:
     lines: Mapping[str, Any]
     last_ticks: LastTicks
     box: int
+    pictures: Any
 
 
 class Supply(NamedTuple):
@@ -195,6 +198,8 @@ class _Application:
             engine = self._engine = Engine(live(part, carriers), diagram.seed, pacer)
             pacer.write_into(engine.memory)
             setup.devices.bind(engine, supply.ports)
+            captures = stack.enter_context(Captures(engine, clock))
+            captures.start()
             if setup.wishes.profile:
                 engine.measure()
             choice = choose(engine, diagram.ticks, setup.engine, setup.link.send, paced=True)
@@ -204,7 +209,11 @@ class _Application:
                 use(engine, choice, pacer if native else None)
             for stream, ring in zip(setup.streams, shared.rings, strict=True):
                 stream.put_into(ring, engine, native)
+            if setup.pictures is not None:
+                PictureBox(setup.pictures).put_from(engine, picture_signals(part), clock)
             engine.prepare()
+            for note in captures.wait():
+                setup.link.send(note)
             stack.enter_context(diagram.guarded())
             stack.enter_context(engine)
             stack.callback(self._leave)

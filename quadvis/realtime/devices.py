@@ -8,8 +8,9 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
 from typing import Any
 
-from quadvis.block import CABLE, Block, Device, Input, Output
+from quadvis.block import CABLE, Block, Device, Input, LineDevice, Output
 from quadvis.engine.engine import Engine
+from quadvis.errors import RunError
 from quadvis.graph.devices import devices
 from quadvis.graph.graph import Graph
 from quadvis.native.choice import Announce
@@ -47,8 +48,9 @@ class Devices:
 
     def __init__(self, context: SpawnContext, graph: Graph, on_host_loss: str, standing: Standing) -> None:
         self._context, self._on_host_loss, self._standing = context, on_host_loss, standing
-        self._outputs = {path: device for path, device in devices(graph) if isinstance(device, Output)}
-        self._inputs = {path: device for path, device in devices(graph) if isinstance(device, Input)}
+        self._devices = list(devices(graph))
+        self._outputs = {path: device for path, device in self._devices if isinstance(device, Output)}
+        self._inputs = {path: device for path, device in self._devices if isinstance(device, Input)}
         words = context.RawArray("q", words_for(len(self._outputs))) if self._outputs else None
         boxes = {path: number for number, path in enumerate(self._outputs)}
         self.ports: dict[str, str] = {}  # of inputs at the end of a cable, by path, from `open` on
@@ -77,6 +79,12 @@ class Devices:
             ports = [self._output_port(path, device, ends) for path, device in self._outputs.items()]
             self._guard.open(ports, announce)
 
+    def missing(self) -> Iterator[str]:
+        """Yield a sentence for each device whose port is surely not there."""
+        for path, device in self._devices:
+            if words := device.missing():
+                yield str(RunError(words, block=path))
+
     def watch(self, process: int) -> None:
         """Let the guardian watch an application."""
         if self._guard is not None:
@@ -100,7 +108,7 @@ class Devices:
         """End everything; a sentence for each port that may be without its safe frames."""
         return self._guard.close() if self._guard is not None else []
 
-    def _all(self) -> Iterator[Device]:
+    def _all(self) -> Iterator[LineDevice]:
         yield from self._outputs.values()
         yield from self._inputs.values()
 

@@ -15,6 +15,7 @@ from quadvis.diagram.times import read_duration
 from quadvis.document import YamlScalar
 from quadvis.engine.tuning import NewValue
 from quadvis.errors import QuadvisError
+from quadvis.realtime.pictures import Picture
 from quadvis.realtime.times import TaskTimes
 
 STARTING, READY, RUNNING, ENDED = STATES = ("starting", "ready", "running", "ended")
@@ -35,6 +36,9 @@ class Progress(Protocol):
     def times(self) -> Mapping[str, tuple[TaskTimes, ...]]:
         """Return the times of the tasks of each computer."""
 
+    def picture(self, path: str, port: str) -> Picture | None:
+        """Return the newest picture of a signal; None if there is none."""
+
 
 @dataclass(frozen=True)
 class Stand:
@@ -47,6 +51,10 @@ class Stand:
     def times(self) -> Mapping[str, tuple[TaskTimes, ...]]:
         """Return the times of the tasks of each computer."""
         return self.found
+
+    def picture(self, path: str, port: str) -> Picture | None:
+        """Return None."""
+        return None
 
 
 class RunWatch(Protocol):
@@ -107,6 +115,13 @@ class Helm:
     def times(self) -> Mapping[str, tuple[TaskTimes, ...]]:
         """Return the times of the tasks up to now, by computer ("" in a diagram without computers)."""
         return self._progress.times()
+
+    def picture(self, path: str, port: str) -> Picture | None:
+        """Return the newest picture of a signal; None if there is none.
+
+        The loop gives pictures a few times a second, as long as somebody asks for them.
+        """
+        return self._progress.picture(path, port)
 
     @property
     def stop_time(self) -> Fraction | float | None:

@@ -8,7 +8,7 @@ from multiprocessing.context import SpawnContext
 from typing import Any
 
 from quadvis.links.link import MEMORY, SERIAL, Link
-from quadvis.machine.serial_port import Line
+from quadvis.machine.serial_port import Line, missing_port
 from quadvis.realtime.cables import Cable, Ends
 
 LOCAL = "127.0.0.1"
@@ -53,6 +53,13 @@ class Lines:
     def shared(self, computer: str) -> dict[str, Any]:
         """Return the words by which one computer opens the ends of its links in memory, before `lay`."""
         return {name: end for name, end in self._of(computer) if name in self._memory}
+
+    def missing(self) -> Iterator[str]:
+        """Yield a sentence for each port of a link that is not there."""
+        for link in self._links:
+            for port in dict.fromkeys(filter(None, link.ports)):
+                if words := missing_port(port):
+                    yield f"link '{link.name}': {words}"
 
     def of(self, computer: str) -> dict[str, Any]:
         """Return what one computer opens the other ends of its links with."""

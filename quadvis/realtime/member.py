@@ -27,6 +27,7 @@ from quadvis.realtime.last_ticks import LastTicks
 from quadvis.realtime.lifeline import Lifeline
 from quadvis.realtime.note_taker import NoteTaker
 from quadvis.realtime.options import RealTime
+from quadvis.realtime.pictures import Picture, PictureBox, picture_signals
 from quadvis.realtime.ring import RecordRing, Words
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
 from quadvis.realtime.streams import RowStream, StreamTaps, room_for, streams_of
@@ -62,6 +63,7 @@ class Member:
         lines: Mapping[str, Any],
         last_ticks: LastTicks,
         announce: Announce,
+        watched: bool,
     ) -> None:
         self.computer, self._part, self._announce = computer, part, announce
         self._taker, self._groups = taker, groups
@@ -77,11 +79,14 @@ class Member:
         self._control[control.TICKS] = diagram.ticks
         Lifeline(self._control[control.LIFELINE]).make()
         self._link, self._theirs = context.Pipe()
+        shows = watched and bool(picture_signals(part))
+        pictures = context.RawArray("q", PictureBox.size()) if shows else None
         setup = Setup(
             diagram.resolved, str(diagram.path.parent), diagram.path.name, diagram.own_blocks,
             IS_COMMAND.get(), computer, engine, wishes, rooms, streams, words, self._theirs, devices,
-            lines, last_ticks, box,
+            lines, last_ticks, box, pictures,
         )  # fmt: skip
+        self._pictures = PictureBox(pictures) if pictures is not None else None
         self.patience = Patience.of(computer, words, Schedule.of(part), self._limits)
         name = f"application {computer}".rstrip()
         self.process: BaseProcess = context.Process(target=perform, args=(setup,), name=name)
@@ -104,6 +109,20 @@ class Member:
     def shift(self, shift: int) -> None:
         """Let each tick be due so much (ns) later than by the start."""
         self._control[control.SHIFT] = shift
+
+    def has_picture(self, path: str, port: str) -> bool:
+        """Return whether a signal is a picture of this computer."""
+        return self._pictures is not None and (path, port) in picture_signals(self._part)
+
+    def picture(self, path: str, port: str) -> Picture | None:
+        """Return the newest picture of a signal that is one; None if there is none yet."""
+        assert self._pictures is not None
+        return self._pictures.newest(picture_signals(self._part).index((path, port)) + 1)
+
+    def rest(self) -> None:
+        """Ask for no more pictures if nobody wants to see one."""
+        if self._pictures is not None:
+            self._pictures.rest()
 
     def end_at(self, ticks: int) -> None:
         """Let the application end after so many ticks, before it begins."""

@@ -7,6 +7,7 @@ picture in a mailbox, a few times a second. A picture costs the loop its copy, s
 from __future__ import annotations
 
 import struct
+import time
 from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple
@@ -35,7 +36,7 @@ class Picture(NamedTuple):
 
 
 def picture_signals(graph: Graph) -> list[tuple[str, str]]:
-    """Return the signals of a graph that are pictures: path and port, in the order of their numbers, from 1."""
+    """Return the signals of a graph that are pictures: path and port, in the order of their numbers."""
     return [
         (node.path, name)
         for node in graph.nodes
@@ -50,6 +51,7 @@ class PictureBox:
 
     def __init__(self, words: Any) -> None:
         view = memoryview(words).cast("B").cast("q")
+        self._asked = self._next = 0
         self._head = view[:HEAD]
         self._mailbox = Mailbox(view[HEAD:], _SHAPE.size + ROOM, PLACES)
 
@@ -62,7 +64,6 @@ class PictureBox:
 
     def put_from(self, engine: Engine, signals: Sequence[tuple[str, str]], clock: Any) -> None:
         """Let an engine leave pictures here; ``clock.now()`` is the time (ns)."""
-        self._next = 0
         for number, (path, port) in enumerate(signals, 1):
             task = engine.graph[path].task.name
             engine.observe(task, partial(self._look, engine, number, path, port, clock))
@@ -80,12 +81,15 @@ class PictureBox:
 
     # for the supervisor
 
-    def want(self, number: int) -> None:
-        """Let the loop leave pictures of a signal from now on; 0 for none."""
-        self._head[WANTED] = number
+    def rest(self) -> None:
+        """Let the loop leave no more pictures if nobody has asked for one lately."""
+        if self._head[WANTED] and time.monotonic_ns() - self._asked > LIFE:
+            self._head[WANTED] = 0
 
     def newest(self, number: int) -> Picture | None:
-        """Return the newest picture of a signal; None if there is none of it."""
+        """Return the newest picture of a signal, and let the loop leave more; None if there is none of it."""
+        self._asked = time.monotonic_ns()
+        self._head[WANTED] = number
         found = self._mailbox.newest(number + 1, number - 1)
         if found is None:
             return None

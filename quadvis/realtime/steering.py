@@ -13,6 +13,7 @@ from quadvis.graph.graph import MULTI, Graph
 from quadvis.native.executor import last_exact
 from quadvis.realtime.helm import ENDLESS, READY, RUNNING, Helm
 from quadvis.realtime.member import Member
+from quadvis.realtime.pictures import Picture
 from quadvis.realtime.ring import Words
 from quadvis.realtime.times import TaskTimes
 from quadvis.realtime.tuner import BEFORE, Tuner
@@ -50,6 +51,11 @@ class Steering:
         self._members = members
 
     @property
+    def is_watched(self) -> bool:
+        """True if somebody may want to see pictures of the run."""
+        return self._helm is not None
+
+    @property
     def sources(self) -> list[int]:
         """What becomes ready when there is something to do."""
         return [self._helm.descriptor] if self._helm is not None and self._tuner is not None else []
@@ -72,6 +78,12 @@ class Steering:
     def times(self) -> Mapping[str, tuple[TaskTimes, ...]]:
         """Return the times of the tasks of each computer."""
         return {member.computer: member.times() for member in self._members}
+
+    def picture(self, path: str, port: str) -> Picture | None:
+        """Return the newest picture of a signal."""
+        return next(
+            (each.picture(path, port) for each in self._members if each.has_picture(path, port)), None
+        )
 
     @property
     def is_stopped(self) -> bool:
@@ -133,6 +145,8 @@ class Steering:
         """
         if self._helm is None or not self._begun:
             return
+        for member in self._members:
+            member.rest()
         self._helm.settle(reached + 1 if last else max(0, self._reached - self._late))
         self._reached = reached
 

@@ -114,6 +114,7 @@ class _Supervisor:
                     self._lines.shared(computer),
                     LastTicks(last_ticks, place),
                     announce,
+                    steering.is_watched,
                 )
             )
         steering.take_over(self._members)
@@ -188,12 +189,28 @@ class _Supervisor:
         self._lines.lay(self._cables.ends)
         if guardian is not None:
             self._cables.watch(guardian)
-        self._devices.open(self._cables.ends, self._announce)
+        self._open_devices()
         for member in self._members:
             process = member.process.pid or 0
             self._devices.watch(process)
             self._cables.watch(process)
             member.supply(self._lines.of(member.computer), self._devices.ports)
+
+    def _open_devices(self) -> None:
+        """Let the outputs have their initial frames; RunError has a sentence for each port that is missing.
+
+        So the outputs that are there are safe before anything else is found to be missing.
+        """
+        refusal = ""
+        try:
+            self._devices.open(self._cables.ends, self._announce)
+        except RunError as error:
+            refusal = str(error)
+        missing = [*self._devices.missing(), *self._lines.missing()]
+        if refusal and refusal not in missing:
+            missing.insert(0, refusal)
+        if missing:
+            raise RunError("\n".join(missing))
 
     def _close(self) -> list[str]:
         """End what the applications needed; return a sentence for each port that may be unsafe."""

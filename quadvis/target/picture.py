@@ -27,7 +27,8 @@ def encoded(diagram: Diagram, helm: Helm, signal: str) -> dict[str, Any]:
     wanted = diagram.ports.get(signal, signal)
     if wanted not in names:
         problem = f"{quoted(signal)} is no signal with pictures"
-        raise QuadvisError(sentence(problem, suggestion(signal, names) or f"there is {', '.join(names) or 'none'}"))
+        there = f"there is {', '.join(names) or 'none'}"
+        raise QuadvisError(sentence(problem, suggestion(signal, names) or there))
     path, _, port = wanted.rpartition(".")
     until = time.monotonic() + WAIT
     while (found := helm.picture(path, port)) is None:
@@ -35,7 +36,9 @@ def encoded(diagram: Diagram, helm: Helm, signal: str) -> dict[str, Any]:
             raise QuadvisError(f"no picture of {quoted(signal)} has come")
         time.sleep(LOOK)
     height, width = found.pixels.shape[:2]
-    return {"format": "jpeg", "data": _jpeg(found), "width": width, "height": height, "sequence": found.sequence}
+    return {
+        "format": "jpeg", "data": _jpeg(found), "width": width, "height": height, "sequence": found.sequence,
+    }  # fmt: skip
 
 
 def _jpeg(picture: Picture) -> bytes:
