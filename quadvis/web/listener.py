@@ -47,7 +47,9 @@ class Listener:
             )  # fmt: skip
         except (OSError, OverflowError) as error:
             why = getattr(error, "strerror", None) or error
-            raise QuadvisError(f"port {port} cannot be opened ({why}); name another one with --port") from None
+            raise QuadvisError(
+                f"port {port} cannot be opened ({why}); name another one with --port"
+            ) from None
         self.port = next(iter(server.sockets)).getsockname()[1]
         self.access = Access(self.port, announce)
         await server.start_serving()

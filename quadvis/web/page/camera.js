@@ -54,7 +54,7 @@ export class Camera {
     const found = picture.found ?? [];
     const thick = Math.max(1.5, this.canvas.width / 240);
     context.lineWidth = thick;
-    context.font = `${Math.round(7 * thick)}px system-ui, sans-serif`;
+    context.font = `${Math.round(9.5 * thick)}px system-ui, sans-serif`;
     for (const { u, v, radius, label, kept, reason } of found) {
       context.strokeStyle = context.fillStyle = colour(kept ? "good" : "bad");
       context.setLineDash(kept ? [] : [3 * thick, 2 * thick]);

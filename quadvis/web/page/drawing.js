@@ -7,7 +7,7 @@ import { draw } from "./spark.js";
 import { makeSvg, readDrawing } from "./svg.js";
 import { View } from "./view.js";
 
-const FAR = 0.5; // pixels of the screen for one unit, below which names are all that can be read
+const FAR = 0.45; // pixels of the screen for one unit, below which names are all that can be read
 const TAGS = { name: 0, kind: 1 }; // the texts of a block by their places; all others are ports
 
 export class Drawing {
@@ -17,8 +17,8 @@ export class Drawing {
   onwire = () => {};
   onblock = () => {};
 
-  constructor(frame, hint, model) {
-    Object.assign(this, { frame, hint, model });
+  constructor(frame, hint, colours, model) {
+    Object.assign(this, { frame, hint, colours, model });
     this.view = new View(frame, () => this.#scaled());
     frame.addEventListener("click", (event) => this.#click(event));
     frame.addEventListener("pointermove", (event) => this.#hover(event));
@@ -28,10 +28,10 @@ export class Drawing {
   /** Show a drawing. */
   take(text) {
     const svg = readDrawing(text);
-    const [, , width, height] = svg.getAttribute("viewBox").split(/\s+/).map(Number);
+    const content = [...svg.querySelectorAll(":scope > g")].at(-1);
+    this.#legend(svg.querySelector(":scope > g"));
+    svg.replaceChildren(content); // paper, title and legend are those of the page
     for (const name of ["width", "height"]) svg.removeAttribute(name);
-    svg.querySelector(":scope > rect")?.remove(); // the paper: the page has its own
-    svg.querySelector(":scope > title")?.remove(); // its tooltip would lie over everything
     this.#wires = [...svg.querySelectorAll("g.wire")];
     const blocks = [...svg.querySelectorAll("g.block")];
     this.#blocks = new Map(blocks.map((block) => [block.dataset.path, block]));
@@ -45,12 +45,25 @@ export class Drawing {
       texts.forEach((each, index) => each.classList.add(Object.keys(TAGS)[index] ?? "port"));
     }
     const layer = makeSvg("g", { class: "values" });
-    (blocks[0]?.parentNode ?? svg).append(layer);
+    content.append(layer);
     this.labels = new Labels(layer, this.#wires, this.model);
     this.frame.replaceChildren(svg);
-    this.view.take(svg, width, height);
+    content.removeAttribute("transform");
     this.svg = svg;
+    this.view.take(svg, content.getBBox());
     this.#scaled();
+  }
+
+  /** Show the colours of the tasks. */
+  #legend(legend) {
+    const texts = legend ? [...legend.querySelectorAll("text")] : [];
+    this.colours.replaceChildren(...texts.map((text) => {
+      const mark = text.previousElementSibling;
+      const sample = make("i", { className: Number(mark.getAttribute("rx")) > 3 ? "pill" : "" });
+      sample.style.background = mark.getAttribute("fill");
+      sample.style.borderColor = mark.getAttribute("stroke");
+      return make("span", {}, sample, text.textContent);
+    }));
   }
 
   /** The signals that wires show. */
@@ -80,6 +93,7 @@ export class Drawing {
   #scaled() {
     if (!this.svg) return;
     this.svg.classList.toggle("far", this.view.scale < FAR);
+    this.svg.style.setProperty("--name", `${Math.min(25, Math.max(13, 10.5 / this.view.scale))}px`);
     this.labels?.scale(this.view.scale);
   }
 

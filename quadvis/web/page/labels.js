@@ -4,7 +4,9 @@ import { value } from "./format.js";
 import { makeSvg } from "./svg.js";
 
 const SIZE = 9; // of the type, in units of the drawing
-const LARGEST = 13; // where the drawing is small on the screen
+const LARGEST = 27; // where the drawing is small on the screen
+const LEGIBLE = 9.5; // px of the screen
+const MOST = 16; // characters for which a label keeps its place free
 const WIDTH = 0.56; // of a character, in sizes of the type
 
 /** Return the horizontal stretches of a line as [left, right, y], from its beginning. */
@@ -37,9 +39,11 @@ class Label {
   }
 }
 
+const overlap = (one, other) => one[0] < other[2] && other[0] < one[2] && one[1] < other[3] && other[1] < one[3];
+
 export class Labels {
   #labels = [];
-  #size = SIZE;
+  #size = 0;
 
   /** Put a label beside the wires of each source; `wires` are their elements. */
   constructor(layer, wires, model) {
@@ -59,7 +63,8 @@ export class Labels {
       }, { length: 0 });
       if (best.place && best.length > (places.get(source)?.length ?? 0)) places.set(source, best);
     }
-    for (const [source, { place }] of places) {
+    const longest = [...places].sort(([, one], [, other]) => other.length - one.length);
+    for (const [source, { place }] of longest) {
       const signal = model.signalOf(source);
       if (!signal || signal.type === "frame") continue;
       const label = new Label(source, signal, place);
@@ -68,19 +73,27 @@ export class Labels {
     }
   }
 
-  /** Choose the size of the type for a scale: pixels of the screen for one unit. */
+  /** Choose the size of the type for a scale, the pixels of the screen for one unit, and who has room for it. */
   scale(scale) {
-    const size = Math.min(LARGEST, Math.max(SIZE, SIZE / scale));
+    const size = Math.min(LARGEST, Math.max(SIZE, LEGIBLE / scale));
     if (Math.abs(size - this.#size) < 0.2) return;
     this.#size = size;
-    for (const label of this.#labels) label.element.style.fontSize = `${size}px`;
+    const taken = [];
+    for (const label of this.#labels) {
+      const width = Math.min(label.right - label.left, MOST * WIDTH * size);
+      const box = [label.left, label.y - size, label.left + width, label.y];
+      const free = width > 3 * size && !taken.some((other) => overlap(box, other));
+      if (free) taken.push(box);
+      label.element.style.display = free ? "" : "none";
+      label.element.style.fontSize = `${size}px`;
+    }
     this.update();
   }
 
   update() {
     for (const label of this.#labels) {
       const found = this.model.values.get(label.signal.name);
-      if (found) label.show(found[0], this.#size);
+      if (found && label.element.style.display === "") label.show(found[0], this.#size);
     }
   }
 }

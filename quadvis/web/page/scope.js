@@ -1,9 +1,9 @@
 // The scope below the diagram: several signals, free or triggered, paused, zoomed, saved.
 
-import { onScheme, colours } from "./colours.js";
+import { onScheme } from "./colours.js";
 import { Curves } from "./curves.js";
-import { find, make, save, show } from "./dom.js";
-import { number, unit } from "./format.js";
+import { make, save, show } from "./dom.js";
+import { unit } from "./format.js";
 import { MOST, Samples } from "./samples.js";
 import { bar, WINDOW } from "./scope_bar.js";
 
@@ -34,7 +34,7 @@ export class Scope {
       oncursor: (row) => this.bar.cursor(row, this.#curves),
     });
     this.plot.addEventListener("dblclick", () => this.#setZoom(null));
-    onScheme(() => this.#begin());
+    onScheme(() => this.#plotAgain());
     connection.on("scope", ({ data, samples, topic }) => topic === this.#topic && this.#take(data, samples));
     connection.on("values", () => this.#takeValues());
   }
@@ -102,7 +102,13 @@ export class Scope {
     this.#zoom = null;
     this.paused = false;
     this.at = NaN;
+    this.#plotAgain();
+  }
+
+  /** Make the plot anew, with the samples that are there. */
+  #plotAgain() {
     this.bar.take(this.#curves);
+    this.#still = false;
     if (this.isOpen) this.curves.begin(this.#curves);
     else this.curves.end();
     this.#draw();

@@ -5,6 +5,7 @@ const MOST = 12; // times larger than all of it
 export class View {
   #points = new Map();
   #moved = 0;
+  #touched = false; // by a person, who now decides what is in view
 
   constructor(frame, changed = () => {}) {
     this.frame = frame;
@@ -16,25 +17,28 @@ export class View {
       frame.addEventListener(name, (event) => this.#points.delete(event.pointerId));
     }
     frame.addEventListener("keydown", (event) => this.#key(event));
-    new ResizeObserver(() => this.#apply()).observe(frame);
+    new ResizeObserver(() => (this.#touched ? this.#apply() : this.fit())).observe(frame);
   }
 
-  /** Show a drawing of a size, in user units. */
-  take(svg, width, height) {
+  /** Show a drawing that fills a box, in user units. */
+  take(svg, { x, y, width, height }) {
     this.svg = svg;
-    this.size = { width, height };
+    const edge = 0.015 * width;
+    this.box = { x: x - edge, y: y - edge, width: width + 2 * edge, height: height + 2 * edge };
     this.fit();
   }
 
   fit() {
-    if (!this.svg) return;
-    const { width, height } = this.frame.getBoundingClientRect();
+    this.#touched = false;
+    const { clientWidth: width, clientHeight: height } = this.frame;
+    if (!this.svg || !width || !height) return;
+    const { box } = this;
     // A wide drawing on a narrow screen begins at its left end, legible.
-    const whole = Math.min(width / this.size.width, height / this.size.height);
+    const whole = Math.min(width / box.width, height / box.height);
     this.least = whole;
-    this.scale = width < 700 ? Math.max(whole, Math.min(0.55, height / this.size.height)) : whole;
-    this.x = this.scale > whole ? 0 : (this.size.width - width / this.scale) / 2;
-    this.y = (this.size.height - height / this.scale) / 2;
+    this.scale = width < 700 ? Math.max(whole, Math.min(0.55, height / box.height)) : whole;
+    this.x = this.scale > whole ? box.x : box.x + (box.width - width / this.scale) / 2;
+    this.y = box.y + (box.height - height / this.scale) / 2;
     this.#apply();
   }
 
@@ -44,6 +48,7 @@ export class View {
     this.x += x / this.scale - x / scale;
     this.y += y / this.scale - y / scale;
     this.scale = scale;
+    this.#touched = true;
     this.#apply();
   }
 
@@ -86,6 +91,7 @@ export class View {
       this.y -= dy / 2 / this.scale;
       this.zoom(apart(event) / apart(last), ...middle);
     } else if (this.dragged) {
+      this.#touched = true;
       this.x -= dx / this.scale;
       this.y -= dy / this.scale;
       this.#apply();
@@ -97,6 +103,7 @@ export class View {
     const step = 60 / this.scale;
     const moves = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, -step], ArrowDown: [0, step] };
     if (event.key in moves) {
+      this.#touched = true;
       this.x += moves[event.key][0];
       this.y += moves[event.key][1];
       this.#apply();

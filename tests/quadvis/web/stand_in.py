@@ -18,7 +18,20 @@ import numpy as np
 from quadvis.api import Diagram
 from quadvis.errors import QuadvisError, quoted
 from quadvis.output.log_reader import read_log
-from quadvis.realtime.times import BINS, COUNTS, LATENESS, OVERRUNS, STEPS, TET, WORDS, TaskTimes, bin_of, clear, count, end_of
+from quadvis.realtime.times import (
+    BINS,
+    COUNTS,
+    LATENESS,
+    OVERRUNS,
+    STEPS,
+    TET,
+    WORDS,
+    TaskTimes,
+    bin_of,
+    clear,
+    count,
+    end_of,
+)
 from quadvis.run.live import LiveRun
 from quadvis.run.rows import ports
 from quadvis.target.parameters import Parameters
@@ -30,7 +43,9 @@ LABELS = ("red", "blue", "green", "black")
 class StandIn:
     """A target with one application, ``level`` is that of the key."""
 
-    def __init__(self, diagram: Diagram, folder: Path, level: int = 0, others: Mapping[str, Diagram] = {}) -> None:  # noqa: B006
+    def __init__(
+        self, diagram: Diagram, folder: Path, level: int = 0, others: Mapping[str, Diagram] = {}
+    ) -> None:  # noqa: B006
         self.name, self.level = "bench", level
         self.applications = {diagram.name: diagram, **others}
         self.folder = folder
@@ -50,6 +65,7 @@ class StandIn:
     def _load(self, diagram: Diagram) -> None:
         self.diagram, self.parameters = diagram, Parameters(diagram)
         self.state, self.problem, self.verdicts = "stopped", "", None
+        self.picture = ""
         self.scopes.clear()
 
     # the interface
@@ -115,7 +131,8 @@ class StandIn:
         self.publish("event", {"event": "loaded", "application": application})
 
     def do_drawing(self) -> str:
-        return self.diagram.draw()
+        self.picture = self.picture or self.diagram.draw()
+        return self.picture
 
     def do_signals(self) -> list[dict[str, Any]]:
         found = []
@@ -141,20 +158,25 @@ class StandIn:
         return self.parameters.facts()
 
     def do_setparam(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        changes = []
+        run = self._flight.run if self._flight and self.state == "running" else None
+        if run is None:
+            raise QuadvisError("nothing runs: start it first")
+        found = [self.parameters.find(name) for name in values]
+        old = [self.parameters.text(path, param) for path, param in found]
         with self._lock:
-            run = self._flight.run if self._flight else None
-            if run is None:
-                raise QuadvisError("nothing runs: start it first")
+            before = len(run.changes)
             for name, value in values.items():
-                path, param = self.parameters.find(name)
-                old = self.parameters.text(path, param)
                 run[name] = value
-                changes.append((path, param, old))
-            self.parameters.took(run.changes[-len(values):])
-            tick = round(run.time / float(self.diagram.graph.tick))
-        facts = [{"name": f"{p}.{n}", "old": old, "new": self.parameters.text(p, n)} for p, n, old in changes]
-        found = {"tick": tick, "time": run.time, "changes": facts}
+        while len(run.changes) < before + len(found) and self.state == "running":
+            time.sleep(0.001)
+        changes = run.changes[before:]
+        self.parameters.took(changes)
+        facts = [
+            {"name": f"{path}.{param}", "old": text, "new": self.parameters.text(path, param)}
+            for (path, param), text in zip(found, old, strict=True)
+        ]
+        tick = changes[-1].tick
+        found = {"tick": tick, "time": tick * float(self.diagram.graph.tick), "changes": facts}
         self.publish("event", {"event": "tuned", "application": self.diagram.name, **found})
         return found
 
@@ -279,7 +301,10 @@ class Scope:
     def start(self) -> None:
         flight = self.target._flight
         self.places = [flight.place(name) for name in self.properties["Signals"]] if flight else []
-        self.names, self.units = list(self.properties["Signals"]), [self.target.unit(n) for n in self.properties["Signals"]]
+        self.names, self.units = (
+            list(self.properties["Signals"]),
+            [self.target.unit(n) for n in self.properties["Signals"]],
+        )
         trigger = self.properties["TriggerSignal"]
         self.trigger = flight.place(trigger) if flight and trigger else None
         before = max(0, -self.properties["NumPrePostSamples"])
@@ -386,7 +411,10 @@ class Flight:
             count(words, at, nanoseconds, bin_of(nanoseconds))
 
     def tasks(self) -> list[dict[str, Any]]:
-        periods = {task.name: float(task.period or self.target.diagram.graph.tick) for task in self.target.diagram.graph.tasks}
+        periods = {
+            task.name: float(task.period or self.target.diagram.graph.tick)
+            for task in self.target.diagram.graph.tasks
+        }
         found = []
         for name, shared in self._times.items():
             words = shared.copy()  # the run goes on
