@@ -8,15 +8,17 @@ from quadvis.version import __version__
 
 if TYPE_CHECKING:
     from quadvis.api import Diagram, load
+    from quadvis.host.target import Target
     from quadvis.output.log_reader import Log, read_log
     from quadvis.realtime.options import RealTime
     from quadvis.run.replay import replay
     from quadvis.sweeps.sweep import sweep
 
-__all__ = ["Diagram", "Log", "RealTime", "__version__", "load", "read_log", "replay", "sweep"]
+__all__ = ["Diagram", "Log", "RealTime", "Target", "__version__", "load", "read_log", "replay", "sweep"]
 
 _HOMES = {
     "Diagram": "api",
+    "Target": "host.target",
     "load": "api",
     "Log": "output.log_reader",
     "read_log": "output.log_reader",

@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 from quadvis.errors import QuadvisError, quoted, sentence, suggestion
 
 HELP = ("-h", "--help")
+_PLACES: Mapping[Any, str] = {"?": "[{}]", "*": "[{} ...]", "+": "{} [...]"}
 
 
 class Parser(argparse.ArgumentParser):
@@ -79,9 +80,9 @@ def _checked(parser: Parser, words: Sequence[str]) -> list[str]:
             ended = True
         else:
             found += _option(parser, word, waiting)
-    needed = [place for place in parser.places if place.nargs is None]
+    needed = [place for place in parser.places if place.nargs in (None, "+")]
     further = [place for place in parser.places if place.nargs == "?"]
-    further += [place for place in parser.places if place.nargs == "*"] * (len(placed) - len(needed))
+    further += [place for place in parser.places if place.nargs in ("*", "+")] * (len(placed) - len(needed))
     for place, word in zip([*needed, *further], placed, strict=False):
         if place.choices is not None and word not in place.choices:
             remedy = suggestion(word, map(str, place.choices))
@@ -133,7 +134,8 @@ def _check_value(action: argparse.Action, name: str, value: str) -> None:
     except argparse.ArgumentTypeError as error:
         raise QuadvisError(f"{name}: {error}; write {name} {_name(action)}") from None
     except ValueError:
-        raise QuadvisError(f"{name}: {quoted(value)} is not a whole number; write one, such as 3") from None
+        kind, such = ("number", "0.5") if action.type is float else ("whole number", "3")
+        raise QuadvisError(f"{name}: {quoted(value)} is not a {kind}; write one, such as {such}") from None
 
 
 def _name(action: argparse.Action) -> str:
@@ -146,9 +148,7 @@ def _usage(parser: Parser) -> str:
     places = (
         "|".join(map(str, place.choices))
         if place.choices
-        else f"[{_name(place)}]"
-        if place.nargs == "?"
-        else _name(place)
+        else _PLACES.get(place.nargs, "{}").format(_name(place))
         for place in parser.places
     )
     return f"'{' '.join([parser.prog, *places])}'"

@@ -55,10 +55,18 @@ def run(options: argparse.Namespace) -> int:
     from quadvis.run.report import summary_lines
     from quadvis.run.session import run as run_diagram
 
+    if options.target is not None or options.on:
+        from quadvis.cli.run_on_target import check_options, run_on_several, run_on_target
+
+        check_options(options)
     real_time = _real_time(options)
     diagram = _load(options, stop_time=options.stop_time, seed=options.seed)
     log = log_path(options.log, diagram)
     _print_warnings(diagram, options)
+    if options.target is not None:
+        return run_on_target(diagram, log, options)
+    if options.on:
+        return run_on_several(diagram, log, options)
     collected_from_now_on()
     try:
         with ProgressLine(diagram.duration) as progress:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from quadvis.cli import commands
+from quadvis.cli import commands, wire
 from quadvis.cli.arguments import Parser
+from quadvis.cli.target_options import add_target_commands
 from quadvis.version import __version__
 
 JSON_HELP = """\
@@ -66,6 +67,13 @@ Exit code: 0 stable, with all margins that the diagram expects; 1 not stable, or
 2 bad input, or a loop that cannot be linearised."""
 
 
+KEYS_HELP = """\
+new makes a key pair, show prints all public keys and fingerprints, allow and revoke change the list of hosts
+that a target on this computer lets in (a target that runs notes it at once), forget drops the pinned key of
+a target. All is kept in $QUADVIS_HOME, else in $XDG_CONFIG_HOME/quadvis or ~/.config/quadvis; a private key
+never leaves it."""
+
+
 def parser() -> Parser:
     """Return the parser of all commands and their options."""
     made = Parser(prog="quadvis", description="Block diagrams in YAML that fly a four-rotor craft.")
@@ -92,6 +100,10 @@ def parser() -> Parser:
     )
     _engine_option(run)
     _real_time_options(run)
+    words = "fly it on a target, by its name or address, and bring the log home"
+    run.add_argument("--target", metavar="NAME", help=words)
+    words = "let a target be one of the diagram's computers; once for each, such as --on world=lab1"
+    run.add_argument("--on", action="append", default=[], metavar="COMPUTER=TARGET", help=words)
     words = "time every call of a block; write a trace for Perfetto or chrome://tracing there, '' for none"
     run.add_argument("--profile", metavar="PATH.json", help=words)
     run.add_argument("--json", action="store_true", help="print one JSON object instead of the summary")
@@ -146,10 +158,28 @@ def parser() -> Parser:
     _own_block_option(schema)
     cache = add("cache", commands.cache, "say where compiled blocks are kept, and how large they are")
     cache.add_argument("--clear", action="store_true", help="remove them all")
+    add_target_commands(add, _setting_options, _engine_option)
     new = add("new", commands.new, "write the skeleton of a block, an output device or a diagram")
     new.add_argument("kind", choices=("block", "device", "diagram"))
     new.add_argument("name", metavar="NAME", help="a block or device as group.block, a diagram as FILE.yaml")
+    _key_options(
+        add("keys", wire.keys, "make and show keys, and say which hosts a target lets in", KEYS_HELP)
+    )
+    add("wire", wire.wire, "print how to talk to a target, for programs in other languages")
     return made
+
+
+def _key_options(parser: Parser) -> None:
+    parser.add_argument("action", choices=wire.ACTIONS)
+    parser.add_argument(
+        "name", metavar="NAME", nargs="?", help="of a key, of a host, or of a target (forget)"
+    )
+    words = "with allow: the host's public key, 64 hexadecimal digits"
+    parser.add_argument("public", metavar="PUBLIC", nargs="?", help=words)
+    words = "with allow: 0 all, 1 starts and stops, 2 sees parameters, 3 looks, 4 sees the status"
+    parser.add_argument("--level", type=int, metavar="0..4", help=words)
+    words = "with allow: the host must come from there, such as 192.168.1.0/24; may be repeated"
+    parser.add_argument("--from", dest="network", action="append", default=[], metavar="NETWORK", help=words)
 
 
 def _replay_options(parser: Parser) -> None:

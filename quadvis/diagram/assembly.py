@@ -17,6 +17,7 @@ from quadvis.diagram.expand import Expansion, Kept
 from quadvis.diagram.flow import Cases
 from quadvis.diagram.group_files import GroupFiles
 from quadvis.diagram.keys import RUN_SECTIONS
+from quadvis.diagram.knobs import find_knobs
 from quadvis.diagram.loader import read_group, read_part
 from quadvis.diagram.outputs import check_writers
 from quadvis.diagram.parts import Parts
@@ -126,6 +127,7 @@ class Assembly:
         return Diagram(
             spec.name, spec.path, variant, graph, stop, seed, spec.values | context.values, listing,
             self.variants, ports=MappingProxyType(ports), sources=sources,
+            knobs=MappingProxyType(find_knobs(expansion)),
         )  # fmt: skip
 
     @property

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from quadvis.block import Block
 from quadvis.diagram.keys import SECTIONS
+from quadvis.diagram.knobs import Knob
 from quadvis.diagram.loop_requirements import LoopRequirement
 from quadvis.diagram.requirements import Entry, Expectation
 from quadvis.diagram.sections.analyse import ANALYSE, Questions
@@ -49,6 +50,7 @@ class Diagram:
     ports: Mapping[str, str] = field(default_factory=dict)  # of parts: the signals of blocks that they are
     sources: tuple[Path, ...] = ()  # the YAML files: its own, of bases, parts and parameter files
     files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of every file that was read, by path
+    knobs: Mapping[str, Knob] = field(default_factory=dict)  # parameters of its own and of parts
     own_blocks: bool = True  # whether code beside the diagram may be run
 
     @cached_property

@@ -100,6 +100,14 @@ def _entry(node: YamlScalar, match: re.Match[str], group: YamlNode, faults: Faul
     return UNKNOWN
 
 
+def whole_parameter(node: YamlNode) -> str | None:
+    """Return the parameter that a value is, ``$name`` or ``$group.name``; None if it is anything else."""
+    match = _PARAMETER.fullmatch(node.value) if isinstance(node, YamlScalar) else None
+    if match is None or match["element"] is not None:
+        return None
+    return match["name"] if match["entry"] is None else f"{match['name']}.{match['entry']}"
+
+
 def named_parameters(node: YamlNode) -> set[str]:
     """Return the names that a value takes from ``params``: ``$name`` and ``$name[i]``."""
     if isinstance(node, YamlScalar):

@@ -48,7 +48,7 @@ class Engine:
         self._executor: Executor = self._interpreter
         self._selves = self._interpreter.selves
         self.memory: Memory = self._interpreter.memory
-        self.tuning = Tuning(self.program, [node.block for node in graph.nodes], self.memory)
+        self.tuning = Tuning(self.program, {node.path: node.block for node in graph.nodes}, self.memory)
         self._opened: list[int] = []
         self._ready: list[int] = []  # those whose ``open`` succeeded: their outputs must end at safe values
         for node, block in zip(graph.nodes, self.program.blocks, strict=True):

@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from quadvis.block import Block, ParameterError
 from quadvis.engine.memory import Memory
-from quadvis.engine.program import Program
+from quadvis.engine.program import Program, Tunable
 from quadvis.errors import sentence, suggestion
+
+Key = tuple[str, str]  # the path of a block, and the name of a parameter of it
+
+
+class NewValue(NamedTuple):
+    """A value that a parameter is to take: as a diagram gives it, in SI units."""
+
+    path: str
+    name: str
+    value: Any
 
 
 class Change(NamedTuple):
@@ -20,67 +32,111 @@ class Change(NamedTuple):
     value: Any
 
 
+class Acceptance:
+    """Checks groups of new values against the declarations of blocks, and against the values in force.
+
+    ``blocks`` are those with ``tunables``, by path. ``now`` returns the value in force of a parameter that
+    can be tuned, as the block's methods see it.
+    """
+
+    def __init__(
+        self, tunables: Iterable[Tunable], blocks: Mapping[str, Block], now: Callable[[Tunable], Any]
+    ) -> None:
+        self._blocks, self._now = blocks, now
+        self.tunables = {(each.path, each.name): each for each in tunables}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All tunable parameters, such as "control/roll.bandwidth"."""
+        return tuple(f"{path}.{name}" for path, name in self.tunables)
+
+    def accept(self, group: Sequence[NewValue]) -> dict[Key, Any]:
+        """Return the values of a group as the methods will see them; of one parameter the last one counts.
+
+        ParameterError if a parameter is not tunable, if a value does not fit, or if a block refuses its
+        values together with its other parameters.
+        """
+        accepted: dict[Key, Any] = {}
+        given: dict[str, dict[str, Any]] = {}
+        for path, name, value in group:
+            accepted[path, name] = self._accepted(path, name, value)
+            given.setdefault(path, {})[name] = value
+        for path, values in given.items():
+            block = self._blocks[path]
+            present = {name: self._given(path, name, block) for name in block.interface.params}
+            type(block)(period=block.period, **present | values)
+        return accepted
+
+    def as_given(self, path: str, name: str, accepted: Any) -> Any:
+        """Return a value as a diagram gives it."""
+        choices = self._blocks[path].interface.params[name].choices
+        return choices[accepted] if choices else accepted
+
+    def _accepted(self, path: str, name: str, value: Any) -> Any:
+        tunable = self.tunables.get((path, name))
+        if tunable is None:
+            raise ParameterError(name, sentence(*self._refusal(path, name)))
+        accepted = self._blocks[path].interface.params[name].accept(value)
+        shape, wanted = np.shape(accepted), tunable.slot.shape
+        if shape not in ((), wanted):
+            sizes = [" x ".join(map(str, each)) or "one" for each in (wanted, shape)]
+            raise ParameterError(name, f"{name} has {sizes[0]} values in this run, got {sizes[1]}")
+        return accepted
+
+    def _given(self, path: str, name: str, block: Block) -> Any:
+        """Return a parameter as a diagram would give it now."""
+        tunable = self.tunables.get((path, name))
+        return self.as_given(path, name, getattr(block, name) if tunable is None else self._now(tunable))
+
+    def _refusal(self, path: str, name: str) -> tuple[str, str]:
+        wanted = f"{path}.{name}"
+        mine = [each for owner, each in self.tunables if owner == path]
+        if any(name in block.interface.params for block in self._blocks.values()) and mine:
+            return f"'{wanted}' cannot be tuned", f"block '{path}' can be tuned in {', '.join(mine)}"
+        return f"'{wanted}' is no parameter that can be tuned", suggestion(wanted, self.names)
+
+
 class Tuning:
-    """Checks new values of tunable parameters, and writes them into memory between two ticks.
+    """Takes new values of tunable parameters, and writes them into memory between two ticks.
 
     Values that are set together take effect at one tick. ``changes`` is the history of a run; ``noted``, if
     it is set, is called with each change before the tick runs.
     """
 
-    def __init__(self, program: Program, blocks: Sequence[Block], memory: Memory) -> None:
+    def __init__(self, program: Program, blocks: Mapping[str, Block], memory: Memory) -> None:
         self._memory = memory
-        self._blocks = blocks
-        self._tunables = {(tunable.path, tunable.name): tunable for tunable in program.tunables}
-        self._waiting: dict[tuple[str, str], Any] = {}
+        self._waiting: dict[Key, Any] = {}
+        self._acceptance = Acceptance(program.tunables, blocks, self._now)
         self.changes: list[Change] = []
         self.noted: Callable[[Change], None] | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
         """All tunable parameters, such as "control/roll.bandwidth"."""
-        return tuple(f"{path}.{name}" for path, name in self._tunables)
+        return self._acceptance.names
 
     def set(self, path: str, name: str, value: Any) -> None:
-        """Let a parameter have a value (SI units) from the next tick on.
+        """Let a parameter have a value (SI units) from the next tick on; see `set_all`."""
+        self.set_all([NewValue(path, name, value)])
 
-        ParameterError if it is not tunable, if the value does not fit, or if the block refuses it together
-        with its other parameters; then nothing changes.
+    def set_all(self, group: Sequence[NewValue]) -> None:
+        """Let parameters have new values from the next tick on; their blocks check them together.
+
+        ParameterError if one of them is refused; then nothing changes. See `Acceptance.accept`.
         """
-        key = (path, name)
-        if key not in self._tunables:
-            raise ParameterError(name, sentence(*self._refusal(path, name)))
-        block = self._blocks[self._tunables[key].block]
-        param = block.interface.params[name]
-        accepted = param.accept(value)
-        given = {each: self._now(path, each, block) for each in block.interface.params}
-        type(block)(period=block.period, **given | {name: value})
-        self._waiting[key] = accepted
+        self._waiting |= self._acceptance.accept(group)
 
-    def _now(self, path: str, name: str, block: Block) -> Any:
-        """Return a parameter as a diagram would give it, with the changes that wait."""
-        param = block.interface.params[name]
-        value = self._waiting.get((path, name))
-        if value is None:
-            tunable = self._tunables.get((path, name))
-            value = getattr(block, name) if tunable is None else self._memory.read(tunable.slot)
-        return param.choices[value] if param.choices else value
-
-    def _refusal(self, path: str, name: str) -> tuple[str, str]:
-        wanted = f"{path}.{name}"
-        mine = [each for owner, each in self._tunables if owner == path]
-        if any(block for block in self._blocks if name in block.interface.params) and mine:
-            return f"'{wanted}' cannot be tuned", f"block '{path}' can be tuned in {', '.join(mine)}"
-        return f"'{wanted}' is no parameter that can be tuned", suggestion(wanted, self.names)
+    def _now(self, tunable: Tunable) -> Any:
+        """Return the value in force, with the changes that wait."""
+        waiting = self._waiting.get((tunable.path, tunable.name))
+        return self._memory.read(tunable.slot) if waiting is None else waiting
 
     def apply(self, tick: int) -> None:
         """Write the waiting values into memory, before a tick."""
         if self._waiting:
             for (path, name), value in self._waiting.items():
-                self._memory.write(self._tunables[path, name].slot, value)
-                param = self._blocks[self._tunables[path, name].block].interface.params[name]
-                self.changes.append(
-                    Change(tick, path, name, param.choices[value] if param.choices else value)
-                )
+                self._memory.write(self._acceptance.tunables[path, name].slot, value)
+                self.changes.append(Change(tick, path, name, self._acceptance.as_given(path, name, value)))
                 if self.noted is not None:
                     self.noted(self.changes[-1])
             self._waiting.clear()

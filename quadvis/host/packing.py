@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from quadvis.errors import QuadvisError, quoted
 from quadvis.machine.shipped import PREFIX, named_file
 from quadvis.target.admission import source_digest
-from quadvis.target.bundle import Bundle
+from quadvis.target.bundle import ApplicationBundle
 from quadvis.version import __version__
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def pack(
     diagram: Diagram, name: str | None = None, engine: str = "auto", computer: str = ""
-) -> tuple[Bundle, dict[str, Path]]:
+) -> tuple[ApplicationBundle, dict[str, Path]]:
     """Return a diagram as a bundle, and the paths of its files by their SHA-256.
 
     Files lie in the bundle as they lie beside the diagram. QuadvisError if one is named by an absolute path,
@@ -41,7 +41,7 @@ def pack(
         files[os.path.normpath(home / each)] = digest
         paths[digest] = named_file(each, diagram.path)
     variant = diagram.variant or ""
-    bundle = Bundle(
+    bundle = ApplicationBundle(
         name or "-".join(filter(None, (diagram.name, variant))),
         variant,
         diagram.resolved,
@@ -50,10 +50,15 @@ def pack(
         sources_of(diagram),
         diagram.hash,
         __version__,
+        dict(diagram.ports),
+        {
+            each: [[list(target) for target in knob.targets], list(knob.elsewhere)]
+            for each, knob in diagram.knobs.items()
+        },
         engine,
         computer,
     )
-    return Bundle.read(bundle.plain()), paths
+    return ApplicationBundle.read(bundle.plain()), paths
 
 
 def sources_of(diagram: Diagram) -> dict[str, str]:

@@ -105,13 +105,13 @@ class RunSignals(Recording):
     def _named(self, pattern: str) -> set[int]:
         """Return the blocks that a pattern names by their signals, by themselves, or by one signal."""
         if pattern in self:
-            return {self._find(pattern)[0]}
+            return {self.find(pattern)[0]}
         found = {
             index for name, (index, _, _) in self._signals.items()
             if fnmatchcase(name, pattern) or fnmatchcase(name.rpartition(".")[0], pattern)
         }  # fmt: skip
         if not found and pattern != ALL:
-            self._find(pattern)  # raises an error that says what is wrong with the pattern
+            self.find(pattern)  # raises an error that says what is wrong with the pattern
         return found
 
     def written(self, log: Path, loss: str) -> None:

@@ -54,12 +54,16 @@ class LogWriter:
     """
 
     def __init__(
-        self, path: str | Path, blocks: Sequence[RecordedBlock], metadata: Mapping[str, str]
+        self,
+        path: str | Path,
+        blocks: Sequence[RecordedBlock],
+        metadata: Mapping[str, str],
+        synced: bool = False,
     ) -> None:
         """Begin a file in place of any older one; `metadata["diagram"]` is the text of the resolved diagram.
 
         `metadata["files"]`, if it is there, has the SHA-256 of files by name, as JSON.
-        RunError if this beginning cannot be written.
+        RunError if this beginning cannot be written. ``synced`` is that of `Sink`.
         """
         definitions = [message_definition(block) for block in blocks]
         self.path = Path(path)
@@ -70,7 +74,7 @@ class LogWriter:
         self._waiting: dict[int, Rows] = {}  # by block
         self._pending = 0  # bytes of the messages that wait
         self._latest = 0  # stamp (ns) of the latest row
-        self._sink = Sink(open_output(self.path, LOG))
+        self._sink = Sink(open_output(self.path, LOG), synced)
         facts = dict(metadata)
         self._file = McapWriter(self._sink, "ros2", f"quadvis {facts.get('quadvis', '')}".strip())
         self._file.add_attachment(DIAGRAM, "application/yaml", facts.pop("diagram", "").encode())
@@ -172,6 +176,16 @@ class LogWriter:
         self._file.end()
         self._sink.hand_on()
         self._sink.close()
+
+    @property
+    def size(self) -> int:
+        """The bytes of the file once all rows are in it that have been taken so far, without its end."""
+        return self._sink.tell() + self._pending
+
+    @property
+    def lost(self) -> int:
+        """The number of rows that were left out so far."""
+        return self._sink.lost
 
     @property
     def loss(self) -> str:

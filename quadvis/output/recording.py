@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.errors import QuadvisError, quoted, suggestion
-from quadvis.graph.graph import Index, selected
+from quadvis.graph.graph import Index, Node, selected
 from quadvis.graph.names import read_name
 
 SLOT = 8
@@ -59,6 +59,16 @@ class RecordedPort(NamedTuple):
         """Return the port's rows (N, *shape) from its block's rows (N, slots); `start` is its first slot."""
         values = slots[:, start : start + self.size].view(SLOT_TYPES[self.type])
         return (values != 0 if self.type == "bool" else values).reshape(len(slots), *self.shape)
+
+
+def ports(node: Node) -> tuple[RecordedPort, ...]:
+    """Return the outputs of a node that a row holds: all but frames."""
+    outputs = node.block.interface.outputs
+    return tuple(
+        RecordedPort(name, port.signal.scalar, node.shape(name), node.unit(name))
+        for name, port in outputs.items()
+        if port.signal.scalar != "frame"
+    )
 
 
 class RecordedBlock(NamedTuple):
@@ -169,7 +179,7 @@ class Recording:
 
     def stamps(self, name: str) -> NDArray[np.int64]:
         """Return the stamps (ns) of a signal's N rows: exact times, rounded down."""
-        return self._arrays(self._find(name)[0])[0]
+        return self._arrays(self.find(name)[0])[0]
 
     def times(self, name: str) -> NDArray[np.float64]:
         """Return the times (s) of a signal's N rows."""
@@ -177,7 +187,7 @@ class Recording:
 
     def port(self, name: str) -> RecordedPort:
         """Return the type, shape and unit of a signal, or of the elements of it that an index names."""
-        _, _, port, index = self._find(name)
+        _, _, port, index = self.find(name)
         if not index:
             return port
         units = port.unit.split(" ")
@@ -188,11 +198,11 @@ class Recording:
 
     def rate(self, name: str) -> str:
         """Return the name of the rate of a signal's block; "" if it is not known."""
-        return self.blocks[self._find(name)[0]].rate
+        return self.blocks[self.find(name)[0]].rate
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         """Return a signal of N rows, shape (N, *shape of the port): float64, int64 or bool."""
-        block, start, port, index = self._find(name)
+        block, start, port, index = self.find(name)
         return port.rows(self._arrays(block)[1], start)[(slice(None), *index)]
 
     def __iter__(self) -> Iterator[str]:
@@ -203,7 +213,7 @@ class Recording:
 
     def __contains__(self, name: object) -> bool:
         try:
-            self._find(str(name))
+            self.find(str(name))
         except QuadvisError:
             return False
         return True
@@ -225,8 +235,8 @@ class Recording:
         """Return the stamps and the rows of a block."""
         return self._rows[block].arrays()
 
-    def _find(self, name: str) -> tuple[int, int, RecordedPort, Index]:
-        """Return the block, first slot, port and index of a name; QuadvisError if no signal has this name."""
+    def find(self, name: str) -> tuple[int, int, RecordedPort, Index]:
+        """Return a signal's block (its number), first slot, port and index; QuadvisError if there is none."""
         if name in self._signals:
             return *self._signals[name], ()
         source, index = self._source(name)

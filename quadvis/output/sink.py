@@ -7,6 +7,7 @@ import threading
 from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from time import monotonic
 from typing import BinaryIO
 
@@ -32,12 +33,16 @@ class Sink:
     `lost` counts the rows that are missing from `lost_from` (ns) on.
     """
 
-    def __init__(self, file: BinaryIO) -> None:
-        """Write to an open, empty file, and close it at the end."""
+    def __init__(self, file: BinaryIO, synced: bool = False) -> None:
+        """Write to an open, empty file, and close it at the end.
+
+        A ``synced`` one has the disk itself take each batch, so that it survives the loss of power.
+        """
         self.failure = ""
         self.lost = 0
         self.lost_from: int | None = None
         self._file = file
+        self._synced = synced
         self._parts: list[bytes | memoryview] = []
         self._taken = 0
         self._queue: deque[Batch] = deque()
@@ -92,9 +97,12 @@ class Sink:
         with self._changed:
             while self._waiting and not self.failure:
                 before = self._written
-                self._changed.wait(HUNG)
-                if self._waiting and self._written == before:
+                if not self._changed.wait_for(partial(self._moved, before), HUNG):
                     self._give_up("the disk takes nothing any more")
+
+    def _moved(self, before: int) -> bool:
+        """Return whether the disk has taken more than so many bytes, or will take no more."""
+        return self._written != before or not self._waiting or bool(self.failure)
 
     def close(self) -> None:
         """Write the waiting bytes and close the file; if the disk hangs, the file stays open."""
@@ -113,6 +121,8 @@ class Sink:
                 batch = self._queue[0]
             try:
                 self._put(batch.data)
+                if self._synced:
+                    os.fsync(self._file.fileno())
             except OSError as error:
                 # Part of a batch is useless, and would make the count of lost rows wrong.
                 with suppress(OSError):

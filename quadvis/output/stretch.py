@@ -7,12 +7,23 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 
+import numpy as np
+from numpy.typing import NDArray
+
 NANOSECONDS = 10**9
 
 
 def stamp(time: Fraction) -> int:
     """Return a time (s) as a row's stamp: in whole nanoseconds, rounded down."""
     return math.floor(time * NANOSECONDS)
+
+
+def stamps_of(ticks: NDArray[np.int64], period: Fraction) -> NDArray[np.int64]:
+    """Return the stamps (ns) of ticks, rounded down."""
+    numerator, denominator = (period * NANOSECONDS).as_integer_ratio()
+    if len(ticks) and int(ticks[-1]) * numerator > np.iinfo(np.int64).max:
+        return np.array([tick * numerator // denominator for tick in ticks.tolist()], np.int64)
+    return ticks * numerator // denominator
 
 
 def seconds_text(time: Fraction) -> str:

@@ -17,7 +17,7 @@ import time
 import traceback
 from collections.abc import Mapping
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import parent_process
 from multiprocessing.connection import Connection
 from typing import Any
@@ -26,6 +26,7 @@ from quadvis.diagram.load import load_text
 from quadvis.diagram.sections.on_host_loss import CONTINUE
 from quadvis.engine.engine import Engine
 from quadvis.engine.profile import ProfileReport
+from quadvis.engine.program import Tunable
 from quadvis.errors import QuadvisError, RunError
 from quadvis.errors.caller import IS_COMMAND
 from quadvis.graph.graph import MULTI, Graph
@@ -72,14 +73,16 @@ class Setup:
     link: Connection
     devices: PortBindings
     lines: Mapping[str, Any]
+    room: int = 0  # of the parameter box
 
 
 @dataclass(frozen=True)
 class Ready:
-    """The application can begin to run: what the system has granted, and which engine runs."""
+    """The application can begin: what the system has granted, which engine runs, where parameters are."""
 
     grants: Grants
     engine: Choice
+    tunables: tuple[Tunable, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -151,9 +154,11 @@ class _Application:
 
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
-        self._shared = SharedMemory(setup.words, setup.tasks, [stream.ring for stream in setup.streams])
+        rings = [stream.ring for stream in setup.streams]
+        self._shared = SharedMemory(setup.words, setup.tasks, rings, setup.room)
         self._signals = _Signals(self._shared.control)
         self._engine: Engine | None = None
+        self._pacer: Pacer | None = None
         self._start = 0
         self.goes_on_alone = False  # true from the start of a run that may lose its supervisor
 
@@ -165,11 +170,12 @@ class _Application:
         schedule = Schedule.of(part)
         names, overload = [task.name for task in part.tasks], diagram.overload_of(setup.computer)
         limits, clock = [overload.of(name) for name in names], MonotonicClock()
-        pacer = Pacer(schedule, names, limits, shared, clock, lambda: engine.hold_safe())
+        pacer = self._pacer = Pacer(schedule, names, limits, shared, clock, lambda: engine.hold_safe())
         with ExitStack() as stack:
             carriers = open_carriers(part, setup.lines)
             stack.callback(close_all, carriers.values())
             engine = self._engine = Engine(live(part, carriers), diagram.seed, pacer)
+            pacer.write_into(engine.memory)
             setup.devices.bind(engine)
             if setup.wishes.profile:
                 engine.measure()
@@ -191,20 +197,22 @@ class _Application:
             grants.granted.append(f"polling {clock.polled / 1e3:.0f} us")
             grants.refused += [note for carrier in carriers.values() for note in carrier.notes]
             Lifeline(shared.control[control.LIFELINE]).hold()
-            setup.link.send(Ready(grants, Choice(choice.engine, choice.reason)))
+            engine_chosen = Choice(choice.engine, choice.reason)
+            setup.link.send(Ready(grants, engine_chosen, engine.program.tunables))
             self._start = clock.start = setup.link.recv()  # all applications begin at one instant
             shared.control[control.START] = self._start
+            ticks = shared.control[control.TICKS]
             self.goes_on_alone = diagram.on_host_loss == CONTINUE
             self._signals.looping = True
             if crew is not None:
                 stack.callback(crew.leave)
-                crew.start(diagram.ticks)
-            engine.run(diagram.ticks)
+                crew.start(ticks)
+            engine.run(ticks)
             pacer.finish()
             if crew is not None:
-                pacer.conclude(crew.rest, diagram.ticks)
+                pacer.conclude(crew.rest, ticks)
             shared.control[control.LEFT] = control.AT_STOP_TIME
-        return Ending(unsafe=pacer.unsafe, profile=engine.profile() if setup.wishes.profile else None)
+        return self._ending()
 
     def _crew(self, part: Graph, choice: Choice, pacer: Pacer) -> Crew | None:
         """Let each task run by itself, if the diagram wants it so."""
@@ -234,7 +242,14 @@ class _Application:
         if engine is None or not self._start:
             return Ending("the application was told to end", asked=True)
         block = _running(error, engine) if isinstance(error, Interrupted) else ""
-        return Ending("the application was told to end", block, time=engine.time, asked=True)
+        told = "the application was told to end"
+        return replace(self._ending(), reason=told, block=block, time=engine.time, asked=True)
+
+    def _ending(self) -> Ending:
+        """Return how a run ends that has begun."""
+        assert self._engine is not None and self._pacer is not None
+        profile = self._engine.profile() if self._setup.wishes.profile else None
+        return Ending(unsafe=self._pacer.unsafe, profile=profile)
 
 
 def perform(setup: Setup) -> None:

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from quadvis.realtime import lifeline, times
+from quadvis.realtime import box, lifeline, times
+from quadvis.realtime.box import ParameterBox
 from quadvis.realtime.ring import RecordRing
 
 START = 0  # by the loop: the instant of the start on the monotonic clock (ns); 0 before
@@ -22,21 +23,28 @@ LEFT = 5  # by the loop: not 0 once it runs no more steps
 EARLY, AT_STOP_TIME = 1, 2  # what LEFT says
 SAFE = 6  # by the loop: not 0 once the outputs are to hold their safe values to the end
 LIFELINE = slice(8, 8 + lifeline.SIZE)  # of the loop's thread
-WORDS = LIFELINE.stop
+TICKS = LIFELINE.stop  # by the supervisor, before the start: at how many ticks the run ends
+LAST = TICKS + 1  # likewise: the last tick with a due task, if it is another one than the diagram has; or 0
+WORDS = LAST + 1
 LEFT_OUT = (
     4096,
     2,
 )  # the ring of the ticks that the loop leaves out: its room, and its records, first and count
+OWN_RINGS = LEFT_OUT, box.NOTED
 
 
 class SharedMemory:
-    """The words of a real-time run: of control, of the times of each task, and of the rings.
+    """The words of a real-time run: of control, of the tasks' times, of the rings, of the parameter box.
 
-    ``left_out`` is the ring of the ticks that the loop leaves out.
+    ``left_out`` is the ring of the ticks that the loop leaves out, ``noted`` that of the groups of parameters
+    that it has taken from the ``box``.
     """
 
-    def __init__(self, words: Any, tasks: int, rings: Sequence[tuple[int, int]]) -> None:
-        """Divide the ``words``; ``rings`` are the records that each has room for, and their widths."""
+    def __init__(self, words: Any, tasks: int, rings: Sequence[tuple[int, int]], room: int = 0) -> None:
+        """Divide the ``words``; ``rings`` are the records that each has room for, and their widths.
+
+        ``room`` is that of the box.
+        """
         view = memoryview(words).cast("B").cast("q")
         self.control = view[:WORDS]
         ends = [WORDS + times.WORDS * (task + 1) for task in range(tasks)]
@@ -44,13 +52,15 @@ class SharedMemory:
         self.tasks = [view[end - times.WORDS : end] for end in ends]
         made = []
         start = WORDS + times.WORDS * tasks
-        for room, width in (*rings, LEFT_OUT):
-            size = RecordRing.size(room, width)
-            made.append(RecordRing(view[start : start + size], room, width))
+        for records, width in (*rings, *OWN_RINGS):
+            size = RecordRing.size(records, width)
+            made.append(RecordRing(view[start : start + size], records, width))
             start += size
-        self.rings, self.left_out = made[:-1], made[-1]
+        *self.rings, self.left_out, self.noted = made
+        self.box = ParameterBox(view[start : start + ParameterBox.size(room)], room)
 
     @staticmethod
-    def size(tasks: int, rings: Sequence[tuple[int, int]]) -> int:
+    def size(tasks: int, rings: Sequence[tuple[int, int]], room: int = 0) -> int:
         """Return the number of words."""
-        return WORDS + times.WORDS * tasks + sum(RecordRing.size(*ring) for ring in (*rings, LEFT_OUT))
+        sizes = sum(RecordRing.size(*ring) for ring in (*rings, *OWN_RINGS))
+        return WORDS + times.WORDS * tasks + sizes + ParameterBox.size(room)

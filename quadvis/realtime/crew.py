@@ -53,7 +53,8 @@ class Crew:
         self._tasks = {block.path: block.task for block in program.blocks}
         self._crew, self._kept = crew_words(program)
         self._memory = self.memory.raw.cast("q")
-        pacer.lead(self._crew, self._memory, self._failed)
+        pacer.write_into(self.memory)
+        pacer.lead(self._crew, self._failed)
         self._gates = [_Gate(self, number, pacer) for number in range(len(self._names))]
         self._parts = [
             interpreter.part(name, self._handover(number)) for number, name in enumerate(self._names)

@@ -40,6 +40,7 @@ ROW = 9
 # Behind the rows two tables by giver and reader: whether the giver has to latch, and where the copies stand.
 # Copies: how many, then for each the first slot to read, the first to write, and the number of slots.
 IDLE, BUSY, GIVEN = range(3)  # GIVEN: it runs, and its outputs are there and stand still
+LAST_BIT = 62  # of a word in which each task has a bit
 AT_REST, AT_ONCE = 1, 2  # the threads end once they are idle, or after their step
 
 
@@ -75,6 +76,24 @@ def release(plan: Any, shared: Any, tasks: Any, crew: Any, memory: Any, tick: in
                 _order(crew, memory, giver, task)
     unlock(crew)
     return answer
+
+
+def at_rest(crew: Any, tasks: int) -> bool:
+    """Return whether none of some tasks, given as bits, is running; the fastest is not asked for."""
+    found = True
+    if crew[COUNT] == 0:
+        return found
+    lock(crew)
+    for task in range(1, crew[COUNT]):
+        if (tasks >> bit(task)) & 1 != 0 and crew[HEAD + ROW * task + STATE] != IDLE:
+            found = False
+    unlock(crew)
+    return found
+
+
+def bit(task: int) -> int:
+    """Return the number of the bit of a task; the slowest of very many have one together."""
+    return min(task, LAST_BIT)
 
 
 def _order(crew: Any, memory: Any, giver: int, task: int) -> None:

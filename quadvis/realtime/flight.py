@@ -16,14 +16,15 @@ from quadvis.realtime.times import TaskTimes
 class Share:
     """What one computer did in a real-time run; ``computer`` is "" in a diagram without computers.
 
-    ``unsafe`` says why its outputs have held their safe values before the end, if they have. ``profile``
-    is that of its blocks, if it was asked for.
+    ``ticks`` is the number of its ticks, those left out included. ``unsafe`` says why its outputs have held
+    their safe values before the end, if they have. ``profile`` is that of its blocks, if it was asked for.
     """
 
     computer: str
     engine: Choice
     grants: Grants
     tasks: tuple[TaskTimes, ...]
+    ticks: int
     unsafe: str = ""
     profile: ProfileReport | None = None
 
@@ -41,13 +42,16 @@ class Share:
 
 @dataclass(frozen=True)
 class Flight:
-    """A real-time run that has reached its stop time.
+    """A real-time run that has reached its stop time, or was stopped.
 
-    ``lost`` is the number of rows that found no room on their way to the log and the verdicts.
+    ``lost`` is the number of rows that found no room on their way to the log and the verdicts. ``early`` says
+    why it ended at another time than its diagram says, ``duration`` is the time that it lasted then (s).
     """
 
     shares: tuple[Share, ...]
     lost: int
+    early: str = ""
+    duration: float | None = None
 
     @property
     def engine(self) -> Choice:

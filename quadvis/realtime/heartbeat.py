@@ -48,8 +48,7 @@ class Patience:
         longest = max(schedule.deadline(rhythm.every) for rhythm in schedule.rhythms)
         allowed = (2 + missed * stops) * schedule.interval
         startup = first + max(each.startup for each in all_limits) * longest
-        last = max(ticks - 1 - (ticks - 1 - offset) % every for every, offset in schedule.rhythms)
-        return Patience(name, words, allowed, first, startup, stops, last)
+        return Patience(name, words, allowed, first, startup, stops, schedule.last_due(ticks))
 
 
 class Sign(Enum):
@@ -102,7 +101,8 @@ class Heartbeat:
         last = start + begun if begun else max(start + self.patience.first, self._seen)
         if now - last <= self.patience.allowed:
             return Sign.WELL
-        patient = now - start <= self.patience.startup or words[control.TICK] >= self.patience.last
+        at_end = words[control.TICK] >= (words[control.LAST] or self.patience.last)
+        patient = at_end or now - start <= self.patience.startup
         return Sign.HANGS if self.patience.lasting and not patient else Sign.PAUSES
 
     @property

@@ -26,14 +26,16 @@ from quadvis.realtime.lifeline import Lifeline
 from quadvis.realtime.options import RealTime
 from quadvis.realtime.ring import RecordRing, Words
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
-from quadvis.realtime.streams import RowStream, streams_of
+from quadvis.realtime.streams import RowStream, StreamTaps, streams_of
 from quadvis.realtime.times import TaskTimes
+from quadvis.realtime.tuner import Tuned, room_for
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
 
 WARNED = 1.0  # s between two warnings
-LeftOut = Callable[[str, Words], None]  # takes a computer, and its ticks that were left out: first, count
+# Takes a computer, and its ticks that were left out: first, count; or its groups of parameters: number, tick.
+LeftOut = Callable[[str, Words], None]
 
 
 class Member:
@@ -53,26 +55,29 @@ class Member:
         engine: str,
         taps: Sequence[Tap],
         left_out: LeftOut,
+        noted: LeftOut,
         devices: PortBindings,
         announce: Announce,
     ) -> None:
         self.computer, self._part, self._announce = computer, part, announce
-        self._left_out = left_out
+        self._left_out, self._noted = left_out, noted
         self._limits = diagram.overload_of(computer)
         self._lines: dict[str, Any] = {}  # what it opens the ends of its links with
         self._streams = streams_of(part, taps)
         streams = tuple(stream for stream, _ in self._streams)
         rings = [stream.ring for stream in streams]
         count = len(part.tasks)
-        words = context.RawArray("q", SharedMemory.size(count, rings))
-        self._shared = SharedMemory(words, count, rings)
+        room = room_for(part)
+        words = context.RawArray("q", SharedMemory.size(count, rings, room))
+        self._shared = SharedMemory(words, count, rings, room)
         self._control = self._shared.control
+        self._control[control.TICKS] = self._written = diagram.ticks
         Lifeline(self._control[control.LIFELINE]).make()
         self._link, self._theirs = context.Pipe()
         setup = Setup(
             diagram.resolved, str(diagram.path.parent), diagram.path.name, diagram.own_blocks,
             IS_COMMAND.get(), computer, engine, wishes, count, streams, words, self._theirs, devices,
-            self._lines,
+            self._lines, room,
         )  # fmt: skip
         self.patience = Patience.of(computer, words, Schedule.of(part), self._limits, diagram.ticks)
         name = f"application {computer}".rstrip()
@@ -92,6 +97,17 @@ class Member:
         self._theirs.close()
         return self.process.pid or 0
 
+    def end_at(self, ticks: int) -> None:
+        """Let the application end after so many ticks, before it begins."""
+        if ticks != self._written:
+            self._control[control.TICKS] = ticks
+            self._control[control.LAST] = Schedule.of(self._part).last_due(ticks)
+
+    def tuned(self) -> Tuned:
+        """Return what tunes the application, which is ready."""
+        assert self.ready is not None
+        return Tuned(self._part, self._shared.box, self.ready.tunables)
+
     def begin(self, instant: int) -> None:
         """Let the application run from an instant (ns) of the monotonic clock on."""
         self._link.send(instant)
@@ -107,9 +123,26 @@ class Member:
         return bool(self._control[control.START])
 
     @property
+    def tick(self) -> int:
+        """The tick that began last."""
+        return int(self._control[control.TICK])
+
+    @property
     def time(self) -> float:
         """The time of the last tick (s)."""
-        return float(self._control[control.TICK] * self._part.tick)
+        return float(self.tick * self._part.tick)
+
+    @property
+    def ticks(self) -> int:
+        """How many ticks the run had, those left out included, now that it has ended."""
+        if not self.stopped:
+            return int(self._control[control.TICKS])
+        return self.tick + 1 if self.running else 0
+
+    def times(self) -> tuple[TaskTimes, ...]:
+        """Return the times of the tasks up to now."""
+        tasks = zip(self._part.tasks, self._shared.tasks, strict=True)
+        return tuple(TaskTimes.read(task.name, float(task.period), words) for task, words in tasks)
 
     @property
     def now(self) -> float:
@@ -130,6 +163,11 @@ class Member:
         return bool(self.ending.reason)
 
     @property
+    def stopped(self) -> bool:
+        """True if the application has ended because it was asked to."""
+        return self.ending is not None and self.ending.asked
+
+    @property
     def ended_silently(self) -> bool:
         """True if the application has ended without a word, and so perhaps without its safe values."""
         return self.ending is None and self.process.exitcode is not None
@@ -144,17 +182,18 @@ class Member:
         self._control[control.END] = 1
 
     def take(self, *, last: bool = False) -> None:
-        """Hand on the ticks that were left out, and the rows that have come.
+        """Hand on the ticks that were left out, the parameters that were taken, and the rows that have come.
 
-        Of both, what the loop has noted before a row that is handed on: the rows are taken first.
+        Of all, what the loop has noted before a row that is handed on: the rows are taken first.
         """
         found = [(stream, taps, ring.take(last=last)) for (stream, taps), ring in self._rings]
         self._left_out(self.computer, self._shared.left_out.take(last=last))
+        self._noted(self.computer, self._shared.noted.take(last=last))
         for stream, taps, records in found:
             stream.hand_on(records, taps)
 
     @property
-    def _rings(self) -> Iterable[tuple[tuple[RowStream, list[Tap]], RecordRing]]:
+    def _rings(self) -> Iterable[tuple[tuple[RowStream, StreamTaps], RecordRing]]:
         return zip(self._streams, self._shared.rings, strict=True)
 
     def listen(self) -> None:
@@ -202,14 +241,13 @@ class Member:
     def share(self) -> Share:
         """Return what the computer did, after the run."""
         assert self.ready is not None
-        tasks = zip(self._part.tasks, self._shared.tasks, strict=True)
-        found = tuple(TaskTimes.read(task.name, float(task.period), words) for task, words in tasks)
         assert self.ending is not None
         return Share(
             self.computer,
             self.ready.engine,
             self.ready.grants,
-            found,
+            self.times(),
+            self.ticks,
             self.ending.unsafe,
             self.ending.profile,
         )

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from quadvis.diagram.sections.overload import OverloadLimits
+from quadvis.engine.memory import Memory
 from quadvis.errors import RunError, counted, sentence
 from quadvis.realtime import control, dispatch, overload, pacing, times
 from quadvis.realtime import plan as plans
@@ -52,6 +53,8 @@ class Pacer:
         self._control: Any = shared.control
         self._times: Any = shared.times
         self._left_out: Any = shared.left_out.words
+        self._box: Any = shared.box.words
+        self._noted: Any = shared.noted.words
         self.clock = clock
         self._crew: Any = whole_words(dispatch.HEAD)
         self._memory: Any = whole_words(1)
@@ -59,19 +62,24 @@ class Pacer:
         for task in shared.tasks:
             times.clear(task)
 
-    def lead(self, crew: Any, memory: Any, fault: Callable[[], Exception]) -> None:
+    def write_into(self, memory: Memory) -> None:
+        """Let what comes by the parameter box, and what tasks give others, go into an engine's memory."""
+        self._memory = memory.raw.cast("q")
+
+    def lead(self, crew: Any, fault: Callable[[], Exception]) -> None:
         """Dispatch all tasks but the first, which run by themselves; see `dispatch` for the plans.
 
         ``fault`` gives the error where one of them has failed.
         """
         self._plan[plans.OWN] = 1
-        self._crew, self._memory, self._fault = crew, memory, fault
+        self._crew, self._fault = crew, fault
 
     @property
-    def words(self) -> tuple[Any, Any, Any, Any, Any, Any, Any]:
+    def words(self) -> tuple[Any, Any, Any, Any, Any, Any, Any, Any, Any]:
         """All that `pacing.wait` takes before the ticks."""
         return (
-            self._plan, self._control, self._times, self._left_out, self.clock, self._crew, self._memory
+            self._plan, self._control, self._times, self._left_out, self._box, self._noted, self.clock,
+            self._crew, self._memory,
         )  # fmt: skip
 
     @property

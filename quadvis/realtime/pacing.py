@@ -3,7 +3,8 @@
 All is done in whole numbers, by plain functions of words that can be indexed. Python runs them for the
 interpreter, and numba compiles the same functions for the compiled loop, so the two cannot differ. ``plan``
 is laid out by `plan`, ``shared`` by `control`, ``tasks`` are the words of all tasks as `times` has them,
-``left_out`` those of the ring of ticks that are left out, ``crew`` and ``memory`` are those of `dispatch`.
+``left_out`` those of the ring of ticks that are left out, ``box`` those of the parameter box and ``noted``
+those of the ring of the groups that were taken from it, ``crew`` and ``memory`` are those of `dispatch`.
 Instants are nanoseconds since the start.
 """
 
@@ -14,9 +15,11 @@ from typing import Any
 from quadvis.native import loop
 from quadvis.native.clock import GO
 from quadvis.native.routine import Routine
+from quadvis.realtime import box as box_words
 from quadvis.realtime import clocks, control, dispatch, times
+from quadvis.realtime.box import NUMBER, check
 from quadvis.realtime.clocks import now, signalled, sleep
-from quadvis.realtime.dispatch import release
+from quadvis.realtime.dispatch import at_rest, release
 from quadvis.realtime.grid import deadline, due_in, following, latest
 from quadvis.realtime.overload import ENDING, FAULTED, OVERLOADED, SIGNAL, missed, worse
 from quadvis.realtime.plan import (
@@ -35,6 +38,7 @@ from quadvis.realtime.plan import (
     STARTING,
     STARTUP,
     STEPPING,
+    TAKEN,
     TASKS,
     TICK,
     WAITING,
@@ -44,8 +48,9 @@ from quadvis.realtime.times import bin_of, count
 
 
 def wait(
-    plan: Any, shared: Any, tasks: Any, left_out: Any, clock: Any, crew: Any, memory: Any, tick: int, end: int
-) -> int:
+    plan: Any, shared: Any, tasks: Any, left_out: Any, box: Any, noted: Any, clock: Any, crew: Any,
+    memory: Any, tick: int, end: int,
+) -> int:  # fmt: skip
     """Wait until a tick from ``tick`` on may run, which ``plan[WAITING]`` is then, at most ``end``.
 
     Return `GO`, and the step has begun; or why it has not: then the wait goes on when it is called again.
@@ -78,12 +83,36 @@ def wait(
         if answer != GO:
             return answer
     if chosen < end:
+        if box[NUMBER] != plan[TAKEN]:
+            _take(plan, box, noted, crew, memory, chosen)
         if plan[OWN] < plan[TASKS]:
             answer = release(plan, shared, tasks, crew, memory, chosen)
             if answer != GO:
                 return answer
         _begin(plan, shared, chosen, instant)
     return GO
+
+
+def _take(plan: Any, box: Any, noted: Any, crew: Any, memory: Any, tick: int) -> None:
+    """Write the group of a box into memory if it may hold from a tick on, and note so."""
+    number = box[NUMBER]
+    if (
+        tick < box[box_words.NOT_BEFORE]
+        or not 0 <= box[box_words.LENGTH] <= box[box_words.ROOM]
+        or check(box, number) != box[box_words.CHECK]
+    ):
+        return
+    if not at_rest(crew, box[box_words.TASKS]):
+        return
+    at, end = box_words.HEAD, box_words.HEAD + box[box_words.LENGTH]
+    while at < end:
+        slot, count = box[at], box[at + 1]
+        at += box_words.ENTRY
+        for index in range(count):
+            memory[slot + index] = box[at + index]
+        at += count
+    plan[TAKEN] = number
+    put_pair(noted, box_words.NOTED[0], number, tick)
 
 
 def _begin(plan: Any, shared: Any, tick: int, instant: int) -> None:
@@ -135,15 +164,17 @@ def _skip(plan: Any, shared: Any, tasks: Any, left_out: Any, stop: int) -> int:
 
 
 def pace(
-    steering: Any, plan: Any, shared: Any, tasks: Any, left_out: Any, clock: Any, crew: Any, memory: Any
-) -> None:
+    steering: Any, plan: Any, shared: Any, tasks: Any, left_out: Any, box: Any, noted: Any, clock: Any,
+    crew: Any, memory: Any,
+) -> None:  # fmt: skip
     """Wait as the clock of the compiled loop, whose control words are ``steering``."""
     steering[loop.PAUSE] = wait(
-        plan, shared, tasks, left_out, clock, crew, memory, steering[loop.TICK], steering[loop.UNTIL]
-    )
+        plan, shared, tasks, left_out, box, noted, clock, crew, memory, steering[loop.TICK],
+        steering[loop.UNTIL],
+    )  # fmt: skip
     if steering[loop.PAUSE] == GO:
         steering[loop.TICK] = plan[WAITING]
         plan[WAITING] = -1
 
 
-PACE = Routine(pace, "wwwwwwww", {**clocks.MACHINE, **dispatch.MACHINE})
+PACE = Routine(pace, "wwwwwwwwww", {**clocks.MACHINE, **dispatch.MACHINE})

@@ -14,6 +14,7 @@ from quadvis.realtime.ring import PUTTING, RecordRing, Words
 
 HELD = 2.0  # s of rows for which there is room
 SPARE = 16  # records besides
+StreamTaps = Sequence[Sequence[Tap]]  # those of each block of a stream
 
 
 class RowStream(NamedTuple):
@@ -45,27 +46,32 @@ class RowStream(NamedTuple):
             machine = MachineCall(library().routine(PUTTING), places, ring)
         engine.observe(self.task, partial(_put, ring, engine.memory.raw, pieces), self.every, machine)
 
-    def hand_on(self, records: Words, taps: Sequence[Tap]) -> None:
-        """Give the rows in records to the taps, one for each of its blocks."""
+    def hand_on(self, records: Words, taps: StreamTaps) -> None:
+        """Give the rows in records to the taps of each of its blocks."""
         if not len(records):
             return
         start = 1
-        for tap, size in zip(taps, self.sizes, strict=True):
-            tap.take_all(records[:, 0].copy(), records[:, start : start + size].copy())
+        for own, size in zip(taps, self.sizes, strict=True):
+            for tap in own:
+                tap.take_all(records[:, 0].copy(), records[:, start : start + size].copy())
             start += size
 
 
-def streams_of(graph: Graph, taps: Sequence[Tap]) -> list[tuple[RowStream, list[Tap]]]:
-    """Return the streams that taps need, each with its taps."""
-    groups: dict[tuple[str, int], list[Tap]] = {}
+def streams_of(graph: Graph, taps: Sequence[Tap]) -> list[tuple[RowStream, StreamTaps]]:
+    """Return the streams that taps need, each with the taps of its blocks.
+
+    A stream has a block once, however many taps take its rows.
+    """
+    groups: dict[tuple[str, int], dict[str, list[Tap]]] = {}
     for tap in taps:
-        groups.setdefault((graph[tap.block].task.name, tap.every), []).append(tap)
-    found = []
+        group = groups.setdefault((graph[tap.block].task.name, tap.every), {})
+        group.setdefault(tap.block, []).append(tap)
+    found: list[tuple[RowStream, StreamTaps]] = []
     for (task, every), group in groups.items():
-        nodes = [graph[tap.block] for tap in group]
+        nodes = [graph[block] for block in group]
         room = math.ceil(HELD / (nodes[0].task.period * every)) + SPARE
         sizes = tuple(map(_row_size, nodes))
-        found.append((RowStream(task, every, tuple(tap.block for tap in group), sizes, room), group))
+        found.append((RowStream(task, every, tuple(group), sizes, room), list(group.values())))
     return found
 
 

@@ -9,6 +9,7 @@ from multiprocessing.connection import wait
 from typing import TYPE_CHECKING
 
 from quadvis.engine.taps import Tap
+from quadvis.engine.tuning import Change
 from quadvis.errors import QuadvisError, RunError
 from quadvis.machine.interrupts import held_back
 from quadvis.machine.processes import launching
@@ -18,15 +19,16 @@ from quadvis.realtime.cables import Cables
 from quadvis.realtime.devices import Devices
 from quadvis.realtime.flight import Flight
 from quadvis.realtime.guardian import Standing
+from quadvis.realtime.helm import Helm
 from quadvis.realtime.lines import Lines
 from quadvis.realtime.member import LeftOut, Member
 from quadvis.realtime.options import RealTime
+from quadvis.realtime.steering import Steering
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
 
 LEAD = 20_000_000  # ns from the moment when all are ready to the start
-LOOK = 0.02  # s between two looks at the rings
 HANG = 5.0  # s after which a step that has not ended is ended
 
 UNSAFE = "its outputs may not be at their safe values"
@@ -40,22 +42,33 @@ def supervise(
     left_out: LeftOut,
     tend: Callable[[float, float], None],
     announce: Announce | None = None,
+    helm: Helm | None = None,
+    changed: Callable[[Change], None] | None = None,
 ) -> Flight:
     """Run a diagram in real time to its stop time, each computer in a process of its own.
 
     ``wishes`` have been checked. ``taps`` take rows here, ``left_out`` the ticks that a computer has left
     out, before the rows of later ticks. ``tend`` is called again and again while it runs, with the time of
-    the last tick and the time since the start (s). RunError if a block fails, if the tasks have too many
-    overruns, if a step does not end, or if a process is killed. However this ends, all processes have ended
-    then, and all rows have been handed on.
+    the last tick and the time since the start (s). With a ``helm`` the run waits until this lets it begin;
+    ``changed`` takes each parameter that it tunes, before the rows of the tick from which it holds.
+
+    RunError if a block fails, if the tasks have too many overruns, if a step does not end, or if a process is
+    killed. However this ends, all processes have ended then, and all rows have been handed on.
     """
-    supervisor = _Supervisor(diagram, wishes, engine, taps, left_out, announce or _nothing)
+    steering = Steering(helm, diagram, changed or _nothing)
+    try:
+        supervisor = _Supervisor(diagram, wishes, engine, taps, left_out, announce or _nothing, steering)
+    except BaseException:
+        steering.end()
+        raise
     try:
         return supervisor.follow(tend)
     except BaseException as error:
         for note in supervisor.end():
             error.add_note(note)
         raise
+    finally:
+        steering.end()
 
 
 class _Supervisor:
@@ -67,7 +80,9 @@ class _Supervisor:
         taps: Sequence[Tap],
         left_out: LeftOut,
         announce: Announce,
+        steering: Steering,
     ) -> None:
+        self._steering = steering
         context = multiprocessing.get_context("spawn")
         self._announce = announce
         asked = {name: wishes.on(diagram.computer(name)) for name in diagram.graph.computers}
@@ -91,11 +106,13 @@ class _Supervisor:
                     engine,
                     own,
                     left_out,
+                    steering.noted,
                     bindings,
                     announce,
                 )
             )
-        self._begun = False
+        steering.take_over(self._members)
+        self._begun = self._stopping = False
         self._unsafe: list[str] = []  # what may be without its safe values, in sentences
 
     def follow(self, tend: Callable[[float, float], None]) -> Flight:
@@ -103,12 +120,19 @@ class _Supervisor:
         self._start()
         while any(member.process.is_alive() for member in self._members):
             sources = [source for member in self._alive for source in member.sources]
-            wait([*sources, *self._devices.sources], LOOK)
+            wait([*sources, *self._devices.sources, *self._steering.sources], self._steering.pause)
+            reached = self._steering.tick
             self._look()
+            self._steering.settle(reached)
             if alarm := self._devices.alarm():
                 raise self._stopped(alarm.reason, alarm.block)
             if not self._begun and all(member.ready for member in self._members):
-                self._begin()
+                self._begun = self._steering.may_begin()
+                if self._begun:
+                    self._begin()
+            self._steering.look()
+            if self._steering.is_stopped and not self._stopping:
+                self._stop()
             running = [member for member in self._members if member.running]
             if running:
                 tend(min(member.time for member in running), running[0].now)
@@ -116,14 +140,19 @@ class _Supervisor:
                 member.warn()
                 self._check_step(member)
         self._look(last=True)
+        self._steering.settle(max(member.tick for member in self._members), last=True)
         if unsafe := self._close():
             raise RunError("; ".join(unsafe))
         first = self._members[0]
         tend(min(member.time for member in self._members), first.now)
         for member in self._members:
             member.warn(last=True)
+        early = self._steering.early(stopped=any(member.stopped for member in self._members))
         return Flight(
-            tuple(member.share() for member in self._members), sum(member.lost for member in self._members)
+            tuple(member.share() for member in self._members),
+            sum(member.lost for member in self._members),
+            early,
+            self._steering.time if early else None,
         )
 
     def end(self) -> list[str]:
@@ -183,10 +212,18 @@ class _Supervisor:
 
     def _begin(self) -> None:
         """Let all applications run, from one instant on."""
-        self._begun = True
+        self._steering.begin()
         start = time.monotonic_ns() + LEAD
         for member in self._members:
             member.begin(start)
+
+    def _stop(self) -> None:
+        """Let all applications end before their next steps; a signal wakes those that sleep."""
+        self._stopping = True
+        if self._steering.is_safe_first:
+            self._devices.make_safe()
+        for member in self._alive:
+            member.process.terminate()
 
     def _look(self, *, last: bool = False) -> None:
         """Take what has come; an error if an application has ended early."""
@@ -194,7 +231,7 @@ class _Supervisor:
             ended = not member.process.is_alive()
             member.listen()
             member.take(last=last)
-            if member.failed and (ended or member.ending):
+            if member.failed and (ended or member.ending) and not (self._stopping and member.stopped):
                 raise self._cause(member)
 
     def _cause(self, member: Member) -> QuadvisError:
@@ -210,5 +247,5 @@ class _Supervisor:
         raise self._stopped(f"the step has not ended after {longest:g} s")
 
 
-def _nothing(_: str) -> None:
-    """Announce nothing."""
+def _nothing(_: object) -> None:
+    """Take what nobody wants."""

@@ -10,23 +10,19 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from quadvis.block import Param
 from quadvis.diagram.diagram import Diagram
-from quadvis.diagram.settings import read_setting
 from quadvis.diagram.times import read_duration
-from quadvis.diagram.values import read_constant, read_value
 from quadvis.document import YamlScalar
 from quadvis.engine.clock import Clock
 from quadvis.engine.engine import Engine, Snapshot
 from quadvis.engine.tuning import Change
-from quadvis.errors import Faults, Place, QuadvisError, known, quoted, sentence, suggestion
+from quadvis.errors import QuadvisError
 from quadvis.graph.devices import refuse_devices
-from quadvis.graph.graph import Node
-from quadvis.graph.names import read_name
 from quadvis.run.played_files import files_text, played_files
 from quadvis.run.row_tap import RowTap, Taker
 from quadvis.run.rows import inputs_of, signals_of
 from quadvis.run.session import metadata
+from quadvis.run.tuned import find_value, new_values
 
 if TYPE_CHECKING:
     from quadvis.output.log import LogWriter
@@ -37,8 +33,10 @@ class LiveRun:
 
     ``run["craft.position"]`` is the present value of a signal, parameter or state, in SI units; an index is
     allowed, and so are the ports of parts. ``run["control/roll.bandwidth"] = "3 rad/s"`` lets a tunable
-    parameter have a new value from the next tick on; numbers are in SI units. Blocks are closed, and outputs
-    left at their safe values, when the context ends. ``log`` is the path of a log, which can be replayed.
+    parameter have a new value from the next tick on; numbers are in SI units. ``run["bandwidth"]`` is a
+    parameter of the diagram, ``run["control.bandwidth"]`` of a part: all blocks that have it change. Blocks
+    are closed, and outputs left at their safe values, when the context ends. ``log`` is the path of a log,
+    which can be replayed.
     """
 
     def __init__(self, diagram: Diagram, clock: Clock | None = None, log: str | Path | None = None) -> None:
@@ -103,37 +101,12 @@ class LiveRun:
             self._writer.flush_late()
 
     def __getitem__(self, name: str) -> Any:
-        path, port, index = self._find(name)
+        path, port, index = find_value(self.diagram, name)
         value = self._engine.read(path, port)
         return value[index] if index else value
 
     def __setitem__(self, name: str, value: Any) -> None:
-        path, parameter, index = self._find(name)
-        if index:
-            raise QuadvisError(f"{quoted(name)} is a part of a parameter; give all of it")
-        node = self.diagram.graph[path]
-        params = node.block.interface.params
-        if parameter not in params:
-            remedy = suggestion(name, self._engine.tuning.names) or "only parameters can be tuned"
-            raise QuadvisError(f"{quoted(name)} is no parameter; {remedy}")
-        self._engine.tuning.set(path, parameter, _value(node, params[parameter], name, value))
-
-    def _find(self, name: str) -> tuple[str, str, Any]:
-        """Return the block, the name within it, and the index; QuadvisError if nothing has the name."""
-        nodes = self.diagram.graph.nodes
-        head, bracket, tail = name.partition("[")
-        wire = read_name(self.diagram.ports.get(head, head) + bracket + tail)
-        if wire is None or wire.block not in (node.path for node in nodes):
-            outputs = [f"{node.path}.{port}" for node in nodes for port in node.block.interface.outputs]
-            names = [*outputs, *self.diagram.ports, *self._engine.tuning.names]
-            raise QuadvisError(sentence(f"this run has no {quoted(name)}", suggestion(head, names)))
-        interface = self.diagram.graph[wire.block].block.interface
-        names = [*interface.outputs, *interface.inputs, *interface.params, *interface.states]
-        if wire.port not in names:
-            raise QuadvisError(
-                sentence(f"block '{wire.block}' has no '{wire.port}'", suggestion(wire.port, names))
-            )
-        return wire.block, wire.port, wire.index
+        self._engine.tuning.set_all(new_values(self.diagram, {name: value}))
 
     def snapshot(self) -> Snapshot:
         """Return the whole state of the run, between two ticks."""
@@ -153,14 +126,3 @@ class LiveRun:
 def _seconds(duration: str | float) -> Fraction:
     text = duration if isinstance(duration, str) else f"{float(duration)!r} s"
     return read_duration(YamlScalar(text, False, "advance", 0, 0))
-
-
-def _value(node: Node, param: Param, name: str, value: Any) -> Any:
-    """Return a value in SI units, read from a text in the parameter's unit or taken as it is."""
-    if not isinstance(value, str) or param.is_text or param.choices:
-        return value
-    faults = Faults()
-    written = read_constant(read_setting(value, param.name, Place(name)), faults)
-    faults.check()
-    assert known(written)
-    return read_value(param.signal, node.units[param.name], written)[0]

@@ -25,6 +25,7 @@ from quadvis.run.row_tap import PacedTap, RowTap
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
     from quadvis.realtime.flight import Flight
+    from quadvis.realtime.helm import Helm
     from quadvis.realtime.options import RealTime
 
 SIMULATED, REAL_TIME = "simulated", "real time"  # the clock of a run, as its log says
@@ -120,11 +121,19 @@ class Paced:
 
     clock, early = REAL_TIME, ""
 
-    def __init__(self, diagram: Diagram, engine: str, announce: Announce | None, wishes: RealTime) -> None:
+    def __init__(
+        self,
+        diagram: Diagram,
+        engine: str,
+        announce: Announce | None,
+        wishes: RealTime,
+        helm: Helm | None = None,
+    ) -> None:
         parts = live_parts(diagram.graph)
         for computer, part in parts.items():
             wishes.on(diagram.computer(computer)).check(part)
         self._diagram, self._engine, self._announce, self._wishes = diagram, engine, announce, wishes
+        self._helm = helm
         self.profiles: Mapping[str, ProfileReport] = {}  # by computer, after a run for which they were asked
         self.computers: Sequence[str] = [*parts]
         self.graphs: Sequence[Graph] = [*parts.values()]
@@ -136,10 +145,12 @@ class Paced:
         taps = paced_taps(takers.taken, self._diagram)
         flight = supervise(
             self._diagram, self._wishes, self._engine, [*taps, *takers.taps], takers.left_out, takers.tend,
-            self._announce,
+            self._announce, self._helm, takers.changed,
         )  # fmt: skip
+        self.early = flight.early
+        ticks = {share.computer: share.ticks for share in flight.shares}
         for tap in taps:
-            tap.end(self._diagram.ticks)
+            tap.end(ticks[self._diagram.graph[tap.block].computer])
         self.profiles = {share.computer: share.profile for share in flight.shares if share.profile}
         return flight.engine, flight
 

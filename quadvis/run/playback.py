@@ -15,9 +15,8 @@ from quadvis.block import NO_FRAME, Block
 from quadvis.engine.tuning import Change
 from quadvis.errors import QuadvisError, quoted
 from quadvis.graph.graph import Graph, Node
-from quadvis.output.recording import Slots
+from quadvis.output.recording import Slots, ports
 from quadvis.run.outside import outside
-from quadvis.run.rows import ports
 
 Whole = NDArray[np.int64]
 
@@ -78,10 +77,12 @@ class RecordedClock:
     """Lets the ticks go that a recorded run had, and tunes parameters before the ticks before which it did.
 
     ``left_out`` are the ticks that it left out, as the first and the count of each run of ticks (N, 2), in
-    order. ``tune`` takes a change.
+    order. ``tune`` takes all changes of a tick, which were checked together.
     """
 
-    def __init__(self, left_out: Whole, changes: Sequence[Change], tune: Callable[[Change], None]) -> None:
+    def __init__(
+        self, left_out: Whole, changes: Sequence[Change], tune: Callable[[Sequence[Change]], None]
+    ) -> None:
         self._first, self._stop = left_out[:, 0].tolist(), left_out.sum(axis=1).tolist()
         self._changes = sorted(changes, key=lambda change: change.tick)
         self._tune = tune
@@ -94,7 +95,9 @@ class RecordedClock:
             place = bisect_right(self._first, tick)
         if tick >= end:
             return range(end, end)
-        while self._changes and self._changes[0].tick <= tick:
-            self._tune(self._changes.pop(0))
+        due = bisect_right(self._changes, tick, key=lambda change: change.tick)
+        if due:
+            self._tune(self._changes[:due])
+            del self._changes[:due]
         following = [*self._first[place : place + 1], *(change.tick for change in self._changes[:1])]
         return range(tick, min(end, *following)) if following else range(tick, end)

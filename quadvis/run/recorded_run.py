@@ -16,12 +16,11 @@ from quadvis.errors import QuadvisError, quoted
 from quadvis.graph.graph import Graph, Node
 from quadvis.links.endpoints import live_parts
 from quadvis.output.log_reader import Log
-from quadvis.output.recording import RecordedBlock, Slots
-from quadvis.output.stretch import NANOSECONDS
+from quadvis.output.recording import RecordedBlock, Slots, ports
+from quadvis.output.stretch import NANOSECONDS, stamps_of
 from quadvis.run.loops import REAL_TIME, SIMULATED
 from quadvis.run.outside import outside
-from quadvis.run.row_tap import stamps_of
-from quadvis.run.rows import all_logged, input_topic, left_out, ports
+from quadvis.run.rows import all_logged, input_topic, left_out
 
 Whole = NDArray[np.int64]
 AGAIN = "run the diagram again with this quadvis"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from quadvis.diagram.load import load_text
 from quadvis.engine.engine import Engine
-from quadvis.engine.tuning import Change
+from quadvis.engine.tuning import Change, NewValue
 from quadvis.errors import DiagramError, QuadvisError, RunError
 from quadvis.errors.caller import as_given
 from quadvis.machine.files import reading
@@ -161,8 +162,8 @@ class _Repeated:
         graph = with_playback(part.graph, part.inputs(self._run.ticks))
         made = Engine(graph, self._diagram.seed)
 
-        def tune(change: Change) -> None:
-            made.tuning.set(change.path, change.name, change.value)
+        def tune(changes: Sequence[Change]) -> None:
+            made.tuning.set_all([NewValue(*change[1:]) for change in changes])
 
         made.clock = RecordedClock(part.left_out, part.changes(), tune)
         return made

@@ -11,8 +11,8 @@ from quadvis.engine.taps import Tap
 from quadvis.output.comparison import BlockComparison, SignalDifference
 from quadvis.output.log_reader import Log
 from quadvis.output.recording import SLOT, Slots
+from quadvis.output.stretch import stamps_of
 from quadvis.run.recorded_run import RecordedPart, check_ports
-from quadvis.run.row_tap import stamps_of
 from quadvis.run.rows import RecordedNode
 
 Whole = NDArray[np.int64]

@@ -12,17 +12,9 @@ from numpy.typing import NDArray
 from quadvis.engine.taps import Tap
 from quadvis.graph.graph import Graph, Node
 from quadvis.output.kept import RowJudge
-from quadvis.output.stretch import NANOSECONDS
+from quadvis.output.stretch import NANOSECONDS, stamps_of
 
 Whole = NDArray[np.int64]
-
-
-def stamps_of(ticks: Whole, period: Fraction) -> Whole:
-    """Return the stamps (ns) of ticks, rounded down."""
-    numerator, denominator = (period * NANOSECONDS).as_integer_ratio()
-    if len(ticks) and int(ticks[-1]) * numerator > np.iinfo(np.int64).max:
-        return np.array([tick * numerator // denominator for tick in ticks.tolist()], np.int64)
-    return ticks * numerator // denominator
 
 
 @dataclass(frozen=True)

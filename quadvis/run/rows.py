@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from quadvis.diagram.diagram import Diagram
 from quadvis.graph.graph import Graph, Node
-from quadvis.output.recording import RecordedBlock, RecordedPort
+from quadvis.output.recording import RecordedBlock, RecordedPort, ports
 from quadvis.run.outside import outside
 
 FOLDER = "/_replay"  # of the topics that only a replay needs
@@ -59,13 +59,3 @@ def input_topic(path: str) -> str:
 def left_out(computer: str) -> RecordedBlock:
     """Return the topic of the ticks that a computer has left out in a real-time run: the first, how many."""
     return RecordedBlock("/".join(filter(None, (FOLDER, "left_out", computer))), LEFT_OUT, hidden=True)
-
-
-def ports(node: Node) -> tuple[RecordedPort, ...]:
-    """Return the outputs of a node that a row holds: all but frames."""
-    outputs = node.block.interface.outputs
-    return tuple(
-        RecordedPort(name, port.signal.scalar, node.shape(name), node.unit(name))
-        for name, port in outputs.items()
-        if port.signal.scalar != "frame"
-    )

@@ -22,10 +22,11 @@ from quadvis.engine.tuning import Change
 from quadvis.native.choice import AUTO, Announce
 from quadvis.output.kept import ALL, RowJudge, RunSignals
 from quadvis.output.recording import RecordedBlock
+from quadvis.output.stretch import stamps_of
 from quadvis.run.loops import SIMULATED, Paced, Progress, RunLoop, Simulated, Taken, Takers
 from quadvis.run.played_files import files_text, played_files
 from quadvis.run.result import Result
-from quadvis.run.row_tap import RowTap, Taker, stamps_of
+from quadvis.run.row_tap import RowTap, Taker
 from quadvis.run.rows import inputs_of, left_out, signals_of
 from quadvis.run.verdict import Judging, Outcome
 from quadvis.version import __version__
@@ -127,11 +128,13 @@ def recorded(
             row.judge.flush()
         outcome = judging.outcome()
         if writer:
-            writer.close({"stopped": loop.early} if loop.early else _closing(outcome, flight))
+            closing = {} if loop.early and not flight else _closing(outcome, flight)
+            writer.close(closing | ({"stopped": loop.early} if loop.early else {}))
             signals.written(writer.path, writer.loss)
     wall, cpu = time.perf_counter() - wall, _processor_time() - cpu
     lost = writer.loss if writer else ""
-    return Result(diagram, signals, outcome, diagram.duration, wall, cpu, lost, choice, flight)
+    duration = diagram.duration if flight is None or flight.duration is None else flight.duration
+    return Result(diagram, signals, outcome, duration, wall, cpu, lost, choice, flight)
 
 
 def _processor_time() -> float:

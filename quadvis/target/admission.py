@@ -5,18 +5,20 @@ from __future__ import annotations
 import hashlib
 import inspect
 import os
+from dataclasses import replace
 from pathlib import Path
 
 from quadvis.diagram.diagram import Diagram
+from quadvis.diagram.knobs import Knob
 from quadvis.diagram.load import load_text
 from quadvis.errors import QuadvisError, quoted
 from quadvis.graph.graph import Node
 from quadvis.machine.shipped import is_shipped
-from quadvis.target.bundle import Bundle
+from quadvis.target.bundle import ApplicationBundle
 from quadvis.version import __version__
 
 
-def admit(bundle: Bundle, place: Path) -> Diagram:
+def admit(bundle: ApplicationBundle, place: Path) -> Diagram:
     """Return the diagram of a bundle whose file stands at a place; QuadvisError if it may not run here.
 
     Its blocks must be installed, from the same source as on the host. Its files stay in its folder.
@@ -35,7 +37,29 @@ def admit(bundle: Bundle, place: Path) -> Diagram:
         raise QuadvisError(
             f"the diagram has no computer {quoted(bundle.computer)}; it has {', '.join(computers)}"
         )
-    return diagram
+    return replace(diagram, ports=_ports(bundle, diagram), knobs=_knobs(bundle, diagram))
+
+
+def _ports(bundle: ApplicationBundle, diagram: Diagram) -> dict[str, str]:
+    """Return the ports of parts whose signals are there."""
+    signals = {f"{node.path}.{port}" for node in diagram.graph.nodes for port in node.block.interface.outputs}
+    return {name: str(of) for name, of in bundle.ports.items() if str(of).partition("[")[0] in signals}
+
+
+def _knobs(bundle: ApplicationBundle, diagram: Diagram) -> dict[str, Knob]:
+    """Return the parameters of parts and of the diagram; QuadvisError if they mean what is not there."""
+    found = {}
+    for name, plain in bundle.knobs.items():
+        try:
+            targets, elsewhere = plain
+            knob = Knob(tuple((str(path), str(own)) for path, own in targets), tuple(map(str, elsewhere)))
+            known = all(own in diagram.graph[path].block.interface.params for path, own in knob.targets)
+        except (TypeError, ValueError, LookupError):
+            known = False
+        if not known:
+            raise QuadvisError(f"the bundle's parameter {quoted(name)} means none of the diagram's blocks")
+        found[name] = knob
+    return found
 
 
 def source_digest(made: type) -> str:
@@ -43,7 +67,7 @@ def source_digest(made: type) -> str:
     return hashlib.sha256(Path(inspect.getfile(made)).read_bytes()).hexdigest()
 
 
-def _check_source(node: Node, bundle: Bundle) -> None:
+def _check_source(node: Node, bundle: ApplicationBundle) -> None:
     """Refuse a block that is another one on the host."""
     if node.origin:
         return
@@ -66,7 +90,7 @@ def _check_paths(node: Node, tree: Path) -> None:
             )
 
 
-def _versions(bundle: Bundle) -> str:
+def _versions(bundle: ApplicationBundle) -> str:
     if bundle.version == __version__:
         return ": install the same quadvis and the same blocks on both"
     return f": the host has quadvis {bundle.version}, the target {__version__}; install the same"

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import replace
-from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from quadvis.diagram.diagram import Diagram
-from quadvis.diagram.times import read_duration
-from quadvis.document import YamlScalar
 from quadvis.errors import QuadvisError
 from quadvis.run.result import Result
-from quadvis.run.tuned import read_tuned
-from quadvis.target.bundle import Bundle
+from quadvis.run.tuned import new_values
+from quadvis.target.bundle import ApplicationBundle
 from quadvis.target.newest import Newest
-from quadvis.target.parameters import Parameters
+from quadvis.target.parameters import Parameters, as_written
+from quadvis.target.scopes import ApplicationScopes
 from quadvis.target.session import Session
 from quadvis.target.store import Store
+from quadvis.wire.desk import Done
 
 if TYPE_CHECKING:
     from quadvis.target.kernel import Publish
@@ -30,20 +29,21 @@ STOPPED, LOADING, READY, RUNNING, STOPPING = "stopped", "loading", "ready", "run
 class Application:
     """One application. Its state is ``loading`` until its processes are ready, and then ``ready``.
 
-    A run goes from there to ``running`` and to ``stopped``; the next `start` begins anew. The values that were
-    tuned stay. ``problem`` says why the last run came to an early end, ``result`` is that of the last run.
+    A run goes from there to ``running`` and to ``stopped``; the next `start` begins anew. The values that
+    were tuned stay. ``problem`` says why the last run came to an early end, ``result`` is its result.
     """
 
-    def __init__(self, bundle: Bundle, diagram: Diagram, store: Store, publish: Publish) -> None:
+    def __init__(self, bundle: ApplicationBundle, diagram: Diagram, store: Store, publish: Publish) -> None:
         self.bundle, self.diagram = bundle, diagram
         self.parameters = Parameters(diagram)
         self.newest = Newest(diagram)
+        self.scopes = ApplicationScopes(diagram, store.scope_folder(bundle.name), publish)
         self.result: Result | None = None
         self.problem = ""
         self.said: list[str] = []  # since the last start
         self._store, self._publish = store, publish
         self._session: Session | None = None
-        self._stop_time: Fraction | None = None
+        self._stop_time: float | None = None
         self._drawing: Future[Any] | None = None
 
     @property
@@ -57,6 +57,11 @@ class Application:
         return self._session
 
     @property
+    def stop_time(self) -> float:
+        """The stop time of the next run, or of the one that goes on (s)."""
+        return float(self.diagram.stop_time if self._stop_time is None else self._stop_time)
+
+    @property
     def running(self) -> bool:
         """True while the loops run."""
         return self.state in (RUNNING, STOPPING)
@@ -67,6 +72,8 @@ class Application:
         session = self._session
         if session is None or not session.running:
             return STOPPED
+        if session.stopped:
+            return STOPPING
         return {"starting": LOADING, "ready": READY, "running": RUNNING}.get(session.helm.state, STOPPING)
 
     # from loaded to stopped
@@ -75,17 +82,19 @@ class Application:
         """Start the processes; the Future is done when they are ready to run."""
         assert self._session is None or not self._session.running
         self.newest.clear()
+        self.scopes.begin()
         self.problem, self.result, self.said = "", None, []
         self._session = Session(
-            self._timed(), self.bundle.engine, self._store.next_log(self.name), self.newest.taps, self._say,
+            self.diagram, self.bundle.engine, self._store.next_log(self.name),
+            [*self.newest.taps, *self.scopes.taps], self._stop_time, self._say, self.scopes.settle,
             self._ended,
         )  # fmt: skip
         if self.parameters.tuned:
             self._session.helm.tune(self.parameters.tuned)
         return self._session.ready
 
-    def start(self) -> Future[Any]:
-        """Start a run; QuadvisError if one is going on."""
+    def start(self, at: int | None = None) -> Future[Any]:
+        """Start a run, at an instant (ns) if one is given; QuadvisError if one is going on."""
         if self.running:
             raise QuadvisError(f"{self.name} runs already")
         ready = self._session.ready if self.state in (LOADING, READY) else self.prepare()  # type: ignore[union-attr]
@@ -98,7 +107,7 @@ class Application:
             if problem is not None:
                 begun.set_exception(problem)
             else:
-                session.helm.begin()
+                session.helm.begin(at)
                 self._event("started")
                 begun.set_result(session.log.stem)
 
@@ -113,11 +122,15 @@ class Application:
         session.helm.stop()
         return session.over
 
-    def make_safe(self, reason: str) -> None:
-        """Give all outputs their safe values for the rest of the run, and stop it."""
-        session = self._session
-        if session is not None and session.running:
-            session.helm.make_safe(reason)
+    def align(self, shift: int) -> None:
+        """Move the ticks of the run by so much since its start (ns), slowly."""
+        if self._session is not None:
+            self._session.helm.align(shift)
+
+    def make_safe(self) -> None:
+        """Give all outputs their safe values at once, and stop the run."""
+        if self._session is not None and self._session.running:
+            self._session.helm.stop(safe_first=True)
 
     def close(self) -> None:
         """End all that goes on."""
@@ -126,23 +139,22 @@ class Application:
             session.helm.stop()
             session.join()
 
-    def set_times(self, stop_time: Any, sample_time: Any) -> None:
-        """Give the next run another stop time or another sample time; QuadvisError while one is going on."""
+    def refuse_times(self) -> None:
+        """Raise QuadvisError while a run is going on."""
         if self.running:
             raise QuadvisError("times cannot change in a run: stop it first")
+
+    def set_times(self, stop_time: float | None, sample_time: float | None) -> None:
+        """Give the next run another stop time or another sample time (s); `inf` is a run without end."""
+        from quadvis.target.rescale import lasting, rescaled
+
+        changed = self.diagram if sample_time is None else rescaled(self.diagram, sample_time)
         if stop_time is not None:
-            self._stop_time = read_duration(YamlScalar(_seconds(stop_time), False, "stop_time", 0, 0))
-        if sample_time is not None:
-            from quadvis.target.rescale import rescaled
-
-            self.diagram = rescaled(self.diagram, _seconds(sample_time))
+            fitting = lasting(changed, stop_time) if math.isfinite(stop_time) else None
+            self._stop_time, changed = (stop_time, changed) if fitting is None else (None, fitting)
         self.close()
-        self.prepare()
-
-    def _timed(self) -> Diagram:
-        if self._stop_time is None:
-            return self.diagram
-        return replace(self.diagram, stop_time=self._stop_time)
+        self.diagram = changed
+        self.prepare().result()
 
     def _say(self, sentence: str) -> None:
         self.said.append(sentence)
@@ -152,6 +164,7 @@ class Application:
         session = self._session
         assert session is not None
         self.problem, self.result = session.problem, session.result
+        self.scopes.end()
         self._event("stopped", problem=self.problem)
 
     def _event(self, what: str, **more: Any) -> None:
@@ -160,36 +173,38 @@ class Application:
     # looking and tuning
 
     def values(self, names: Sequence[str]) -> dict[str, Any]:
-        """Return the newest values of signals by name, with their ticks; of all if none is named."""
+        """Return the newest values of signals by name; of all if none is named. None is one not there yet."""
         found = [self.newest.value(name) for name in (names or self.newest.names)]
-        return {each.name: [each.value, each.tick] for each in found}
+        return {each.name: each.value for each in found}
 
     def tune(self, values: Mapping[str, Any]) -> Future[Any]:
         """Give parameters values, all at one tick.
 
         The Future has the tick, its time, and what has changed: ``[{name, old, new}]``.
         """
-        changes = [each for name, value in values.items() for each in read_tuned(self.diagram, name, value)]
-        before = {(path, name): self.parameters.text(path, name) for path, name, _ in changes}
+        group = new_values(self.diagram, {name: as_written(value) for name, value in values.items()})
+        before = {(each.path, each.name): self.parameters.text(each.path, each.name) for each in group}
         told: Future[Any] = Future()
 
         def took(tick: int) -> None:
-            self.parameters.took(changes)
+            self.parameters.took(group)
             facts = [
-                {"name": f"{path}.{name}", "old": before[path, name], "new": self.parameters.text(path, name)}
-                for path, name, _ in changes
+                {"name": f"{path}.{name}", "old": old, "new": self.parameters.text(path, name)}
+                for (path, name), old in before.items()
             ]
             time = float(tick * self.diagram.graph.tick)
             self._event("tuned", tick=tick, time=time, changes=facts)
-            told.set_result({"tick": tick, "time": time, "changes": facts})
+            found = {"tick": tick, "time": time, "changes": facts}
+            old, new = ({each["name"]: each[which] for each in facts} for which in ("old", "new"))
+            told.set_result(Done(found, tick, old, new))
 
         session = self._session
-        if session is None or not session.running:
-            # nothing runs: the next run begins with these values, once they are found to be right
-            took_at_start = self.parameters.check(changes)
-            took(took_at_start)
+        if session is None or not self.running:
+            self.parameters.check(group)
+            if session is not None and session.running:
+                session.helm.tune(group)
+            took(0)  # the next run begins with them
             return told
-        waiting = session.helm.tune(changes)
 
         def done(future: Future[int]) -> None:
             problem = future.exception()
@@ -198,7 +213,7 @@ class Application:
             else:
                 took(future.result())
 
-        waiting.add_done_callback(done)
+        session.helm.tune(group).add_done_callback(done)
         return told
 
     def drawing(self) -> Future[Any]:
@@ -216,7 +231,3 @@ def _draw(diagram: Diagram, drawing: Future[Any]) -> None:
         drawing.set_result(draw_diagram(diagram))
     except Exception as error:
         drawing.set_exception(error)
-
-
-def _seconds(time: Any) -> str:
-    return time if isinstance(time, str) else f"{float(time)!r} s"

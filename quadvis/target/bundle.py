@@ -6,9 +6,10 @@ SHA-256. Blocks are named; the target has them installed, with the same source o
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -22,12 +23,14 @@ MOST_FILES = 10_000
 
 
 @dataclass(frozen=True)
-class Bundle:
+class ApplicationBundle:
     """A resolved diagram with what it needs.
 
     ``place`` is where its file lies in the bundle's folder, ``files`` the SHA-256 of the other files there by
-    their paths, ``sources`` that of the Python file of each block by the block's name. ``engine`` is one of
-    those of `quadvis.native.choice`. ``computer`` is the one of the diagram that the target is; "" for all.
+    their paths, ``sources`` that of the Python file of each block by the block's name. ``ports`` and
+    ``knobs`` are names that the resolved diagram has no more, as `Diagram` has them: ports of parts,
+    parameters of parts. ``engine`` is one of those of `quadvis.native.choice`. ``computer`` is the one of the
+    diagram that the target is; "" for all.
     """
 
     name: str
@@ -38,22 +41,41 @@ class Bundle:
     sources: Mapping[str, str]
     hash: str
     version: str
+    ports: Mapping[str, str] = field(default_factory=dict)
+    knobs: Mapping[str, Any] = field(default_factory=dict)
     engine: str = "auto"
     computer: str = ""
 
     def plain(self) -> dict[str, Any]:
         """Return it as plain data."""
         facts = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return {"format": FORMAT, **facts, "files": dict(self.files), "sources": dict(self.sources)}
+        maps = {name: dict(facts[name]) for name in ("files", "sources", "ports", "knobs")}
+        return {"format": FORMAT, **facts, **maps}
+
+    @property
+    def data(self) -> bytes:
+        """The bundle as a file: JSON."""
+        return json.dumps(self.plain(), sort_keys=True).encode()
 
     @staticmethod
-    def read(plain: Mapping[str, Any]) -> Bundle:
+    def parse(data: bytes) -> ApplicationBundle:
+        """Read a bundle's file of unknown origin; QuadvisError if anything is not as it must be."""
+        try:
+            plain = json.loads(data)
+        except (ValueError, RecursionError):
+            plain = None
+        if not isinstance(plain, dict):
+            raise QuadvisError("this file is no bundle")
+        return ApplicationBundle.read(plain)
+
+    @staticmethod
+    def read(plain: Mapping[str, Any]) -> ApplicationBundle:
         """Read it from plain data of unknown origin; QuadvisError if anything is not as it must be."""
         if plain.get("format") != FORMAT:
             raise QuadvisError(
                 f"this is no bundle of format {FORMAT}: use the same quadvis on host and target"
             )
-        given = {name: plain.get(name) for name in Bundle.__dataclass_fields__}
+        given = {name: plain.get(name) for name in ApplicationBundle.__dataclass_fields__}
         texts = ("name", "variant", "text", "place", "hash", "version", "engine", "computer")
         for name in texts:
             if not isinstance(given[name], str):
@@ -61,9 +83,14 @@ class Bundle:
         for name in ("files", "sources"):
             if not _is_digests(given[name]):
                 raise QuadvisError(f"the bundle's {name!r} must be SHA-256 by name, at most {MOST_FILES}")
-        made = Bundle(**given)  # type: ignore[arg-type]
+        for name in ("ports", "knobs"):
+            if not isinstance(given[name], dict):
+                raise QuadvisError(f"the bundle's {name!r} must be a map")
+        made = ApplicationBundle(**given)  # type: ignore[arg-type]
         if not NAME.fullmatch(made.name):
-            raise QuadvisError(f"{quoted(made.name)} is no name of an application: use letters, digits, _ . -")
+            raise QuadvisError(
+                f"{quoted(made.name)} is no name of an application: use letters, digits, _ . -"
+            )
         if len(made.text) > MOST_TEXT:
             raise QuadvisError(f"the diagram has more than {MOST_TEXT} characters")
         for path in (made.place, *made.files):

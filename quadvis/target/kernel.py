@@ -1,24 +1,22 @@
-"""The kernel: one application loaded, started, stopped, looked at and tuned, by the verbs of `quadvis.wire`."""
+"""The kernel: one application loaded, started, stopped, looked at and tuned, by the verbs of the wire."""
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.sections.on_host_loss import CONTINUE, SAFE
-from quadvis.errors import QuadvisError, quoted
+from quadvis.errors import QuadvisError
 from quadvis.target.admission import admit
 from quadvis.target.application import Application
-from quadvis.target.bundle import Bundle
+from quadvis.target.bundle import DIGEST, ApplicationBundle
 from quadvis.target.parameters import compared, read_set
 from quadvis.target.status import status
 from quadvis.target.store import Store
 
-PIECE = 1_000_000  # bytes of a file in one reply
 Publish = Callable[[str, Mapping[str, Any], Any], None]  # takes a topic, a header, an array or None
 
 
@@ -34,6 +32,8 @@ class Kernel:
         self._publish = publish
         self._born = time.monotonic()
         self._application: Application | None = None
+        # What takes long is done here, one after the other; the verbs are answered meanwhile.
+        self._worker = ThreadPoolExecutor(1, "target")
 
     def call(self, verb: str, arguments: Mapping[str, Any]) -> Any:
         """Do what a verb of the wire says."""
@@ -41,8 +41,13 @@ class Kernel:
 
     def close(self) -> None:
         """End a run, with its outputs at their safe values."""
+        application = self._application
+        if application is not None:
+            application.close()
+        self._worker.shutdown()
         if self._application is not None:
             self._application.close()
+        self.store.close()
 
     def lose_host(self) -> None:
         """Do what the application wants when its operator is lost."""
@@ -52,73 +57,101 @@ class Kernel:
         wish = application.diagram.on_host_loss
         self._event("the operator is lost", wish=wish)
         if wish == SAFE:
-            application.make_safe("the operator was lost")
+            application.make_safe()
         elif wish != CONTINUE:
             application.stop()
 
     # applications
 
-    def applications(self) -> list[str]:
-        """Return the names of the applications that are kept."""
-        return self.store.applications
+    def applications(self) -> list[dict[str, Any]]:
+        """Return the applications that are kept."""
+        found = []
+        for name in self.store.applications:
+            bundle = self.store.bundle(name)
+            loaded = self._application is not None and self._application.name == name
+            found.append({"name": name, "variant": bundle.variant, "hash": bundle.hash, "loaded": loaded})
+        return found
 
-    def have(self, digests: Sequence[str]) -> list[str]:
+    def have(self, files: Sequence[str]) -> list[str]:
         """Return those SHA-256 of files that are missing here."""
-        return self.store.missing(digests)
+        return self.store.missing(files)
 
-    def put(self, digest: str, at: int, data: bytes, last: bool) -> None:
+    def put(self, file: str, size: int, offset: int, data: bytes) -> int:
         """Take a piece of a file."""
-        self.store.put(digest, at, data, last)
+        return self.store.put(file, size, offset, data)
 
-    def keep(self, bundle: Mapping[str, Any]) -> str:
-        """Keep an application in the place of one of its name; return the name."""
-        found = Bundle.read(bundle)
-        if self._application is not None and self._application.name == found.name:
-            self.unload()
-        self.store.add(found)
-        try:
-            admit(found, self.store.place(found))
-        except QuadvisError:
-            self.store.remove(found.name)
-            raise
-        return found.name
+    def load(self, application: str) -> Future[Any]:
+        """Load an application in the place of the one that is loaded; it is ready to start then.
 
-    def forget(self, name: str) -> None:
-        """Remove an application that is not loaded."""
-        if self._application is not None and self._application.name == name:
-            raise QuadvisError(f"{quoted(name)} is loaded: unload it first")
-        self.store.remove(name)
+        It is named by its name, or by the SHA-256 of its bundle, which is kept under its name then.
+        """
+        self._refuse_running()
+        return self._worker.submit(self._load, application)
 
-    def load(self, name: str) -> Future[Any]:
-        """Load an application in the place of the one that is loaded; it is ready to start then."""
-        bundle = self.store.bundle(name)
+    def _load(self, application: str) -> dict[str, Any]:
+        self._refuse_running()
+        bundle = self._bundle(application)
         diagram = admit(bundle, self.store.place(bundle))
-        self.unload()
-        self._application = Application(bundle, diagram, self.store, self._publish)
-        return self._application.prepare()
+        self._unload()
+        self._application = made = Application(bundle, diagram, self.store, self._publish)
+        self._event("loaded", application=bundle.name)
+        made.prepare().result()
+        return {"name": bundle.name, "variant": bundle.variant, "hash": bundle.hash}
 
-    def unload(self) -> None:
+    def _refuse_running(self) -> None:
+        if self._application is not None and self._application.running:
+            raise QuadvisError(f"{self._application.name} runs: stop it first")
+
+    def _bundle(self, application: str) -> ApplicationBundle:
+        """Return an application by its name, or keep the one whose bundle has a SHA-256."""
+        if not DIGEST.fullmatch(application):
+            return self.store.bundle(application)
+        bundle = ApplicationBundle.parse(self.store.contents(application))
+        if self._application is not None and self._application.name == bundle.name:
+            self._unload()
+        self.store.add(bundle)
+        return bundle
+
+    def unload(self) -> Future[Any]:
         """End the run, if there is one, and forget the application that is loaded."""
+        return self._worker.submit(self._unload)
+
+    def _unload(self) -> None:
         if self._application is not None:
             self._application.close()
             self._application = None
             self._event("unloaded")
 
-    def start(self) -> Future[Any]:
-        """Start the application."""
-        return self._loaded.start()
+    def start(self, at: int | None) -> Future[Any]:
+        """Start the application, at an instant of this machine's monotonic clock (ns) if one is given."""
+        return self._loaded.start(at)
+
+    def clock(self) -> int:
+        """Return this machine's monotonic clock (ns)."""
+        return time.monotonic_ns()
+
+    def align(self, shift: int) -> None:
+        """Move the ticks of the run by so much since its start (ns), slowly."""
+        self._loaded.align(shift)
 
     def stop(self) -> Future[Any]:
         """Stop the application: safe values, log closed. It stays loaded."""
         return self._loaded.stop()
 
-    def settime(self, stop_time: Any = None, sample_time: Any = None) -> None:
-        """Give the next run another stop time, or another sample time."""
-        self._loaded.set_times(stop_time, sample_time)
+    def settime(self, StopTime: float | None, SampleTime: float | None) -> Future[Any]:
+        """Give the next run another stop time, or another sample time (s)."""
+        application = self._loaded
+        application.refuse_times()
+        return self._worker.submit(application.set_times, StopTime, SampleTime)
 
     def status(self) -> dict[str, Any]:
         """Return the state of the target, in xPC's words."""
         return status(self.name, self._application, time.monotonic() - self._born)
+
+    @property
+    def is_idle(self) -> bool:
+        """True if nothing is loaded."""
+        return self._application is None
 
     @property
     def _loaded(self) -> Application:
@@ -133,20 +166,20 @@ class Kernel:
 
     # signals and parameters
 
-    def signals(self) -> list[dict[str, Any]]:
+    def signals(self, first: int, count: int) -> list[dict[str, Any]]:
         """Return what there is to know of each signal."""
-        return self._loaded.newest.facts()
+        return self._loaded.newest.facts()[first : first + count]
 
     def getsignal(self, names: Sequence[str]) -> dict[str, Any]:
         """Return the newest values of signals; all of them if none is named."""
         return self._loaded.values(names)
 
-    def parameters(self) -> list[dict[str, Any]]:
+    def parameters(self, first: int, count: int) -> list[dict[str, Any]]:
         """Return what there is to know of each parameter."""
-        return self._loaded.parameters.facts()
+        return self._loaded.parameters.facts()[first : first + count]
 
     def getparam(self, names: Sequence[str]) -> dict[str, Any]:
-        """Return the values of parameters as a diagram writes them; of all that can be tuned if none is named."""
+        """Return values of parameters as a diagram writes them; of all that can be tuned if none is named."""
         parameters = self._loaded.parameters
         if not names:
             return {each["name"]: each["value"] for each in parameters.facts() if each["tunable"]}
@@ -185,19 +218,52 @@ class Kernel:
     def _set(self, name: str) -> dict[str, Any]:
         return self.getparamset(name) if name else self.getparam(())
 
+    # scopes
+
+    def addscope(self, id: int | None, type: str) -> int:
+        """Add a scope; return its number."""
+        return self._loaded.scopes.add(id, type)
+
+    def remscope(self, ids: Sequence[int]) -> None:
+        """Remove scopes."""
+        self._loaded.scopes.remove(ids)
+
+    def setscope(self, id: int, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Set properties of a scope."""
+        return self._loaded.scopes.set(id, values)
+
+    def startscope(self, ids: Sequence[int]) -> None:
+        """Let scopes acquire."""
+        self._loaded.scopes.start(ids)
+
+    def stopscope(self, ids: Sequence[int]) -> None:
+        """Interrupt scopes."""
+        self._loaded.scopes.stop(ids)
+
+    def trigger(self, ids: Sequence[int]) -> None:
+        """Trigger scopes by software."""
+        self._loaded.scopes.trigger(ids)
+
+    def scopes(self) -> list[dict[str, Any]]:
+        """Return all scopes with their properties; none if nothing is loaded."""
+        return self._application.scopes.facts() if self._application is not None else []
+
+    def getscope(self, id: int, first: int, count: int) -> dict[str, Any]:
+        """Return samples of the newest package of a scope."""
+        return self._loaded.scopes.samples(id, first, count)
+
     # results
 
     def logs(self) -> list[dict[str, Any]]:
         """Return the logs that are kept, the oldest first."""
-        return [{"name": path.stem, "bytes": path.stat().st_size} for path in self.store.logs()]
+        return [{"name": path.stem, "size": path.stat().st_size} for path in self.store.logs()]
 
-    def getlogfile(self, name: str, at: int) -> dict[str, Any]:
-        """Return a piece of a log, and whether it is the last one."""
+    def getlog(self, name: str, offset: int, count: int) -> dict[str, Any]:
+        """Return a piece of a log."""
         path = self.store.known_log(name)
         with path.open("rb") as file:
-            file.seek(at)
-            data = file.read(PIECE)
-            return {"data": data, "last": file.tell() >= path.stat().st_size}
+            file.seek(offset)
+            return {"data": file.read(count), "size": path.stat().st_size}
 
     def drawing(self) -> Future[Any]:
         """Return the picture of the diagram as SVG."""
@@ -205,17 +271,3 @@ class Kernel:
 
     def _event(self, what: str, **more: Any) -> None:
         self._publish("event", {"event": what, **more}, None)
-
-
-def in_thread(work: Callable[[], Any]) -> Future[Any]:
-    """Return what some work gives, done in a thread of its own."""
-    found: Future[Any] = Future()
-
-    def perform() -> None:
-        try:
-            found.set_result(work())
-        except BaseException as error:
-            found.set_exception(error)
-
-    threading.Thread(target=perform, daemon=True).start()
-    return found

@@ -12,8 +12,7 @@ from quadvis.diagram.diagram import Diagram
 from quadvis.engine.taps import Tap
 from quadvis.errors import QuadvisError, quoted, sentence, suggestion
 from quadvis.graph.names import index_text, read_name
-from quadvis.output.recording import RecordedPort
-from quadvis.run.rows import ports
+from quadvis.output.recording import RecordedPort, ports
 
 
 class Value(NamedTuple):
@@ -40,6 +39,24 @@ class Newest:
         """The names of all signals."""
         for path, found in self.ports.items():
             yield from (f"{path}.{port.name}" for port in found)
+
+    def facts(self) -> list[dict[str, Any]]:
+        """Return what there is to know of each signal."""
+        found = []
+        for path, outputs in self.ports.items():
+            node = self._diagram.graph[path]
+            for port in outputs:
+                doc = node.block.interface.outputs[port.name].doc
+                found.append({
+                    "name": f"{path}.{port.name}", "type": port.type, "shape": list(port.shape),
+                    "unit": port.unit, "task": node.task.name, "period": float(node.task.period),
+                    "computer": node.computer, "block": node.kind, "doc": doc,
+                })  # fmt: skip
+        return found
+
+    def clear(self) -> None:
+        """Forget all values, before another run."""
+        self._rows.clear()
 
     def value(self, name: str) -> Value:
         """Return the value of a signal, or of a part of it; QuadvisError if there is none of this name."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,8 @@ from quadvis.block import Param
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.sections.block_text import quantity
 from quadvis.document import dump_yaml, read_yaml
-from quadvis.engine.tuning import Change
+from quadvis.engine.program import Tunable, make_program
+from quadvis.engine.tuning import Acceptance, NewValue
 from quadvis.errors import Faults, QuadvisError, quoted, sentence, suggestion
 from quadvis.graph.graph import Node
 from quadvis.machine.files import Kind, write_output
@@ -29,14 +30,27 @@ class Parameters:
         self._tuned: dict[tuple[str, str], Any] = {}
 
     @property
-    def tuned(self) -> list[tuple[str, str, Any]]:
-        """What differs from the diagram: block, parameter, value."""
-        return [(path, name, value) for (path, name), value in self._tuned.items()]
+    def tuned(self) -> list[NewValue]:
+        """What differs from the diagram."""
+        return [NewValue(path, name, value) for (path, name), value in self._tuned.items()]
 
-    def took(self, changes: Iterable[Change]) -> None:
+    def check(self, group: Sequence[NewValue]) -> None:
+        """Check new values against declarations and the values in force; ParameterError if one is wrong."""
+        graph = self._diagram.graph
+        program = make_program(graph, self._diagram.seed)
+        blocks = {node.path: node.block for node in graph.nodes}
+        Acceptance(program.tunables, blocks, self._in_force).accept(group)
+
+    def _in_force(self, tunable: Tunable) -> Any:
+        """Return a value as the methods of its block see it."""
+        value = self.value(tunable.path, tunable.name)
+        param = self._diagram.graph[tunable.path].block.interface.params[tunable.name]
+        return param.choices.index(value) if param.choices else value
+
+    def took(self, group: Iterable[NewValue]) -> None:
         """Note values that parameters have taken."""
-        for change in changes:
-            self._tuned[change.path, change.name] = change.value
+        for path, name, value in group:
+            self._tuned[path, name] = value
 
     @property
     def names(self) -> list[str]:
@@ -99,7 +113,9 @@ class Parameters:
     def save(self, path: Path) -> None:
         """Write the present values of all that can be tuned as a parameter file of this name."""
         values = {
-            f"{node.path}.{name}": self.text(node.path, name) for node, name, param in self._all() if param.tune
+            f"{node.path}.{name}": self.text(node.path, name)
+            for node, name, param in self._all()
+            if param.tune
         }
         about = f"{self._diagram.name}, as tuned on the target; diagram {self._diagram.hash[:12]}"
         text = dump_yaml({"quadvis": 1, "name": path.stem, "doc": about, "set": values})
@@ -116,6 +132,11 @@ def read_set(path: Path) -> dict[str, Any]:
     if not isinstance(found, dict):
         raise QuadvisError(f"the parameter set {quoted(path.stem)} has no key 'set'")
     return found
+
+
+def as_written(value: Any) -> Any:
+    """Return a value of a set as a setting is written: ``{value: [1, 2], unit: m}`` as one text."""
+    return f"{{value: {value['value']}, unit: {value['unit']}}}" if isinstance(value, dict) else value
 
 
 def compared(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[dict[str, Any]]:

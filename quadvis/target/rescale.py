@@ -1,4 +1,4 @@
-"""Another sample time: all rates of a diagram scaled together, as xPC's SampleTime does."""
+"""Other times: all rates of a diagram scaled together, as xPC's SampleTime does; another stop time."""
 
 from __future__ import annotations
 
@@ -11,25 +11,41 @@ from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.load import load_text
 from quadvis.diagram.times import read_duration
 from quadvis.document import YamlScalar, dump_yaml
-from quadvis.errors import QuadvisError
+from quadvis.errors import DiagramError
 
 
-def rescaled(diagram: Diagram, sample_time: str) -> Diagram:
-    """Return a diagram whose base tick is another one, such as "2 ms"; QuadvisError if it cannot be.
+def rescaled(diagram: Diagram, sample_time: float) -> Diagram:
+    """Return a diagram with another base tick (s); QuadvisError if it cannot be.
 
     The periods of all rates and the step of the solver keep their ratios. The parameters stay: numbers that
     were worked out for a rate, such as a coefficient of a filter, are not worked out again.
     """
-    wanted = read_duration(YamlScalar(sample_time, False, "SampleTime", 0, 0))
-    if wanted <= 0:
-        raise QuadvisError("the sample time must be above 0 s")
-    factor = wanted / diagram.graph.tick
     written: dict[str, Any] = yaml.safe_load(diagram.resolved)
+    factor = _exact(sample_time) / diagram.graph.tick
     written["rates"] = {name: _scaled(text, factor) for name, text in written.get("rates", {}).items()}
     solver = written.get("solver")
     if isinstance(solver, dict) and "step" in solver:
         solver["step"] = _scaled(solver["step"], factor)
+    return _read(written, diagram)
+
+
+def lasting(diagram: Diagram, stop_time: float) -> Diagram | None:
+    """Return a diagram with another stop time (s); None if what it expects does not fit this time."""
+    written: dict[str, Any] = yaml.safe_load(diagram.resolved)
+    written["stop_time"] = f"{_exact(stop_time)} s"
+    try:
+        return _read(written, diagram)
+    except DiagramError:
+        return None
+
+
+def _read(written: dict[str, Any], diagram: Diagram) -> Diagram:
     return load_text(dump_yaml(written), diagram.path.parent, diagram.path.name, diagram.own_blocks)
+
+
+def _exact(time: float) -> Fraction:
+    """Return a time as it is written: 0.1 s is 1/10 s."""
+    return Fraction(repr(float(time)))
 
 
 def _scaled(entry: Any, factor: Fraction) -> Any:

@@ -1,26 +1,26 @@
 """What a target keeps on its disk: files by their SHA-256, applications, parameter sets, logs.
 
- folder/files/<SHA-256>              contents of files, each once
- folder/applications/<name>/         bundle.json, and the folder `tree` as the diagram's blocks see it
- folder/sets/<name>/<set>.yaml       parameter sets of an application
- folder/logs/<name>-<number>.mcap    the logs of its runs
+folder/files/<SHA-256>              contents of files, each once
+folder/applications/<name>/         bundle.json, and the folder `tree` as the diagram's blocks see it
+folder/sets/<name>/<set>.yaml       parameter sets of an application
+folder/scopes/<name>/               files of file scopes
+folder/logs/<name>-<number>.mcap    the logs of its runs
 """
 
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Mapping
+from io import BufferedRandom
 from pathlib import Path
-from typing import BinaryIO
 
-from quadvis.errors import QuadvisError, quoted, suggestion
-from quadvis.errors.words import sentence
-from quadvis.target.bundle import DIGEST, NAME, Bundle, inner_path
+from quadvis.errors import QuadvisError, quoted, sentence, suggestion
+from quadvis.target.bundle import DIGEST, NAME, ApplicationBundle, inner_path
 
 MOST_BYTES = 256_000_000  # of a file
+MOST_BUNDLE = 4_000_000
 PARTLY = 8  # files that may be on their way at the same time
 LOGS = 100  # of one application; older ones are removed
 
@@ -34,7 +34,7 @@ class Store:
             (folder / name).mkdir(mode=0o700, parents=True, exist_ok=True)
         for left in (folder / "files").glob("*.part"):
             left.unlink()
-        self._partly: dict[str, BinaryIO] = {}
+        self._partly: dict[str, BufferedRandom] = {}
 
     # files
 
@@ -42,24 +42,28 @@ class Store:
         """Return those of some SHA-256 that are not here."""
         return [digest for digest in digests if not self._file(digest).exists()]
 
-    def put(self, digest: str, at: int, data: bytes, last: bool) -> None:
-        """Take the next piece of a file; with its last piece the contents must have their SHA-256."""
+    def put(self, digest: str, size: int, offset: int, data: bytes) -> int:
+        """Take the next piece of a file of a size; return how many bytes of it are here.
+
+        With its last piece the contents must have their SHA-256.
+        """
         path, part = self._file(digest), self._file(digest).with_suffix(".part")
         if path.exists():
-            return
-        if at == 0:
+            return size
+        if offset == 0:
             self._drop(digest)
             if len(self._partly) >= PARTLY:
                 self._drop(next(iter(self._partly)))
             self._partly[digest] = part.open("w+b")
         file = self._partly.get(digest)
-        if file is None or file.tell() != at:
+        if file is None or file.tell() != offset:
             raise QuadvisError("the pieces of a file must come in their order, from the first one on")
-        if at + len(data) > MOST_BYTES:
+        reached = offset + len(data)
+        if max(size, reached) > MOST_BYTES or reached > size:
             self._drop(digest)
-            raise QuadvisError(f"a file of more than {MOST_BYTES // 1_000_000} MB cannot be kept")
+            raise QuadvisError(f"a file has its size, and at most {MOST_BYTES // 1_000_000} MB")
         file.write(data)
-        if last:
+        if reached == size:
             file.seek(0)
             found = hashlib.file_digest(file, "sha256").hexdigest()
             if found != digest:
@@ -68,6 +72,21 @@ class Store:
             file.close()
             del self._partly[digest]
             part.replace(path)
+        return reached
+
+    def contents(self, digest: str) -> bytes:
+        """Return the contents of a file; QuadvisError if it is not here, or too large to be a bundle."""
+        path = self._file(digest)
+        if not path.exists():
+            raise QuadvisError(f"the file {quoted(digest)} is not on the target")
+        if path.stat().st_size > MOST_BUNDLE:
+            raise QuadvisError("this file is too large to be a bundle")
+        return path.read_bytes()
+
+    def close(self) -> None:
+        """Forget the files that are not whole."""
+        for digest in list(self._partly):
+            self._drop(digest)
 
     def _drop(self, digest: str) -> None:
         file = self._partly.pop(digest, None)
@@ -87,7 +106,7 @@ class Store:
         """The names of all applications."""
         return sorted(path.parent.name for path in (self.folder / "applications").glob("*/bundle.json"))
 
-    def add(self, bundle: Bundle) -> None:
+    def add(self, bundle: ApplicationBundle) -> None:
         """Keep an application, in the place of one of the same name; its files must be here."""
         if absent := self.missing(bundle.files.values()):
             name = next(name for name, digest in bundle.files.items() if digest in absent)
@@ -101,22 +120,20 @@ class Store:
             path = tree / inner_path(name)
             path.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(self._file(digest), path)  # a block that writes there changes no other file
-        (fresh / "bundle.json").write_text(json.dumps(bundle.plain(), indent=1))
+        (fresh / "bundle.json").write_bytes(bundle.data)
         shutil.rmtree(home, ignore_errors=True)
         fresh.replace(home)
 
-    def bundle(self, name: str) -> Bundle:
+    def bundle(self, name: str) -> ApplicationBundle:
         """Return an application that is kept here; QuadvisError if there is none of this name."""
         path = self._home(name) / "bundle.json"
         try:
-            return Bundle.read(json.loads(path.read_bytes()))
+            return ApplicationBundle.parse(path.read_bytes())
         except FileNotFoundError:
             problem = f"there is no application {quoted(name)} on the target"
             raise QuadvisError(sentence(problem, suggestion(name, self.applications))) from None
-        except ValueError:
-            raise QuadvisError(f"the application {quoted(name)} is damaged: load it again") from None
 
-    def place(self, bundle: Bundle) -> Path:
+    def place(self, bundle: ApplicationBundle) -> Path:
         """Return where the diagram of an application stands."""
         return self._home(bundle.name) / "tree" / bundle.place
 
@@ -140,6 +157,16 @@ class Store:
         folder.mkdir(mode=0o700, exist_ok=True)
         return folder / f"{_checked(chosen, 'a parameter set')}.yaml"
 
+    def known_set(self, name: str, chosen: str) -> Path:
+        """Return the path of a parameter set; QuadvisError if there is none of this name."""
+        return _known(chosen, {each: self.set_path(name, each) for each in self.sets(name)}, "parameter set")
+
+    def scope_folder(self, name: str) -> Path:
+        """Return the folder for the files of an application's scopes."""
+        folder = self.folder / "scopes" / _checked(name)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        return folder
+
     # logs
 
     def logs(self, name: str | None = None) -> list[Path]:
@@ -156,17 +183,21 @@ class Store:
         number = 1 + max((_number(path) for path in logs), default=0)
         return self.folder / "logs" / f"{name}-{number}.mcap"
 
-    def pieces(self, log: Path, size: int) -> Iterator[bytes]:
-        """Yield the contents of a log, piece by piece."""
-        with log.open("rb") as file:
-            while data := file.read(size):
-                yield data
+    def known_log(self, name: str) -> Path:
+        """Return the path of a log; QuadvisError if there is none of this name."""
+        return _known(name, {path.stem: path for path in self.logs()}, "log")
 
 
 def _checked(name: str, what: str = "an application") -> str:
     if not NAME.fullmatch(name):
         raise QuadvisError(f"{quoted(name)} is no name of {what}: use letters, digits, _ . -")
     return name
+
+
+def _known(name: str, paths: Mapping[str, Path], what: str) -> Path:
+    if name not in paths:
+        raise QuadvisError(sentence(f"there is no {what} {quoted(name)}", suggestion(name, paths)))
+    return paths[name]
 
 
 def _number(path: Path) -> int:

@@ -22,7 +22,7 @@ import cv2
 import numpy as np
 
 from quadvis.native.functions import prepare
-from quadvis_vision.detection.circles import Target
+from quadvis_vision.detection.circles import CircleTarget
 from quadvis_vision.detection.colours import ColourCalibration
 from quadvis_vision.detection.detect import search
 from quadvis_vision.detection.follow import follow
@@ -31,7 +31,7 @@ from tests.ceilings.kinds import KINDS
 from tests.ceilings.stage import DISC, SQUARE, Kind, Shot, shoot
 
 COLOURS = Path(__file__).parents[2] / "diagrams" / "calib" / "colours.yaml"
-TARGET = Target(ColourCalibration.load(COLOURS), DISC / SQUARE, 2.0, 80.0)
+TARGET = CircleTarget(ColourCalibration.load(COLOURS), DISC / SQUARE, 2.0, 80.0)
 SIZE = (320, 240)
 SILENT = 0.3  # px
 ANNOUNCED = 4.0  # sigma

@@ -14,7 +14,10 @@ from quadvis.cli.options import parser
 from quadvis.errors import QuadvisError
 
 HELP = "see 'quadvis --help'"
-COMMANDS = "run, replay, sweep, check, list, describe, analyse, draw, program, diff, plot, schema, cache, new"
+COMMANDS = (
+    "run, replay, sweep, check, list, describe, analyse, draw, program, diff, plot, schema, cache, target, "
+    "load, start, stop, unload, status, get, set, scope, log, sets, console, new"
+)
 
 
 @pytest.mark.parametrize(
@@ -49,6 +52,9 @@ COMMANDS = "run, replay, sweep, check, list, describe, analyse, draw, program, d
         (("run", "a", "--seed", "one"), "--seed: 'one' is not a whole number; write one, such as 3"),
         (("run", "a", "--seed=1.5"), "--seed: '1.5' is not a whole number; write one, such as 3"),
         (("run", "a", "--seed="), "--seed: '' is not a whole number; write one, such as 3"),
+        (("scope", "a", "--level", "high"), "--level: 'high' is not a number; write one, such as 0.5"),
+        (("set",), "NAME=VALUE is missing; write 'quadvis set NAME=VALUE [...]'"),
+        (("sets", "kep"), "ACTION cannot be 'kep'; choose from 'list', 'save', 'load'"),
         (("sweep", "a", "--workers", "many"), "--workers: 'many' is not a whole number"),
         (("run", "a", "--json=yes"), "--json takes no value; leave 'yes' out"),
         (("run", "a\0b"), r"'a\x00b' holds a character that no name and no value can have"),
@@ -119,5 +125,5 @@ def test_every_option_is_known_to_the_sentences() -> None:
         assert declared - {"-h", "--help"} == set(command.options)
         plain = [action for action in command._actions if not action.option_strings]
         assert plain == command.places
-        assert all(action.nargs in (None, 0, 2, "?") for action in command._actions)
+        assert all(action.nargs in (None, 0, 2, "?", "*", "+") for action in command._actions)
         assert not any(isinstance(action, argparse._SubParsersAction) for action in plain)

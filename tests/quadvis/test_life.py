@@ -12,9 +12,11 @@ import pytest
 from quadvis.block import Block, In, Out, Param, ParameterError, Safe, State, Work
 from quadvis.engine.engine import Engine
 from quadvis.engine.taps import Tap
+from quadvis.engine.tuning import NewValue
 from quadvis.errors import RunError
 from quadvis.graph.graph import Constant, Graph, Node, Task, Wire
 from quadvis.native.choice import NATIVE, choose, use
+from quadvis.testing.alone import alone
 
 FAST, SLOW = Task("fast", Fraction(1, 10)), Task("slow", Fraction(1, 5))
 EVENTS: list[Any] = []
@@ -54,6 +56,14 @@ class Motor(Block, numeric=False):
 
     def close(self):
         EVENTS.append("close")
+
+
+class Triple(Block):
+    y = Out("float64[n]")
+    values = Param([1, 2, 3], type="float64[n]", tune=True)
+
+    def output(self):
+        return self.values
 
 
 class Gain(Block):
@@ -274,6 +284,29 @@ def test_values_set_together_are_checked_together_and_count_at_one_tick() -> Non
         made.tuning.set("gain", "factor", 6.0)
         made.run(1)
     assert [change.tick for change in made.tuning.changes] == [0, 0]
+
+
+def test_a_group_is_checked_as_a_whole_whatever_its_order() -> None:
+    made = engine(node("gain", Gain()))
+    with made:
+        made.tuning.set_all([NewValue("gain", "factor", 6.0), NewValue("gain", "limit", 8.0)])
+        made.run(1)
+        assert made.read("gain", "factor") == 6.0
+        with pytest.raises(ParameterError, match="limit must be at least factor"):
+            made.tuning.set_all([NewValue("gain", "limit", 9.0), NewValue("gain", "factor", 9.5)])
+        made.run(1)
+        assert (made.read("gain", "factor"), made.read("gain", "limit")) == (6.0, 8.0)
+
+
+def test_an_array_keeps_its_size() -> None:
+    made = alone(Triple(), {}, {"n": 3}, Fraction(1, 10))
+    with made:
+        (tunable,) = made.program.tunables
+        with pytest.raises(ParameterError, match="values has 3 values in this run, got 4"):
+            made.tuning.set(tunable.path, "values", [1, 2, 3, 4])
+        made.tuning.set(tunable.path, "values", [4, 5, 6])
+        made.run(1)
+        assert made.read(tunable.path, "y").tolist() == [4, 5, 6]
 
 
 def test_memory_can_live_in_a_buffer_that_others_see() -> None:

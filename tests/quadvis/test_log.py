@@ -12,6 +12,7 @@ import subprocess
 import sys
 import textwrap
 import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -426,6 +427,27 @@ def test_a_disk_that_is_slow_for_a_moment_costs_nothing(
     log.close()
     assert log.loss == ""
     assert len(read_log(tmp_path / "slow.mcap")["plant.speed"]) == 10_000
+
+
+def test_batches_that_the_disk_itself_takes_are_waited_for_one_by_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A batch that is written and not yet on the disk is no sign of a disk that hangs."""
+    synced: list[int] = []
+
+    def sync(descriptor: int) -> None:
+        time.sleep(0.005)
+        synced.append(descriptor)
+
+    monkeypatch.setattr("quadvis.output.sink.os.fsync", sync)
+    log = LogWriter(tmp_path / "synced.mcap", [PLANT], METADATA, synced=True)
+    for i in range(10):
+        log.write(0, i, slots(float(i), 0.0, 0.0, 0.0))
+        log.flush()
+    log.close()
+    assert (log.loss, log.lost) == ("", 0)
+    assert len(read_log(tmp_path / "synced.mcap")["plant.speed"]) == 10
+    assert len(synced) >= 10
 
 
 def test_a_disk_that_hangs_for_good_is_given_up_at_the_end(

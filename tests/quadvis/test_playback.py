@@ -44,7 +44,7 @@ def test_the_ticks_and_the_changes_of_the_recorded_run_come_again(
     told: list[str] = []
     changes = [Change(tick, "block", str(tick), 0.0) for tick in changed if tick not in missing]
     clock = RecordedClock(
-        np.array(runs, np.int64).reshape(-1, 2), changes, lambda change: told.append(change.name)
+        np.array(runs, np.int64).reshape(-1, 2), changes, lambda some: told.extend(each.name for each in some)
     )
     tick, ran, seen = 0, list[int](), list[tuple[int, str]]()
     while tick < 60:

@@ -11,7 +11,7 @@ import numpy as np
 from quadvis.block import Block, Frame, In, Out, Param, ParameterError, State
 from quadvis_vision.camera.calibration import CameraCalibration
 from quadvis_vision.camera.projection import RADIUS, SIDE
-from quadvis_vision.detection.circles import Target
+from quadvis_vision.detection.circles import CircleTarget
 from quadvis_vision.detection.colours import ColourCalibration
 from quadvis_vision.detection.detect import (
     STALE,
@@ -132,7 +132,7 @@ class CircleDetector(Block, numeric=False):
     def open(self) -> None:
         """Read the files."""
         self._picture = self._size()
-        self._target = Target(self._load(), self.radius / self.side, self.radius_min, self.radius_max)
+        self._target = CircleTarget(self._load(), self.radius / self.side, self.radius_min, self.radius_max)
         # Results of output, for update of the same tick.
         self._new = self._frozen = False
         self._seen = nothing(STALE)

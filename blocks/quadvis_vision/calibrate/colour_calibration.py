@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from quadvis.errors import QuadvisError
 from quadvis_vision.calibrate.colour_names import check_order
 from quadvis_vision.calibrate.colour_search import RADIUS_MAX, RADIUS_MIN, Sighting, find_circles
-from quadvis_vision.detection.circles import Pixels, Target
+from quadvis_vision.detection.circles import Pixels, CircleTarget
 from quadvis_vision.detection.colour_provenance import DIGITS, ColourEvidence
 from quadvis_vision.detection.colours import NAMES, THRESHOLD, ColourCalibration
 from quadvis_vision.detection.detect import search
@@ -113,7 +113,7 @@ def _threshold(measured: NDArray[np.float64]) -> float:
 
 def _count_found(picture: Pixels, seen: Sighting, colours: ColourCalibration, ratio: float) -> int:
     """Return the number of circles that the detector finds in their places; 0 if it finds one elsewhere."""
-    target = Target(colours, ratio, RADIUS_MIN / 2, RADIUS_MAX * picture.shape[1])
+    target = CircleTarget(colours, ratio, RADIUS_MIN / 2, RADIUS_MAX * picture.shape[1])
     centres = [complex(u, v) for u, v in search(picture, target).centres.tolist() if not math.isnan(u)]
     there = [
         any(abs(centre - disc.centre) < SAME + disc.radius / 10 for disc in seen.discs) for centre in centres

@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from quadvis_vision.detection.circles import Ceiling, Pixels, Target, mean, over
+from quadvis_vision.detection.circles import Ceiling, Pixels, CircleTarget, mean, over
 from quadvis_vision.detection.colours import Colour
 from quadvis_vision.detection.square import Blob
 
@@ -42,7 +42,7 @@ def reductions(pixels: Pixels) -> tuple[int, ...]:
     return (4, 2) if pixels.shape[1] > WIDE else (2,)
 
 
-def looks(pixels: Pixels, ceiling: Ceiling, target: Target) -> Iterator[Blobs]:
+def looks(pixels: Pixels, ceiling: Ceiling, target: CircleTarget) -> Iterator[Blobs]:
     """Yield, look after look, all blobs found so far: for each corner those of its colour, the best first."""
     blobs: Blobs = [[], [], [], []]
     views = [ReducedPicture(pixels, ceiling, reduction) for reduction in reductions(pixels)]
@@ -60,7 +60,7 @@ def looks(pixels: Pixels, ceiling: Ceiling, target: Target) -> Iterator[Blobs]:
             yield blobs
 
 
-def _add(blobs: Blobs, patches: list[Patch], target: Target) -> None:
+def _add(blobs: Blobs, patches: list[Patch], target: CircleTarget) -> None:
     """Add patches in a colour of the target's to the blobs of that colour."""
     for centre, radius, ratio in patches:
         corner, distance = target.colours.nearest(ratio)

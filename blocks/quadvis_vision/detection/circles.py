@@ -25,7 +25,7 @@ WINDOW = 7  # edge of its median filter: nearly half the picture, so that circle
 
 
 @dataclass(frozen=True, eq=False)
-class Target:
+class CircleTarget:
     """The target of a search: circles by their `colours`, with radii between two limits in px.
 
     `ratio` is a circle's radius over the square's side.

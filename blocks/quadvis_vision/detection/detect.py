@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis_vision.detection.blobs import looks
-from quadvis_vision.detection.circles import SMALLEST, Ceiling, Disc, Pixels, Target, locate, refine
+from quadvis_vision.detection.circles import SMALLEST, Ceiling, Disc, Pixels, CircleTarget, locate, refine
 from quadvis_vision.detection.colours import Colour
 from quadvis_vision.detection.partial import Known, three_of_four, two_of_four, whole
 from quadvis_vision.detection.square import (
@@ -85,7 +85,7 @@ def nothing(status: int) -> Detection:
     )
 
 
-def search(pixels: Pixels, target: Target, fewest: int = 2, thorough: bool = True) -> Detection:
+def search(pixels: Pixels, target: CircleTarget, fewest: int = 2, thorough: bool = True) -> Detection:
     """Search the whole picture for the circles; fewer than `fewest` are no target.
 
     Without `thorough` there is one look only, which is enough on a plain ceiling.
@@ -109,7 +109,7 @@ def search(pixels: Pixels, target: Target, fewest: int = 2, thorough: bool = Tru
     return nothing(TOO_LARGE if thorough and _larger(pixels, ceiling, target) else status)
 
 
-def _larger(pixels: Pixels, ceiling: Ceiling, target: Target) -> bool:
+def _larger(pixels: Pixels, ceiling: Ceiling, target: CircleTarget) -> bool:
     """Return whether a target with circles that are too large is in the picture."""
     larger = replace(target, radius_min=target.radius_max, radius_max=max(pixels.shape) / 2)
     blobs = next(looks(pixels, ceiling, larger))
@@ -125,7 +125,7 @@ def _measure(pixels: Pixels, blobs: Sequence[Blob], measured: dict[Blob, Disc | 
 
 def _four(
     pixels: Pixels,
-    target: Target,
+    target: CircleTarget,
     choices: Sequence[Sequence[Blob]],
     measured: dict[Blob, Disc | None],
 ) -> Detection | None:
@@ -141,7 +141,7 @@ def _four(
     return None if best is None else refined(pixels, best, target)
 
 
-def _square_cost(known: Sequence[Disc], target: Target) -> float:
+def _square_cost(known: Sequence[Disc], target: CircleTarget) -> float:
     """Return the misfit of four measured circles to a new target; infinity if they are none."""
     radii, cost = _fit(known, target)
     if cost == math.inf:
@@ -158,7 +158,7 @@ def _square_cost(known: Sequence[Disc], target: Target) -> float:
     return cost if whole >= 3 and sizes[3] - sizes[1] <= SIZES_MAX else math.inf
 
 
-def refined(pixels: Pixels, known: Sequence[Disc], target: Target) -> Detection | None:
+def refined(pixels: Pixels, known: Sequence[Disc], target: CircleTarget) -> Detection | None:
     """Return the detection of a square of circles, each measured as the ellipse that the square makes it."""
     radii, cost = _fit(known, target)
     shapes = expected_shapes([disc.centre for disc in known], target.ratio)
@@ -178,7 +178,7 @@ def refined(pixels: Pixels, known: Sequence[Disc], target: Target) -> Detection 
 
 def _few(
     pixels: Pixels,
-    target: Target,
+    target: CircleTarget,
     blobs: Sequence[Sequence[Blob]],
     fewest: int,
     measured: dict[Blob, Disc | None],
@@ -207,7 +207,7 @@ def _few(
     return _known(found[0], target) if len(found) == 1 else None
 
 
-def _known(known: Known, target: Target) -> Detection | None:
+def _known(known: Known, target: CircleTarget) -> Detection | None:
     """Return the detection of three or two circles."""
     radius = sum(disc.radius for disc in known.values()) / len(known)
     places = [
@@ -219,13 +219,13 @@ def _known(known: Known, target: Target) -> Detection | None:
     return detection([known.get(k) for k in range(4)], places)
 
 
-def square_seen(known: Sequence[Disc], target: Target) -> Detection | None:
+def square_seen(known: Sequence[Disc], target: CircleTarget) -> Detection | None:
     """Return the detection of four circles that form a square, or None."""
     radii, cost = _fit(known, target)
     return None if cost == math.inf else detection(known, _places(known, radii))
 
 
-def _fit(discs: Sequence[Disc], target: Target) -> tuple[Sequence[float], float]:
+def _fit(discs: Sequence[Disc], target: CircleTarget) -> tuple[Sequence[float], float]:
     """Return the expected radii (px) of four circles, and their misfit to a square: infinity if none."""
     points = [disc.centre for disc in discs]
     radii = expected_radii(points, target.ratio)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis_vision.detection.blobs import looks
-from quadvis_vision.detection.circles import Ceiling, Disc, Pixels, Target, discs, locate
+from quadvis_vision.detection.circles import Ceiling, Disc, Pixels, CircleTarget, discs, locate
 from quadvis_vision.detection.detect import (
     QUALITY_MIN,
     CirclePlace,
@@ -31,7 +31,7 @@ BEND_MAX = 0.08  # of the side: deviation of three circles from a motion of the 
 RADIUS_MAX = math.log(1.6)  # of a followed circle against its expected radius
 
 
-def follow(pixels: Pixels, target: Target, places: Array, fewest: int = 2) -> Detection:
+def follow(pixels: Pixels, target: CircleTarget, places: Array, fewest: int = 2) -> Detection:
     """Search for the circles near their `places` (4, 6); if one is not there, search the whole picture."""
     known = [CirclePlace(complex(u, v), radius, (b, g, r)) for u, v, radius, b, g, r in places.tolist()]
     measured, exact = _followed(pixels, target, places)
@@ -57,7 +57,7 @@ def follow(pixels: Pixels, target: Target, places: Array, fewest: int = 2) -> De
     return found if found.status < kept.status else kept
 
 
-def _followed(pixels: Pixels, target: Target, places: Array) -> tuple[list[Disc | None], bool]:
+def _followed(pixels: Pixels, target: CircleTarget, places: Array) -> tuple[list[Disc | None], bool]:
     """Return what is near the places (4, 6), measured as the ellipses that the last square had.
 
     The second value is false if they moved or grew so much that their ellipses are others.
@@ -71,7 +71,7 @@ def _followed(pixels: Pixels, target: Target, places: Array) -> tuple[list[Disc 
 
 
 def _look_around(
-    pixels: Pixels, target: Target, known: Sequence[CirclePlace], discs: list[Disc | None]
+    pixels: Pixels, target: CircleTarget, known: Sequence[CirclePlace], discs: list[Disc | None]
 ) -> None:
     """Add the circles that moved farther, by the blobs of their colours around the places to expect."""
     blobs = next(looks(pixels, Ceiling(pixels), target))
@@ -98,7 +98,7 @@ def _look_around(
                 discs[corner] = other
 
 
-def _same(disc: Disc, target: Target, corner: int, radius: float) -> bool:
+def _same(disc: Disc, target: CircleTarget, corner: int, radius: float) -> bool:
     return (
         abs(math.log(disc.radius / radius)) < RADIUS_MAX and target.colours.nearest(disc.ratio)[0] == corner
     )

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 
 from quadvis_vision.detection.blobs import looks
-from quadvis_vision.detection.circles import Ceiling, Target
+from quadvis_vision.detection.circles import Ceiling, CircleTarget
 from quadvis_vision.detection.colours import ColourCalibration
 
 COLOURS = Path(__file__).parents[3] / "diagrams" / "calib" / "colours.yaml"
-TARGET = Target(ColourCalibration.load(COLOURS), 0.12, 2.0, 80.0)
+TARGET = CircleTarget(ColourCalibration.load(COLOURS), 0.12, 2.0, 80.0)
 
 
 def test_a_picture_of_noise_has_few_looks():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from quadvis_vision.calibrate.colour_calibration import calibrate_colours
-from quadvis_vision.detection.circles import Target
+from quadvis_vision.detection.circles import CircleTarget
 from quadvis_vision.detection.colours import NAMES, ColourCalibration
 from quadvis_vision.detection.detect import TWO_CIRCLES, search
 from quadvis_vision.detection.follow import follow
@@ -17,7 +17,7 @@ from tests.ceilings.stage import DISC, SQUARE, shoot
 from tests.stages import mostly_slow
 
 COLOURS = Path(__file__).parents[3] / "diagrams" / "calib" / "colours.yaml"
-TARGET = Target(ColourCalibration.load(COLOURS), DISC / SQUARE, 2.0, 80.0)
+TARGET = CircleTarget(ColourCalibration.load(COLOURS), DISC / SQUARE, 2.0, 80.0)
 SIZE = (320, 240)
 RMS = 0.05  # px, what is asked of centres on plain ceilings and on tiles
 HARD = {"tiles 30 cm, joints 0.35": 0.1, "combo": 0.08, "combo on tiles": 0.15}

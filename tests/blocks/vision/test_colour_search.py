@@ -10,7 +10,7 @@ import pytest
 from quadvis.errors import QuadvisError
 from quadvis_vision.calibrate.colour_calibration import calibrate_colours
 from quadvis_vision.calibrate.colour_names import HUES, named, nearest_name
-from quadvis_vision.detection.circles import Target
+from quadvis_vision.detection.circles import CircleTarget
 from quadvis_vision.detection.colours import ColourCalibration
 from quadvis_vision.detection.detect import search
 from quadvis_vision.trials.scenery import CEILING, Condition
@@ -60,7 +60,7 @@ def album(name, size, count, paint=PAINT):
 
 def seen_rightly(colours, size, count, names=tuple(CONDITIONS), paint=PAINT):
     """Return the share of pictures of these conditions that the detector sees rightly with some colours."""
-    target = Target(colours, RADIUS, 2.0, 80.0)
+    target = CircleTarget(colours, RADIUS, 2.0, 80.0)
     shots = [shot for name in names for shot in album(name, size, count, paint)]
     return np.mean([shot.right(search(shot.pixels, target).centres) for shot in shots])
 
@@ -118,7 +118,7 @@ def test_a_ceiling_darker_than_the_paint_changes_no_colour_by_more_than_a_common
 def test_colours_from_a_dark_ceiling_find_the_circles_on_it(level):
     condition = Condition(ceiling=(float(level),) * 3)
     found = calibrate(taken(condition).pixels)
-    target = Target(found.colours, RADIUS, 2.0, 80.0)
+    target = CircleTarget(found.colours, RADIUS, 2.0, 80.0)
     for seed in range(2, 8):
         shot = taken(condition, seed=seed)
         assert shot.right(search(shot.pixels, target).centres)

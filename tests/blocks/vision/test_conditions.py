@@ -13,7 +13,7 @@ from quadvis_vision.camera.projection import (
     ellipse_centre,
     target_corners,
 )
-from quadvis_vision.detection.circles import Target
+from quadvis_vision.detection.circles import CircleTarget
 from quadvis_vision.detection.colours import ColourCalibration
 from quadvis_vision.detection.detect import search
 from quadvis_vision.detection.follow import follow
@@ -30,7 +30,7 @@ from quadvis_vision.trials.scenes import (
 from tests.stages import mostly_slow
 
 COLOURS = Path(__file__).parents[3] / "diagrams" / "calib" / "colours.yaml"
-TARGET = Target(ColourCalibration.load(COLOURS), 0.12, 2.0, 80.0)
+TARGET = CircleTarget(ColourCalibration.load(COLOURS), 0.12, 2.0, 80.0)
 CAMERA = CameraCalibration((452, 322), np.array([[430.0, 2, 225.5], [0, 438, 160.5], [0, 0, 1]]), np.zeros(5))
 CLEAN, COMBINED = 0.07, 0.10  # px rms, what is asked of centres
 

@@ -25,6 +25,7 @@ from quadvis.realtime.schedule import NANOSECONDS, Schedule
 from quadvis.realtime.streams import RowStream
 from quadvis.realtime.times import TaskTimes
 
+ROOM = 64  # words for a group of parameters
 WARN = OverloadLimits(action="warn")
 
 
@@ -133,14 +134,15 @@ class Paced:
     ) -> None:
         graph, self._clock = diagram.graph, clock
         rings = [stream.ring for stream in streams]
-        words = np.zeros(SharedMemory.size(len(graph.tasks), rings), np.int64)
-        self.shared = SharedMemory(words, len(graph.tasks), rings)
+        words = np.zeros(SharedMemory.size(len(graph.tasks), rings, ROOM), np.int64)
+        self.shared = SharedMemory(words, len(graph.tasks), rings, ROOM)
         self.schedule = Schedule.of(graph)
         self._tasks = graph.tasks
         names = [task.name for task in graph.tasks]
         each = [limits.of(name) for name in names]
         self.pacer = Pacer(self.schedule, names, each, self.shared, clock, lambda: self.engine.hold_safe())
         self.engine = Engine(graph, diagram.seed, self.pacer)
+        self.pacer.write_into(self.engine.memory)
         native, choice = engine == NATIVE, choose(self.engine, 10**9, engine)
         self.crew = None
         if graph.tasking == MULTI:

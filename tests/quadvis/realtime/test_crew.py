@@ -144,7 +144,7 @@ def test_a_tick_of_a_slow_task_that_the_fastest_overran_begins_late(engine: str)
 def test_a_task_waits_for_outputs_of_a_faster_one_that_are_under_way() -> None:
     made, clock = diagram(), CrewClock()
     paced = Paced(made, clock)
-    plan, shared, times, _, _, crew, memory = paced.pacer.words
+    plan, shared, times, *_, crew, memory = paced.pacer.words
     row = dispatch.HEAD + 2 * dispatch.ROW
     own = memoryview(np.array([0, 1], np.int64))
 

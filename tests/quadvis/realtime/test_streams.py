@@ -38,8 +38,12 @@ class Kept(Tap):
 
 
 def taps() -> list[Kept]:
-    """Return taps whose rows lie side by side, apart, and at different rhythms; nothing of 'three'."""
-    return [Kept("noise"), Kept("wave"), Kept("lag"), Kept("held"), Kept("wave", 3), Kept("held", 2)]
+    """Return taps whose rows lie side by side, apart, and at different rhythms; nothing of 'three'.
+
+    Two of them take the same rows.
+    """
+    found = [Kept("noise"), Kept("wave"), Kept("lag"), Kept("held"), Kept("wave", 3), Kept("held", 2)]
+    return [*found, Kept("wave")]
 
 
 @pytest.mark.parametrize("engine", ["python", "native"])
@@ -66,6 +70,18 @@ def test_rows_through_rings_are_those_of_taps_to_the_bit(engine: str) -> None:
             assert ring.lost == 0
     assert [tap.rows for tap in received] == [tap.rows for tap in simulated]
     assert list(received[4].rows) == list(range(0, 400, 3))
+
+
+def test_a_stream_carries_a_block_once_for_all_its_taps() -> None:
+    diagram = load_text(TEXT)
+    wanted = [Kept("wave"), Kept("noise"), Kept("wave"), Kept("wave", 3), Kept("wave")]
+    (stream, own), (slow, _) = streams_of(diagram.graph, wanted)
+    assert (stream.blocks, stream.ring[1]) == (("wave", "noise"), 3)
+    assert list(map(list, own)) == [[wanted[0], wanted[2], wanted[4]], [wanted[1]]]
+    assert slow.blocks == ("wave",)
+    stream.hand_on(np.arange(6).reshape(2, 3), own)
+    assert wanted[0].rows == wanted[2].rows == wanted[4].rows
+    assert list(wanted[0].rows) == [0, 3]
 
 
 def test_after_a_skip_rows_are_those_of_the_ticks_that_ran() -> None:

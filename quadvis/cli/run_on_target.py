@@ -1,0 +1,149 @@
+"""`quadvis run FILE --target NAME`: load, start, wait, and bring the log and the verdicts home."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from quadvis.errors import QuadvisError
+from quadvis.machine.columns import table
+from quadvis.machine.status_line import ProgressLine
+from quadvis.units import Unit, format_quantity
+
+if TYPE_CHECKING:
+    from quadvis.diagram.diagram import Diagram
+    from quadvis.host.target import Target
+
+LOOK = 0.2  # s between two looks at the status
+SECOND = Unit.parse("s")
+FAILED = 1
+
+
+def run_on_target(diagram: Diagram, log: Path | None, options: argparse.Namespace) -> int:
+    """Fly a diagram on a target to its stop time; 1 if it misses an expectation or ends early.
+
+    This process is the operator meanwhile: if it is lost, the target does what the diagram's `on_host_loss`
+    says. Ctrl-C stops the run, and the log comes home all the same.
+    """
+    from quadvis.host.target import Target
+
+    with Target(options.target) as tg, tg.operator():
+        tg.load(diagram, engine=options.engine)
+        tg.start()
+        try:
+            _wait(tg, diagram)
+        except KeyboardInterrupt:
+            tg.stop()
+            _bring(tg, log)
+            raise
+        found = tg.status()
+        place = _bring(tg, log)
+    _print(diagram, found, options)
+    if place:
+        print(f"log: {place}")
+    if found["Problem"]:
+        print(found["Problem"], file=sys.stderr)
+    return 0 if found.get("Passed") else FAILED
+
+
+def run_on_several(diagram: Diagram, log: Path | None, options: argparse.Namespace) -> int:
+    """Fly a diagram on several targets, each as one of its computers; as `run_on_target` besides.
+
+    The logs go into a folder with the name of the log, without its ending.
+    """
+    from quadvis.host.several import Several, read_places
+    from quadvis.host.target import Target
+
+    with ExitStack() as stack:
+        places = read_places(options.on)
+        targets = {name: stack.enter_context(Target(place)) for name, place in places.items()}
+        several = stack.enter_context(Several(diagram, targets))
+        several.load(options.engine)
+        several.start()
+        try:
+            with ProgressLine(diagram.duration) as progress:
+                several.wait(progress)
+        except KeyboardInterrupt:
+            several.stop()
+            raise
+        folder = (log or Path("runs/several.mcap")).with_suffix("")
+        folder.mkdir(parents=True, exist_ok=True)
+        logs = several.logs(folder)
+        outcome = several.judge(logs)
+        tasks = {name: target.Tasks for name, target in targets.items()}
+    print(f"{diagram.name} on {', '.join(f'{name} ({place})' for name, place in places.items())}")
+    for verdict in outcome.verdicts:
+        print(f"  {verdict}")
+    for line in table([_task_row(task) for each in tasks.values() for task in each]):
+        print(f"  {line}")
+    for name, offset in several.offsets.items():
+        print(f"  clock of {name}: known to {format_quantity(offset.error / 1e9, SECOND, 2)}")
+    met = sum(verdict.met for verdict in outcome.verdicts)
+    print(f"{'PASSED' if outcome.passed else 'FAILED'}: {met} of {len(outcome.verdicts)} expectations met")
+    print(f"logs: {folder}")
+    return 0 if outcome.passed else FAILED
+
+
+def _wait(tg: Target, diagram: Diagram) -> None:
+    """Wait for the end of the run, and show how far it is."""
+    began = time.monotonic()
+    with ProgressLine(diagram.duration) as progress:
+        while True:
+            found = tg.status()
+            if found["Status"] not in ("running", "stopping"):
+                return
+            progress(found["ExecTime"], time.monotonic() - began)
+            time.sleep(LOOK)
+
+
+def _bring(tg: Target, log: Path | None) -> Path | None:
+    return tg.fetchlog(path=log) if log is not None else None
+
+
+def _print(diagram: Diagram, found: dict[str, Any], options: argparse.Namespace) -> None:
+    """Print the verdicts and the times of the tasks."""
+    if options.json:
+        import json
+
+        print(json.dumps(found))
+        return
+    variant = f" ({diagram.variant})" if diagram.variant else ""
+    print(f"{diagram.name}{variant} on {found['Target']}: {found['ExecTime']:g} s")
+    for verdict in found.get("Verdicts", []):
+        print(f"  {verdict}")
+    for line in table([_task_row(task) for task in found.get("Tasks", [])]):
+        print(f"  {line}")
+    if "Passed" not in found:
+        return
+    missed = len(found["NotMet"])
+    count = len(found["Verdicts"])
+    print(f"{'PASSED' if found['Passed'] else 'FAILED'}: {count - missed} of {count} expectations met")
+
+
+def _task_row(task: dict[str, Any]) -> tuple[str, ...]:
+    def spread(name: str) -> str:
+        times = task[name]
+        if not times:
+            return f"{name} none"
+        shown = [format_quantity(times[key], SECOND, 3) for key in ("min_s", "mean_s", "max_s")]
+        return f"{name} min {shown[0]}, avg {shown[1]}, max {shown[2]}"
+
+    name = f"task {task['task']}" + (f" of {task['computer']}" if task["computer"] else "")
+    return (
+        name,
+        f"{task['steps']} steps, {task['overruns']} overruns",
+        spread("lateness"),
+        spread("execution"),
+    )
+
+
+def check_options(options: argparse.Namespace) -> None:
+    """Refuse options that mean nothing on a target."""
+    for name in ("real_time", "cpu", "priority", "poll", "profile"):
+        if getattr(options, name, None):
+            option = f"--{name.replace('_', '-')}"
+            raise QuadvisError(f"{option} is for a run on this machine; a target always runs in real time")

@@ -1,0 +1,184 @@
+"""Several targets that fly one diagram together: each is one of its computers."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.errors import QuadvisError, quoted
+from quadvis.host.offset import Offset, measure
+from quadvis.host.target import LOADING, Target
+
+if TYPE_CHECKING:
+    from quadvis.diagram.diagram import Diagram
+    from quadvis.output.log_reader import Log
+    from quadvis.run.verdict import Outcome
+
+LEAD = 0.5  # s from the order to start until the first tick
+ALIGN = 1.0  # s between two looks at the clocks
+LOOK = 0.2  # s between two looks at the status
+FEW = 4  # pings of one look
+
+
+class Several:
+    """The targets that are the computers of a diagram, by the names of the computers.
+
+    This process is their operator from ``with`` on. All begin at one instant. As long as they run, the clocks
+    of the targets are compared with that of this host, and their ticks are kept at its pace; so times and ages
+    mean the same everywhere, within the error of ``offsets``.
+    """
+
+    def __init__(self, diagram: Diagram, targets: Mapping[str, Target]) -> None:
+        missing = [name for name in diagram.graph.computers if name not in targets]
+        unknown = [name for name in targets if name not in diagram.graph.computers]
+        if missing or unknown:
+            problem = f"has no target: {', '.join(missing)}" if missing else f"is none of it: {unknown[0]}"
+            computers = ", ".join(filter(None, diagram.graph.computers)) or "none"
+            raise QuadvisError(f"a computer of the diagram {problem}; its computers are {computers}")
+        self.diagram, self.targets = diagram, dict(targets)
+        self.offsets: dict[str, Offset] = {}
+        self._pool = ThreadPoolExecutor(len(targets), "target")
+        self._stack = ExitStack()
+        self._ended = threading.Event()
+        self._first: dict[str, Offset] = {}
+
+    def __enter__(self) -> Self:
+        with ExitStack() as stack:
+            stack.callback(self._pool.shutdown)
+            for target in self.targets.values():
+                stack.enter_context(target.operator())
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._ended.set()
+        self._stack.__exit__(kind, error, trace)
+
+    def load(self, engine: str = "auto") -> None:
+        """Load the diagram everywhere, each target as its computer."""
+        self._all(lambda name, target: target.load(self.diagram, engine=engine, computer=name))
+
+    def start(self) -> None:
+        """Let all begin at one instant, and keep their ticks at one pace from then on."""
+        self._first = self.offsets = self._measured()
+        instant = time.monotonic_ns() + int(LEAD * 1e9)
+        self._all(
+            lambda name, target: target.request(
+                "start", at=instant + self._first[name].offset, deadline=LOADING
+            )
+        )
+        threading.Thread(target=self._align, name="clocks", daemon=True).start()
+
+    def stop(self) -> None:
+        """Stop all that run."""
+        self._ended.set()
+        self._all(lambda name, target: target.stop() if target.Status == "running" else None)
+
+    def wait(self, progress: Callable[[float, float], None] = lambda reached, spent: None) -> None:
+        """Wait until all have ended; if one ends early, stop the others. QuadvisError says why that was."""
+        began = time.monotonic()
+        while True:
+            found = self._all(lambda name, target: target.status())
+            running = [each for each in found.values() if each["Status"] in ("running", "stopping")]
+            problems = [f"{name}: {each['Problem']}" for name, each in found.items() if each["Problem"]]
+            if problems:
+                self.stop()
+                raise QuadvisError("; ".join(problems))
+            if not running:
+                self._ended.set()
+                return
+            progress(min(each["ExecTime"] for each in found.values()), time.monotonic() - began)
+            time.sleep(LOOK)
+
+    def logs(self, folder: Path) -> dict[str, Path]:
+        """Copy the newest log of each to a folder; return the paths by computer."""
+        return self._all(lambda name, target: target.fetchlog(path=folder / f"{name}.mcap"))
+
+    def judge(self, logs: Mapping[str, Path]) -> Outcome:
+        """Return the verdicts on the whole flight, from the logs of all."""
+        from quadvis.output.log_reader import read_log
+        from quadvis.run.verdict import Judging
+
+        judging = Judging(self.diagram.summary, self.diagram.expectations)
+        judging.read(Together(self.diagram, {name: read_log(path) for name, path in logs.items()}))
+        return judging.outcome()
+
+    def _measured(self, pings: int | None = None) -> dict[str, Offset]:
+        more = {} if pings is None else {"pings": pings}
+        return self._all(lambda name, target: measure(lambda: int(target.request("clock")), **more))
+
+    def _align(self) -> None:
+        """Keep the ticks of all targets at the pace of this host's clock, until the end."""
+        while not self._ended.wait(ALIGN):
+            try:
+                self.offsets = self._measured(FEW)
+                for name, found in self.offsets.items():
+                    self.targets[name].request("align", shift=found.offset - self._first[name].offset)
+            except QuadvisError:  # the end, or a host that is lost: `wait` says so
+                return
+
+    def _all(self, call: Callable[[str, Target], Any]) -> dict[str, Any]:
+        """Return what a call gives for each target, all at the same time."""
+        futures = {name: self._pool.submit(call, name, target) for name, target in self.targets.items()}
+        return {name: future.result() for name, future in futures.items()}
+
+
+class Together:
+    """The signals of several logs, each with the blocks of its computer."""
+
+    def __init__(self, diagram: Diagram, logs: Mapping[str, Log]) -> None:
+        self._diagram, self._logs = diagram, logs
+
+    def _log(self, name: str) -> Log:
+        head = name.partition("[")[0]
+        path = self._diagram.ports.get(head, head).rpartition(".")[0]
+        if path not in self._diagram.graph:
+            raise QuadvisError(f"there is no signal {quoted(name)}")
+        return self._logs[self._diagram.graph[path].computer]
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """The unit of every signal."""
+        return {name: unit for log in self._logs.values() for name, unit in log.units.items()}
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self._log(name)[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.units)
+
+    def times(self, name: str) -> NDArray[np.float64]:
+        """Return the times (s) of a signal's rows."""
+        return self._log(name).times(name)
+
+    def rate(self, name: str) -> str:
+        """Return the name of the rate of a signal's block."""
+        return self._log(name).rate(name)
+
+    def stamps(self, name: str) -> NDArray[np.int64]:
+        """Return the stamps (ns) of its rows."""
+        return self._log(name).stamps(name)
+
+
+def read_places(texts: Iterable[str]) -> dict[str, str]:
+    """Return the targets by computer from texts such as "vision_pc=lab1"."""
+    found: dict[str, str] = {}
+    for text in texts:
+        computer, equals, target = (part.strip() for part in text.partition("="))
+        if not (computer and equals and target):
+            raise QuadvisError(f"{quoted(text)} names no target; write COMPUTER=TARGET")
+        if computer in found:
+            raise QuadvisError(f"the computer {quoted(computer)} is given twice; it is one target")
+        found[computer] = target
+    return found

@@ -1,0 +1,345 @@
+"""The target as its host sees it: xPC Target's object, its names and its rules."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+from quadvis.errors import QuadvisError, sentence, suggestion
+from quadvis.host.connection import HostConnection, connect
+from quadvis.host.scope import HostScope
+from quadvis.machine.columns import table
+from quadvis.units import Unit, format_quantity
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from quadvis.diagram.diagram import Diagram
+    from quadvis.diagram.settings import Files, Given
+    from quadvis.output.log_reader import Log
+
+PIECE = 1 << 20  # bytes of a file in one message
+LOADING = 120.0  # s that a target has to get an application ready
+STOPPING = 20.0  # s that a run has to come to its end
+SECOND = Unit.parse("s")
+
+# What `status` says, by the names of xPC Target, with the names that Python's style wants.
+PROPERTIES: Mapping[str, str] = {
+    "Application": "application", "Mode": "mode", "Status": "state", "CPUOverload": "cpu_overload",
+    "ExecTime": "exec_time", "SessionTime": "session_time", "StopTime": "stop_time",
+    "SampleTime": "sample_time", "MinTET": "min_tet", "AvgTET": "avg_tet", "MaxTET": "max_tet",
+    "NumSignals": "num_signals", "NumParameters": "num_parameters", "Scopes": "scope_numbers",
+    "Tasks": "tasks", "Problem": "problem", "Passed": "passed", "Verdicts": "verdicts", "Log": "log_name",
+    "Variant": "variant", "Hash": "hash",
+}  # fmt: skip
+_BY_ALIAS = {alias: name for name, alias in PROPERTIES.items()} | {name: name for name in PROPERTIES}
+_TIMES = ("ExecTime", "SessionTime", "StopTime", "SampleTime", "MinTET", "AvgTET", "MaxTET")
+
+
+class Target:
+    """A machine that flies, or this one: ``Target("lab1")``, or ``Target()`` for the target of this machine.
+
+    The properties of xPC Target are attributes: ``tg.Status``, ``tg.ExecTime`` (s), ``tg.AvgTET`` (s), and so
+    on, see ``print(tg)``; each also has a name in Python's style, such as ``tg.exec_time``. ``StopTime`` and
+    ``SampleTime`` can be set while the application is stopped. Whoever changes something becomes the operator
+    for that moment, or, inside ``with tg.operator():``, for as long as that lasts.
+
+    Without a name, a target on this machine is started if none runs, and ends by itself when it is unused.
+    QuadvisError says in a sentence why something is refused, or that the target does not answer.
+    """
+
+    _connection: HostConnection
+
+    def __init__(self, name: str | None = None, *, connection: HostConnection | None = None) -> None:
+        self.__dict__["_connection"] = connection or connect(name)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the connection; the target goes on."""
+        self._connection.close()
+
+    @property
+    def name(self) -> str:
+        """The name of the target."""
+        return self._connection.name
+
+    @property
+    def level(self) -> int:
+        """What this host's key may do, from 0 (all) to 4 (see the status)."""
+        return self._connection.level
+
+    def request(self, verb: str, **arguments: Any) -> Any:
+        """Return what the target answers to a verb, see `quadvis wire`; as the operator if needed."""
+        return self._connection.operate(verb, **arguments)
+
+    def subscribe(self, topic: str, take: Callable[[Mapping[str, Any], Any], object]) -> None:
+        """Let ``take(header, array)`` be called with the data of a topic, in another thread."""
+        self._connection.subscribe(topic, take)
+
+    # properties
+
+    def status(self) -> dict[str, Any]:
+        """Return all properties at one moment."""
+        found: dict[str, Any] = self.request("status")
+        return found
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        known = _BY_ALIAS.get(name)
+        if known is None:
+            problem = f"a target has no '{name}'"
+            raise AttributeError(sentence(problem, suggestion(name, _BY_ALIAS)))
+        if known == "Scopes":
+            return [each["id"] for each in self.request("scopes")]
+        return self.status().get(known)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        known = _BY_ALIAS.get(name, name)
+        if known not in ("StopTime", "SampleTime"):
+            raise AttributeError(f"'{name}' of a target cannot be set; StopTime and SampleTime can")
+        self._connection.operate("settime", deadline=LOADING, **{known: float(value)})
+
+    def __repr__(self) -> str:
+        return f"<Target {self.name}>"
+
+    def __str__(self) -> str:
+        found = self.status()
+        rows = [(name, _shown(name, found[name])) for name in PROPERTIES if name in found and name != "Tasks"]
+        return "\n".join([f"Target: {self.name}", *(f"  {line}" for line in table(rows))])
+
+    def operator(self) -> Any:
+        """Return a context in which this host is the operator: nobody else changes what the target does.
+
+        If this process ends or hangs inside, the target does what the diagram's `on_host_loss` says.
+        """
+        return self._connection.operator()
+
+    # applications
+
+    def load(
+        self,
+        what: str | Path | Diagram,
+        *,
+        variant: str | None = None,
+        settings: Given = (),
+        params: Files = (),
+        engine: str = "auto",
+        name: str | None = None,
+        computer: str = "",
+    ) -> Target:
+        """Load a diagram, or an application that the target keeps under a name, in place of the one there.
+
+        ``computer`` is the one of the diagram that this target is to be; "" for all of them.
+        """
+        application = str(what)
+        if not isinstance(what, str) or what.endswith((".yaml", ".yml")):
+            application = self._send(_loaded(what, variant, settings, params), name, engine, computer)
+        self._connection.operate("load", application=application, deadline=LOADING)
+        return self
+
+    def _send(self, diagram: Diagram, name: str | None, engine: str, computer: str) -> str:
+        """Send a diagram with its files as far as they are missing there; return the bundle's SHA-256."""
+        from quadvis.host.packing import pack
+
+        bundle, paths = pack(diagram, name, engine, computer)
+        data = bundle.data
+        digest = hashlib.sha256(data).hexdigest()
+        for missing in self.request("have", files=[*dict.fromkeys([*bundle.files.values(), digest])]):
+            self._put(missing, data if missing == digest else paths[missing].read_bytes())
+        return digest
+
+    def _put(self, digest: str, data: bytes) -> None:
+        for offset in range(0, max(1, len(data)), PIECE):
+            piece = data[offset : offset + PIECE]
+            self.request("put", file=digest, size=len(data), offset=offset, data=piece)
+
+    @property
+    def applications(self) -> list[str]:
+        """The names of the applications that the target keeps."""
+        return [each["name"] for each in self.request("applications")]
+
+    def start(self) -> Target:
+        """Start the application; QuadvisError if it runs already."""
+        self._connection.operate("start", deadline=LOADING)
+        return self
+
+    def stop(self) -> Target:
+        """Stop the application: safe values at the outputs, log closed. It stays loaded."""
+        self._connection.operate("stop", deadline=STOPPING)
+        return self
+
+    def unload(self) -> None:
+        """Remove the application that is loaded from the target's memory; the target keeps its files."""
+        self._connection.operate("unload", deadline=LOADING)
+
+    # parameters and signals
+
+    def setparam(self, name: str | Mapping[str, Any], value: Any = None) -> int:
+        """Give a parameter a value, such as "2.5 rad/s" or a number in SI units; return the tick.
+
+        A map gives several parameters their values at one tick.
+        """
+        values = {name: value} if isinstance(name, str) else dict(name)
+        return int(self.tune(values)["tick"])
+
+    def tune(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Do as `setparam`; return the tick, its time (s), and what has changed: ``[{name, old, new}]``."""
+        found: dict[str, Any] = self._connection.operate("setparam", values=_plain(values))
+        return found
+
+    def getparam(self, *names: str) -> Any:
+        """Return the value of a parameter as a diagram writes it; of several, or of all tunable, by name."""
+        found = self.request("getparam", names=list(names))
+        return found[names[0]] if len(names) == 1 else found
+
+    def getsignal(self, *names: str) -> Any:
+        """Return the newest value of a signal (SI units); of several, or of all, by name."""
+        found = self.request("getsignal", names=list(names))
+        return found[names[0]] if len(names) == 1 else found
+
+    def signals(self) -> list[dict[str, Any]]:
+        """Return what there is to know of each signal."""
+        return self._all("signals")
+
+    def parameters(self) -> list[dict[str, Any]]:
+        """Return what there is to know of each parameter."""
+        return self._all("parameters")
+
+    def _all(self, verb: str) -> list[dict[str, Any]]:
+        found: list[dict[str, Any]] = []
+        while True:
+            more = self.request(verb, first=len(found), count=1000)
+            found += more
+            if len(more) < 1000:
+                return found
+
+    def saveparamset(self, name: str) -> None:
+        """Let the target keep the present values of all that can be tuned under a name."""
+        self._connection.operate("saveparamset", name=name)
+
+    def loadparamset(self, name: str) -> int:
+        """Give parameters the values of a set that the target keeps; return the tick."""
+        return int(self._connection.operate("loadparamset", name=name)["tick"])
+
+    def listparamsets(self) -> list[str]:
+        """Return the names of the parameter sets of the application."""
+        return list(self.request("listparamsets"))
+
+    def getparamset(self, name: str) -> dict[str, Any]:
+        """Return the values of a parameter set by name; "" is the set of the present values."""
+        return dict(self.request("getparamset", name=name) if name else self.getparam())
+
+    def deleteparamset(self, name: str) -> None:
+        """Remove a parameter set from the target."""
+        self._connection.operate("deleteparamset", name=name)
+
+    def compare(self, first: str, second: str = "") -> list[tuple[str, Any, Any]]:
+        """Return the parameters that differ between two sets, with both values; "" is the present one."""
+        one, two = self.getparamset(first), self.getparamset(second)
+        return [
+            (name, one.get(name), two.get(name))
+            for name in sorted({*one, *two})
+            if one.get(name) != two.get(name)
+        ]
+
+    # scopes
+
+    def addscope(
+        self, type: str = "host", number: int | None = None, *, signals: Sequence[str] = (), **settings: Any
+    ) -> HostScope:
+        """Add a scope: ``host``, ``target`` or ``file``; return it. Settings are xPC's, see `HostScope`."""
+        number = int(self._connection.operate("addscope", id=number, type=type))
+        scope = HostScope(self._connection, number)
+        try:
+            scope.set(signals=list(signals), **settings)
+        except QuadvisError:
+            scope.remove()
+            raise
+        return scope
+
+    def getscope(self, number: int) -> HostScope:
+        """Return a scope of the target by its number."""
+        return HostScope(self._connection, number)
+
+    def remscope(self, *numbers: int) -> None:
+        """Remove scopes; all of them if none is named."""
+        chosen = list(numbers) or [each["id"] for each in self.request("scopes")]
+        if chosen:
+            self._connection.operate("remscope", ids=chosen)
+
+    # results
+
+    def logs(self) -> list[dict[str, Any]]:
+        """Return the logs that the target keeps, the oldest first."""
+        return list(self.request("logs"))
+
+    def fetchlog(self, name: str | None = None, path: str | Path | None = None) -> Path:
+        """Copy a log of the target, the newest if none is named, to a path here; return the path."""
+        if name is None:
+            logs = self.logs()
+            if not logs:
+                raise QuadvisError(f"{self.name} has no log")
+            name = logs[-1]["name"]
+        place = Path(path) if path is not None else Path(tempfile.mkdtemp(prefix="quadvis-")) / f"{name}.mcap"
+        with place.open("wb") as file:
+            while True:
+                piece = self.request("getlog", name=name, offset=file.tell(), count=PIECE)
+                file.write(piece["data"])
+                if not piece["data"] or file.tell() >= piece["size"]:
+                    return place
+
+    def getlog(
+        self, signal: str | None = None, first: int = 1, count: int | None = None, decimation: int = 1
+    ) -> Log | NDArray[np.float64]:
+        """Return the newest log, or samples of one of its signals as xPC's `getlog` gives them.
+
+        ``TimeLog`` is the times of the fastest recorded signal. The first sample has the number 1.
+        """
+        from quadvis.output.log_reader import read_log
+
+        log = read_log(self.fetchlog())
+        if signal is None:
+            return log
+        rows = max(map(log.times, log), key=len) if signal == "TimeLog" else log[signal]
+        last = None if count is None else first - 1 + count * decimation
+        found: NDArray[np.float64] = rows[first - 1 : last : decimation]
+        return found
+
+
+def _loaded(what: str | Path | Diagram, variant: str | None, settings: Given, params: Files) -> Diagram:
+    if not isinstance(what, str | Path):
+        return what
+    from quadvis.diagram.load import load
+
+    return load(what, variant=variant, settings=settings, params=params)
+
+
+def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values as they can be sent: no numpy, and no maps, for which there are texts."""
+    from quadvis.target.parameters import as_written
+
+    return {
+        name: value.tolist() if hasattr(value, "tolist") else as_written(value)
+        for name, value in values.items()
+    }
+
+
+def _shown(name: str, value: Any) -> str:
+    if name in _TIMES and isinstance(value, float):
+        return format_quantity(value, SECOND, 4)
+    if isinstance(value, list):
+        return "; ".join(map(str, value)) or "none"
+    return "none" if value in ("", None) else str(value)

@@ -1,0 +1,162 @@
+"""Steering: what the supervisor of a run does for the helm, if the run has one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from quadvis.diagram.times import LONGEST, time_text
+from quadvis.engine.tuning import Change
+from quadvis.graph.graph import MULTI, Graph
+from quadvis.native.executor import last_exact
+from quadvis.realtime.helm import ENDLESS, READY, RUNNING, Helm
+from quadvis.realtime.member import Member
+from quadvis.realtime.ring import Words
+from quadvis.realtime.times import TaskTimes
+from quadvis.realtime.tuner import Tuner
+
+if TYPE_CHECKING:
+    from quadvis.diagram.diagram import Diagram
+
+LOOK = 0.02  # s between two looks at the rings
+NEAR = 0.001  # s, while somebody waits for a tick
+
+
+class Steering:
+    """Does for the members of a run what a helm asks; without a helm the run begins by itself.
+
+    QuadvisError if the helm has steered another run.
+    """
+
+    def __init__(self, helm: Helm | None, diagram: Diagram, changed: Callable[[Change], None]) -> None:
+        self._helm, self._changed = helm, changed
+        self._period, self._written = diagram.graph.tick, diagram.ticks
+        self._members: Sequence[Member] = ()
+        self._tuner: Tuner | None = None
+        self._begun = False
+        self._reached = 0
+        self._late = _most_late(diagram.graph)
+        self.ticks = diagram.ticks
+        if helm is not None:
+            helm.follow(self)
+
+    def take_over(self, members: Sequence[Member]) -> None:
+        """Steer these members, which have not begun."""
+        self._members = members
+
+    @property
+    def sources(self) -> list[int]:
+        """What becomes ready when there is something to do."""
+        return [self._helm.descriptor] if self._helm is not None and self._tuner is not None else []
+
+    @property
+    def pause(self) -> float:
+        """How long (s) the supervisor may wait for something to come."""
+        return NEAR if self._begun and self._tuner is not None and self._tuner.waits else LOOK
+
+    @property
+    def tick(self) -> int:
+        """The last tick that every computer has begun."""
+        return min((member.tick for member in self._members), default=0)
+
+    @property
+    def time(self) -> float:
+        """Its time (s)."""
+        return float(self.tick * self._period)
+
+    def times(self) -> Mapping[str, tuple[TaskTimes, ...]]:
+        """Return the times of the tasks of each computer."""
+        return {member.computer: member.times() for member in self._members}
+
+    @property
+    def is_stopped(self) -> bool:
+        """True if all members, which are ready, are to end."""
+        return self._helm is not None and self._helm.is_stopped and self._tuner is not None
+
+    def may_begin(self) -> bool:
+        """Return whether the members, which are ready, may begin; from now on values can be checked."""
+        if self._helm is None:
+            return True
+        if self._tuner is None:
+            self._tuner = Tuner(
+                {each.computer: each.tuned() for each in self._members}, self._period, self._changed
+            )
+            self._helm.enter(READY)
+        self.look()
+        return self._helm.is_begun and not self._helm.is_stopped
+
+    def begin(self) -> None:
+        """Give the members what they need before their first tick."""
+        self._begun = True
+        if self._helm is None or self._tuner is None:
+            return
+        self.ticks = self._wanted_ticks(self._helm.stop_time)
+        for member in self._members:
+            member.end_at(self.ticks)
+        self.look()
+        self._tuner.send(-1)
+        self._helm.enter(RUNNING)
+
+    def look(self) -> None:
+        """Take what the helm wants."""
+        if self._helm is None or self._tuner is None:
+            return
+        for wanted in self._helm.take():
+            self._tuner.offer(wanted, self.tick)
+        if self._begun:
+            self._tuner.send(max(member.tick for member in self._members))
+
+    def settle(self, reached: int, *, last: bool = False) -> None:
+        """Note how far the rows are that have been handed on, after a look at the rings.
+
+        ``reached`` is the tick before that look. A look hands on what was there at the one before it.
+        """
+        if self._helm is None or not self._begun:
+            return
+        self._helm.settle(reached + 1 if last else max(0, self._reached - self._late))
+        self._reached = reached
+
+    @property
+    def is_safe_first(self) -> bool:
+        """True if the outputs are to be safe before the members end."""
+        return self._helm is not None and self._helm.is_safe_first
+
+    def noted(self, computer: str, records: Words) -> None:
+        """Take the groups of values that a loop has noted, and their ticks."""
+        if self._tuner is not None:
+            self._tuner.noted(computer, records)
+
+    def end(self) -> None:
+        """End the steering; the members have ended."""
+        if self._tuner is not None:
+            self._tuner.end()
+        if self._helm is not None:
+            self._helm.end()
+
+    def early(self, *, stopped: bool) -> str:
+        """Say how a run that has no error came to end at another time than its diagram says; "" if not."""
+        if stopped:
+            begun = any(member.running for member in self._members)
+            return f"it was stopped at t = {self.time:.9g} s" if begun else "it was stopped before its start"
+        if self.ticks == self._written:
+            return ""
+        return f"its stop time was set to {time_text((self.ticks - 1) * self._period)}"
+
+    def _wanted_ticks(self, stop_time: Fraction | float | None) -> int:
+        if stop_time is None:
+            return self._written
+        most = max(self._written, min(last_exact(self._period) - 1, int(LONGEST / self._period)))
+        if stop_time == ENDLESS:
+            return most
+        return min(most, int(Fraction(stop_time) / self._period) + 1)
+
+
+def _most_late(graph: Graph) -> int:
+    """Return how many ticks after its own a row may come at the latest, since its task runs by itself.
+
+    A step that takes longer than two periods of its task has cost it overruns.
+    """
+    if graph.tasking != MULTI:
+        return 0
+    return int(2 * max(task.period for task in graph.tasks) / graph.tick)

@@ -1,0 +1,69 @@
+"""The ports and paths at which a target listens, bound before ZeroMQ has them."""
+
+from __future__ import annotations
+
+import os
+import socket
+from contextlib import ExitStack, suppress
+from pathlib import Path
+
+from quadvis.errors import QuadvisError
+from quadvis.machine.files import reason
+from quadvis.wire.home import private_folder
+
+_TRIES = 50
+
+
+def listeners(host: str, port: int) -> list[socket.socket]:
+    """Return three bound TCP sockets at neighbouring ports: control, introductions, stream."""
+    for last in range(_TRIES if port == 0 else 1, 0, -1):
+        with ExitStack() as opened:
+            try:
+                first = opened.enter_context(_bound(host, port))
+                start = int(first.getsockname()[1])
+                found = [first, *(opened.enter_context(_bound(host, start + n)) for n in (1, 2))]
+            except (OSError, OverflowError) as error:
+                if last == 1:
+                    words = getattr(error, "strerror", None) or str(error)
+                    raise QuadvisError(
+                        f"cannot listen at {host}, ports {port} to {port + 2}: {words.lower()}"
+                    ) from None
+                continue
+            opened.pop_all()
+            return found
+    raise AssertionError
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    made = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        made.setblocking(False)
+        made.bind((host, port))
+    except BaseException:
+        made.close()
+        raise
+    return made
+
+
+def local_folder(path: str) -> Path:
+    """Return the folder of a socket, which only its owner can open."""
+    return private_folder(Path(path).parent)
+
+
+def held(path: str, target: str) -> int:
+    """Return a lock on a path, as an open file; QuadvisError if another process has it.
+
+    ZeroMQ would take the path away from whoever listens there.
+    """
+    import fcntl
+
+    try:
+        descriptor = os.open(f"{path}.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+    except OSError as error:
+        raise QuadvisError(f"cannot listen at '{path}': {reason(error)}") from None
+    with suppress(BlockingIOError):
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return descriptor
+    os.close(descriptor)
+    raise QuadvisError(f"a target '{target}' runs already: it listens at '{path}'")

@@ -1,0 +1,324 @@
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import quadvis
+from quadvis.errors import QuadvisError
+from quadvis.host.local import _answers
+from quadvis.host.target import PROPERTIES, Target
+from quadvis.output.log_reader import Log
+from tests.processes import linux, wait_for
+from tests.quadvis.host.targets import LOOP, Running, running_target
+
+pytestmark = linux
+
+
+@pytest.fixture(scope="module")
+def lab() -> Iterator[Running]:
+    with running_target() as found:
+        yield found
+
+
+@pytest.fixture
+def diagram(tmp_path: Path) -> Path:
+    path = tmp_path / "loop.yaml"
+    path.write_text(LOOP)
+    return path
+
+
+@pytest.fixture
+def tg(lab: Running, monkeypatch: pytest.MonkeyPatch) -> Iterator[Target]:
+    for name in ("QUADVIS_HOME", "XDG_RUNTIME_DIR"):
+        monkeypatch.setenv(name, lab.environment[name])
+    with Target("lab") as found:
+        yield found
+        found.unload()
+
+
+def test_an_application_goes_through_its_states_as_in_xpc_target(tg: Target, diagram: Path) -> None:
+    assert (tg.Application, tg.Status) == ("", "stopped")
+    tg.load(diagram)
+    assert (tg.Application, tg.Status, tg.Mode) == ("loop", "ready", "Real-Time Single-Tasking")
+    with pytest.raises(QuadvisError, match="lab refuses: loop does not run"):
+        tg.stop()
+    tg.start()
+    with pytest.raises(QuadvisError, match="lab refuses: loop runs already"):
+        tg.start()
+    with pytest.raises(QuadvisError, match="lab refuses: loop runs: stop it first"):
+        tg.load("loop")
+    wait_for(lambda: tg.ExecTime > 0.3)
+    assert tg.Status == "running"
+    tg.stop()
+    assert (tg.Application, tg.Status) == ("loop", "stopped")  # it stays loaded
+    first = tg.ExecTime
+    tg.start()
+    wait_for(lambda: 0.1 < tg.ExecTime < first + 10)
+    tg.stop()
+    log = tg.getlog()
+    assert isinstance(log, Log)
+    assert log.summary["stopped"].startswith("it was stopped at t = ")
+    assert [each["name"] for each in tg.logs()][-2:] == ["loop-1", "loop-2"]
+
+
+def test_the_list_of_properties_reads_as_in_xpc_target(tg: Target, diagram: Path) -> None:
+    tg.load(diagram)
+    tg.start()
+    wait_for(lambda: tg.ExecTime > 0.2)
+    lines = str(tg).splitlines()
+    assert lines[0] == "Target: lab"
+    names = [line.split()[0] for line in lines[1:]]
+    assert {"Application", "Mode", "Status", "ExecTime", "SampleTime", "AvgTET", "NumSignals"} <= set(names)
+    found = tg.status()
+    assert 0 < found["MinTET"] <= found["AvgTET"] <= found["MaxTET"]
+    assert (tg.SampleTime, tg.sample_time, tg.StopTime) == (0.01, 0.01, 600.0)
+    assert {each["task"] for each in tg.Tasks} == {"fast", "slow"}
+    for name, alias in PROPERTIES.items():
+        if name not in (
+            "Passed",
+            "Verdicts",
+            "ExecTime",
+            "SessionTime",
+            "Tasks",
+            "MinTET",
+            "AvgTET",
+            "MaxTET",
+        ):
+            assert getattr(tg, name) == getattr(tg, alias)
+    with pytest.raises(AttributeError, match="a target has no 'Sttus'; did you mean 'Status'"):
+        _ = tg.Sttus
+    with pytest.raises(AttributeError, match="StopTime and SampleTime can"):
+        tg.Status = "running"
+
+
+def test_times_can_be_set_while_it_is_stopped(tg: Target, diagram: Path) -> None:
+    tg.load(diagram)
+    tg.StopTime = 0.5
+    tg.SampleTime = 0.02
+    assert (tg.StopTime, tg.SampleTime, tg.Status) == (0.5, 0.02, "ready")
+    tg.start()
+    wait_for(lambda: tg.Status == "stopped")
+    assert tg.Passed
+    assert tg.Verdicts == ["met: law.y within 100 m: 1.902 m"]
+    times = tg.getlog("TimeLog")
+    np.testing.assert_allclose(times, 0.02 * np.arange(26))
+    tg.start()
+    with pytest.raises(QuadvisError, match="times cannot change in a run"):
+        tg.StopTime = 3.0
+
+
+def test_values_are_tuned_together_at_a_tick_that_the_log_has(
+    tg: Target, diagram: Path, lab: Running
+) -> None:
+    tg.load(diagram)
+    tg.start()
+    wait_for(lambda: tg.ExecTime > 0.1)
+    found = tg.tune({"law.factor": 5.0, "other.factor": "7"})
+    assert found["changes"] == [
+        {"name": "law.factor", "old": 2.0, "new": 5.0}, {"name": "other.factor", "old": 1.0, "new": 7.0},
+    ]  # fmt: skip
+    wait_for(lambda: tg.ExecTime > found["time"] + 0.2)
+    assert tg.getparam("law.factor") == 5.0
+    tg.stop()
+    log = tg.getlog()
+    wave, law, other = (log[name] for name in ("wave.y", "law.y", "other.y"))
+    sampled = np.interp(log.times("law.y"), log.times("wave.y"), wave)
+    after = log.times("law.y") >= found["time"] - 1e-9
+    assert after.any() and not after.all()
+    np.testing.assert_allclose(law, np.where(after, 5.0, 2.0) * sampled, atol=1e-12)
+    np.testing.assert_allclose(other, np.where(after, 7.0, 1.0) * sampled, atol=1e-12)
+    text = (lab.folder / "state/quadvis/lab/audit.jsonl").read_text()
+    lines = [json.loads(line) for line in text.splitlines()]
+    written = [line for line in lines if line["verb"] == "setparam"][-1]
+    assert (written["tick"], written["args"]["values"]) == (
+        found["tick"],
+        {"law.factor": 5.0, "other.factor": "7"},
+    )
+    tg.start()  # what was tuned stays
+    wait_for(lambda: tg.ExecTime > 0.1)
+    tg.stop()
+    again = tg.getlog()
+    np.testing.assert_allclose(
+        again["law.y"],
+        5.0 * np.interp(again.times("law.y"), again.times("wave.y"), again["wave.y"]),
+        atol=1e-12,
+    )
+
+
+@pytest.mark.parametrize("running", [False, True])
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("law.factr", 1.0, "did you mean 'factor'"),
+        ("wave.y", 1.0, "wave"),
+        ("law.factor", "3 m", "law.factor|factor"),
+        ("law.factor", "nan", "factor"),
+        ("law.factor", [1.0, 2.0], "factor"),
+    ],
+)
+def test_a_wrong_value_is_refused_in_a_sentence_and_nothing_changes(
+    tg: Target, diagram: Path, name: str, value: object, words: str, running: bool
+) -> None:
+    tg.load(diagram)
+    if running:
+        tg.start()
+    with pytest.raises(QuadvisError, match=f"lab refuses: .*({words})"):
+        tg.setparam({"other.factor": 9.0, name: value})
+    assert tg.getparam("law.factor", "other.factor") == {"law.factor": 2.0, "other.factor": 1.0}
+
+
+def test_sets_are_kept_compared_and_used(tg: Target, diagram: Path, lab: Running) -> None:
+    tg.load(diagram)
+    tg.saveparamset("first")
+    tg.setparam("law.factor", 3.0)
+    tg.saveparamset("second")
+    assert tg.listparamsets() == ["first", "second"]
+    assert tg.compare("first", "second") == [("law.factor", 2.0, 3.0)] or tg.compare("first", "second") == [
+        ("law.factor", "2.0", "3.0")
+    ]
+    tg.start()
+    wait_for(lambda: tg.ExecTime > 0.05)
+    assert tg.loadparamset("first") > 0
+    assert tg.getparam("law.factor") == 2.0
+    with pytest.raises(QuadvisError, match="there is no parameter set 'frst'; did you mean 'first'"):
+        tg.loadparamset("frst")
+    path = lab.folder / "state/quadvis/lab/sets/loop/second.yaml"
+    assert quadvis.load(diagram, params=path).graph["law"].block.factor == 3.0  # type: ignore[attr-defined]
+    tg.deleteparamset("first")
+    assert tg.listparamsets() == ["second"]
+
+
+def test_two_scopes_that_trigger_each_other_lose_nothing(tg: Target, diagram: Path) -> None:
+    tg.load(diagram)
+    first = tg.addscope("host", signals=["wave.y", "law.y"], NumSamples=20)
+    second = tg.addscope("host", signals=["wave.y", "law.y"], NumSamples=20)
+    assert tg.Scopes == [first.number, second.number]
+    first.set(TriggerMode="Scope", TriggerScope=second.number, TriggerSample=-1, AutoRestart=True)
+    second.set(TriggerMode="Scope", TriggerScope=first.number, TriggerSample=-1, AutoRestart=True)
+    first.start()
+    second.start()
+    assert second.Status == "Ready for being Triggered"
+    tg.start()
+    first.trigger()
+    wait_for(lambda: tg.ExecTime > 2.0)
+    both = {"Acquiring", "Ready for being Triggered"}
+    wait_for(lambda: {each["Status"] for each in tg.request("scopes")} == both)
+    tg.stop()
+    ticks = np.concatenate([each.package.times for each in (first, second)])
+    assert len(np.unique(np.round(ticks * 100))) == 40
+    assert np.ptp(ticks) == pytest.approx(0.39)  # two packages, one after the other
+    tg.remscope()
+    assert tg.Scopes == []
+
+
+def test_packages_of_a_scope_follow_one_another(tg: Target, diagram: Path) -> None:
+    tg.load(diagram)
+    scope = tg.addscope(signals=["wave.y"], NumSamples=10).start()
+    tg.start()
+    found = []
+    for package in scope.packages():
+        found.append(package)
+        if len(found) == 8:
+            break
+    times = np.concatenate([each.times for each in found])
+    np.testing.assert_allclose(np.diff(times), 0.01, atol=1e-9)
+    np.testing.assert_allclose(
+        np.concatenate([each.samples[:, 0] for each in found]), np.sin(2 * np.pi * times), atol=1e-9
+    )
+    assert [each.sequence for each in found] == list(range(found[0].sequence, found[0].sequence + 8))
+
+
+def test_a_scope_tells_what_is_wrong(tg: Target, diagram: Path) -> None:
+    tg.load(diagram)
+    with pytest.raises(QuadvisError, match=r"wave\.y"):
+        tg.addscope(signals=["wav.y"])
+    assert tg.Scopes == []
+    scope = tg.addscope(signals=["wave.y"])
+    with pytest.raises(QuadvisError, match="NumSamples"):
+        scope.NumSamples = -3
+    scope.start()
+    with pytest.raises(QuadvisError, match="stop it before you change NumSamples"):
+        scope.NumSamples = 30
+    with pytest.raises(QuadvisError, match=r"there is no signal 'wave\.x'; did you mean 'wave.y'"):
+        tg.getsignal("wave.x")
+
+
+def test_the_same_diagram_is_sent_once(tg: Target, diagram: Path) -> None:
+    tg.load(diagram)
+    sent: list[str] = []
+    put = tg._put
+    tg.__dict__["_put"] = lambda digest, data: (sent.append(digest), put(digest, data))
+    tg.load(diagram)
+    assert sent == []
+    tg.load(diagram, name="second")
+    assert len(sent) == 1
+    assert {"loop", "second"} <= set(tg.applications)
+
+
+def quadvis_says(lab: Running, *words: str, input: str = "") -> tuple[int, str, str]:
+    found = subprocess.run(
+        [sys.executable, "-m", "quadvis", *words], env=dict(lab.environment), capture_output=True, text=True,
+        input=input, timeout=60,
+    )  # fmt: skip
+    return found.returncode, found.stdout, found.stderr
+
+
+@pytest.mark.slow
+def test_the_shell_has_the_same_verbs(tg: Target, lab: Running, diagram: Path, tmp_path: Path) -> None:
+    to = ("--target", "lab")
+    assert quadvis_says(lab, "load", str(diagram), *to) == (0, "lab: loop is loaded, ready\n", "")
+    assert quadvis_says(lab, "start", *to) == (0, "lab: loop runs\n", "")
+    code, out, _ = quadvis_says(lab, "set", "law.factor=4", *to)
+    assert code == 0
+    assert out.startswith("law.factor: 2.0 -> 4.0 at tick ")
+    code, out, told = quadvis_says(lab, "set", "law.fctor=4", *to)
+    assert (code, out) == (2, "")
+    assert "did you mean 'factor'" in told
+    assert quadvis_says(lab, "get", "law.factor", *to) == (0, "law.factor: 4.0\n", "")
+    table = tmp_path / "wave.csv"
+    assert quadvis_says(lab, "scope", "wave.y", "--samples", "50", "-o", str(table), *to) == (
+        0,
+        f"{table}\n",
+        "",
+    )
+    rows = np.loadtxt(table, delimiter=",", skiprows=1)
+    np.testing.assert_allclose(rows[:, 1], np.sin(2 * np.pi * rows[:, 0]), atol=1e-9)
+    code, out, _ = quadvis_says(lab, "scope", "wave.y", "--samples", "50", *to)
+    assert code == 0
+    assert "wave.y" in out
+    code, out, _ = quadvis_says(lab, "console", *to, input="get law.factor\nsets save kept\nsets\nstop\n")
+    assert (code, out.splitlines()[:2]) == (0, ["law.factor: 4.0", "kept"])
+    code, out, _ = quadvis_says(lab, "log", "-o", str(tmp_path / "x.mcap"), *to)
+    assert (code, out) == (0, f"{tmp_path / 'x.mcap'}\n")
+    assert quadvis_says(lab, "unload", *to) == (0, "", "")
+
+
+@pytest.mark.slow
+def test_run_flies_on_a_target_and_brings_the_log_home(lab: Running, diagram: Path, tmp_path: Path) -> None:
+    log = tmp_path / "home.mcap"
+    words = ("run", str(diagram), "--stop-time", "1 s", "--target", "lab", "--log", str(log))
+    code, out, told = quadvis_says(lab, *words)
+    assert (code, told) == (0, "")
+    assert "PASSED: 1 of 1 expectations met" in out
+    assert len(quadvis.read_log(log)["wave.y"]) == 101
+
+
+def test_a_local_target_starts_and_ends_by_itself(
+    diagram: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    import tempfile
+
+    folder = tempfile.mkdtemp(prefix="q")
+    for name in ("QUADVIS_HOME", "XDG_RUNTIME_DIR", "XDG_STATE_HOME"):
+        monkeypatch.setenv(name, f"{folder}/{name[-4:]}")
+    monkeypatch.setattr("quadvis.host.local.UNUSED", 0.5)
+    with Target() as tg:
+        assert tg.name == "local"
+        assert tg.level == 0
+    socket = Path(folder) / "_DIR" / "quadvis" / "local"
+    assert socket.exists()
+    wait_for(lambda: not _answers(socket))
