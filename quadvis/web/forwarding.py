@@ -1,7 +1,7 @@
 """What a page can ask for: the verbs and topics that the gateway forwards, and nothing else.
 
-The target checks levels and arguments again. The gateway knows levels so that the page shows no button in
-vain, and so that nothing that is refused anyway costs the target a request.
+The target checks levels and arguments again. The gateway looks at the level, too, so that the page shows no
+button in vain and the target is not asked for what it refuses anyway.
 """
 
 from __future__ import annotations
@@ -10,35 +10,32 @@ import re
 from collections.abc import Mapping
 
 from quadvis.errors import QuadvisError, quoted
+from quadvis.wire.verbs import VERBS, check_level
 
-FORWARDED: Mapping[str, int] = {
-    "load": 0, "setparam": 0,
-    "start": 1, "stop": 1, "logs": 1, "getlog": 1,
-    "parameters": 2, "getparam": 2, "addscope": 2, "remscope": 2,
-    "applications": 3, "signals": 3, "getsignal": 3, "drawing": 3, "picture": 3,
-    "scopes": 3, "setscope": 3, "startscope": 3, "stopscope": 3, "trigger": 3,
-    "status": 4,
-}  # fmt: skip
-"""The highest level that may use each verb of the target."""
-
-OWN: Mapping[str, int] = {"describe": 3, "watch": 3, "listen": 3}
-"""The verbs of the gateway itself."""
+FORWARDED = (
+    "load", "setparam", "start", "stop", "logs", "getlog", "parameters", "getparam", "addscope", "remscope",
+    "applications", "signals", "getsignal", "drawing", "picture", "scopes", "setscope", "startscope",
+    "stopscope", "trigger", "status",
+)  # fmt: skip
+OWN: Mapping[str, str] = {"describe": "signals", "watch": "getsignal", "listen": "scopes"}
+"""The gateway's own verbs, each with the verb of the target whose level it has."""
 
 COMMANDS = frozenset(("load", "setparam", "start"))
 """What nobody may do who looks at old data. Whoever wants to stop may."""
+
+PATIENCE: Mapping[str, float] = {"load": 120.0, "start": 120.0, "stop": 20.0, "drawing": 60.0}
+"""How long the target may take (s), where it may take longer than usual."""
 
 SCOPE = re.compile(r"scope/[1-9][0-9]{0,3}", re.ASCII)
 
 
 def check_verb(verb: str, level: int) -> None:
     """Raise QuadvisError if a page may not use a verb."""
-    highest = FORWARDED.get(verb, OWN.get(verb))
-    if highest is None:
+    if verb not in FORWARDED and verb not in OWN:
         raise QuadvisError(f"the page cannot ask for {quoted(verb)}")
-    if level > highest:
-        raise QuadvisError(f"'{verb}' needs a key of level {highest} or lower; this one has level {level}")
+    check_level(VERBS[OWN.get(verb, verb)], level)
 
 
 def permitted(level: int) -> list[str]:
     """Return all verbs that a level may use."""
-    return [verb for verb, highest in {**FORWARDED, **OWN}.items() if level <= highest]
+    return [verb for verb in (*FORWARDED, *OWN) if level <= VERBS[OWN.get(verb, verb)].level]

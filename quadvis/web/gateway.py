@@ -19,7 +19,7 @@ from quadvis.version import __version__
 from quadvis.web import messages
 from quadvis.web.access import LOOPBACK, Access
 from quadvis.web.described import described
-from quadvis.web.forwarding import COMMANDS, FORWARDED, SCOPE, check_verb, permitted
+from quadvis.web.forwarding import COMMANDS, PATIENCE, SCOPE, check_verb, permitted
 from quadvis.web.listener import Listener
 from quadvis.web.rate import Allowance
 from quadvis.web.viewed import ViewedTarget
@@ -75,10 +75,10 @@ class Gateway:
         finally:
             beats.cancel()
             self._watch.close()
-            for end in self._streams.values():
-                end()
             server.close()
             await server.wait_closed()
+            while self._streams:
+                self._streams.popitem()[1]()
             self._workers.shutdown(wait=False, cancel_futures=True)
 
     # one page
@@ -106,6 +106,7 @@ class Gateway:
         finally:
             self.viewers.discard(viewer)
             sending.cancel()
+            self._workers.submit(self._remove, viewer.scopes)
             self._rewatch()
             self._relisten()
 
@@ -174,9 +175,21 @@ class Gateway:
         if request.verb == "describe":
             work = partial(described, str(request.arguments.get("block")))
         else:
-            assert request.verb in FORWARDED
+            if request.verb in PATIENCE:
+                request.arguments["deadline"] = PATIENCE[request.verb]
+            elif "deadline" in request.arguments:
+                raise QuadvisError("a page has no 'deadline'")
             work = partial(self.target.request, request.verb, **request.arguments)
-        return await self._loop.run_in_executor(self._workers, work)
+        found = await self._loop.run_in_executor(self._workers, work)
+        if request.verb == "addscope":
+            viewer.scopes.add(found)
+        return found
+
+    def _remove(self, scopes: set[int]) -> None:
+        """Remove the scopes that a page has left."""
+        for number in scopes:
+            with suppress(QuadvisError):  # they are gone with their application, or the page removed them
+                self.target.request("remscope", ids=[number])
 
     # what comes from the target
 

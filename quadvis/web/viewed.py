@@ -21,7 +21,10 @@ class ViewedTarget(Protocol):
         """The level of the key by which it is reached: 0 may do all, 4 may see the status alone."""
 
     def request(self, verb: str, /, **arguments: Any) -> Any:
-        """Do what a verb says and return plain data; QuadvisError says why it is refused."""
+        """Do what a verb says and return plain data; QuadvisError says why it is refused.
+
+        The argument ``deadline`` is how long the target may take (s).
+        """
 
     def subscribe(self, topic: str, take: Taker) -> Callable[[], None]:
         """Have stream data of a topic handed over, in a thread of the target's; return what ends that."""

@@ -27,6 +27,7 @@ class Viewer:
         self.dropped = 0  # messages of values and samples
         self.watched: frozenset[str] = frozenset()
         self.listens: frozenset[str] = frozenset()
+        self.scopes: set[int] = set()  # that it has added to the target
         self.gone = False  # too slow to be told what it asked for
         self._now = now
         self._seen = now()

@@ -9,19 +9,10 @@ function typed(found) {
   return Array.isArray(found) ? `[${found.map(typed).join(", ")}]` : String(found);
 }
 
-/** Return what was typed, as the target takes it: numbers and lists as such, all else as a text. */
-function read(text, parameter) {
-  const plain = text.trim();
-  const list = plain.match(/^(\[.*\])\s*(.*)$/);
-  if (list) {
-    try {
-      const numbers = JSON.parse(list[1]);
-      return list[2] ? { value: numbers, unit: list[2] } : numbers;
-    } catch {
-      return plain;
-    }
-  }
-  return plain;
+/** Return what was typed as the target reads it: a list with a unit as a map. */
+function read(text) {
+  const [, list, name] = text.trim().match(/^(\[.*\])\s*(\S.*)$/) ?? [];
+  return list ? `{value: ${list}, unit: ${name}}` : text.trim();
 }
 
 function bounds({ min, max, unit: name }) {
@@ -104,7 +95,7 @@ export class Block {
     row.append(input, make("button", { textContent: "Set" }), note);
     row.onsubmit = (event) => {
       event.preventDefault();
-      this.#tune(parameter, read(input.value, parameter), row, note, input);
+      this.#tune(parameter, read(input.value), row, note, input);
     };
     return row;
   }

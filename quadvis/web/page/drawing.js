@@ -28,7 +28,7 @@ export class Drawing {
   /** Show a drawing. */
   take(text) {
     const svg = readDrawing(text);
-    const content = [...svg.querySelectorAll(":scope > g")].at(-1);
+    const content = svg.querySelector(":scope > g:has(g.block)") ?? svg;
     this.#legend(svg.querySelector(":scope > g"));
     svg.replaceChildren(content); // paper, title and legend are those of the page
     for (const name of ["width", "height"]) svg.removeAttribute(name);

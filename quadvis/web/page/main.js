@@ -107,6 +107,7 @@ connection.on("state", ({ data }) => {
   say(find("#state"), data.Status);
   find("#state").dataset.state = data.CPUOverload === "detected" && running ? "overrun" : data.Status;
   say(find("#clock"), clock(data));
+  say(find("#operator"), data.Operator ? `operator: ${data.Operator}` : "");
   show(find("#stop"), connection.may("stop") && (running || data.Status === "stopping"));
   show(find("#start"), connection.may("start") && Boolean(data.Application) && !running && data.Status !== "stopping");
   status.take(data);

@@ -139,7 +139,7 @@ export class Scope {
     const count = Math.max(1, Math.round((free ? PACKAGE : window) / period / decimation));
     const found = {
       Signals: this.#curves.map((curve) => curve.name), Decimation: decimation, NumSamples: Math.min(count, MOST),
-      NumPrePostSamples: free ? 0 : -Math.round(BEFORE * count), TriggerMode: mode,
+      NumPrePostSamples: free ? 0 : -Math.round(BEFORE * count), TriggerMode: mode, AutoRestart: !free,
     };
     if (mode === "Signal") {
       const known = this.#curves.some((curve) => curve.name === signal);
@@ -153,10 +153,10 @@ export class Scope {
     if (header.names?.join() !== this.#curves.map((curve) => curve.name).join()) return; // of the last settings
     if (this.settings.mode !== "FreeRun") {
       if (this.paused) return;
-      this.data.clear();
-      this.at = header.trigger;
+      if (!header.part) this.data.clear();
     }
     this.data.add(samples);
+    if (header.trigger !== null && header.trigger !== undefined) this.at = this.data.columns[0][header.trigger];
     this.#draw();
   }
 

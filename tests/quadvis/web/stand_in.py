@@ -33,7 +33,7 @@ from quadvis.realtime.times import (
     end_of,
 )
 from quadvis.run.live import LiveRun
-from quadvis.run.rows import ports
+from quadvis.run.tuned import find_value
 from quadvis.target.parameters import Parameters
 
 PIECE = 200_000  # bytes of a log in one reply
@@ -74,6 +74,7 @@ class StandIn:
         while self.silent:
             time.sleep(0.02)
         self.asked.append(verb)
+        arguments.pop("deadline", None)
         answer = getattr(self, f"do_{verb}", None)
         if answer is None:
             raise QuadvisError(f"there is no verb {quoted(verb)}")
@@ -118,8 +119,11 @@ class StandIn:
             found["NotMet"] = [str(verdict) for verdict in self.verdicts if not verdict.met]
         return found
 
-    def do_applications(self) -> list[str]:
-        return sorted(self.applications)
+    def do_applications(self) -> list[dict[str, Any]]:
+        return [
+            {"name": name, "loaded": self.applications[name] is self.diagram}
+            for name in sorted(self.applications)
+        ]
 
     def do_load(self, application: str) -> None:
         if self.state != "stopped":
@@ -134,7 +138,7 @@ class StandIn:
         self.picture = self.picture or self.diagram.draw()
         return self.picture
 
-    def do_signals(self) -> list[dict[str, Any]]:
+    def do_signals(self, first: int = 0) -> list[dict[str, Any]]:
         found = []
         for node in self.diagram.graph.nodes:
             for name, port in node.block.interface.outputs.items():
@@ -154,7 +158,7 @@ class StandIn:
             tick = round(run.time / float(self.diagram.graph.tick)) - 1
             return {name: [_plain(run[name]), tick] for name in names}
 
-    def do_parameters(self) -> list[dict[str, Any]]:
+    def do_parameters(self, first: int = 0) -> list[dict[str, Any]]:
         return self.parameters.facts()
 
     def do_setparam(self, values: Mapping[str, Any]) -> dict[str, Any]:
@@ -170,7 +174,7 @@ class StandIn:
         while len(run.changes) < before + len(found) and self.state == "running":
             time.sleep(0.001)
         changes = run.changes[before:]
-        self.parameters.took(changes)
+        self.parameters.took([change[1:] for change in changes])
         facts = [
             {"name": f"{path}.{param}", "old": text, "new": self.parameters.text(path, param)}
             for (path, param), text in zip(found, old, strict=True)
@@ -204,15 +208,15 @@ class StandIn:
         self.publish("state", self.do_status())
 
     def do_logs(self) -> list[dict[str, Any]]:
-        return [{"name": p.stem, "bytes": p.stat().st_size} for p in sorted(self.folder.glob("*.mcap"))]
+        return [{"name": p.stem, "size": p.stat().st_size} for p in sorted(self.folder.glob("*.mcap"))]
 
-    def do_getlog(self, name: str, offset: int = 0) -> dict[str, Any]:
+    def do_getlog(self, name: str, offset: int = 0, count: int = PIECE) -> dict[str, Any]:
         path = self.folder / f"{name}.mcap"
         if path not in self.folder.glob("*.mcap"):
             raise QuadvisError(f"there is no log {quoted(name)}")
         with path.open("rb") as file:
             file.seek(offset)
-            return {"data": file.read(PIECE), "size": path.stat().st_size}
+            return {"data": file.read(count), "size": path.stat().st_size}
 
     def do_picture(self, signal: str) -> dict[str, Any]:
         import cv2
@@ -284,7 +288,7 @@ class Scope:
         self.target, self.number, self.status = target, number, "Interrupted"
         self.properties = {
             "Signals": [], "NumSamples": 20, "Decimation": 1, "NumPrePostSamples": 0, "TriggerMode": "FreeRun",
-            "TriggerSignal": "", "TriggerLevel": 0.0, "TriggerSlope": "Either",
+            "TriggerSignal": "", "TriggerLevel": 0.0, "TriggerSlope": "Either", "AutoRestart": False,
         }  # fmt: skip
         self.forced, self.sequence = False, 0
 
@@ -318,9 +322,9 @@ class Scope:
         if self.status != "Acquiring" or tick % self.properties["Decimation"]:
             return
         row = [time, *(read(*place) for place in self.places)]
-        if not self.acquiring and self._triggers(read):
+        if not self.acquiring and len(self.before) == self.before.maxlen and self._triggers(read):
             self.acquiring, self.rows = True, list(self.before)
-            self.at = time
+            self.at = len(self.before)
         if not self.acquiring:
             self.before.append(row)
             return
@@ -328,9 +332,11 @@ class Scope:
         if len(self.rows) >= self.properties["NumSamples"]:
             self.sequence += 1
             header = {"scope": self.number, "sequence": self.sequence, "names": self.names, "units": self.units,
-                      "trigger": self.at, "mode": self.properties["TriggerMode"], "lost": 0}  # fmt: skip
+                      "trigger": None if self.properties["TriggerMode"] == "FreeRun" else self.at, "lost": 0, "part": 0, "parts": 1,}  # fmt: skip
             self.target.publish(f"scope/{self.number}", header, np.array(self.rows))
             self.acquiring, self.rows = False, []
+            if self.properties["TriggerMode"] != "FreeRun" and not self.properties["AutoRestart"]:
+                self.status = "Finished"
 
     def _triggers(self, read: Callable[..., float]) -> bool:
         mode = self.properties["TriggerMode"]
@@ -363,7 +369,7 @@ class Flight:
         self._opened.wait(10)
 
     def place(self, name: str) -> tuple[str, str, Any]:
-        return self.run._find(name)
+        return find_value(self.run.diagram, name)
 
     def _read(self, path: str, port: str, index: Any) -> float:
         value = self.run._engine.read(path, port)
