@@ -87,9 +87,7 @@ class Target:
         """
         return self._connection.operate(verb, **arguments)
 
-    def subscribe(
-        self, topic: str, take: Callable[[Mapping[str, Any], Any], object]
-    ) -> Callable[[], None]:
+    def subscribe(self, topic: str, take: Callable[[Mapping[str, Any], Any], object]) -> Callable[[], None]:
         """Let ``take(header, array)`` be called with the data of a topic, in another thread.
 
         Return what ends that. A topic has one taker; another one takes its place.

@@ -1,1 +1,1 @@
-"""The live page of a target: a gateway between browsers on this computer and the target, and the page itself."""
+"""The live page of a target: a gateway between browsers and the target, and the page."""

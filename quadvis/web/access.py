@@ -49,7 +49,7 @@ class Access:
         return reason
 
     def objection(self, headers: Mapping[str, list[str]], upgrade: bool) -> str:
-        """Return why a request is refused, given all values of its headers by lower-case name; "" if it is not."""
+        """Return why a request is refused, given all values of its headers by lower-case name; else ""."""
         hosts = headers.get("host", [])
         if len(hosts) != 1 or hosts[0] not in self._hosts:
             return self.refuse("a request for another host", ", ".join(hosts)[:80])

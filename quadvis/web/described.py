@@ -8,7 +8,7 @@ from typing import Any
 
 @lru_cache(256)
 def described(kind: str) -> dict[str, Any]:
-    """Return the docstring of a block by its name in a diagram, and its ports; QuadvisError if there is none."""
+    """Return docstring and ports of a block by its name in a diagram; QuadvisError if there is none."""
     from quadvis.library.catalogue import Catalogue
     from quadvis.library.describe import facts
 

@@ -2,8 +2,8 @@
 
  page to gateway    {"token"} first; then {"id", "verb", "args"} or {"beat"}
  gateway to page    {"hello"}, {"reply", "ok", "result" | "error"}, {"topic", "data"}, {"beat", "heard", ...}
- bytes              length of the head (uint32, little-endian), the head as JSON, spaces up to a multiple of 8,
-                    then the numbers (float64, little-endian, row by row) or the bytes of a file
+ bytes              length of the head (uint32, little-endian), the head as JSON, spaces up to a multiple
+                    of 8, then the numbers (float64, little-endian, row by row) or the bytes of a file
 
 JSON has no NaN and no infinity: they are the texts that JavaScript's Number reads.
 """

@@ -34,7 +34,9 @@ def _leading_to(address: str) -> Iterator[Path]:
     """Give a file that leads to an address: every user sees the arguments of a browser, and not this file."""
     number, name = tempfile.mkstemp(prefix="quadvis-", suffix=".html")
     with os.fdopen(number, "w", encoding="utf-8") as file:
-        file.write(f'<!DOCTYPE html><meta http-equiv="refresh" content="0; url={address}"><title>quadvis</title>')
+        file.write(
+            f'<!DOCTYPE html><meta http-equiv="refresh" content="0; url={address}"><title>quadvis</title>'
+        )
     try:
         yield Path(name)
     finally:

@@ -18,8 +18,8 @@ SIGN = 0.4  # s without a word from the target until it is asked how it is
 class Watch:
     """A thread that asks a target for values, and whether it is still there.
 
-    ``found`` takes the values by name, ``status`` that of the target, both in this thread. ``heard`` is the time
-    (monotonic, s) at which the target was last heard of.
+    ``found`` takes the values by name, ``status`` that of the target, both in this thread. ``heard`` is the
+    time (monotonic, s) at which the target was last heard of.
     """
 
     def __init__(

@@ -72,6 +72,12 @@ export class Drawing {
     return [...new Set(found.filter((signal) => signal && signal.type !== "frame").map((signal) => signal.name))];
   }
 
+  /** The signals on wires that have no numbers: rows hold none, so they are pictures. */
+  get pictures() {
+    const sources = this.#wires.map((wire) => wire.dataset.source);
+    return [...new Set(sources.filter((source) => (this.model.signalOf(source)?.type ?? "frame") === "frame"))];
+  }
+
   update() {
     this.labels?.update();
     if (this.#hovered) this.#fill();

@@ -50,8 +50,7 @@ async function begin(key) {
   try {
     const [picture] = await Promise.all([connection.request("drawing"), model.load()]);
     drawing.take(picture);
-    const modes = await status.begin();
-    camera.begin();
+    const modes = [...(await status.begin()), ...camera.begin(drawing.pictures)];
     scope.renew(true);
     if (block.path && model.kinds.has(block.path)) block.open(block.path);
     else block.close();

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from quadvis.api import Diagram
+from quadvis.block import Frame
 from quadvis.errors import QuadvisError, quoted
 from quadvis.output.log_reader import read_log
 from quadvis.realtime.times import (
@@ -37,7 +38,6 @@ from quadvis.run.tuned import find_value
 from quadvis.target.parameters import Parameters
 
 PIECE = 200_000  # bytes of a log in one reply
-LABELS = ("red", "blue", "green", "black")
 
 
 class StandIn:
@@ -45,7 +45,7 @@ class StandIn:
 
     def __init__(
         self, diagram: Diagram, folder: Path, level: int = 0, others: Mapping[str, Diagram] = {}
-    ) -> None:  # noqa: B006
+    ) -> None:
         self.name, self.level = "bench", level
         self.applications = {diagram.name: diagram, **others}
         self.folder = folder
@@ -110,7 +110,8 @@ class StandIn:
             "SessionTime": time.monotonic() - self._born, "Mode": "Real-Time Single-Tasking",
             "Variant": self.diagram.variant or "", "Hash": self.diagram.hash[:12],
             "ExecTime": flight.time if flight else 0.0, "StopTime": float(self.diagram.stop_time),
-            "SampleTime": float(graph.tick), "Tasks": flight.tasks() if flight else [], "Problem": self.problem,
+            "SampleTime": float(graph.tick), "Tasks": flight.tasks() if flight else [],
+            "Problem": self.problem,
         }  # fmt: skip
         found["CPUOverload"] = "detected" if any(task["overruns"] for task in found["Tasks"]) else "none"
         if self.verdicts is not None:
@@ -142,11 +143,13 @@ class StandIn:
         found = []
         for node in self.diagram.graph.nodes:
             for name, port in node.block.interface.outputs.items():
-                frame = port.signal.scalar == "frame"
+                if port.signal.scalar == "frame":
+                    continue
                 found.append({
-                    "name": f"{node.path}.{name}", "unit": "" if frame else str(node.unit(name)),
-                    "shape": [] if frame else list(node.shape(name)), "type": port.signal.scalar, "doc": port.doc,
-                    "task": node.task.name, "period": float(node.task.period or 0), "block": node.kind,
+                    "name": f"{node.path}.{name}", "unit": str(node.unit(name)),
+                    "shape": list(node.shape(name)),
+                    "type": port.signal.scalar, "doc": port.doc, "task": node.task.name,
+                    "period": float(node.task.period or 0), "computer": "", "block": node.kind,
                 })  # fmt: skip
         return found
 
@@ -221,26 +224,18 @@ class StandIn:
     def do_picture(self, signal: str) -> dict[str, Any]:
         import cv2
 
-        detector = signal.rpartition("/")[0] + "/detector"
         with self._lock:
             if self._flight is None:
-                raise QuadvisError("there is no picture before a start")
-            run = self._flight.run
-            frame = run[signal]
-            centres, quality = np.array(run[f"{detector}.centres"]), np.array(run[f"{detector}.quality"])
-            radii = np.array(run[f"{detector}.places"])[:, 2]
+                raise QuadvisError("no picture has come")
+            frame = self._flight.run[signal]
+        if not isinstance(frame, Frame):
+            raise QuadvisError(f"{quoted(signal)} is no signal with pictures")
         if not frame.pixels.size:
-            raise QuadvisError("there is no picture yet")
-        jpeg = cv2.imencode(".jpg", frame.pixels, [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes()
-        found = [
-            {"u": float(u), "v": float(v), "radius": float(radius), "label": label,
-             "kept": bool(good >= 0.9), "reason": "" if good >= 0.9 else "partly hidden"}
-            for (u, v), good, radius, label in zip(centres, quality, radii, LABELS, strict=True)
-            if np.isfinite(u)
-        ]  # fmt: skip
+            raise QuadvisError("no picture has come")
+        data = cv2.imencode(".jpg", frame.pixels, [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes()
         height, width = frame.pixels.shape[:2]
-        return {"jpeg": jpeg, "found": found, "width": width, "height": height, "stamp": frame.stamp,
-                "sequence": frame.sequence}  # fmt: skip
+        facts = {"format": "jpeg", "width": width, "height": height, "sequence": frame.sequence}
+        return facts | {"data": data}
 
     # scopes
 
@@ -287,8 +282,8 @@ class Scope:
     def __init__(self, target: StandIn, number: int) -> None:
         self.target, self.number, self.status = target, number, "Interrupted"
         self.properties = {
-            "Signals": [], "NumSamples": 20, "Decimation": 1, "NumPrePostSamples": 0, "TriggerMode": "FreeRun",
-            "TriggerSignal": "", "TriggerLevel": 0.0, "TriggerSlope": "Either", "AutoRestart": False,
+            "Signals": [], "NumSamples": 20, "Decimation": 1, "NumPrePostSamples": 0,
+            "TriggerMode": "FreeRun", "TriggerSignal": "", "TriggerLevel": 0.0, "TriggerSlope": "Either", "AutoRestart": False,
         }  # fmt: skip
         self.forced, self.sequence = False, 0
 
@@ -331,11 +326,15 @@ class Scope:
         self.rows.append(row)
         if len(self.rows) >= self.properties["NumSamples"]:
             self.sequence += 1
-            header = {"scope": self.number, "sequence": self.sequence, "names": self.names, "units": self.units,
-                      "trigger": None if self.properties["TriggerMode"] == "FreeRun" else self.at, "lost": 0, "part": 0, "parts": 1,}  # fmt: skip
+            free = self.properties["TriggerMode"] == "FreeRun"
+            header = {
+                "scope": self.number, "sequence": self.sequence, "names": self.names, "units": self.units,
+                "trigger": None if free else self.at, "lost": 0, "part": 0, "parts": 1,
+                "tick": float(self.target.diagram.graph.tick),
+            }  # fmt: skip
             self.target.publish(f"scope/{self.number}", header, np.array(self.rows))
             self.acquiring, self.rows = False, []
-            if self.properties["TriggerMode"] != "FreeRun" and not self.properties["AutoRestart"]:
+            if not free and not self.properties["AutoRestart"]:
                 self.status = "Finished"
 
     def _triggers(self, read: Callable[..., float]) -> bool:

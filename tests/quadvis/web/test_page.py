@@ -1,9 +1,11 @@
+# ruff: noqa: RUF001
 """The page in a real browser, in front of a real run."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -82,7 +84,7 @@ def test_a_flight_from_start_to_stop(browser: Browser, running: Running, target:
     assert browser.text(".signals").split() == [f"craft.attitude[{axis}]" for axis in range(3)]
     browser.until(lambda: browser.page("page.scope.data.count") > 200)
     curves = browser.page("page.scope.data.between(0, 1e9).map((list) => list.slice(-100))")
-    assert all(later - sooner < 0.006 for sooner, later in zip(curves[0], curves[0][1:], strict=False))
+    assert all(later - sooner < 0.006 for sooner, later in pairwise(curves[0]))
     browser.page("page.scope.toggle('control/mixer.thrust')")
     browser.until(lambda: browser.page("page.scope.data.count > 50 && page.scope.data.width === 7"))
     # space pauses, and goes on
@@ -133,7 +135,7 @@ def test_a_triggered_acquisition_stands_still(browser: Browser, running: Running
     browser.until(lambda: [scope.status for scope in target.scopes.values()] == ["Acquiring"])
     assert browser.page("page.scope.data.count") == 0
     browser.run(
-        "[...document.querySelectorAll('.controls button')].find((each) => each.innerText === 'Trigger').click()"
+        "[...document.querySelectorAll('.controls button')].find((b) => b.innerText === 'Trigger').click()"
     )
     browser.until(lambda: browser.page("page.scope.data.count") == 200)
     browser.page("page.scope.adjust({mode: 'Signal', signal: 'craft.attitude[0]', level: 0})")
@@ -186,7 +188,8 @@ def test_each_level_sees_what_it_may(browser: Browser, running: Running, target:
     target.do_start()
     browser.open(running.gateway.address)
     browser.until("document.querySelector('#state').innerText === 'running'")
-    visible = "[...document.querySelectorAll('button, input, select')].filter((each) => each.offsetParent).map((each) => each.id)"
+    controls = "[...document.querySelectorAll('button, input, select')]"
+    visible = f"{controls}.filter((each) => each.offsetParent).map((each) => each.id)"
     if level == 4:
         browser.until("document.querySelectorAll('.task').length === 4")
         assert browser.run(visible) == [] and "no diagram" in browser.text("#drawing")
@@ -212,7 +215,8 @@ def test_a_phone_shows_state_and_stop_first_and_pans(
     opened(browser, running, width=390, height=844, mobile=True)
     browser.until("!document.querySelector('#stop').hidden && !document.querySelector('#modes').hidden")
     tops = browser.run(
-        "['#state', '#stop', '#modes', '#middle'].map((each) => document.querySelector(each).getBoundingClientRect().top)"
+        "['#state', '#stop', '#modes', '#middle']"
+        ".map((each) => document.querySelector(each).getBoundingClientRect().top)"
     )
     assert tops == sorted(tops) and tops[2] < 200
     assert browser.run("document.documentElement.scrollWidth") <= 390
@@ -232,12 +236,16 @@ def test_a_drawing_brings_no_script_into_the_page(
     browser: Browser, running: Running, target: StandIn
 ) -> None:
     target.do_drawing()
-    evil = '<script>window.evil = 1</script><a href="javascript:evil()"><rect width="9" height="9" onclick="evil()"/></a><image href="x" onerror="evil()"/><foreignObject><p>x</p></foreignObject>'
+    evil = (
+        '<script>window.evil = 1</script><a href="javascript:evil()"><rect onclick="evil()"/></a>'
+        '<image href="x" onerror="evil()"/><foreignObject><p>x</p></foreignObject>'
+    )
     target.picture = target.picture.replace('<g class="block"', f'{evil}<g onclick="evil()" class="block"')
     opened(browser, running)
     assert (
         browser.run(
-            "document.querySelectorAll('#drawing :is(script, a, image, foreignObject, [onclick], [href])').length"
+            "document.querySelectorAll("
+            "'#drawing :is(script, a, image, foreignObject, [onclick], [href])').length"
         )
         == 0
     )
@@ -251,8 +259,10 @@ def test_numbers_and_words_are_made_for_people(browser: Browser, running: Runnin
       units: ['m/s^2', 'rad/s^1.5', '1', 'm^-1', ''].map(f.unit),
       vector: f.value({unit: 'm', type: 'float64'}, [1, 2, 3, 4, 5, 6]),
       flags: f.value({unit: '1', type: 'bool'}, [true, false]),
-      word: f.value({unit: '1', type: 'int64', words: w.words('mode', '0 MANUAL, 1 MIXED, 2 AUTOMATIC', '')}, 2),
-      table: [...w.words('reason', 'reason for the mode: 0 to 13, see above', 'x\\n\\n====== ===\\nreason meaning\\n====== ===\\n3      the IMU is stale\\n10     frozen\\n====== ===\\n')],
+      word: f.value(
+        {unit: '1', type: 'int64', words: w.words('mode', '0 MANUAL, 1 MIXED, 2 AUTOMATIC', '')}, 2),
+      table: [...w.words('reason', 'reason for the mode: 0 to 13, see above',
+        'x\\n\\n====== ===\\nreason meaning\\n====== ===\\n3      the IMU is stale\\n10     frozen\\n====== ===\\n')],
       none: w.words('count', 'how often, 0 to 3', '').size,
     }))"""
     assert browser.run(code) == {
