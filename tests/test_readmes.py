@@ -268,11 +268,12 @@ def _contents(folder: Path) -> dict[Path, bytes]:
 
 def test_the_licences_that_the_package_names_go_with_it() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert project["license"] == "BSD-3-Clause AND EPL-2.0"
+    assert project["license"] == "BSD-3-Clause AND EPL-2.0 AND MIT"
     texts = [(ROOT / file).read_text(encoding="utf-8") for file in project["license-files"]]
     assert [text.partition("\n")[0].strip("# ") for text in texts] == [
         "BSD 3-Clause License",
         "Eclipse Public License - v 2.0",
+        "The MIT License (MIT)",
     ]
     carried = {path.parent for path in (ROOT / "quadvis").rglob("*LICEN*")}
     assert carried == {(ROOT / file).parent for file in project["license-files"]} - {ROOT}

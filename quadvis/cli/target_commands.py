@@ -167,6 +167,15 @@ def console(options: argparse.Namespace) -> int:
         return run_console(tg)
 
 
+def web(options: argparse.Namespace) -> int:
+    """Serve the live page of a target until Ctrl-C."""
+    from quadvis.web.serving import serve
+
+    with _target(options) as tg:
+        serve(tg, options.port, not options.no_browser, lambda words: print(words, flush=True))
+    return 0
+
+
 def _target(options: argparse.Namespace) -> Target:
     """Return the target that is named; a console has one that stays."""
     from quadvis.host.target import Target

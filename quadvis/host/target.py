@@ -80,13 +80,20 @@ class Target:
         """What this host's key may do, from 0 (all) to 4 (see the status)."""
         return self._connection.level
 
-    def request(self, verb: str, **arguments: Any) -> Any:
-        """Return what the target answers to a verb, see `quadvis wire`; as the operator if needed."""
+    def request(self, verb: str, /, **arguments: Any) -> Any:
+        """Return what the target answers to a verb, see `quadvis wire`; as the operator if needed.
+
+        The argument ``deadline`` is how long it may take (s).
+        """
         return self._connection.operate(verb, **arguments)
 
-    def subscribe(self, topic: str, take: Callable[[Mapping[str, Any], Any], object]) -> None:
-        """Let ``take(header, array)`` be called with the data of a topic, in another thread."""
+    def subscribe(self, topic: str, take: Callable[[Mapping[str, Any], Any], object]) -> Callable[[], None]:
+        """Let ``take(header, array)`` be called with the data of a topic, in another thread.
+
+        Return what ends that. A topic has one taker; another one takes its place.
+        """
         self._connection.subscribe(topic, take)
+        return lambda: self._connection.unsubscribe(topic)
 
     # properties
 

@@ -1,0 +1,1 @@
+"""The live page of a target: a gateway between browsers and the target, and the page."""

@@ -1,0 +1,114 @@
+"""Messages between gateway and page. Text is JSON; bytes carry what JSON cannot, samples and files.
+
+ page to gateway    {"token"} first; then {"id", "verb", "args"} or {"beat"}
+ gateway to page    {"hello"}, {"reply", "ok", "result" | "error"}, {"topic", "data"}, {"beat", "heard", ...}
+ bytes              length of the head (uint32, little-endian), the head as JSON, spaces up to a multiple
+                    of 8, then the numbers (float64, little-endian, row by row) or the bytes of a file
+
+JSON has no NaN and no infinity: they are the texts that JavaScript's Number reads.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from quadvis.errors import QuadvisError
+
+MOST_TEXT = 64_000  # bytes of a message from a page
+MOST_NAMES = 1000  # signals that one page watches
+
+
+class PageRequest(NamedTuple):
+    """What a page asks for: its number, the verb and its arguments."""
+
+    id: int
+    verb: str
+    arguments: dict[str, Any]
+
+
+def text(value: Mapping[str, Any]) -> str:
+    """Return plain data as JSON."""
+    try:
+        return json.dumps(value, separators=(",", ":"), allow_nan=False)
+    except ValueError:
+        return json.dumps(_plain(value), separators=(",", ":"))
+    except TypeError:
+        return json.dumps(_plain(value), separators=(",", ":"), default=str)
+
+
+def _plain(value: Any) -> Any:
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): _plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
+    return value
+
+
+def packed(head: Mapping[str, Any], data: bytes) -> bytes:
+    """Return a message of bytes."""
+    front = text(head).encode()
+    front += b" " * (-(len(front) + 4) % 8)
+    return struct.pack("<I", len(front)) + front + data
+
+
+def samples(topic: str, header: Mapping[str, Any], array: Any) -> bytes:
+    """Return stream data with an array of two dimensions."""
+    import numpy as np
+
+    rows = np.ascontiguousarray(array, "<f8")
+    return packed({"topic": topic, "data": dict(header), "shape": rows.shape}, rows.tobytes())
+
+
+def reply(number: int, result: Any) -> str | bytes:
+    """Return the answer to a request; bytes in its result, at most one entry, travel as they are."""
+    if isinstance(result, Mapping):
+        for key, value in result.items():
+            if isinstance(value, bytes | bytearray | memoryview):
+                rest = {name: each for name, each in result.items() if name != key}
+                return packed({"reply": number, "ok": True, "result": rest, "bytes": key}, bytes(value))
+    return text({"reply": number, "ok": True, "result": result})
+
+
+def refusal(number: int, sentence: str) -> str:
+    """Return the answer to a request that is refused."""
+    return text({"reply": number, "ok": False, "error": sentence})
+
+
+def read(message: str | bytes) -> Mapping[str, Any]:
+    """Return the object in a message from a page; QuadvisError if there is none."""
+    if isinstance(message, bytes):
+        raise QuadvisError("a page sends no bytes")
+    try:
+        found = json.loads(message)
+    except (ValueError, RecursionError):
+        raise QuadvisError("this is no JSON") from None
+    if not isinstance(found, dict):
+        raise QuadvisError("a message is an object")
+    return found
+
+
+def read_request(found: Mapping[str, Any]) -> PageRequest:
+    """Return the request in a message; QuadvisError if it is none."""
+    number, verb, arguments = found.get("id"), found.get("verb"), found.get("args", {})
+    whole = isinstance(number, int) and not isinstance(number, bool) and 0 <= number < 2**53
+    if not whole or not isinstance(verb, str) or not isinstance(arguments, dict):
+        raise QuadvisError("a request has 'id', 'verb' and 'args'")
+    return PageRequest(number, verb, arguments)  # type: ignore[arg-type]
+
+
+def read_names(arguments: Mapping[str, Any], key: str) -> list[str]:
+    """Return a list of names among the arguments; QuadvisError if it is none, or too long."""
+    names = arguments.get(key)
+    if not isinstance(names, list) or not all(isinstance(name, str) and len(name) <= 200 for name in names):
+        raise QuadvisError(f"'{key}' is a list of names")
+    if len(names) > MOST_NAMES:
+        raise QuadvisError(f"'{key}' has {len(names)} names; at most {MOST_NAMES} are possible")
+    return names

@@ -1,0 +1,97 @@
+// What the target is and what its signals were a short while ago.
+
+const PAST = 200; // values of each signal that are kept, some 20 s
+
+/** The newest numbers of a signal, in a ring. */
+class Past {
+  constructor(width) {
+    this.width = Math.min(width, 4);
+    this.numbers = new Float64Array(PAST * this.width);
+    this.count = 0;
+  }
+
+  add(value) {
+    const numbers = Array.isArray(value) ? value.flat(Infinity) : [value];
+    const at = (this.count++ % PAST) * this.width;
+    for (let index = 0; index < this.width; index++) this.numbers[at + index] = Number(numbers[index]);
+  }
+
+  /** Yield the numbers of one element, the oldest first. */
+  *of(element) {
+    for (let index = Math.max(0, this.count - PAST); index < this.count; index++) {
+      yield this.numbers[(index % PAST) * this.width + element];
+    }
+  }
+}
+
+export class Model {
+  signals = new Map(); // by name
+  parameters = new Map(); // lists by block
+  values = new Map(); // [value, tick] by name
+  past = new Map();
+  kinds = new Map(); // the name of the block type, by block
+  tasks = new Map(); // the task, by block
+  status = {};
+  #docs = new Map();
+
+  constructor(connection) {
+    this.connection = connection;
+  }
+
+  /** Ask for all that does not change while an application is loaded. */
+  async load() {
+    for (const map of [this.signals, this.values, this.past, this.kinds, this.tasks, this.parameters]) map.clear();
+    for (const signal of await this.#all("signals")) {
+      const { 0: block } = signal.name.match(/^.*(?=\.)/);
+      Object.assign(signal, { path: block, port: signal.name.slice(block.length + 1), words: null });
+      this.signals.set(signal.name, signal);
+      this.kinds.set(block, signal.block);
+      this.tasks.set(block, signal.task);
+    }
+    if (this.connection.may("parameters")) await this.loadParameters();
+  }
+
+  async loadParameters() {
+    this.parameters.clear();
+    for (const each of await this.#all("parameters")) {
+      const path = each.name.slice(0, each.name.lastIndexOf("."));
+      this.kinds.set(path, each.block);
+      this.parameters.set(path, [...(this.parameters.get(path) ?? []), each]);
+    }
+  }
+
+  async #all(verb) {
+    const found = await this.connection.request(verb);
+    while (found.length && found.length % 4000 === 0) {
+      const more = await this.connection.request(verb, { first: found.length });
+      if (!more.length) break;
+      found.push(...more);
+    }
+    return found;
+  }
+
+  /** Return what a block is; the same promise each time. */
+  describe(kind) {
+    if (!this.#docs.has(kind)) this.#docs.set(kind, this.connection.request("describe", { block: kind }));
+    this.#docs.get(kind).catch(() => this.#docs.delete(kind));
+    return this.#docs.get(kind);
+  }
+
+  take(values) {
+    for (const [name, found] of Object.entries(values)) {
+      const last = this.values.get(name);
+      this.values.set(name, found);
+      if (found[0] === null || (last && last[1] === found[1])) continue;
+      if (!this.past.has(name)) {
+        const shape = this.signals.get(name)?.shape ?? [];
+        this.past.set(name, new Past(shape.reduce((product, size) => product * size, 1)));
+      }
+      this.past.get(name).add(found[0]);
+    }
+  }
+
+  /** Return the signal that a wire takes: "craft.position[0]" takes from "craft.position". */
+  signalOf(source) {
+    return this.signals.get(source.replace(/\[.*$/, ""));
+  }
+}
