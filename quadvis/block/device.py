@@ -1,7 +1,8 @@
-"""Devices: blocks that reach a serial port.
+"""Devices: blocks that reach a port.
 
 An output device says which bytes a command is; the guardian of a real-time run owns its port and sends them,
 see ``quadvis.realtime.guardian``. An input device takes messages out of the bytes that have come to its port.
+Both reach serial ports; what a process of its own must read is a `quadvis.block.captured_input`.
 """
 
 from __future__ import annotations
@@ -18,7 +19,15 @@ from quadvis.block.block import Block
 from quadvis.block.declare import Initial, Out, ParameterError
 from quadvis.block.sizes import parameter_sizes
 from quadvis.errors import sentence
-from quadvis.machine.serial_port import BACKLOG, Line, PortError, close_port, open_port, read_waiting
+from quadvis.machine.serial_port import (
+    BACKLOG,
+    Line,
+    PortError,
+    close_port,
+    missing_port,
+    open_port,
+    read_waiting,
+)
 from quadvis.units import format_quantity, parse_period
 from quadvis.units.unit import Unit
 
@@ -35,18 +44,49 @@ class Counted(Enum):
 
 
 class Device(Block, numeric=False):
-    """A block with one port: a parameter of type ``port``, and the settings of its ``line``."""
+    """A block with one port: a parameter of type ``port``."""
 
-    line: ClassVar[Line]
     port_parameter: ClassVar[str] = ""
+    port_example: ClassVar[str] = f"{CABLE}name"
 
     def __init_subclass__(cls, *, numeric: bool | None = None, bound: bool = False) -> None:
         super().__init_subclass__(numeric=numeric, bound=bound)
         ports = [name for name, param in cls.interface.params.items() if param.is_port]
         if ports and not bound:
-            if len(ports) > 1 or not hasattr(cls, "line"):
-                raise TypeError(f"{cls.__name__} must have one parameter of type port, and say its 'line'")
+            cls.check_port(ports)
             cls.port_parameter = ports[0]
+
+    @classmethod
+    def check_port(cls, ports: list[str]) -> None:
+        """Refuse a class with several ports, which are given by the names of their parameters."""
+        if len(ports) > 1:
+            raise TypeError(f"{cls.__name__} must have one parameter of type port, not {len(ports)}")
+
+    @classmethod
+    def used_outside(cls) -> set[str]:
+        """Return the names of the parameters that say how the port is used."""
+        return {cls.port_parameter}
+
+    @property
+    def port_given(self) -> str:
+        """The port as the diagram has it: a path, or `pty:NAME`."""
+        return str(getattr(self, self.port_parameter))
+
+    def missing(self) -> str:
+        """Return a sentence if the port is surely not there, else ""."""
+        return "" if self.port_given.startswith(CABLE) else missing_port(self.port_given)
+
+
+class LineDevice(Device):
+    """A device at a serial port, with the settings of its ``line``."""
+
+    line: ClassVar[Line]
+
+    @classmethod
+    def check_port(cls, ports: list[str]) -> None:
+        """Refuse a class with several ports, or without settings of its line."""
+        if len(ports) > 1 or not hasattr(cls, "line"):
+            raise TypeError(f"{cls.__name__} must have one parameter of type port, and say its 'line'")
 
     @classmethod
     def used_outside(cls) -> set[str]:
@@ -55,18 +95,13 @@ class Device(Block, numeric=False):
         return found | {cls.port_parameter, str(cls.line.baud), getattr(cls, "rate", "")}
 
     @property
-    def port_given(self) -> str:
-        """The port as the diagram has it: a path, or `pty:NAME`."""
-        return str(getattr(self, self.port_parameter))
-
-    @property
     def settings(self) -> Line:
         """The settings of the line, with the baud that the block's parameters give."""
         baud = self.line.baud
         return self.line._replace(baud=int(getattr(self, baud)) if isinstance(baud, str) else baud)
 
 
-class Output(Device):
+class Output(LineDevice):
     """A device that takes commands: ``frame`` returns the bytes of one.
 
     ``frame`` asks for inputs by name; each has an ``Initial`` and a ``Safe`` value. The guardian sends the
@@ -151,7 +186,7 @@ class Output(Device):
             raise ParameterError(named, sentence(problem, "send fewer frames, or use a faster line"))
 
 
-class Input(Device):
+class Input(LineDevice):
     """A device that gives values: ``decode`` takes messages out of the bytes that have come.
 
     A step takes all bytes that have come and never waits; the outputs are those of the newest message. Before

@@ -239,6 +239,13 @@ def _plain_faults(faults: Iterable[Fault]) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
+def camera(options: argparse.Namespace) -> int:
+    """List the cameras, show what one sees, or calibrate it."""
+    from quadvis.cli.camera import camera as perform
+
+    return perform(options)
+
+
 def list_blocks(options: argparse.Namespace) -> int:
     """Print all blocks, and the files that come with quadvis; 2 if a library cannot be loaded."""
     from quadvis.library.describe import catalogue_lines, facts
@@ -354,13 +361,17 @@ def plot(options: argparse.Namespace) -> int:
     """Draw the figures of a log."""
     from quadvis.diagram.sections.figures import read_figures
     from quadvis.output.log_reader import read_log
-    from quadvis.output.plot import plot_log
+    from quadvis.output.plot import plot_log, plot_times
 
     log = read_log(options.log)
     if log.damage:
         print(log.damage, file=sys.stderr)
-    figures = read_figures(log.diagram, f"{log.path}: diagram")
-    for path in plot_log(log, figures, Path(options.output) if options.output else None):
+    output = Path(options.output) if options.output else None
+    if options.times:
+        paths = plot_times(log, output)
+    else:
+        paths = plot_log(log, read_figures(log.diagram, f"{log.path}: diagram"), output)
+    for path in paths:
         print(path)
     return 0
 

@@ -8,6 +8,7 @@ from typing import Any
 from quadvis.cli import commands, wire
 from quadvis.cli.arguments import Parser
 from quadvis.cli.target_options import add_target_commands
+from quadvis.cli.tool import dimensions, positive
 from quadvis.version import __version__
 
 JSON_HELP = """\
@@ -16,7 +17,7 @@ engine, real_time_factor, log, lost (what the log lacks, and why);
 real_time (null for a simulation): {lost_rows, computers: [{computer (null if the diagram names none), engine,
 granted, not_granted, unsafe (why its outputs were made safe, or null),
 tasks: {name: {period_s, steps, overruns,
-lateness and execution: {min_s, mean_s, max_s, p99_s, p99.9_s}}}}]};
+lateness and execution: {min_s, mean_s, max_s, p99_s, p99.9_s, histogram: [{from_s, to_s, count}]}}}}]};
 summary: {label: {signal, unit, and the statistics by name, final of a vector as a list}};
 expect: [{expectation, signal, kind, unit, limit, found, met, lack (why the run cannot be judged)}];
 margins: the number of expectations that only 'quadvis analyse' judges;
@@ -36,6 +37,12 @@ lacks: [{block, rows, time_s, only_in}], engine, new_log, lost (what the new log
 null where they are infinite or NaN.
 Exit code: 0 the same to the bit, or with --set; 1 something differs, or a block fails; 2 the log does not
 hold what is needed, or bad input."""
+
+CAMERA_HELP = """\
+A picture is shown on the terminal, in colour if COLORTERM says truecolor, else in dots. For --calibrate move
+the board before the camera, hold it still for a moment in each place, and tilt it by 20 degrees and more each
+way; what is missing is said in words. Ctrl-C ends the sitting and calibrates with the views that there are.
+Exit code: 0 done, 2 no such camera, no pictures, or views that do not determine a camera."""
 
 SWEEP_HELP = """\
 With several --over all combinations are run; the last one changes fastest. A name is that of a parameter, as
@@ -152,10 +159,18 @@ def parser() -> Parser:
     )
     plot = add("plot", commands.plot, "draw the figures that a log's diagram declares, as PNG")
     plot.add_argument("log", metavar="LOG")
+    plot.add_argument(
+        "--times",
+        action="store_true",
+        help="draw the lateness and execution times of a real-time run's tasks",
+    )
     plot.add_argument("--output", "-o", metavar="FOLDER", help="default: beside the log")
     schema = add("schema", commands.schema, "print the JSON schema of diagrams, for editors")
     schema.add_argument("--output", "-o", metavar="PATH", help="default: standard output")
     _own_block_option(schema)
+    _camera_options(
+        add("camera", commands.camera, "list cameras, show what one sees, or calibrate it", CAMERA_HELP)
+    )
     cache = add("cache", commands.cache, "say where compiled blocks are kept, and how large they are")
     cache.add_argument("--clear", action="store_true", help="remove them all")
     add_target_commands(add, _setting_options, _engine_option)
@@ -180,6 +195,21 @@ def _key_options(parser: Parser) -> None:
     parser.add_argument("--level", type=int, metavar="0..4", help=words)
     words = "with allow: the host must come from there, such as 192.168.1.0/24; may be repeated"
     parser.add_argument("--from", dest="network", action="append", default=[], metavar="NETWORK", help=words)
+
+
+def _camera_options(parser: Parser) -> None:
+    words = "path in /dev/v4l/by-id, number, URL, or video file; without it, cameras are listed"
+    parser.add_argument("device", metavar="DEVICE", nargs="?", help=words)
+    words = "what its pictures must have, such as 640x480; default: as the camera gives them"
+    parser.add_argument("--size", type=dimensions, metavar="WxH", help=words)
+    words = "write pictures into this folder, as PNG; with --calibrate, the camera's file"
+    parser.add_argument("--output", "-o", metavar="PATH", help=words)
+    parser.add_argument("--count", type=positive, default=1, metavar="N", help="of the pictures; default 1")
+    words = "calibrate with a chessboard of so many inner corners, such as 9x6"
+    parser.add_argument("--calibrate", type=dimensions, metavar="BOARD", help=words)
+    parser.add_argument("--square", metavar="25mm", help="with --calibrate: side of one square of the board")
+    words = "with --calibrate: go on with the views that there are after so many seconds without a new one"
+    parser.add_argument("--idle", type=positive, default=30, metavar="S", help=words)
 
 
 def _replay_options(parser: Parser) -> None:

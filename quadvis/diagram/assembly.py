@@ -79,11 +79,11 @@ class Assembly:
         seed: int | None = None,
     ) -> Diagram:
         """Return the diagram; it may run if there are no faults."""
-        spec, faults = self.spec, self.faults
-        filled = fill_slots(spec, variant, faults)
-        expansion = Expansion(filled, self.catalogue, settings, self.parts, self.groups, faults, self.kept)
+        written, faults = self.spec, self.faults
+        spec = fill_slots(written, variant, faults)
+        expansion = Expansion(spec, self.catalogue, settings, self.parts, self.groups, faults, self.kept)
         wiring = Wiring(expansion, faults)
-        wiring.stand_ins = stand_ins(filled, self._outputs)
+        wiring.stand_ins = stand_ins(spec, self._outputs)
         wiring.check_ports(expansion.root)
         builder = Builder(spec, expansion, wiring, self.made, faults)
         drafts = builder.drafts()
@@ -98,7 +98,7 @@ class Assembly:
         if known(builder.step):
             tasks = {draft.task for draft in drafts if known(draft.task)}
             check_ticks(spec, tasks, builder.step, stop, faults)
-        files = [spec, *self.parts.specs()]
+        files = [written, *self.parts.specs()]
         for file in files[self._warned :]:
             warn_parameters(file, faults)
         self._warned = len(files)
@@ -109,9 +109,9 @@ class Assembly:
                 own = [each.overload for each in spec[COMPUTERS].values() if known(each) and each.overload]
                 for limits in (spec[OVERLOAD], *own):
                     warn_tasks(limits, graph, faults)
-        written = spec[STOP_TIME]
+        whole = spec[STOP_TIME]
         context = Context(
-            wiring, graph, stop, written is not None and known(written) and stop < written, faults,
+            wiring, graph, stop, whole is not None and known(whole) and stop < whole, faults,
             frozenset(spec[LINKS]),
         )  # fmt: skip
         for section in RUN_SECTIONS:

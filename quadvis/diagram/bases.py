@@ -7,10 +7,8 @@ the base. Every value keeps the file in which it stands, so its paths are relati
 from __future__ import annotations
 
 import os
-from collections.abc import Container, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from quadvis.diagram.keys import FILE_SECTIONS
 from quadvis.diagram.loader import read_file
@@ -19,6 +17,7 @@ from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec
 from quadvis.diagram.sections.section import Values
 from quadvis.diagram.sections.summary import SUMMARY
 from quadvis.diagram.sections.variants import VARIANTS
+from quadvis.diagram.sections.without import kept
 from quadvis.diagram.slots import fill_slots, in_slot
 from quadvis.diagram.spec import FileSpec
 from quadvis.document import YamlMap, YamlNode
@@ -59,31 +58,24 @@ def standing(spec: FileSpec | Unknown, faults: Faults, users: tuple[str, ...] = 
 
 def _changed(base: FileSpec, spec: FileSpec, has_variants: bool, faults: Faults) -> FileSpec:
     """Return a base with the changes of the diagram that stands on it, with or without its variants."""
-    _check_without(base, spec, faults)
+    _checkkept(base, spec, faults)
     without = spec[WITHOUT]
     values = Values()
     for section in FILE_SECTIONS:
         if section in MERGED:
-            kept = _without(base[section], without.get(section.key, ()))
-            values[section] = kept | spec[section]
+            values[section] = kept(base[section], without.get(section.key, ())) | spec[section]
         else:
             values[section] = (spec if section.key in spec.written else base)[section]
     values[BASE], values[WITHOUT] = spec[BASE], without
     removed = without.get(BLOCKS.key, ())
-    before = _without(base[BLOCKS], removed)
+    before = kept(base[BLOCKS], removed)
     own = {name: _standing_in(before.get(name), block) for name, block in spec[BLOCKS].items()}
     values[BLOCKS] = before | own
-    inherited = _without(base[VARIANTS], without.get(VARIANTS.key, ())) if has_variants else {}
-    values[VARIANTS] = {
-        name: replace(variant, slots=_without(variant.slots, removed)) for name, variant in inherited.items()
-    } | spec[VARIANTS]
+    inherited = kept(base[VARIANTS], without.get(VARIANTS.key, ())) if has_variants else {}
+    values[VARIANTS] = {name: variant.on(removed) for name, variant in inherited.items()} | spec[VARIANTS]
     return replace(
         spec, values=values, nodes=_nodes(base, spec), written=base.written | spec.written, base=base
     )
-
-
-def _without(entries: Mapping[str, Any], names: Container[str]) -> dict[str, Any]:
-    return {name: entry for name, entry in entries.items() if name not in names}
 
 
 def _standing_in(before: BlockSpec | Unknown | None, block: BlockSpec | Unknown) -> BlockSpec | Unknown:
@@ -99,7 +91,7 @@ def _nodes(base: FileSpec, spec: FileSpec) -> dict[str, YamlNode]:
     there, own = base.nodes.get(SUMMARY.key), spec.nodes.get(SUMMARY.key)
     if isinstance(there, YamlMap) and (own is None or isinstance(own, YamlMap)):
         removed = spec[WITHOUT].get(SUMMARY.key, ())
-        keys, entries = _without(there.keys, removed), _without(there.values, removed)
+        keys, entries = kept(there.keys, removed), kept(there.values, removed)
         top = own if own is not None else there
         if own is not None:
             keys, entries = keys | own.keys, entries | own.values
@@ -107,7 +99,7 @@ def _nodes(base: FileSpec, spec: FileSpec) -> dict[str, YamlNode]:
     return nodes
 
 
-def _check_without(base: FileSpec, spec: FileSpec, faults: Faults) -> None:
+def _checkkept(base: FileSpec, spec: FileSpec, faults: Faults) -> None:
     """Report names to be taken away that the base does not have."""
     summary = base.nodes.get(SUMMARY.key)
     for section in MERGED:

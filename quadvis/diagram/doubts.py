@@ -42,6 +42,9 @@ def warn_parameters(spec: FileSpec, faults: Faults) -> None:
     for link in spec[LINKS].values():
         for node in link.fields.values() if known(link) else ():
             used |= named_parameters(node)
+    for variant in spec[VARIANTS].values():
+        for node in variant.nodes.values():
+            used |= named_parameters(node)
     for name, value in spec[PARAMS].items():
         if name not in used and known(value) and value.file == spec.place.file:
             faults.warn(value.place, f"parameter '{name}' is not used", f"write '${name}' where it belongs")

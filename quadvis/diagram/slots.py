@@ -7,13 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from quadvis.block import Out
 from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec
+from quadvis.diagram.sections.computers import COMPUTERS
+from quadvis.diagram.sections.links import LINKS
+from quadvis.diagram.sections.params import PARAMS
+from quadvis.diagram.sections.section import Section
 from quadvis.diagram.sections.variants import VARIANTS, Variants
+from quadvis.diagram.sections.without import kept
 from quadvis.diagram.spec import FileSpec
 from quadvis.errors import UNKNOWN, Faults, Place, known, suggestion
+
+TAKEN_AWAY: tuple[Section[Any], ...] = (BLOCKS, COMPUTERS, LINKS)
 
 
 def fill_slots(spec: FileSpec, variant: str | None, faults: Faults, place: Place | None = None) -> FileSpec:
@@ -28,12 +35,35 @@ def fill_slots(spec: FileSpec, variant: str | None, faults: Faults, place: Place
     lineages = {name: _lineage(variants, name, faults) for name in variants}
     blocks = dict(spec[BLOCKS])
     fitting = {name: dict(_fitting(spec, name, faults)) for name in variants}
-    for name in reversed(lineages.get(variant or "", [])):
+    chosen = [*reversed(lineages.get(variant or "", []))]
+    for name in chosen:
         for slot, block in fitting[name].items():
             before = blocks[slot]
             assert known(before)
             blocks[slot] = in_slot(before, block)
-    return replace(spec, values=spec.values.replaced(BLOCKS, blocks), base=spec)
+    values, nodes = spec.values.replaced(BLOCKS, blocks), {**spec.nodes}
+    for name in variants:
+        _check_changes(spec, name, faults)
+    for change in (variants[name] for name in chosen):
+        values = values.replaced(PARAMS, {**values[PARAMS], **change.params})
+        for section in TAKEN_AWAY:
+            values = values.replaced(section, kept(values[section], change.without.get(section.key, ())))
+        nodes |= change.nodes
+    return replace(spec, values=values, nodes=nodes, base=spec)
+
+
+def _check_changes(spec: FileSpec, variant: str, faults: Faults) -> None:
+    """Report parameters, and names that are taken away, which the diagram does not have."""
+    change = spec[VARIANTS][variant]
+    for name, value in change.params.items():
+        if name not in spec[PARAMS] and known(value):
+            problem = f"variant '{variant}' gives '{name}', which is no parameter of the diagram"
+            faults.add(value.place, problem, suggestion(name, spec[PARAMS]))
+    for section in TAKEN_AWAY:
+        for name, place in change.without.get(section.key, {}).items():
+            if name not in spec[section]:
+                problem = f"the diagram has no '{name}' under '{section.key}'"
+                faults.add(place, problem, suggestion(name, spec[section]))
 
 
 def _lineage(variants: Variants, variant: str, faults: Faults) -> list[str]:

@@ -122,6 +122,10 @@ class Engine:
         """Run with another executor from the next tick on; it works over the interpreter's memory."""
         self._executor = make(self._interpreter)
 
+    def apart(self, program: Program) -> Interpreter:
+        """Return what runs another program over the same memory and blocks, beside the engine's own."""
+        return self._interpreter.apart(program)
+
     def prepare(self) -> None:
         """Do now what would take time at the first tick."""
         self._executor.prepare()

@@ -22,6 +22,7 @@ from quadvis.engine.taps import MachineCall, Observer, Tap
 Call = Callable[[], None]
 NOT_FINITE_OUTPUT = "output"
 NOT_FINITE_STATE = "state"
+PREPARED = 3  # ticks of each task for which `prepare` makes the calls: they meet most others that are due
 
 
 class Stop(NamedTuple):
@@ -127,6 +128,14 @@ class Interpreter:
         made._bind()
         return made
 
+    def apart(self, program: Program) -> Interpreter:
+        """Return an interpreter for another program over the same memory, which times no calls."""
+        made = copy(self)
+        made.program, made.handover, made.profile = program, None, None
+        made._calls, made._owners = {}, {}
+        made._bind()
+        return made
+
     def measure(self) -> None:
         """Time every call of a block from now on."""
         self.profile = Profile()
@@ -172,8 +181,13 @@ class Interpreter:
         return task.every * observer.every, task.offset
 
     def prepare(self) -> None:
-        """Make the calls of the first tick."""
-        self._moment()
+        """Make the calls of the first ticks of each task."""
+        tick = self.tick
+        for number in range(PREPARED):
+            for every, offset in self._rhythms:
+                self.tick = offset + number * every
+                self._moment()
+        self.tick = tick
 
     def run(self, until: int) -> Stop | None:
         """Run all ticks before ``until``; None if nothing failed."""

@@ -8,7 +8,7 @@ run one program.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -155,6 +155,24 @@ class Program:
         return replace(
             self, tasks=(alone,), held=0, states=(), slopes=(), derivatives=(), minor=(), time=task.time
         )
+
+    def quiet(self, left_out: Set[int]) -> Program:
+        """Return what runs without effects outside: without reads and writes, and without some blocks.
+
+        These are given by their numbers. Numbers that are not finite are not refused.
+        """
+
+        def without(ops: Iterable[Op]) -> tuple[Op, ...]:
+            return tuple(op for op in ops if op.block not in left_out)
+
+        tasks = [
+            task._replace(
+                reads=(), writes=(), finite=(), outputs=without(task.outputs), updates=without(task.updates)
+            )
+            for task in self.tasks
+        ]
+        derivatives, minor = without(self.derivatives), without(self.minor)
+        return replace(self, tasks=tuple(tasks), derivatives=derivatives, minor=minor)
 
     @cached_property
     def hash(self) -> str:

@@ -16,7 +16,9 @@ class Offset(NamedTuple):
     error: int
 
 
-def measure(ask: Callable[[], int], pings: int = PINGS, clock: Callable[[], int] = time.monotonic_ns) -> Offset:
+def measure(
+    ask: Callable[[], int], pings: int = PINGS, clock: Callable[[], int] = time.monotonic_ns
+) -> Offset:
     """Return the offset of a clock that ``ask`` reads (ns).
 
     Of all round trips the shortest one counts, as in Cristian's algorithm (Distributed Computing 3, 1989):

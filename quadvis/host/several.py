@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.errors import QuadvisError, quoted
-from quadvis.host.offset import Offset, measure
+from quadvis.host.offset import PINGS, Offset, measure
 from quadvis.host.target import LOADING, Target
 
 if TYPE_CHECKING:
@@ -33,8 +33,8 @@ class Several:
     """The targets that are the computers of a diagram, by the names of the computers.
 
     This process is their operator from ``with`` on. All begin at one instant. As long as they run, the clocks
-    of the targets are compared with that of this host, and their ticks are kept at its pace; so times and ages
-    mean the same everywhere, within the error of ``offsets``.
+    of the targets are compared with that of this host, and their ticks are kept at its pace; so times and
+    ages mean the same everywhere, within the error of ``offsets``.
     """
 
     def __init__(self, diagram: Diagram, targets: Mapping[str, Target]) -> None:
@@ -114,9 +114,8 @@ class Several:
         judging.read(Together(self.diagram, {name: read_log(path) for name, path in logs.items()}))
         return judging.outcome()
 
-    def _measured(self, pings: int | None = None) -> dict[str, Offset]:
-        more = {} if pings is None else {"pings": pings}
-        return self._all(lambda name, target: measure(lambda: int(target.request("clock")), **more))
+    def _measured(self, pings: int = PINGS) -> dict[str, Offset]:
+        return self._all(lambda name, target: measure(lambda: int(target.request("clock")), pings))
 
     def _align(self) -> None:
         """Keep the ticks of all targets at the pace of this host's clock, until the end."""

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import CABLE, TAGS, Block, Declared, Device, FixedInput, In, Out, Output, Param, State
+from quadvis.block import TAGS, Block, Declared, Device, FixedInput, In, LineDevice, Out, Output, Param, State
 from quadvis.library.catalogue import Catalogue
 from quadvis.machine.columns import table
 
@@ -60,7 +60,8 @@ def _tags(block: type[Block]) -> dict[str, str]:
 def _device(block: type[Device]) -> str:
     """Say what a device does with its port."""
     rate = f", a frame every '{block.rate}'" if issubclass(block, Output) else ""
-    return f"{'output' if rate else 'input'} by the port of '{block.port_parameter}', {block.line}{rate}"
+    line = f", {block.line}" if issubclass(block, LineDevice) else ", read by a process of its own"
+    return f"{'output' if rate else 'input'} by the port of '{block.port_parameter}'{line}{rate}"
 
 
 def _input_row(port: In, direct: bool) -> tuple[str, ...]:
@@ -110,7 +111,7 @@ def example(name: str, block: type[Block]) -> list[str]:
     interface = block.interface
     lines = [f"{name.rpartition('.')[2].rpartition(':')[2]}:", f"  block: {name}"]
     lines += [] if interface.continuous else ["  rate: ..."]
-    required = {param.name: _sample(param) for param in interface.params.values() if param.required}
+    required = {param.name: _sample(param, block) for param in interface.params.values() if param.required}
     wired = {port.name: "block.port" for port in interface.inputs.values() if port.default is None}
     for key, values in (("with", required), ("in", wired)):
         entries = [f"{item}: {text}" for item, text in values.items()]
@@ -120,9 +121,11 @@ def example(name: str, block: type[Block]) -> list[str]:
     return lines
 
 
-def _sample(param: Param) -> str:
+def _sample(param: Param, block: type[Block]) -> str:
+    if param.is_port and issubclass(block, Device):
+        return block.port_example
     if param.is_file or param.is_port:
-        return f"{CABLE}name" if param.is_port else "path"
+        return "path"
     return param.choices[0] if param.choices else "..."
 
 

@@ -142,6 +142,14 @@ def open_receiver(link: Link, resource: Any) -> Carrier:
 def _opened(link: Link, resource: Any, *, listens: bool) -> Carrier:
     if link.via == MEMORY:
         return MemoryCarrier(link, resource)
+    try:
+        return _on_line(link, resource, listens=listens)
+    except QuadvisError as error:
+        end = "receiver" if listens else "sender"
+        raise QuadvisError(f"link '{link.name}', {end}: {error}") from error
+
+
+def _on_line(link: Link, resource: Any, *, listens: bool) -> Carrier:
     if link.via == SERIAL:
         line = SerialLine(resource, link.baud)
         slow = f"'{resource}' hands bytes on when it likes: its driver knows no low latency"

@@ -90,6 +90,11 @@ def open_port(path: str, line: Line) -> int:
     return descriptor
 
 
+def missing_port(path: str) -> str:
+    """Return a sentence if there is no port of this path, else ""."""
+    return "" if os.path.exists(path) else str(_refused(path, OSError(errno.ENOENT, "")))
+
+
 def close_port(descriptor: int) -> None:
     """Let others open the port again, and close it."""
     import fcntl

@@ -38,7 +38,7 @@ PATIENCE = 2.0  # s that a run waits for a slow disk in total, before rows are l
 FORMAT = "1"
 DIAGRAM, FILES, METADATA, SUMMARY = "diagram.yaml", "files.json", "quadvis", "summary"
 CHANGES = "changes"  # the name of the records of parameters that were tuned
-HIDDEN = "hidden"  # key of a channel that is no signal of the diagram: it serves to replay the run
+HIDDEN = "hidden"  # key of a channel that is no signal of the diagram
 PORTS = "ports"  # key of the facts of a run: the sources of the ports of parts, as JSON
 
 

@@ -7,13 +7,17 @@ import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from quadvis.errors import QuadvisError, quoted
 from quadvis.machine.inputs import read_input
 from quadvis.output import mcap_records as mcap
 from quadvis.output.log import CHANGES, DIAGRAM, FILES, HIDDEN, METADATA, SUMMARY, ports_of
 from quadvis.output.mcap_messages import CDR
-from quadvis.output.recording import SLOT_TYPES, RecordedBlock, RecordedPort, Recording
+from quadvis.output.recording import SLOT_TYPES, TASK_TIMES, RecordedBlock, RecordedPort, Recording
 
 MOST_SLOTS, MOST_AXES = 1 << 20, 32  # of one block, of one output
 LONGEST_DIAGRAM = 1 << 24  # bytes
@@ -27,8 +31,10 @@ class Log(Recording):
     `diagram` is the resolved diagram's text, `metadata` the facts of the run, `summary` its outcome.
     `complete` is False if the run was killed, if the file is damaged, or if the diagram is not the one that
     ran; then `damage` says so in a sentence. `end` is the time (s) of the last row, None without rows.
-    `hidden` are the rows that only a replay needs, `changes` the facts of parameters that were tuned, `files`
-    the SHA-256 of the files that blocks read while they ran, by name.
+    `hidden` are the rows that only a replay needs. `task_times` are the times of tasks in a real-time run,
+    such as "_times/target/control.lateness": to be had by their names, but not listed among the signals.
+    `changes` are the facts of parameters that were tuned, `files` the SHA-256 of the files that blocks read
+    while they ran, by name.
     """
 
     def __init__(self, path: Path) -> None:
@@ -38,7 +44,7 @@ class Log(Recording):
         self.diagram = ""
         self.metadata: dict[str, str] = {}
         self.summary: dict[str, str] = {}
-        self.hidden = Recording()
+        self.hidden, self.task_times = Recording(), Recording()
         self.changes: list[dict[str, str]] = []
         self.files: dict[str, str] = {}
         self.damage = ""
@@ -61,7 +67,7 @@ class Log(Recording):
         elif isinstance(record, mcap.ChannelRecord):
             if "fields" in record.entries and record.number not in self._ids:
                 block = _block(record.topic, record.entries)
-                recording = self.hidden if block.hidden else self
+                recording = self._recording(block)
                 self._ids[record.number] = recording, len(recording.blocks)
                 recording.add(block)
                 for time, data in self._early.pop(record.number, []):
@@ -78,6 +84,31 @@ class Log(Recording):
             self.summary = record.entries
         elif record.name == CHANGES:
             self.changes.append(record.entries)
+
+    def _recording(self, block: RecordedBlock) -> Recording:
+        """Return where the rows of a block belong."""
+        if not block.hidden:
+            return self
+        return self.task_times if _is_time(block.path.strip("/")) else self.hidden
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """Return a signal of N rows, or the N times of a task: shape (N, *shape of the port)."""
+        return self.task_times[name] if _is_time(name) else super().__getitem__(name)
+
+    def stamps(self, name: str) -> NDArray[np.int64]:
+        """Return the stamps (ns) of its N rows."""
+        return self.task_times.stamps(name) if _is_time(name) else super().stamps(name)
+
+    def port(self, name: str) -> RecordedPort:
+        """Return its type, shape and unit."""
+        return self.task_times.port(name) if _is_time(name) else super().port(name)
+
+    def rate(self, name: str) -> str:
+        """Return the name of its rate; "" if it is not known."""
+        return self.task_times.rate(name) if _is_time(name) else super().rate(name)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.task_times if _is_time(str(name)) else super().__contains__(name)
 
     def _row(self, number: int, time: int, data: bytes) -> None:
         recording, index = self._ids[number]
@@ -131,6 +162,11 @@ def log_facts(path: str | Path) -> dict[str, str]:
         record for record in records if isinstance(record, mcap.MetadataRecord) and record.name == METADATA
     )
     return next((record.entries for record in facts), {})
+
+
+def _is_time(name: str) -> bool:
+    """Return whether a name is one of the times of tasks."""
+    return name.startswith(f"{TASK_TIMES}/")
 
 
 def _texts(data: bytes) -> dict[str, str]:

@@ -39,6 +39,17 @@ def plot_log(log: Log, figures: Sequence[Figure], output: Path | None = None) ->
     return plot_figures(log, figures or block_figures(log), folder, [log.path])
 
 
+def plot_times(log: Log, output: Path | None = None) -> list[Path]:
+    """Draw the times of the tasks in a real-time run, a figure for each task; return the PNG files.
+
+    They are in ``output`` or in a folder beside the log. QuadvisError if the log has none.
+    """
+    if not log.task_times.names:
+        raise QuadvisError(f"the log '{log.path}' has no times of tasks; only a real-time run has them")
+    folder = output or log.path.with_name(f"{log.path.stem}-times")
+    return plot_figures(log.task_times, block_figures(log.task_times), folder, [log.path])
+
+
 def plot_figures(
     recorded: Recorded, figures: Iterable[Figure], folder: Path, inputs: Sequence[Path] = ()
 ) -> list[Path]:

@@ -16,6 +16,7 @@ from quadvis.graph.graph import Index, Node, selected
 from quadvis.graph.names import read_name
 
 SLOT = 8
+TASK_TIMES = "_times"  # the folder of the times of tasks, which are no signals of the diagram
 SLOT_TYPES = {"float64": "<f8", "int64": "<i8", "bool": "<i8"}
 
 Buffer = bytes | bytearray | memoryview
@@ -74,7 +75,7 @@ def ports(node: Node) -> tuple[RecordedPort, ...]:
 class RecordedBlock(NamedTuple):
     """One recorded block: its path ("/vision/detector"), its ports in the order of memory, its rate.
 
-    A ``hidden`` one is no signal of the diagram; it serves to replay the run.
+    A ``hidden`` one is no signal of the diagram; it serves to replay the run, or has the times of a task.
     """
 
     path: str

@@ -20,7 +20,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from multiprocessing import parent_process
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Any, NamedTuple
 
 from quadvis.diagram.load import load_text
 from quadvis.diagram.sections.on_host_loss import CONTINUE
@@ -36,17 +36,21 @@ from quadvis.machine.interrupts import leave_to_parent
 from quadvis.native.choice import NATIVE, PYTHON, Choice, choose, interpreted, use
 from quadvis.native.executor import last_exact
 from quadvis.realtime import control
+from quadvis.realtime.captures import Captures
 from quadvis.realtime.clocks import MonotonicClock
 from quadvis.realtime.control import SharedMemory
 from quadvis.realtime.crew import Crew, lead
 from quadvis.realtime.devices import PortBindings
 from quadvis.realtime.hold_ups import hold_ups
+from quadvis.realtime.last_ticks import LastTicks
 from quadvis.realtime.lifeline import Lifeline
 from quadvis.realtime.options import RealTime
 from quadvis.realtime.pacer import Ended, Pacer
-from quadvis.realtime.schedule import Schedule
+from quadvis.realtime.pictures import PictureBox, picture_signals
+from quadvis.realtime.schedule import NANOSECONDS, Schedule
 from quadvis.realtime.streams import RowStream
 from quadvis.realtime.system import SHARE, Grants, ask_all, raise_thread, wake_up_time
+from quadvis.realtime.warm import warm
 
 GRACE = 2.0  # s that a step has to end, once it was asked to
 
@@ -55,8 +59,9 @@ GRACE = 2.0  # s that a step has to end, once it was asked to
 class Setup:
     """What an application needs: a resolved diagram, how to run it, what it shares with its supervisor.
 
-    ``computer`` is the one whose blocks it runs, "" in a diagram without computers. ``lines`` has what the
-    ends of its links are opened with, by the names of the links.
+    ``computer`` is the one whose blocks it runs, "" in a diagram without computers. ``rooms`` are those of
+    the notes, ``box`` that of the parameter box; ``pictures`` are the words of the picture box, if there is
+    one. ``lines`` has the words of its links in memory, by their names.
     """
 
     text: str
@@ -67,13 +72,26 @@ class Setup:
     computer: str
     engine: str
     wishes: RealTime
-    tasks: int
+    rooms: tuple[int, ...]
     streams: tuple[RowStream, ...]
     words: Any
     link: Connection
     devices: PortBindings
     lines: Mapping[str, Any]
-    room: int = 0  # of the parameter box
+    last_ticks: LastTicks
+    box: int
+    pictures: Any
+
+
+class Supply(NamedTuple):
+    """What an application waits for before it opens its blocks, since other processes make it.
+
+    ``lines`` has what the ends of its other links are opened with, by the names of the links; ``ports`` the
+    ptys of its input devices, by their paths.
+    """
+
+    lines: Mapping[str, Any]
+    ports: Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -155,7 +173,7 @@ class _Application:
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
         rings = [stream.ring for stream in setup.streams]
-        self._shared = SharedMemory(setup.words, setup.tasks, rings, setup.room)
+        self._shared = SharedMemory(setup.words, setup.rooms, rings, setup.box)
         self._signals = _Signals(self._shared.control)
         self._engine: Engine | None = None
         self._pacer: Pacer | None = None
@@ -170,13 +188,18 @@ class _Application:
         schedule = Schedule.of(part)
         names, overload = [task.name for task in part.tasks], diagram.overload_of(setup.computer)
         limits, clock = [overload.of(name) for name in names], MonotonicClock()
-        pacer = self._pacer = Pacer(schedule, names, limits, shared, clock, lambda: engine.hold_safe())
+        pacer = self._pacer = Pacer(
+            schedule, names, limits, shared, clock, lambda: engine.hold_safe(), setup.computer
+        )
+        supply: Supply = setup.link.recv()
         with ExitStack() as stack:
-            carriers = open_carriers(part, setup.lines)
+            carriers = open_carriers(part, {**setup.lines, **supply.lines})
             stack.callback(close_all, carriers.values())
             engine = self._engine = Engine(live(part, carriers), diagram.seed, pacer)
             pacer.write_into(engine.memory)
-            setup.devices.bind(engine)
+            setup.devices.bind(engine, supply.ports)
+            captures = stack.enter_context(Captures(engine, clock))
+            captures.start()
             if setup.wishes.profile:
                 engine.measure()
             choice = choose(engine, diagram.ticks, setup.engine, setup.link.send, paced=True)
@@ -186,10 +209,15 @@ class _Application:
                 use(engine, choice, pacer if native else None)
             for stream, ring in zip(setup.streams, shared.rings, strict=True):
                 stream.put_into(ring, engine, native)
+            if setup.pictures is not None:
+                PictureBox(setup.pictures).put_from(engine, picture_signals(part), clock)
             engine.prepare()
+            for note in captures.wait():
+                setup.link.send(note)
             stack.enter_context(diagram.guarded())
             stack.enter_context(engine)
             stack.callback(self._leave)
+            warm(engine, choice)
             grants = ask_all(setup.wishes)
             if native:
                 clock.hear_signals()
@@ -211,7 +239,10 @@ class _Application:
             pacer.finish()
             if crew is not None:
                 pacer.conclude(crew.rest, ticks)
-            shared.control[control.LEFT] = control.AT_STOP_TIME
+            remaining = schedule.deadline(ticks) - clock.now()
+            setup.last_ticks.stay(remaining / NANOSECONDS, schedule.interval / NANOSECONDS, pacer.live)
+            if shared.control[control.END]:
+                raise Ended
         return self._ending()
 
     def _crew(self, part: Graph, choice: Choice, pacer: Pacer) -> Crew | None:
@@ -232,8 +263,7 @@ class _Application:
 
     def _leave(self) -> None:
         """Let the guardian know that no step follows, and nothing interrupt the closing of the blocks."""
-        words = self._shared.control
-        words[control.LEFT] = words[control.LEFT] or control.EARLY
+        self._shared.control[control.LEFT] = 1
         self._signals.close()
 
     def ended_early(self, error: BaseException) -> Ending:

@@ -19,7 +19,6 @@ NUMBER, NOT_BEFORE, TASKS, LENGTH, CHECK, ROOM = range(6)
 HEAD = 8
 # Behind the head, for each parameter: its first slot in memory, the number of slots, their contents.
 ENTRY = 2
-NOTED = (16, 2)  # the ring of what the loop has taken: its room; its records, the number and the tick
 LOW = (1 << 48) - 1  # bits of a check that are multiplied: their product fits a word
 
 

@@ -30,7 +30,7 @@ from quadvis.realtime.system import ask_all
 
 ROOM = 4096  # bytes on their way in one direction; then the sender waits
 GRAIN = 500_000  # ns: bytes are handed on in pieces that take about as long, the last ones at their own time
-START = 10.0  # s that the process has to make the cables
+START = 30.0  # s that the process has to make the cables
 
 
 class Cable(NamedTuple):
@@ -100,7 +100,7 @@ class CablesSetup:
 class Cables:
     """The process of the cables, as the supervisor has it.
 
-    ``ends`` are there after `start`. It ends when it is told to, or when neither the supervisor nor any
+    ``ends`` are there after `make`. It ends when it is told to, or when neither the supervisor nor any
     watched process lives. Without cables there is no process.
     """
 
@@ -112,12 +112,16 @@ class Cables:
         self.ends: dict[str, Ends] = {}
 
     def start(self) -> None:
-        """Make the cables."""
+        """Start the process."""
+        if self._cables:
+            with launching():
+                self.process.start()
+            self._theirs.close()
+
+    def make(self) -> None:
+        """Wait until the cables are made; RunError if they cannot be."""
         if not self._cables:
             return
-        with launching():
-            self.process.start()
-        self._theirs.close()
         try:
             made = self._link.recv() if self._link.poll(START) else None
         except (EOFError, OSError):

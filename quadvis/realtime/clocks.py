@@ -18,7 +18,8 @@ CLOCK_MONOTONIC, TIMER_ABSTIME = 1, 1
 GET, WAIT, START, POLLED, TIMESPEC, SECONDS, REST = range(7)
 # The end of a pipe into which a signal puts a byte, or -1; the function that reads, and where to.
 PIPE, READ, BUFFER, BYTE = range(7, 11)
-WORDS = 11
+BASE = 11  # the start as it was given; START is moved from there
+WORDS = 12
 
 
 class Timekeeper(Protocol):
@@ -31,6 +32,9 @@ class Timekeeper(Protocol):
 
     def sleep(self, instant: int) -> None:
         """Wait until an instant, or until a signal comes."""
+
+    def follow(self, shift: int) -> None:
+        """Let the instant 0 be so much (ns) after the start that was given."""
 
 
 class MonotonicClock:
@@ -54,7 +58,11 @@ class MonotonicClock:
 
     @start.setter
     def start(self, start: int) -> None:
-        self.words[START] = start
+        self.words[START] = self.words[BASE] = start
+
+    def follow(self, shift: int) -> None:
+        """Let the instant 0 be so much (ns) after the start that was given."""
+        self.words[START] = self.words[BASE] + shift
 
     @property
     def polled(self) -> int:
@@ -114,6 +122,11 @@ def sleep(clock: Any, instant: int) -> None:
     clock.sleep(instant)
 
 
+def follow(clock: Any, shift: int) -> None:
+    """Let the instant 0 be so much (ns) after the start that was given."""
+    clock.follow(shift)
+
+
 def signalled(_: Any) -> bool:
     """Return whether a signal waits for Python: never while Python runs."""
     return False
@@ -136,6 +149,10 @@ def _machine_sleep(words: Any, instant: int) -> None:
         pass
 
 
+def _machine_follow(words: Any, shift: int) -> None:
+    words[START] = words[BASE] + shift
+
+
 def _machine_signalled(words: Any) -> bool:
     if words[PIPE] < 0:
         return False
@@ -143,4 +160,6 @@ def _machine_signalled(words: Any) -> bool:
 
 
 # What stands for the three functions in machine code.
-MACHINE: Mapping[Any, Any] = {now: _machine_now, sleep: _machine_sleep, signalled: _machine_signalled}
+MACHINE: Mapping[Any, Any] = {
+    now: _machine_now, sleep: _machine_sleep, follow: _machine_follow, signalled: _machine_signalled,
+}  # fmt: skip

@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from quadvis.realtime import box, lifeline, times
+from quadvis.realtime import lifeline, times
 from quadvis.realtime.box import ParameterBox
+from quadvis.realtime.notes import Notes
 from quadvis.realtime.ring import RecordRing
 
 START = 0  # by the loop: the instant of the start on the monotonic clock (ns); 0 before
@@ -17,50 +18,45 @@ TICK = 1  # by the loop: the tick whose step began last
 BEGUN = (
     2  # by the loop: when the step began that is running (ns since the start, at least 1); 0 between steps
 )
-DONE = 3  # by the loop: the number of steps
+DONE = 3  # by the loop: grows with each step, and after the last one while the loop waits for others
 END = 4  # by either: not 0 if the run is to end before its next step
-LEFT = 5  # by the loop: not 0 once it runs no more steps
-EARLY, AT_STOP_TIME = 1, 2  # what LEFT says
+LEFT = 5  # by the loop: not 0 once it runs no more steps, and no other loop does at the stop time
 SAFE = 6  # by the loop: not 0 once the outputs are to hold their safe values to the end
+RESTING = 7  # by the loop: when it began to wait for tasks that run by themselves, as BEGUN; 0 else
 LIFELINE = slice(8, 8 + lifeline.SIZE)  # of the loop's thread
 TICKS = LIFELINE.stop  # by the supervisor, before the start: at how many ticks the run ends
-LAST = TICKS + 1  # likewise: the last tick with a due task, if it is another one than the diagram has; or 0
-WORDS = LAST + 1
-LEFT_OUT = (
-    4096,
-    2,
-)  # the ring of the ticks that the loop leaves out: its room, and its records, first and count
-OWN_RINGS = LEFT_OUT, box.NOTED
+SHIFT = TICKS + 1  # by the supervisor: how much (ns) later than after its start each tick is due
+WORDS = SHIFT + 1
 
 
 class SharedMemory:
-    """The words of a real-time run: of control, of the tasks' times, of the rings, of the parameter box.
+    """The words of a run: of control, of the tasks' times, of the rings, of the notes, of the parameter box.
 
-    ``left_out`` is the ring of the ticks that the loop leaves out, ``noted`` that of the groups of parameters
-    that it has taken from the ``box``.
+    ``rooms`` has for how many steps of each task the notes have room, ``box`` how many words a group of
+    parameters may have.
     """
 
-    def __init__(self, words: Any, tasks: int, rings: Sequence[tuple[int, int]], room: int = 0) -> None:
-        """Divide the ``words``; ``rings`` are the records that each has room for, and their widths.
-
-        ``room`` is that of the box.
-        """
-        view = memoryview(words).cast("B").cast("q")
+    def __init__(
+        self, words: Any, rooms: Sequence[int], rings: Sequence[tuple[int, int]], box: int = 0
+    ) -> None:
+        """Divide the ``words``; ``rings`` are the records that each has room for, and their widths."""
+        view, tasks = memoryview(words).cast("B").cast("q"), len(rooms)
         self.control = view[:WORDS]
         ends = [WORDS + times.WORDS * (task + 1) for task in range(tasks)]
         self.times = view[WORDS : WORDS + times.WORDS * tasks]
         self.tasks = [view[end - times.WORDS : end] for end in ends]
-        made = []
+        self.rings = []
         start = WORDS + times.WORDS * tasks
-        for records, width in (*rings, *OWN_RINGS):
-            size = RecordRing.size(records, width)
-            made.append(RecordRing(view[start : start + size], records, width))
+        for room, width in rings:
+            size = RecordRing.size(room, width)
+            self.rings.append(RecordRing(view[start : start + size], room, width))
             start += size
-        *self.rings, self.left_out, self.noted = made
-        self.box = ParameterBox(view[start : start + ParameterBox.size(room)], room)
+        end = start + Notes.size(rooms)
+        self.notes = Notes(view[start:end], rooms)
+        self.box = ParameterBox(view[end : end + ParameterBox.size(box)], box)
 
     @staticmethod
-    def size(tasks: int, rings: Sequence[tuple[int, int]], room: int = 0) -> int:
+    def size(rooms: Sequence[int], rings: Sequence[tuple[int, int]], box: int = 0) -> int:
         """Return the number of words."""
-        sizes = sum(RecordRing.size(*ring) for ring in (*rings, *OWN_RINGS))
-        return WORDS + times.WORDS * tasks + sizes + ParameterBox.size(room)
+        all_rings = sum(RecordRing.size(*ring) for ring in rings)
+        return WORDS + times.WORDS * len(rooms) + all_rings + Notes.size(rooms) + ParameterBox.size(box)

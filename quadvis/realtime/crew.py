@@ -13,11 +13,11 @@ import numpy as np
 
 from quadvis.engine.clock import Unpaced
 from quadvis.engine.engine import Engine
-from quadvis.engine.interpreter import Executor, Handover, Interpreter, Stop
-from quadvis.engine.memory import Memory
-from quadvis.engine.taps import MachineCall, Observer, Tap
-from quadvis.native.choice import NATIVE, Choice, executor
+from quadvis.engine.interpreter import Handover, Interpreter, Stop
+from quadvis.engine.taps import MachineCall
+from quadvis.native.choice import NATIVE, Choice
 from quadvis.native.clock import GO, MachineClock
+from quadvis.native.task_executors import TaskExecutors
 from quadvis.realtime import dispatch
 from quadvis.realtime.clocks import START, for_thread
 from quadvis.realtime.crew_words import crew_words
@@ -29,7 +29,7 @@ SWITCH = 1e-4  # s after which a thread in Python lets another one have the inte
 PATIENCE = 2.0  # s that steps have to end, when the run ends early
 
 
-class Crew:
+class Crew(TaskExecutors):
     """Runs each task of a program in a thread of its own, the fastest one in the caller's: an executor.
 
     ``tend`` is called in each new thread before its first step, with the number of its task. ``explain``
@@ -44,27 +44,17 @@ class Crew:
         explain: Callable[[Stop], Exception],
         tend: Callable[[int], None],
     ) -> None:
-        self.memory: Memory = interpreter.memory
         self._error: Exception | None = None
         self._explain, self._tend = explain, tend
         self._native = choice.engine == NATIVE
         program = interpreter.program
-        self._names = [task.name for task in program.tasks]
-        self._tasks = {block.path: block.task for block in program.blocks}
+        self._pause = float(program.tasks[0].period) / 2  # s
         self._crew, self._kept = crew_words(program)
-        self._memory = self.memory.raw.cast("q")
-        pacer.write_into(self.memory)
+        self._memory = interpreter.memory.raw.cast("q")
         pacer.lead(self._crew, self._failed)
-        self._gates = [_Gate(self, number, pacer) for number in range(len(self._names))]
-        self._parts = [
-            interpreter.part(name, self._handover(number)) for number, name in enumerate(self._names)
-        ]
-        clocks: list[MachineClock | None] = [None] * len(self._names)
-        if self._native:
-            clocks = [pacer, *self._gates[1:]]
-        self._executors: list[Executor] = [
-            executor(part, choice, clock) for part, clock in zip(self._parts, clocks, strict=True)
-        ]
+        self._gates = [_Gate(self, number, pacer) for number in range(len(program.tasks))]
+        clocks: list[MachineClock] = [pacer, *self._gates[1:]] if self._native else []
+        super().__init__(interpreter, choice, self._handover, clocks)
         self._threads: list[threading.Thread] = []
 
     def _handover(self, number: int) -> Handover:
@@ -77,41 +67,6 @@ class Crew:
 
         places = tuple(map(address_of, (self._crew, self._memory, own)))
         return Handover(call, MachineCall(library().routine(dispatch.HAND_OVER), places, own))
-
-    @property
-    def tick(self) -> int:
-        """The next tick of the fastest task."""
-        return self._executors[0].tick
-
-    @tick.setter
-    def tick(self, tick: int) -> None:
-        self._executors[0].tick = tick
-
-    def prepare(self) -> None:
-        """Do now what would take time at the first ticks."""
-        for each in self._executors:
-            each.prepare()
-
-    def run(self, until: int) -> Stop | None:
-        """Run the ticks of the fastest task before ``until``, which dispatches the others."""
-        return self._executors[0].run(until)
-
-    def attach(self, observer: Tap | Observer) -> None:
-        """Have rows taken from now on, or something done at the ticks of a task, in its thread."""
-        self._executors[self._number(observer)].attach(observer)
-
-    def detach(self, observer: Tap | Observer) -> None:
-        """End what `attach` has begun."""
-        self._executors[self._number(observer)].detach(observer)
-
-    def leave_writes(self) -> None:
-        """Hand nothing to the world outside any more."""
-        for each in self._executors:
-            each.leave_writes()
-
-    def _number(self, observer: Tap | Observer) -> int:
-        name = observer.task if isinstance(observer, Observer) else self._tasks[observer.block]
-        return self._names.index(name)
 
     def start(self, until: int) -> None:
         """Start the threads, for a run of so many ticks whose start is known.
@@ -130,11 +85,16 @@ class Crew:
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
-    def rest(self) -> None:
-        """Let all steps end that have begun or are due, and the threads after them."""
+    def rest(self, live: Callable[[], object]) -> None:
+        """Let all steps end that have begun or are due, and the threads after them.
+
+        Meanwhile call ``live`` at least once in a period of the fastest task.
+        """
         self._end(AT_REST)
         for thread in self._threads:
-            thread.join()
+            while thread.is_alive():
+                thread.join(self._pause)
+                live()
         if self._error is not None:
             raise self._error
 
@@ -229,8 +189,8 @@ class _Gate:
 
     def enter(self) -> int:
         """Count the step that has ended, and wait; return GO, or another number for the end."""
-        plan, _, tasks, *_, clock, crew, _ = self._pacer.words
-        return dispatch.enter(plan, tasks, clock, crew, self._own)
+        plan, _, tasks, noted, _, clock, crew, _ = self._pacer.words
+        return dispatch.enter(plan, tasks, noted, clock, crew, self._own)
 
     @property
     def tick(self) -> int:
@@ -247,8 +207,8 @@ class _Gate:
     @property
     def places(self) -> Sequence[int]:
         """The addresses that its machine code takes."""
-        plan, _, tasks, *_, crew, _ = self._pacer.words
-        return [address_of(each) for each in (plan, tasks, self._clock, crew, self._own)]
+        plan, _, tasks, noted, *_, crew, _ = self._pacer.words
+        return [address_of(each) for each in (plan, tasks, noted, self._clock, crew, self._own)]
 
     def answer(self, pause: int) -> None:
         """End the thread."""

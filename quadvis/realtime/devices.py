@@ -8,8 +8,9 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
 from typing import Any
 
-from quadvis.block import CABLE, Block, Device, Input, Output
+from quadvis.block import CABLE, Block, Device, Input, LineDevice, Output
 from quadvis.engine.engine import Engine
+from quadvis.errors import RunError
 from quadvis.graph.devices import devices
 from quadvis.graph.graph import Graph
 from quadvis.native.choice import Announce
@@ -23,24 +24,23 @@ from quadvis.realtime.schedule import NANOSECONDS
 
 @dataclass(frozen=True)
 class PortBindings:
-    """What the devices of an application need: the guardian's words, the outbox of each output, by path.
-
-    ``ports`` are the paths of the ptys of those inputs that are at the end of a cable.
-    """
+    """What the devices of an application need: the guardian's words, the outbox of each output, by path."""
 
     words: Any = None
     boxes: Mapping[str, int] = field(default_factory=dict)
-    ports: Mapping[str, str] = field(default_factory=dict)
 
-    def bind(self, engine: Engine) -> None:
-        """Bind the devices of an engine, before it opens them."""
+    def bind(self, engine: Engine, ports: Mapping[str, str]) -> None:
+        """Bind the devices of an engine, before it opens them.
+
+        ``ports`` are the paths of the ptys of those inputs that are at the end of a cable.
+        """
         boxes = outboxes(self.words) if self.boxes else []
         for path, device in devices(engine.graph):
             block = engine.bound(path)
             if isinstance(device, Output):
                 block.deliver = boxes[self.boxes[path]].put
-            elif path in self.ports:
-                block.actual_port = self.ports[path]
+            elif path in ports:
+                block.actual_port = ports[path]
 
 
 class Devices:
@@ -48,39 +48,47 @@ class Devices:
 
     def __init__(self, context: SpawnContext, graph: Graph, on_host_loss: str, standing: Standing) -> None:
         self._context, self._on_host_loss, self._standing = context, on_host_loss, standing
-        self._outputs = {path: device for path, device in devices(graph) if isinstance(device, Output)}
-        self._inputs = {path: device for path, device in devices(graph) if isinstance(device, Input)}
+        self._devices = list(devices(graph))
+        self._outputs = {path: device for path, device in self._devices if isinstance(device, Output)}
+        self._inputs = {path: device for path, device in self._devices if isinstance(device, Input)}
         words = context.RawArray("q", words_for(len(self._outputs))) if self._outputs else None
         boxes = {path: number for number, path in enumerate(self._outputs)}
-        self._ports: dict[str, str] = {}  # filled when the cables are made
-        self.bindings = PortBindings(words, boxes, self._ports)
+        self.ports: dict[str, str] = {}  # of inputs at the end of a cable, by path, from `open` on
+        self.bindings = PortBindings(words, boxes)
         lines = {device.port_given: device.settings for device in self._all() if _on_cable(device)}
         self.cables = [Cable(port, line) for port, line in lines.items()]
         self._guard: Guard | None = None
 
-    def start(
-        self, ends: Mapping[str, Ends], patiences: Sequence[Patience], announce: Announce
-    ) -> int | None:
+    def start(self, patiences: Sequence[Patience]) -> int | None:
+        """Start the guardian, and return its process; None if nothing needs one."""
+        if not self._outputs:
+            return None
+        self._guard = Guard(self._context, self.bindings.words, patiences, self._on_host_loss, self._standing)
+        self._guard.start()
+        return self._guard.process.pid
+
+    def open(self, ends: Mapping[str, Ends], announce: Announce) -> None:
         """Let all output ports have their initial frames; RunError if one refuses.
 
-        ``ends`` are those of its `cables`. Return the guardian's process, if there is one.
+        ``ends`` are those of its `cables`.
         """
         for path, device in self._inputs.items():
             if _on_cable(device):
-                self._ports[path] = ends[device.port_given].b
-        if not self._outputs:
-            return None
-        ports = [self._output_port(path, device, ends) for path, device in self._outputs.items()]
-        self._guard = Guard(
-            self._context, ports, self.bindings.words, patiences, self._on_host_loss, self._standing
-        )
-        self._guard.start(announce)
-        return self._guard.process.pid
-
-    def watch(self, process: int, loop: int) -> None:
-        """Let the guardian watch an application, and the loop of this place among the patiences."""
+                self.ports[path] = ends[device.port_given].b
         if self._guard is not None:
-            self._guard.watch(process, loop)
+            ports = [self._output_port(path, device, ends) for path, device in self._outputs.items()]
+            self._guard.open(ports, announce)
+
+    def missing(self) -> Iterator[str]:
+        """Yield a sentence for each device whose port is surely not there."""
+        for path, device in self._devices:
+            if words := device.missing():
+                yield str(RunError(words, block=path))
+
+    def watch(self, process: int) -> None:
+        """Let the guardian watch an application."""
+        if self._guard is not None:
+            self._guard.watch(process)
 
     @property
     def sources(self) -> list[Connection | int]:
@@ -100,7 +108,7 @@ class Devices:
         """End everything; a sentence for each port that may be without its safe frames."""
         return self._guard.close() if self._guard is not None else []
 
-    def _all(self) -> Iterator[Device]:
+    def _all(self) -> Iterator[LineDevice]:
         yield from self._outputs.values()
         yield from self._inputs.values()
 

@@ -24,7 +24,8 @@ from quadvis.native.routine import Routine
 from quadvis.realtime import clocks, times
 from quadvis.realtime import plan as plans
 from quadvis.realtime.clocks import now
-from quadvis.realtime.grid import deadline, due_in
+from quadvis.realtime.grid import deadline, due_in, first_from
+from quadvis.realtime.notes import put_release, put_times
 from quadvis.realtime.overload import ENDING, missed, worse
 from quadvis.realtime.times import bin_of, count
 
@@ -44,10 +45,11 @@ LAST_BIT = 62  # of a word in which each task has a bit
 AT_REST, AT_ONCE = 1, 2  # the threads end once they are idle, or after their step
 
 
-def release(plan: Any, shared: Any, tasks: Any, crew: Any, memory: Any, tick: int) -> int:
+def release(plan: Any, shared: Any, tasks: Any, noted: Any, crew: Any, memory: Any, tick: int) -> int:
     """Release the tasks that are due up to a tick and idle, and count the overruns of others; see `missed`.
 
-    A task whose tick the loop has missed begins late, until its next tick is due.
+    A task whose tick the loop has missed begins late, until its next tick is due. What begins late or not at
+    all is noted.
     """
     answer = GO
     lock(crew)
@@ -58,7 +60,7 @@ def release(plan: Any, shared: Any, tasks: Any, crew: Any, memory: Any, tick: in
         crew[row + SEEN] = tick + 1
         if found == 0:
             continue
-        starting = plan[plans.STARTING]
+        starting, late = plan[plans.STARTING], -1
         if crew[row + STATE] != IDLE:
             steps = tasks[times.WORDS * task + times.STEPS] + 1
             starting = 1 if steps <= plan[rhythm + plans.STARTUP] else 0
@@ -66,7 +68,10 @@ def release(plan: Any, shared: Any, tasks: Any, crew: Any, memory: Any, tick: in
             found -= 1
             crew[row + STATE], crew[row + FRESH], crew[row + WAITS] = BUSY, 1, 1
             crew[row + TICK] = tick - (tick - offset) % every
+            late = tick if crew[row + TICK] < tick else -1
             _copy(crew, memory, crew[row + DELAYS])
+        if found > 0 or late >= 0:
+            put_release(noted, task, first_from(every, offset, start), found, late)
         if found > 0:
             tasks[times.WORDS * task + times.OVERRUNS] += found
             answer = worse(answer, missed(plan, shared, task, found, start, starting))
@@ -153,14 +158,14 @@ def _copy(crew: Any, memory: Any, at: int) -> None:
             memory[target + index] = memory[source + index]
 
 
-def enter(plan: Any, tasks: Any, clock: Any, crew: Any, own: Any) -> int:
+def enter(plan: Any, tasks: Any, noted: Any, clock: Any, crew: Any, own: Any) -> int:
     """Count the step of the task ``own[0]`` that has ended; wait until it is released.
 
     Return `GO`, and its step has begun, or `ENDING`.
     """
     row = HEAD + ROW * own[0]
     if crew[row + BEGUN] != 0:
-        _leave(plan, tasks, crew, own[0], now(clock))
+        _leave(plan, tasks, noted, crew, own[0], now(clock))
     while True:
         lock(crew)
         runs, quits = crew[row + STATE] != IDLE, crew[QUIT]
@@ -177,22 +182,24 @@ def enter(plan: Any, tasks: Any, clock: Any, crew: Any, own: Any) -> int:
     return GO
 
 
-def _leave(plan: Any, tasks: Any, crew: Any, task: int, instant: int) -> None:
-    row, words = HEAD + ROW * task, times.WORDS * task
+def _leave(plan: Any, tasks: Any, noted: Any, crew: Any, task: int, instant: int) -> None:
+    row, words, planned = HEAD + ROW * task, times.WORDS * task, plans.HEAD + plans.ROW * task
     late, taken = crew[row + LATE], instant - crew[row + BEGUN]
     late_bin, taken_bin = bin_of(late), bin_of(taken)
     lock(crew)
     tasks[words + times.STEPS] += 1
     count(tasks, words + times.LATENESS, late, late_bin)
     count(tasks, words + times.TET, taken, taken_bin)
-    plan[plans.HEAD + plans.ROW * task + plans.IN_A_ROW] = 0
+    start, room = plan[planned + plans.NOTED], plan[planned + plans.NOTES_ROOM]
+    put_times(noted, start, room, crew[row + TICK], late, taken, tasks[words + times.OVERRUNS])
+    plan[planned + plans.IN_A_ROW] = 0
     crew[row + STATE], crew[row + BEGUN] = IDLE, 0
     unlock(crew)
 
 
-def gate(steering: Any, plan: Any, tasks: Any, clock: Any, crew: Any, own: Any) -> None:
+def gate(steering: Any, plan: Any, tasks: Any, noted: Any, clock: Any, crew: Any, own: Any) -> None:
     """Wait as the clock of the compiled loop of a task, whose control words are ``steering``."""
-    steering[loop.PAUSE] = enter(plan, tasks, clock, crew, own)
+    steering[loop.PAUSE] = enter(plan, tasks, noted, clock, crew, own)
     steering[loop.TICK] = crew[HEAD + ROW * own[0] + TICK]
 
 
@@ -241,5 +248,5 @@ def _machine_rest(crew: Any, semaphore: int) -> None:
 MACHINE: Mapping[Any, Any] = {
     lock: _machine_lock, unlock: _machine_unlock, post: _machine_post, rest: _machine_rest,
 }  # fmt: skip
-GATE = Routine(gate, "wwwwww", {**clocks.MACHINE, **MACHINE})
+GATE = Routine(gate, "wwwwwww", {**clocks.MACHINE, **MACHINE})
 HAND_OVER = Routine(hand_over, "www", MACHINE)

@@ -23,8 +23,7 @@ def following(plan: Any, tick: int, instant: int) -> int:
         tick = _not_before(plan, instant)
     found = -1
     for row in range(HEAD, HEAD + ROW * plan[TASKS], ROW):
-        every, offset = plan[row + EVERY], plan[row + OFFSET]
-        first = tick + max(offset - tick, (offset - tick) % every)
+        first = first_from(plan[row + EVERY], plan[row + OFFSET], tick)
         if found < 0 or first < found:
             found = first
     return found
@@ -44,6 +43,11 @@ def latest(plan: Any, instant: int) -> int:
 def due_in(every: int, offset: int, start: int, stop: int) -> int:
     """Return how many ticks of a rhythm lie in ``range(start, stop)``."""
     return max(0, -((offset - stop) // every)) - max(0, -((offset - start) // every))
+
+
+def first_from(every: int, offset: int, tick: int) -> int:
+    """Return the first tick of a rhythm from a tick on."""
+    return tick + max(offset - tick, (offset - tick) % every)
 
 
 def _not_before(plan: Any, instant: int) -> int:

@@ -29,7 +29,7 @@ from quadvis.realtime.heartbeat import Patience
 from quadvis.realtime.outlet import Outlet, OutputPort
 from quadvis.realtime.schedule import NANOSECONDS
 
-START = 10.0  # s that the guardian has to open its ports
+START = 30.0  # s that the guardian has to open its ports
 SILENT = 3.0  # s without a look at the loops, after which it counts as hanging
 END = 3.0  # s that it has to send its last safe frames
 LOST = Alarm("the guardian of the outputs has been lost")
@@ -39,33 +39,35 @@ class Guard:
     """Starts the guardian, tells it whom to watch and what to send, and hears its alarms.
 
     ``words`` (a RawArray of `words_for` words) hold the outboxes of `quadvis.realtime.guardian.outboxes`,
-    in the order of ``ports``: whoever gives commands puts frames there.
+    in the order of the ports: whoever gives commands puts frames there.
     """
 
     def __init__(
         self,
         context: SpawnContext,
-        ports: Sequence[OutputPort],
         words: Any,
         patiences: Sequence[Patience],
         on_host_loss: str,
         standing: Standing,
     ) -> None:
-        self.ports = tuple(ports)
+        self._ports: tuple[OutputPort, ...] = ()
         self._looked = looked(words)
         self._link, self._theirs = context.Pipe()
-        setup = GuardianSetup(
-            self.ports, words, tuple(patiences), self._theirs, os.getpid(), on_host_loss, standing
-        )
+        setup = GuardianSetup((), words, tuple(patiences), self._theirs, os.getpid(), on_host_loss, standing)
         self.process: BaseProcess = context.Process(target=guard, args=(setup,), name="guardian")
         self._started = self._lost = False
 
-    def start(self, announce: Announce) -> None:
-        """Start it, and wait until all ports have their initial frames; RunError if a port refuses."""
+    def start(self) -> None:
+        """Start it: it waits for its ports."""
         with launching():
             self.process.start()
         self._started = True
         self._theirs.close()
+
+    def open(self, ports: Sequence[OutputPort], announce: Announce) -> None:
+        """Wait until all ports have their initial frames; RunError if one refuses."""
+        self._ports = tuple(ports)
+        self._say(self._ports)
         until = time.monotonic() + START
         while time.monotonic() < until:
             if self._link.poll(START):
@@ -76,13 +78,9 @@ class Guard:
                 raise RunError(said.reason, block=said.block)
         raise RunError(f"the guardian was not ready after {START:g} s")
 
-    def watch(self, process: int, loop: int | None = None) -> None:
-        """Let it watch an application: when that ends, safe frames are sent.
-
-        ``loop`` is the place of its loop among the patiences. At the stop time the loops may end one by one;
-        safe frames are sent when all have.
-        """
-        self._say(Watch(process, loop))
+    def watch(self, process: int) -> None:
+        """Let it watch an application: when that ends, safe frames are sent."""
+        self._say(Watch(process))
 
     def make_safe(self) -> None:
         """Let it send safe frames at once, and from now on."""
@@ -116,7 +114,7 @@ class Guard:
             return []
         self.process.kill()
         self.process.join()
-        return [sentence for port in self.ports for sentence in _in_its_place(port)]
+        return [sentence for port in self._ports for sentence in _in_its_place(port)]
 
     def _receive(self) -> Any:
         try:

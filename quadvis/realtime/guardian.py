@@ -14,7 +14,7 @@ import signal
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
 from multiprocessing.connection import Connection
@@ -62,7 +62,8 @@ class Standing(NamedTuple):
 class GuardianSetup:
     """What the guardian needs: ``words`` has an outbox for each of the ``ports``, in their order.
 
-    ``supervisor`` is the process that started it, ``on_host_loss`` what its death means.
+    Its process starts without ports, and takes them from the ``link``. ``supervisor`` is the process that
+    started it, ``on_host_loss`` what its death means.
     """
 
     ports: tuple[OutputPort, ...]
@@ -83,10 +84,9 @@ class Order(Enum):
 
 @dataclass(frozen=True)
 class Watch:
-    """The supervisor names an application: its process, and the place of its loop among the patiences."""
+    """The supervisor names the process of an application."""
 
     process: int
-    loop: int | None = None
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,6 @@ class Guardian:
         self._looked = looked(setup.words)
         self._hearts = [Heartbeat(patience, time.monotonic_ns) for patience in setup.patiences]
         self._supervisor, self._applications = Lives(), Lives()
-        self._loops: dict[int, int | None] = {}  # of the applications, by process
         self._supervisor.watch(setup.supervisor)
         shortest = min([patience.allowed // LOOKS for patience in setup.patiences], default=LONGEST_LOOK)
         self._look_every = min(max(shortest, SHORTEST_LOOK), LONGEST_LOOK)
@@ -200,7 +199,7 @@ class Guardian:
         self._supervisor.look()
         self._applications.look()
         host_lost = self._supervisor.any_ended and self._setup.on_host_loss == SAFE
-        if host_lost or any(not self._has_finished(process) for process in self._applications.ended):
+        if host_lost or self._applications.any_ended:
             self._make_safe()
         if self.told_to_end and not self.safe:
             self._make_safe(Alarm("the guardian was told to end"))
@@ -208,7 +207,7 @@ class Guardian:
             heart.hold_on(self._setup.standing.priority)
         signs = [(heart.look(), heart) for heart in self._hearts] if not self.safe else []
         kinds = {sign for sign, _ in signs}
-        if Sign.ENDS in kinds or kinds == {Sign.FINISHED}:
+        if Sign.ENDS in kinds:
             self._make_safe()
         for sign, heart in signs:
             if sign is Sign.HANGS and not self.safe:
@@ -218,18 +217,12 @@ class Guardian:
             self._hurry()
         self._paused = paused
 
-    def _has_finished(self, process: int) -> bool:
-        """Return whether the loop of an application has reached the stop time."""
-        loop = self._loops[process]
-        return loop is not None and self._hearts[loop].has_finished
-
     def _listen(self) -> None:
         """Take what the supervisor says."""
         try:
             while self._listening and self._link.poll():
                 said = self._link.recv()
                 if isinstance(said, Watch):
-                    self._loops[said.process] = said.loop
                     self._applications.watch(said.process)
                 else:
                     self._make_safe()
@@ -275,7 +268,13 @@ def guard(setup: GuardianSetup) -> None:
     """Be the guardian: the whole life of its process."""
     os.setsid()  # no terminal stops it (Ctrl-Z) or kills it
     leave_to_parent()
-    guardian = Guardian(setup)
+    try:
+        ports = setup.link.recv()
+    except EOFError:  # the supervisor has ended
+        return
+    if isinstance(ports, Order):  # the run ends before it has begun
+        return
+    guardian = Guardian(replace(setup, ports=ports))
 
     def end(*_: object) -> None:
         guardian.told_to_end = True

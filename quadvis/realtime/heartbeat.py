@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,9 +21,7 @@ class Patience:
     """How long a loop may give no sign of life in its ``words``; times are in nanoseconds.
 
     Its first tick is due ``first`` after the start. After a silence longer than ``allowed`` the loop hangs;
-    if it is not ``lasting``, or in the time ``startup`` from the start on, it only pauses, and may go on. So
-    it does at its ``last`` tick: other processes end then, which can hold up the system, and safe values
-    follow anyway.
+    if it is not ``lasting``, or in the time ``startup`` from the start on, it only pauses, and may go on.
     """
 
     name: str
@@ -33,11 +30,10 @@ class Patience:
     first: int = 0
     startup: int = 0
     lasting: bool = True
-    last: int = sys.maxsize
 
     @staticmethod
-    def of(name: str, words: Any, schedule: Schedule, limits: OverloadLimits, ticks: int) -> Patience:
-        """Return the patience with a loop of so many ticks and these limits.
+    def of(name: str, words: Any, schedule: Schedule, limits: OverloadLimits) -> Patience:
+        """Return the patience with a loop of these limits.
 
         It lasts for the ticks that may be missed in a row, and two.
         """
@@ -48,7 +44,7 @@ class Patience:
         longest = max(schedule.deadline(rhythm.every) for rhythm in schedule.rhythms)
         allowed = (2 + missed * stops) * schedule.interval
         startup = first + max(each.startup for each in all_limits) * longest
-        return Patience(name, words, allowed, first, startup, stops, schedule.last_due(ticks))
+        return Patience(name, words, allowed, first, startup, stops)
 
 
 class Sign(Enum):
@@ -58,7 +54,6 @@ class Sign(Enum):
     PAUSES = "pauses"  # it gives no sign of life, which the diagram allows
     HANGS = "hangs"
     ENDS = "ends"  # or it goes on, and its outputs hold their safe values
-    FINISHED = "finished"  # it has reached the stop time
 
 
 class Heartbeat:
@@ -87,12 +82,9 @@ class Heartbeat:
     def look(self) -> Sign:
         """Return what the loop does."""
         words, now = self._control, self._now()
-        start, begun, done = words[control.START], words[control.BEGUN], words[control.DONE]
-        if words[control.END] or words[control.SAFE]:
-            return Sign.ENDS
-        if self.has_finished:
-            return Sign.FINISHED
-        if words[control.LEFT] or self._has_died:
+        start = words[control.START] + words[control.SHIFT]
+        begun, done = words[control.BEGUN], words[control.DONE]
+        if words[control.END] or words[control.SAFE] or words[control.LEFT] or self._has_died:
             return Sign.ENDS
         if not start:
             return Sign.WELL
@@ -101,14 +93,8 @@ class Heartbeat:
         last = start + begun if begun else max(start + self.patience.first, self._seen)
         if now - last <= self.patience.allowed:
             return Sign.WELL
-        at_end = words[control.TICK] >= (words[control.LAST] or self.patience.last)
-        patient = at_end or now - start <= self.patience.startup
+        patient = now - start <= self.patience.startup
         return Sign.HANGS if self.patience.lasting and not patient else Sign.PAUSES
-
-    @property
-    def has_finished(self) -> bool:
-        """True if the loop has reached the stop time: its end is no loss then."""
-        return bool(self._control[control.LEFT] == control.AT_STOP_TIME)
 
     @property
     def descriptors(self) -> list[int]:

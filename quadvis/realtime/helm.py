@@ -15,6 +15,7 @@ from quadvis.diagram.times import read_duration
 from quadvis.document import YamlScalar
 from quadvis.engine.tuning import NewValue
 from quadvis.errors import QuadvisError
+from quadvis.realtime.pictures import Picture
 from quadvis.realtime.times import TaskTimes
 
 STARTING, READY, RUNNING, ENDED = STATES = ("starting", "ready", "running", "ended")
@@ -35,6 +36,9 @@ class Progress(Protocol):
     def times(self) -> Mapping[str, tuple[TaskTimes, ...]]:
         """Return the times of the tasks of each computer."""
 
+    def picture(self, path: str, port: str) -> Picture | None:
+        """Return the newest picture of a signal; None if there is none."""
+
 
 @dataclass(frozen=True)
 class Stand:
@@ -47,6 +51,10 @@ class Stand:
     def times(self) -> Mapping[str, tuple[TaskTimes, ...]]:
         """Return the times of the tasks of each computer."""
         return self.found
+
+    def picture(self, path: str, port: str) -> Picture | None:
+        """Return None."""
+        return None
 
 
 class RunWatch(Protocol):
@@ -74,13 +82,17 @@ class Helm:
     many ticks as its engine counts exactly, at most 1e9 s. ``watch`` hears of the run.
     """
 
-    def __init__(self, stop_time: str | float | Fraction | None = None, watch: RunWatch | None = None) -> None:
+    def __init__(
+        self, stop_time: str | float | Fraction | None = None, watch: RunWatch | None = None
+    ) -> None:
         self._watch = watch
         self._lock = threading.Lock()
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._wanted: list[Wanted] = []
         self._begun = self._stopped = self._safe = False
         self._state = STARTING
+        self._instant: int | None = None
+        self.shift = 0
         self._progress: Progress = Stand()
         self._stop_time: Fraction | float | None = None
         self.stop_time = stop_time
@@ -104,6 +116,13 @@ class Helm:
         """Return the times of the tasks up to now, by computer ("" in a diagram without computers)."""
         return self._progress.times()
 
+    def picture(self, path: str, port: str) -> Picture | None:
+        """Return the newest picture of a signal; None if there is none.
+
+        The loop gives pictures a few times a second, as long as somebody asks for them.
+        """
+        return self._progress.picture(path, port)
+
     @property
     def stop_time(self) -> Fraction | float | None:
         """The stop time (s): `inf` for none, None for that of the diagram."""
@@ -120,11 +139,18 @@ class Helm:
                 raise QuadvisError("the run has begun, so its stop time stands; stop it instead")
             self._stop_time = found
 
-    def begin(self) -> None:
-        """Let the run begin as soon as it is ready."""
+    def begin(self, instant: int | None = None) -> None:
+        """Let the run begin as soon as it is ready, or at an instant (ns) of the monotonic clock."""
         with self._lock:
-            self._begun = True
+            self._begun, self._instant = True, instant
             self._call()
+
+    def align(self, shift: int) -> None:
+        """Let each tick be due so much (ns) later than it was by the start.
+
+        The loops come there slowly, by half a millisecond a second, so that no tick is lost.
+        """
+        self.shift = shift
 
     def stop(self, *, safe_first: bool = False) -> None:
         """Let the run end before its next step: an orderly end, with safe values, and no error.
@@ -168,6 +194,11 @@ class Helm:
     def is_begun(self) -> bool:
         """True once the run may begin."""
         return self._begun
+
+    @property
+    def instant(self) -> int | None:
+        """When the run is to begin (ns); None for as soon as it is ready."""
+        return self._instant
 
     @property
     def is_stopped(self) -> bool:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from multiprocessing.context import SpawnContext
 from typing import Any
 
 from quadvis.links.link import MEMORY, SERIAL, Link
-from quadvis.machine.serial_port import Line
+from quadvis.machine.serial_port import Line, missing_port
 from quadvis.realtime.cables import Cable, Ends
 
 LOCAL = "127.0.0.1"
@@ -25,6 +25,7 @@ class Lines:
         self._links = links
         self.sending: dict[str, Any] = {}
         self.receiving: dict[str, Any] = {}
+        self._memory = {link.name for link in links if link.via == MEMORY}
         for link in links:
             if link.via == MEMORY:
                 words = context.RawArray("q", link.words)
@@ -49,12 +50,27 @@ class Lines:
             elif link.via != MEMORY:
                 self.sending[link.name] = self.receiving[link.name] = _address(link.address)
 
+    def shared(self, computer: str) -> dict[str, Any]:
+        """Return the words by which one computer opens the ends of its links in memory, before `lay`."""
+        return {name: end for name, end in self._of(computer) if name in self._memory}
+
+    def missing(self) -> Iterator[str]:
+        """Yield a sentence for each port of a link that is not there."""
+        for link in self._links:
+            for port in dict.fromkeys(filter(None, link.ports)):
+                if words := missing_port(port):
+                    yield f"link '{link.name}': {words}"
+
     def of(self, computer: str) -> dict[str, Any]:
-        """Return what one computer opens the ends of its links with."""
-        found = {link.name: self.sending[link.name] for link in self._links if link.source == computer}
-        return found | {
-            link.name: self.receiving[link.name] for link in self._links if link.target == computer
-        }
+        """Return what one computer opens the other ends of its links with."""
+        return {name: end for name, end in self._of(computer) if name not in self._memory}
+
+    def _of(self, computer: str) -> Iterator[tuple[str, Any]]:
+        for link in self._links:
+            if link.source == computer:
+                yield link.name, self.sending.get(link.name)
+            elif link.target == computer:
+                yield link.name, self.receiving.get(link.name)
 
 
 def _cable(link: Link) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import select
-from collections.abc import Set
 
 
 class Lives:
@@ -35,11 +34,6 @@ class Lives:
             if descriptor in readable:
                 os.close(self._watched.pop(process))
                 self._ended.add(process)
-
-    @property
-    def ended(self) -> Set[int]:
-        """Those that were found to have ended."""
-        return self._ended
 
     @property
     def any_ended(self) -> bool:

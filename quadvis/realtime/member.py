@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
 from multiprocessing.process import BaseProcess
@@ -17,31 +18,33 @@ from quadvis.errors.caller import IS_COMMAND
 from quadvis.graph.graph import Graph
 from quadvis.native.choice import Announce
 from quadvis.realtime import control, times
-from quadvis.realtime.application import Ending, Ready, Setup, perform
+from quadvis.realtime.application import Ending, Ready, Setup, Supply, perform
 from quadvis.realtime.control import SharedMemory
 from quadvis.realtime.devices import PortBindings, guards_all
 from quadvis.realtime.flight import Share
 from quadvis.realtime.heartbeat import Patience
+from quadvis.realtime.last_ticks import LastTicks
 from quadvis.realtime.lifeline import Lifeline
+from quadvis.realtime.note_taker import NoteTaker
 from quadvis.realtime.options import RealTime
+from quadvis.realtime.pictures import Picture, PictureBox, picture_signals
 from quadvis.realtime.ring import RecordRing, Words
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
-from quadvis.realtime.streams import RowStream, StreamTaps, streams_of
+from quadvis.realtime.streams import RowStream, StreamTaps, room_for, streams_of
 from quadvis.realtime.times import TaskTimes
-from quadvis.realtime.tuner import Tuned, room_for
+from quadvis.realtime.tuner import Tuned, box_room
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
 
 WARNED = 1.0  # s between two warnings
-# Takes a computer, and its ticks that were left out: first, count; or its groups of parameters: number, tick.
-LeftOut = Callable[[str, Words], None]
 
 
 class Member:
     """One application: its process, the words that it shares, and the rows that come from it.
 
-    ``part`` is the graph of the computer, with the base tick of the whole. ``ready`` is what the application
+    ``part`` is the graph of the computer, with the base tick of the whole; ``lines`` has the words of its
+    links in memory. ``ready`` is what the application
     said before its run, ``ending`` what it said after it.
     """
 
@@ -54,54 +57,76 @@ class Member:
         wishes: RealTime,
         engine: str,
         taps: Sequence[Tap],
-        left_out: LeftOut,
-        noted: LeftOut,
+        taker: NoteTaker,
+        groups: Callable[[str, Words], None],
         devices: PortBindings,
+        lines: Mapping[str, Any],
+        last_ticks: LastTicks,
         announce: Announce,
+        watched: bool,
     ) -> None:
         self.computer, self._part, self._announce = computer, part, announce
-        self._left_out, self._noted = left_out, noted
+        self._taker, self._groups = taker, groups
         self._limits = diagram.overload_of(computer)
-        self._lines: dict[str, Any] = {}  # what it opens the ends of its links with
         self._streams = streams_of(part, taps)
         streams = tuple(stream for stream, _ in self._streams)
         rings = [stream.ring for stream in streams]
-        count = len(part.tasks)
-        room = room_for(part)
-        words = context.RawArray("q", SharedMemory.size(count, rings, room))
-        self._shared = SharedMemory(words, count, rings, room)
+        rooms = tuple(room_for(task.period) for task in part.tasks)
+        box = box_room(part)
+        words = context.RawArray("q", SharedMemory.size(rooms, rings, box))
+        self._shared = SharedMemory(words, rooms, rings, box)
         self._control = self._shared.control
-        self._control[control.TICKS] = self._written = diagram.ticks
+        self._control[control.TICKS] = diagram.ticks
         Lifeline(self._control[control.LIFELINE]).make()
         self._link, self._theirs = context.Pipe()
+        shows = watched and bool(picture_signals(part))
+        pictures = context.RawArray("q", PictureBox.size()) if shows else None
         setup = Setup(
             diagram.resolved, str(diagram.path.parent), diagram.path.name, diagram.own_blocks,
-            IS_COMMAND.get(), computer, engine, wishes, count, streams, words, self._theirs, devices,
-            self._lines, room,
+            IS_COMMAND.get(), computer, engine, wishes, rooms, streams, words, self._theirs, devices,
+            lines, last_ticks, box, pictures,
         )  # fmt: skip
-        self.patience = Patience.of(computer, words, Schedule.of(part), self._limits, diagram.ticks)
+        self._pictures = PictureBox(pictures) if pictures is not None else None
+        self.patience = Patience.of(computer, words, Schedule.of(part), self._limits)
         name = f"application {computer}".rstrip()
         self.process: BaseProcess = context.Process(target=perform, args=(setup,), name=name)
-        self._listening = True
+        self._listening, self._supplied = True, False
         self.ready: Ready | None = None
         self.ending: Ending | None = None
-        self._warned, self._overruns = 0.0, [0] * count
+        self._warned, self._overruns = 0.0, [0] * len(rooms)
 
-    def start(self, lines: Mapping[str, Any]) -> int:
-        """Start the process, which gets ready to run and waits; return its number.
-
-        ``lines`` has what it opens the ends of its links with.
-        """
-        self._lines.update(lines)
+    def start(self) -> None:
+        """Start the process, which loads the diagram and waits for its `supply`."""
         self.process.start()
         self._theirs.close()
-        return self.process.pid or 0
+
+    def supply(self, lines: Mapping[str, Any], ports: Mapping[str, str]) -> None:
+        """Let the application open its blocks, and get ready to run; see `Supply`."""
+        self._supplied = True
+        with suppress(OSError):  # it may have ended
+            self._link.send(Supply(lines, ports))
+
+    def shift(self, shift: int) -> None:
+        """Let each tick be due so much (ns) later than by the start."""
+        self._control[control.SHIFT] = shift
+
+    def has_picture(self, path: str, port: str) -> bool:
+        """Return whether a signal is a picture of this computer."""
+        return self._pictures is not None and (path, port) in picture_signals(self._part)
+
+    def picture(self, path: str, port: str) -> Picture | None:
+        """Return the newest picture of a signal that is one; None if there is none yet."""
+        assert self._pictures is not None
+        return self._pictures.newest(picture_signals(self._part).index((path, port)) + 1)
+
+    def rest(self) -> None:
+        """Ask for no more pictures if nobody wants to see one."""
+        if self._pictures is not None:
+            self._pictures.rest()
 
     def end_at(self, ticks: int) -> None:
         """Let the application end after so many ticks, before it begins."""
-        if ticks != self._written:
-            self._control[control.TICKS] = ticks
-            self._control[control.LAST] = Schedule.of(self._part).last_due(ticks)
+        self._control[control.TICKS] = ticks
 
     def tuned(self) -> Tuned:
         """Return what tunes the application, which is ready."""
@@ -147,13 +172,14 @@ class Member:
     @property
     def now(self) -> float:
         """The time since the start (s)."""
-        return max(0, time.monotonic_ns() - self._control[control.START]) / NANOSECONDS
+        start = self._control[control.START] + self._control[control.SHIFT]
+        return max(0, time.monotonic_ns() - start) / NANOSECONDS
 
     @property
     def lost(self) -> int:
         """How many rows found no room on the way here."""
         rows = sum(len(stream.blocks) * ring.lost for (stream, _), ring in self._rings)
-        return rows + self._shared.left_out.lost
+        return rows + self._shared.notes.left_out.lost + self._shared.notes.releases.lost
 
     @property
     def failed(self) -> bool:
@@ -169,8 +195,8 @@ class Member:
 
     @property
     def ended_silently(self) -> bool:
-        """True if the application has ended without a word, and so perhaps without its safe values."""
-        return self.ending is None and self.process.exitcode is not None
+        """True if it has opened blocks and ended without a word, and so perhaps without its safe values."""
+        return self._supplied and self.ending is None and self.process.exitcode is not None
 
     @property
     def is_guarded(self) -> bool:
@@ -182,13 +208,17 @@ class Member:
         self._control[control.END] = 1
 
     def take(self, *, last: bool = False) -> None:
-        """Hand on the ticks that were left out, the parameters that were taken, and the rows that have come.
+        """Hand on what the loop has noted, and the rows that have come.
 
-        Of all, what the loop has noted before a row that is handed on: the rows are taken first.
+        Of all, what it has noted before a row that is handed on: the rows are taken first.
         """
         found = [(stream, taps, ring.take(last=last)) for (stream, taps), ring in self._rings]
-        self._left_out(self.computer, self._shared.left_out.take(last=last))
-        self._noted(self.computer, self._shared.noted.take(last=last))
+        notes = self._shared.notes
+        self._taker.left_out(self.computer, notes.left_out.take(last=last))
+        self._groups(self.computer, notes.groups.take(last=last))
+        self._taker.releases(self.computer, notes.releases.take(last=last))
+        for task, ring in zip(self._part.tasks, notes.times, strict=True):
+            self._taker.times(self.computer, task.name, ring.take(last=last))
         for stream, taps, records in found:
             stream.hand_on(records, taps)
 
@@ -230,7 +260,7 @@ class Member:
 
         That is ``patience``, or longer if the diagram allows longer steps.
         """
-        begun = self._control[control.BEGUN]
+        begun = self._control[control.BEGUN] or self._control[control.RESTING]
         tasks = [(self._limits.of(task.name), float(task.period)) for task in self._part.tasks]
         longest = max(patience, *((limits.max + 1) * period for limits, period in tasks))
         lasting = any(limits.action == WARN for limits, _ in tasks)

@@ -11,6 +11,7 @@ from typing import Any
 from quadvis.diagram.sections.overload import ACTIONS, SAFE, STOP
 from quadvis.native.clock import GO
 from quadvis.realtime import control
+from quadvis.realtime.grid import first_from
 from quadvis.realtime.plan import (
     ACTION,
     AT_ONCE,
@@ -56,9 +57,8 @@ def missed(plan: Any, shared: Any, task: int, number: int, start: int, starting:
     saves = plan[row + ACTION] == SAVES and shared[control.SAFE] == 0
     if not (stops or saves):
         return GO
-    every, offset = plan[row + EVERY], plan[row + OFFSET]
     plan[EXCEEDED], plan[LIMIT], plan[FOUND] = task, limit, found
-    plan[MISSED] = start + max(offset - start, (offset - start) % every)
+    plan[MISSED] = first_from(plan[row + EVERY], plan[row + OFFSET], start)
     if saves:
         shared[control.SAFE] = 1
         return UNSAFE

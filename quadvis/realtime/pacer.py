@@ -12,7 +12,8 @@ from quadvis.realtime import control, dispatch, overload, pacing, times
 from quadvis.realtime import plan as plans
 from quadvis.realtime.clocks import Timekeeper
 from quadvis.realtime.control import SharedMemory
-from quadvis.realtime.grid import deadline, due_in
+from quadvis.realtime.grid import deadline, due_in, first_from
+from quadvis.realtime.notes import put_release
 from quadvis.realtime.plan import make_plan
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
 from quadvis.realtime.words import address_of, whole_words
@@ -33,9 +34,10 @@ class Pacer:
     the loop wakes too late for, is left out: the run goes on with a later tick of the same grid, and the
     tasks that were due there have an overrun.
 
-    ``names`` and ``limits`` are those of the tasks. ``save`` is called where overruns are to make the outputs
-    safe; ``unsafe`` says then why. The interpreter asks `wait`; the compiled loop calls the machine code at
-    ``address``, which does the same (`quadvis.native.clock.MachineClock`).
+    ``names`` and ``limits`` are those of the tasks, ``computer`` is the name of theirs for messages. ``save``
+    is called where overruns are to make the outputs safe; ``unsafe`` says then why. The interpreter asks
+    `wait`; the compiled loop calls the machine code at ``address``, which does the same
+    (`quadvis.native.clock.MachineClock`).
     """
 
     def __init__(
@@ -46,15 +48,16 @@ class Pacer:
         shared: SharedMemory,
         clock: Timekeeper,
         save: Callable[[], None] | None = None,
+        computer: str = "",
     ) -> None:
         self._names, self._limits, self._save = names, limits, save
+        self._of = f" of '{computer}'" if computer else ""
         self.unsafe = ""
-        self._plan = make_plan(schedule, limits)
+        self._plan = make_plan(schedule, limits, shared.notes.rooms)
         self._control: Any = shared.control
         self._times: Any = shared.times
-        self._left_out: Any = shared.left_out.words
+        self._noted: Any = shared.notes.words
         self._box: Any = shared.box.words
-        self._noted: Any = shared.noted.words
         self.clock = clock
         self._crew: Any = whole_words(dispatch.HEAD)
         self._memory: Any = whole_words(1)
@@ -75,11 +78,11 @@ class Pacer:
         self._crew, self._fault = crew, fault
 
     @property
-    def words(self) -> tuple[Any, Any, Any, Any, Any, Any, Any, Any, Any]:
+    def words(self) -> tuple[Any, Any, Any, Any, Any, Any, Any, Any]:
         """All that `pacing.wait` takes before the ticks."""
         return (
-            self._plan, self._control, self._times, self._left_out, self._box, self._noted, self.clock,
-            self._crew, self._memory,
+            self._plan, self._control, self._times, self._noted, self._box, self.clock, self._crew,
+            self._memory,
         )  # fmt: skip
 
     @property
@@ -122,21 +125,29 @@ class Pacer:
 
     def finish(self) -> None:
         """Count the step that has ended."""
-        pacing.finish(self._plan, self._control, self._times, self.clock.now())
+        pacing.finish(self._plan, self._control, self._times, self._noted, self.clock.now())
 
-    def conclude(self, rest: Callable[[], None], end: int) -> None:
+    def live(self) -> bool:
+        """Give a sign of life while no step runs; return whether the run goes on."""
+        self._control[control.DONE] += 1
+        return not self._control[control.END]
+
+    def conclude(self, rest: Callable[[Callable[[], object]], None], end: int) -> None:
         """Let ``rest`` wait for the tasks that run by themselves; count ticks never dispatched.
 
-        A wait that takes too long is a step that does so.
+        It calls what it is given again and again. A wait that takes too long is a step that does so.
         """
-        self._control[control.BEGUN] = max(1, self.clock.now())
-        rest()
-        self._control[control.BEGUN] = 0
+        self._control[control.RESTING] = max(1, self.clock.now())
+        rest(self.live)
+        self._control[control.RESTING] = 0
         for task in range(1, self._crew[dispatch.COUNT]):
             row = plans.HEAD + plans.ROW * task
             rhythm = self._plan[row + plans.EVERY], self._plan[row + plans.OFFSET]
             seen = self._crew[dispatch.HEAD + dispatch.ROW * task + dispatch.SEEN]
-            self._times[times.WORDS * task + times.OVERRUNS] += due_in(*rhythm, seen, end)
+            found = due_in(*rhythm, seen, end)
+            self._times[times.WORDS * task + times.OVERRUNS] += found
+            if found:
+                put_release(self._noted, task, first_from(*rhythm, seen), found, -1)
 
     def _overload(self) -> RunError:
         plan = self._plan
@@ -160,7 +171,7 @@ class Pacer:
         """Return which limit of which task has been exceeded."""
         plan = self._plan
         task, found = plan[plans.EXCEEDED], plan[plans.FOUND]
-        limits, name = self._limits[task], f"task '{self._names[task]}'"
+        limits, name = self._limits[task], f"task '{self._names[task]}'{self._of}"
         overruns = counted(found, "overrun")
         if plan[plans.LIMIT] == plans.IN_ALL:
             return f"{name}: overload limit ({limits.max}) exceeded with {overruns}"

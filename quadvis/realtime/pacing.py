@@ -3,9 +3,8 @@
 All is done in whole numbers, by plain functions of words that can be indexed. Python runs them for the
 interpreter, and numba compiles the same functions for the compiled loop, so the two cannot differ. ``plan``
 is laid out by `plan`, ``shared`` by `control`, ``tasks`` are the words of all tasks as `times` has them,
-``left_out`` those of the ring of ticks that are left out, ``box`` those of the parameter box and ``noted``
-those of the ring of the groups that were taken from it, ``crew`` and ``memory`` are those of `dispatch`.
-Instants are nanoseconds since the start.
+``noted`` those of the rings of `notes`, ``box`` those of the parameter box, ``crew`` and ``memory`` are those
+of `dispatch`. Instants are nanoseconds since the start.
 """
 
 from __future__ import annotations
@@ -18,9 +17,10 @@ from quadvis.native.routine import Routine
 from quadvis.realtime import box as box_words
 from quadvis.realtime import clocks, control, dispatch, times
 from quadvis.realtime.box import NUMBER, check
-from quadvis.realtime.clocks import now, signalled, sleep
+from quadvis.realtime.clocks import follow, now, signalled, sleep
 from quadvis.realtime.dispatch import at_rest, release
 from quadvis.realtime.grid import deadline, due_in, following, latest
+from quadvis.realtime.notes import put_group, put_left_out, put_times
 from quadvis.realtime.overload import ENDING, FAULTED, OVERLOADED, SIGNAL, missed, worse
 from quadvis.realtime.plan import (
     BEGUN,
@@ -32,6 +32,8 @@ from quadvis.realtime.plan import (
     IN_A_ROW,
     INSTANT,
     LATE,
+    NOTED,
+    NOTES_ROOM,
     OFFSET,
     OWN,
     ROW,
@@ -43,21 +45,21 @@ from quadvis.realtime.plan import (
     TICK,
     WAITING,
 )  # fmt: skip
-from quadvis.realtime.ring import put_pair
 from quadvis.realtime.times import bin_of, count
 
 
 def wait(
-    plan: Any, shared: Any, tasks: Any, left_out: Any, box: Any, noted: Any, clock: Any, crew: Any,
-    memory: Any, tick: int, end: int,
+    plan: Any, shared: Any, tasks: Any, noted: Any, box: Any, clock: Any, crew: Any, memory: Any,
+    tick: int, end: int,
 ) -> int:  # fmt: skip
     """Wait until a tick from ``tick`` on may run, which ``plan[WAITING]`` is then, at most ``end``.
 
     Return `GO`, and the step has begun; or why it has not: then the wait goes on when it is called again.
     """
     if plan[WAITING] < 0:
+        follow(clock, shared[control.SHIFT])
         instant = now(clock)
-        finish(plan, shared, tasks, instant)
+        finish(plan, shared, tasks, noted, instant)
         plan[WAITING], plan[INSTANT], plan[COUNTED_TO] = following(plan, tick, instant), instant, tick
     chosen, instant = plan[WAITING], plan[INSTANT]
     if chosen < end:
@@ -79,14 +81,14 @@ def wait(
     chosen = min(chosen, end)
     plan[WAITING] = chosen
     if chosen > plan[COUNTED_TO]:
-        answer = _skip(plan, shared, tasks, left_out, chosen)
+        answer = _skip(plan, shared, tasks, noted, chosen)
         if answer != GO:
             return answer
     if chosen < end:
         if box[NUMBER] != plan[TAKEN]:
             _take(plan, box, noted, crew, memory, chosen)
         if plan[OWN] < plan[TASKS]:
-            answer = release(plan, shared, tasks, crew, memory, chosen)
+            answer = release(plan, shared, tasks, noted, crew, memory, chosen)
             if answer != GO:
                 return answer
         _begin(plan, shared, chosen, instant)
@@ -112,7 +114,7 @@ def _take(plan: Any, box: Any, noted: Any, crew: Any, memory: Any, tick: int) ->
             memory[slot + index] = box[at + index]
         at += count
     plan[TAKEN] = number
-    put_pair(noted, box_words.NOTED[0], number, tick)
+    put_group(noted, number, tick)
 
 
 def _begin(plan: Any, shared: Any, tick: int, instant: int) -> None:
@@ -125,7 +127,7 @@ def _begin(plan: Any, shared: Any, tick: int, instant: int) -> None:
     shared[control.BEGUN] = max(1, instant)
 
 
-def finish(plan: Any, shared: Any, tasks: Any, instant: int) -> None:
+def finish(plan: Any, shared: Any, tasks: Any, noted: Any, instant: int) -> None:
     """Count the step that has ended, if one was running; its times are those of each task in it."""
     if plan[STEPPING] == 0:
         return
@@ -138,6 +140,8 @@ def finish(plan: Any, shared: Any, tasks: Any, instant: int) -> None:
             tasks[words + times.STEPS] += 1
             count(tasks, words + times.LATENESS, late, late_bin)
             count(tasks, words + times.TET, taken, taken_bin)
+            overruns = tasks[words + times.OVERRUNS]
+            put_times(noted, plan[row + NOTED], plan[row + NOTES_ROOM], plan[TICK], late, taken, overruns)
             plan[row + IN_A_ROW] = 0
             if tasks[words + times.STEPS] <= plan[row + STARTUP]:
                 plan[STARTING] = 1
@@ -145,17 +149,17 @@ def finish(plan: Any, shared: Any, tasks: Any, instant: int) -> None:
     shared[control.BEGUN] = 0
 
 
-def _skip(plan: Any, shared: Any, tasks: Any, left_out: Any, stop: int) -> int:
+def _skip(plan: Any, shared: Any, tasks: Any, noted: Any, stop: int) -> int:
     """Note that the ticks before ``stop`` are left out, and count the overruns; return what follows."""
     start, plan[COUNTED_TO] = plan[COUNTED_TO], stop
-    answer, noted = GO, False
+    answer, done = GO, False
     for task in range(plan[OWN]):
         row = HEAD + ROW * task
         found = due_in(plan[row + EVERY], plan[row + OFFSET], start, stop)
         if found > 0:
-            if not noted:
-                put_pair(left_out, control.LEFT_OUT[0], start, stop - start)
-                noted = True
+            if not done:
+                put_left_out(noted, start, stop - start)
+                done = True
             tasks[times.WORDS * task + times.OVERRUNS] += found
             answer = worse(answer, missed(plan, shared, task, found, start, plan[STARTING]))
             if answer == OVERLOADED:
@@ -164,17 +168,16 @@ def _skip(plan: Any, shared: Any, tasks: Any, left_out: Any, stop: int) -> int:
 
 
 def pace(
-    steering: Any, plan: Any, shared: Any, tasks: Any, left_out: Any, box: Any, noted: Any, clock: Any,
-    crew: Any, memory: Any,
+    steering: Any, plan: Any, shared: Any, tasks: Any, noted: Any, box: Any, clock: Any, crew: Any,
+    memory: Any,
 ) -> None:  # fmt: skip
     """Wait as the clock of the compiled loop, whose control words are ``steering``."""
     steering[loop.PAUSE] = wait(
-        plan, shared, tasks, left_out, box, noted, clock, crew, memory, steering[loop.TICK],
-        steering[loop.UNTIL],
-    )  # fmt: skip
+        plan, shared, tasks, noted, box, clock, crew, memory, steering[loop.TICK], steering[loop.UNTIL]
+    )
     if steering[loop.PAUSE] == GO:
         steering[loop.TICK] = plan[WAITING]
         plan[WAITING] = -1
 
 
-PACE = Routine(pace, "wwwwwwwwww", {**clocks.MACHINE, **dispatch.MACHINE})
+PACE = Routine(pace, "wwwwwwwww", {**clocks.MACHINE, **dispatch.MACHINE})

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from quadvis.diagram.sections.overload import ACTIONS, OverloadLimits
+from quadvis.realtime.notes import times_starts
 from quadvis.realtime.schedule import Schedule
 from quadvis.realtime.words import whole_words
 
@@ -29,16 +30,20 @@ HEAD = 19
 # Words of a task's row: what is given, and what the pacer keeps.
 EVERY, OFFSET, MAX, CONSECUTIVE, STARTUP, ACTION = range(6)
 DUE, COUNTED, IN_A_ROW = range(6, 9)
-ROW = 9
+NOTED, NOTES_ROOM = range(9, 11)  # where the ring of its times begins among the notes, and its room
+ROW = 11
 
 UNLIMITED = -1
 IN_ALL, AT_ONCE = range(2)  # limits
 
 
-def make_plan(schedule: Schedule, limits: Sequence[OverloadLimits], own: int | None = None) -> Any:
+def make_plan(
+    schedule: Schedule, limits: Sequence[OverloadLimits], rooms: Sequence[int], own: int | None = None
+) -> Any:
     """Return the plan of a loop that has not begun; ``limits`` are those of each task.
 
-    The first ``own`` tasks run in the loop itself, or all.
+    ``rooms`` has for how many steps of each task the notes have room. The first ``own`` tasks run in the loop
+    itself, or all.
     """
     plan = whole_words(HEAD + ROW * len(schedule.rhythms))
     plan[WHOLE], rest = divmod(schedule.numerator, schedule.denominator)
@@ -52,4 +57,5 @@ def make_plan(schedule: Schedule, limits: Sequence[OverloadLimits], own: int | N
         plan[row + MAX], plan[row + STARTUP] = limit.max, limit.startup
         plan[row + CONSECUTIVE] = UNLIMITED if limit.consecutive is None else limit.consecutive
         plan[row + ACTION] = ACTIONS.index(limit.action)
+        plan[row + NOTED], plan[row + NOTES_ROOM] = times_starts(rooms)[number], rooms[number]
     return plan

@@ -43,7 +43,7 @@ class RecordRing:
     def put(self, number: int, raw: memoryview, pieces: Sequence[slice]) -> None:
         """Add a record: a number, and pieces of bytes one after another, which fill its other words."""
         words = self.words
-        at = place_in(words, self._room, self._width)
+        at = place_in(words, 0, self._room, self._width)
         if at < 0:
             return
         words[at] = number
@@ -82,30 +82,19 @@ class RecordRing:
         return found
 
 
-def place_in(words: Any, room: int, width: int) -> Any:
-    """Return where the next record begins; -1 if the ring is full, which is counted."""
-    done = words[PUT]
-    if done - words[TAKEN] >= room:
-        words[LOST] += 1
+def place_in(words: Any, start: int, room: int, width: int) -> Any:
+    """Return where the next record of the ring at ``start`` begins; -1 if it is full, which is counted."""
+    done = words[start + PUT]
+    if done - words[start + TAKEN] >= room:
+        words[start + LOST] += 1
         return -1
-    return HEAD + done % room * width
-
-
-def put_pair(words: Any, room: int, first: int, second: int) -> None:
-    """Add a record of two words to a ring as `RecordRing.put` does, in operations that machine code has, too.
-
-    A producer that adds records so does not add any by the method.
-    """
-    at = place_in(words, room, 2)
-    if at >= 0:
-        words[at], words[at + 1] = first, second
-        words[PUT] += 1
+    return start + HEAD + done % room * width
 
 
 def put(number: Any, words: Any, memory: Any, pieces: Any) -> None:
     """Do as `RecordRing.put`, as machine code; ``pieces``: room, width, how many, first and size of each."""
     room, width, count = pieces[0], pieces[1], pieces[2]
-    at = place_in(words, room, width)
+    at = place_in(words, 0, room, width)
     if at < 0:
         return
     words[at] = number[0]

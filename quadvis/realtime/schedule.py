@@ -41,10 +41,6 @@ class Schedule:
         """Return the instant at which a tick is due."""
         return tick * self.numerator // self.denominator
 
-    def last_due(self, ticks: int) -> int:
-        """Return the last tick with a due task in a run of so many ticks."""
-        return max(ticks - 1 - (ticks - 1 - offset) % every for every, offset in self.rhythms)
-
     @property
     def interval(self) -> int:
         """The shortest period of a task (ns)."""

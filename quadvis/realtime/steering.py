@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -12,13 +13,16 @@ from quadvis.graph.graph import MULTI, Graph
 from quadvis.native.executor import last_exact
 from quadvis.realtime.helm import ENDLESS, READY, RUNNING, Helm
 from quadvis.realtime.member import Member
+from quadvis.realtime.pictures import Picture
 from quadvis.realtime.ring import Words
 from quadvis.realtime.times import TaskTimes
-from quadvis.realtime.tuner import Tuner
+from quadvis.realtime.tuner import BEFORE, Tuner
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
 
+PACE = 5e-4  # by how much of the time the ticks may be moved
+LONGEST_MOVE = 10**8  # ns for which they are moved at once, at most
 LOOK = 0.02  # s between two looks at the rings
 NEAR = 0.001  # s, while somebody waits for a tick
 
@@ -36,6 +40,7 @@ class Steering:
         self._tuner: Tuner | None = None
         self._begun = False
         self._reached = 0
+        self._shift, self._moved = 0, time.monotonic_ns()
         self._late = _most_late(diagram.graph)
         self.ticks = diagram.ticks
         if helm is not None:
@@ -44,6 +49,11 @@ class Steering:
     def take_over(self, members: Sequence[Member]) -> None:
         """Steer these members, which have not begun."""
         self._members = members
+
+    @property
+    def is_watched(self) -> bool:
+        """True if somebody may want to see pictures of the run."""
+        return self._helm is not None
 
     @property
     def sources(self) -> list[int]:
@@ -69,6 +79,12 @@ class Steering:
         """Return the times of the tasks of each computer."""
         return {member.computer: member.times() for member in self._members}
 
+    def picture(self, path: str, port: str) -> Picture | None:
+        """Return the newest picture of a signal."""
+        return next(
+            (each.picture(path, port) for each in self._members if each.has_picture(path, port)), None
+        )
+
     @property
     def is_stopped(self) -> bool:
         """True if all members, which are ready, are to end."""
@@ -88,24 +104,39 @@ class Steering:
 
     def begin(self) -> None:
         """Give the members what they need before their first tick."""
+        if self._helm is not None and self._tuner is not None:
+            self.ticks = self._wanted_ticks(self._helm.stop_time)
+            for member in self._members:
+                member.end_at(self.ticks)
+            self.look()
+            self._tuner.send(BEFORE)
+            self._helm.enter(RUNNING)
         self._begun = True
-        if self._helm is None or self._tuner is None:
-            return
-        self.ticks = self._wanted_ticks(self._helm.stop_time)
-        for member in self._members:
-            member.end_at(self.ticks)
-        self.look()
-        self._tuner.send(-1)
-        self._helm.enter(RUNNING)
+
+    @property
+    def instant(self) -> int | None:
+        """When the members are to begin (ns); None for as soon as they are ready."""
+        return self._helm.instant if self._helm is not None else None
 
     def look(self) -> None:
         """Take what the helm wants."""
         if self._helm is None or self._tuner is None:
             return
+        if self._helm.shift != self._shift:
+            self._approach(self._helm.shift)
         for wanted in self._helm.take():
             self._tuner.offer(wanted, self.tick)
         if self._begun:
             self._tuner.send(max(member.tick for member in self._members))
+
+    def _approach(self, wanted: int) -> None:
+        """Move the ticks of the members towards a shift, as fast as they may."""
+        now = time.monotonic_ns()
+        most = int(min(now - self._moved, LONGEST_MOVE) * PACE)
+        self._moved = now
+        self._shift += max(-most, min(most, wanted - self._shift))
+        for member in self._members:
+            member.shift(self._shift)
 
     def settle(self, reached: int, *, last: bool = False) -> None:
         """Note how far the rows are that have been handed on, after a look at the rings.
@@ -114,6 +145,8 @@ class Steering:
         """
         if self._helm is None or not self._begun:
             return
+        for member in self._members:
+            member.rest()
         self._helm.settle(reached + 1 if last else max(0, self._reached - self._late))
         self._reached = reached
 
@@ -134,14 +167,20 @@ class Steering:
         if self._helm is not None:
             self._helm.end()
 
-    def early(self, *, stopped: bool) -> str:
-        """Say how a run that has no error came to end at another time than its diagram says; "" if not."""
-        if stopped:
+    def early(self) -> tuple[str, float | None]:
+        """Say how a run without an error came to end at another time than its diagram says, and when (s).
+
+        That is "" and None if it did not. A run that was stopped ended at the last tick that a computer has
+        begun.
+        """
+        if any(member.stopped for member in self._members):
             begun = any(member.running for member in self._members)
-            return f"it was stopped at t = {self.time:.9g} s" if begun else "it was stopped before its start"
+            last = float(max(member.tick for member in self._members) * self._period)
+            return f"it was stopped at t = {last:.9g} s" if begun else "it was stopped before its start", last
         if self.ticks == self._written:
-            return ""
-        return f"its stop time was set to {time_text((self.ticks - 1) * self._period)}"
+            return "", None
+        end = (self.ticks - 1) * self._period
+        return f"its stop time was set to {time_text(end)}", float(end)
 
     def _wanted_ticks(self, stop_time: Fraction | float | None) -> int:
         if stop_time is None:

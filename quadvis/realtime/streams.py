@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from fractions import Fraction
 from functools import partial
 from typing import NamedTuple
 
@@ -69,10 +70,15 @@ def streams_of(graph: Graph, taps: Sequence[Tap]) -> list[tuple[RowStream, Strea
     found: list[tuple[RowStream, StreamTaps]] = []
     for (task, every), group in groups.items():
         nodes = [graph[block] for block in group]
-        room = math.ceil(HELD / (nodes[0].task.period * every)) + SPARE
+        room = room_for(nodes[0].task.period * every)
         sizes = tuple(map(_row_size, nodes))
         found.append((RowStream(task, every, tuple(group), sizes, room), list(group.values())))
     return found
+
+
+def room_for(period: Fraction) -> int:
+    """Return how many records may wait that come once in a period (s)."""
+    return math.ceil(HELD / period) + SPARE
 
 
 def _put(ring: RecordRing, raw: memoryview, pieces: Sequence[slice], tick: int) -> None:

@@ -20,8 +20,10 @@ from quadvis.realtime.devices import Devices
 from quadvis.realtime.flight import Flight
 from quadvis.realtime.guardian import Standing
 from quadvis.realtime.helm import Helm
+from quadvis.realtime.last_ticks import LastTicks
 from quadvis.realtime.lines import Lines
-from quadvis.realtime.member import LeftOut, Member
+from quadvis.realtime.member import Member
+from quadvis.realtime.note_taker import NoteTaker
 from quadvis.realtime.options import RealTime
 from quadvis.realtime.steering import Steering
 
@@ -39,7 +41,7 @@ def supervise(
     wishes: RealTime,
     engine: str,
     taps: Sequence[Tap],
-    left_out: LeftOut,
+    taker: NoteTaker,
     tend: Callable[[float, float], None],
     announce: Announce | None = None,
     helm: Helm | None = None,
@@ -47,17 +49,17 @@ def supervise(
 ) -> Flight:
     """Run a diagram in real time to its stop time, each computer in a process of its own.
 
-    ``wishes`` have been checked. ``taps`` take rows here, ``left_out`` the ticks that a computer has left
-    out, before the rows of later ticks. ``tend`` is called again and again while it runs, with the time of
-    the last tick and the time since the start (s). With a ``helm`` the run waits until this lets it begin;
-    ``changed`` takes each parameter that it tunes, before the rows of the tick from which it holds.
+    ``wishes`` have been checked. ``taps`` take rows here, ``taker`` what the loops note, before the rows of
+    later ticks. ``tend`` is called again and again while it runs, with the time of the last tick and the time
+    since the start (s). With a ``helm`` the run waits until this lets it begin; ``changed`` takes each
+    parameter that it tunes, before the rows of the tick from which it holds.
 
     RunError if a block fails, if the tasks have too many overruns, if a step does not end, or if a process is
     killed. However this ends, all processes have ended then, and all rows have been handed on.
     """
     steering = Steering(helm, diagram, changed or _nothing)
     try:
-        supervisor = _Supervisor(diagram, wishes, engine, taps, left_out, announce or _nothing, steering)
+        supervisor = _Supervisor(diagram, wishes, engine, taps, taker, announce or _nothing, steering)
     except BaseException:
         steering.end()
         raise
@@ -78,7 +80,7 @@ class _Supervisor:
         wishes: RealTime,
         engine: str,
         taps: Sequence[Tap],
-        left_out: LeftOut,
+        taker: NoteTaker,
         announce: Announce,
         steering: Steering,
     ) -> None:
@@ -92,7 +94,8 @@ class _Supervisor:
         self._lines = Lines(context, diagram.links)
         self._cables = Cables(context, [*self._devices.cables, *self._lines.cables], priority)
         self._members = []
-        for computer in diagram.graph.computers:
+        last_ticks = context.RawArray("q", len(diagram.graph.computers))
+        for place, computer in enumerate(diagram.graph.computers):
             part = diagram.graph.part_of(computer)
             own = [tap for tap in taps if tap.block in part]
             bindings = self._devices.bindings
@@ -105,10 +108,13 @@ class _Supervisor:
                     asked[computer],
                     engine,
                     own,
-                    left_out,
+                    taker,
                     steering.noted,
                     bindings,
+                    self._lines.shared(computer),
+                    LastTicks(last_ticks, place),
                     announce,
+                    steering.is_watched,
                 )
             )
         steering.take_over(self._members)
@@ -147,12 +153,10 @@ class _Supervisor:
         tend(min(member.time for member in self._members), first.now)
         for member in self._members:
             member.warn(last=True)
-        early = self._steering.early(stopped=any(member.stopped for member in self._members))
         return Flight(
             tuple(member.share() for member in self._members),
             sum(member.lost for member in self._members),
-            early,
-            self._steering.time if early else None,
+            *self._steering.early(),
         )
 
     def end(self) -> list[str]:
@@ -175,19 +179,38 @@ class _Supervisor:
         return [*self._unsafe, *([UNSAFE] if not all(member.is_guarded for member in silent) else [])]
 
     def _start(self) -> None:
-        """Start all processes, those first on which others depend."""
+        """Start all processes at once; the applications open no block before the guardian has the ports."""
         self._cables.start()
+        guardian = self._devices.start([member.patience for member in self._members])
+        with launching():
+            for member in self._members:
+                member.start()
+        self._cables.make()
         self._lines.lay(self._cables.ends)
-        guardian = self._devices.start(
-            self._cables.ends, [member.patience for member in self._members], self._announce
-        )
         if guardian is not None:
             self._cables.watch(guardian)
-        with launching():
-            for place, member in enumerate(self._members):
-                process = member.start(self._lines.of(member.computer))
-                self._devices.watch(process, place)
-                self._cables.watch(process)
+        self._open_devices()
+        for member in self._members:
+            process = member.process.pid or 0
+            self._devices.watch(process)
+            self._cables.watch(process)
+            member.supply(self._lines.of(member.computer), self._devices.ports)
+
+    def _open_devices(self) -> None:
+        """Let the outputs have their initial frames; RunError has a sentence for each port that is missing.
+
+        So the outputs that are there are safe before anything else is found to be missing.
+        """
+        refusal = ""
+        try:
+            self._devices.open(self._cables.ends, self._announce)
+        except RunError as error:
+            refusal = str(error)
+        missing = [*self._devices.missing(), *self._lines.missing()]
+        if refusal and refusal not in missing:
+            missing.insert(0, refusal)
+        if missing:
+            raise RunError("\n".join(missing))
 
     def _close(self) -> list[str]:
         """End what the applications needed; return a sentence for each port that may be unsafe."""
@@ -213,7 +236,7 @@ class _Supervisor:
     def _begin(self) -> None:
         """Let all applications run, from one instant on."""
         self._steering.begin()
-        start = time.monotonic_ns() + LEAD
+        start = self._steering.instant or time.monotonic_ns() + LEAD
         for member in self._members:
             member.begin(start)
 

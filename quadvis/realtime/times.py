@@ -39,7 +39,8 @@ def end_of(number: int) -> int:
 class Spread:
     """Measured times (s): the least, the mean, the largest, and that which 1 in 100, 1 in 1000 exceed.
 
-    The last two are ends of bins, at most 1/16 too large, and never larger than the largest.
+    The last two are ends of bins, at most 1/16 too large, and never larger than the largest. ``bins`` are
+    those of the histogram that hold times: begin, end, count.
     """
 
     least: float
@@ -47,12 +48,14 @@ class Spread:
     most: float
     p99: float
     p999: float
+    bins: tuple[tuple[float, float, int], ...] = ()
 
-    def facts(self) -> dict[str, float]:
+    def facts(self) -> dict[str, Any]:
         """Return the times as plain data."""
         return {
             "min_s": self.least, "mean_s": self.mean, "max_s": self.most,
             "p99_s": self.p99, "p99.9_s": self.p999,
+            "histogram": [{"from_s": start, "to_s": end, "count": count} for start, end, count in self.bins],
         }  # fmt: skip
 
 
@@ -118,6 +121,9 @@ def _spread(words: Any) -> Spread | None:
         place = int(np.searchsorted(np.cumsum(counts), total * (1 - part)))
         return min(end_of(place), most) / 1e9
 
-    return Spread(
-        least / 1e9, int(words[TOTAL]) / total / 1e9, most / 1e9, exceeded_by(1e-2), exceeded_by(1e-3)
-    )
+    bins = [
+        ((end_of(number - 1) if number else 0) / 1e9, end_of(number) / 1e9, int(counts[number]))
+        for number in np.flatnonzero(counts).tolist()
+    ]
+    mean, p99, p999 = int(words[TOTAL]) / total / 1e9, exceeded_by(1e-2), exceeded_by(1e-3)
+    return Spread(least / 1e9, mean, most / 1e9, p99, p999, tuple(bins))

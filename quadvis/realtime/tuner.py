@@ -21,6 +21,7 @@ from quadvis.realtime.ring import Words
 
 AHEAD = 0.01  # s that several computers have until all of them hold a group
 LEAST = 2  # ticks, likewise
+BEFORE = -1  # in place of a tick: no computer has begun
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ class Tuner:
         self._waiting.append(_Group(accepted, computers, wanted.future))
 
     def send(self, tick: int) -> None:
-        """Put what waits into the boxes that are free; ``tick`` is the latest of the computers.
+        """Put what waits into the boxes that are free; ``tick`` is the latest of the computers, or `BEFORE`.
 
         A group for several computers holds from one tick on, which lies a little ahead.
         """
@@ -106,7 +107,7 @@ class Tuner:
         together = {name for group in chosen for name in group.computers if len(group.computers) > 1}
         for computer in {name for group in chosen for name in group.computers}:
             mine = [group for group in chosen if computer in group.computers]
-            not_before = tick + self._ahead if computer in together and tick >= 0 else 0
+            not_before = tick + self._ahead if computer in together and tick != BEFORE else 0
             self._flying[computer] = self._put(computer, mine, not_before), mine
 
     def noted(self, computer: str, records: Words) -> None:
@@ -156,7 +157,7 @@ class Tuner:
         return getattr(part[tunable.path].block, tunable.name)
 
 
-def room_for(part: Graph) -> int:
+def box_room(part: Graph) -> int:
     """Return how many words a box needs that has new values of all tunable parameters of a graph."""
     found = 0
     for node in part.nodes:

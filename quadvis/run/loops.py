@@ -5,10 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple, Protocol
-
-import numpy as np
-from numpy.typing import NDArray
 
 from quadvis.engine.engine import Engine
 from quadvis.engine.profile import ProfileReport
@@ -20,6 +18,7 @@ from quadvis.graph.graph import Graph, Node
 from quadvis.links.endpoints import live_parts
 from quadvis.native.choice import Announce, Choice, choose, use
 from quadvis.output.kept import RowJudge
+from quadvis.realtime.note_taker import NoteTaker
 from quadvis.run.row_tap import PacedTap, RowTap
 
 if TYPE_CHECKING:
@@ -45,13 +44,13 @@ class Taken(NamedTuple):
 class Takers(NamedTuple):
     """Who takes what comes from a loop.
 
-    ``left_out`` takes a computer's name and the ticks that it left out: the first and the count of each run
-    of ticks (N, 2). ``changed`` takes the parameters that were tuned, ``tend`` the progress.
+    ``notes`` takes what the loops of computers note, ``changed`` the parameters that were tuned, ``tend`` the
+    progress.
     """
 
     taken: Sequence[Taken]
     taps: Sequence[Tap]
-    left_out: Callable[[str, NDArray[np.int64]], None]
+    notes: NoteTaker
     changed: Callable[[Change], None]
     tend: Progress
 
@@ -60,8 +59,8 @@ class RunLoop(Protocol):
     """The ticks of a run, ready to begin.
 
     ``clock`` is ``SIMULATED`` or ``REAL_TIME``. ``graphs`` are those that run side by side. ``computers`` are
-    those that may leave ticks out. ``early``
-    says why it ends before the stop time; "" if it does not.
+    those that may leave ticks out, with their graphs, and ``measured`` says whether their tasks are timed.
+    ``early`` says why it ends before the stop time; "" if it does not.
     """
 
     @property
@@ -73,8 +72,12 @@ class RunLoop(Protocol):
         """Return them."""
 
     @property
-    def computers(self) -> Sequence[str]:
+    def computers(self) -> Mapping[str, Graph]:
         """Return them."""
+
+    @property
+    def measured(self) -> bool:
+        """Return it."""
 
     @property
     def early(self) -> str:
@@ -87,8 +90,8 @@ class RunLoop(Protocol):
 class Simulated:
     """All ticks at once."""
 
-    clock, early = SIMULATED, ""
-    computers: Sequence[str] = ()
+    clock, early, measured = SIMULATED, "", False
+    computers: Mapping[str, Graph] = MappingProxyType({})
 
     def __init__(
         self, diagram: Diagram, engine: str, announce: Announce | None, profile: bool = False
@@ -119,7 +122,7 @@ class Simulated:
 class Paced:
     """Each tick at its time, each computer in a process of its own; QuadvisError if that cannot be."""
 
-    clock, early = REAL_TIME, ""
+    clock, early, measured = REAL_TIME, "", True
 
     def __init__(
         self,
@@ -135,7 +138,7 @@ class Paced:
         self._diagram, self._engine, self._announce, self._wishes = diagram, engine, announce, wishes
         self._helm = helm
         self.profiles: Mapping[str, ProfileReport] = {}  # by computer, after a run for which they were asked
-        self.computers: Sequence[str] = [*parts]
+        self.computers: Mapping[str, Graph] = parts
         self.graphs: Sequence[Graph] = [*parts.values()]
 
     def run(self, takers: Takers, stack: ExitStack) -> tuple[Choice, Flight]:
@@ -144,7 +147,7 @@ class Paced:
 
         taps = paced_taps(takers.taken, self._diagram)
         flight = supervise(
-            self._diagram, self._wishes, self._engine, [*taps, *takers.taps], takers.left_out, takers.tend,
+            self._diagram, self._wishes, self._engine, [*taps, *takers.taps], takers.notes, takers.tend,
             self._announce, self._helm, takers.changed,
         )  # fmt: skip
         self.early = flight.early

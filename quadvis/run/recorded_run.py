@@ -13,16 +13,18 @@ from numpy.typing import NDArray
 from quadvis.diagram.diagram import Diagram
 from quadvis.engine.tuning import Change
 from quadvis.errors import QuadvisError, quoted
-from quadvis.graph.graph import Graph, Node
+from quadvis.graph.graph import MULTI, Graph, Node, Task
 from quadvis.links.endpoints import live_parts
 from quadvis.output.log_reader import Log
 from quadvis.output.recording import RecordedBlock, Slots, ports
 from quadvis.output.stretch import NANOSECONDS, stamps_of
 from quadvis.run.loops import REAL_TIME, SIMULATED
 from quadvis.run.outside import outside
-from quadvis.run.rows import all_logged, input_topic, left_out
+from quadvis.run.played_tasks import begins, without
+from quadvis.run.rows import all_logged, input_topic, left_out, releases
 
 Whole = NDArray[np.int64]
+NOTED = tuple(block.path.strip("/") for block in (left_out(""), releases("")))
 AGAIN = "run the diagram again with this quadvis"
 
 
@@ -52,7 +54,7 @@ class RecordedRun:
             int(recording.stamps(name)[-1])
             for recording in (self._log, self._log.hidden)
             for name in recording.names
-            if len(recording.stamps(name)) and not name.startswith(left_out("").path.strip("/"))
+            if len(recording.stamps(name)) and not name.startswith(NOTED)
         ]
         if not ends:
             raise QuadvisError(f"the log '{self._log.path}' holds no row that a replay could repeat")
@@ -68,21 +70,26 @@ class RecordedRun:
 class RecordedPart:
     """What a log holds of one computer; ``computer`` is "" in a diagram without computers.
 
-    ``left_out`` are the ticks that it left out: the first, and how many (N, 2).
+    ``left_out`` are the ticks that it left out: the first, and how many (N, 2). ``releases`` are what tasks
+    that run by themselves missed, as the log has it (N, 4); none in other runs.
     """
 
     def __init__(self, log: Log, diagram: Diagram, computer: str, graph: Graph, may_leave_out: bool) -> None:
         self._log, self._diagram = log, diagram
         self.computer, self.graph = computer, graph
-        self.left_out = self._left_out() if may_leave_out else np.zeros((0, 2), np.int64)
+        self.dispatched = may_leave_out and graph.tasking == MULTI
+        self.left_out = self._noted(left_out(computer), may_leave_out, by=0)
+        self.releases = self._noted(releases(computer), self.dispatched, by=1)
 
-    def _left_out(self) -> Whole:
-        topic = left_out(self.computer).path
-        if self._log.hidden.block(topic) is None:
+    def _noted(self, block: RecordedBlock, wanted: bool, by: int) -> Whole:
+        """Return what a run has noted, in the order of one column; nothing if it is not wanted."""
+        if not wanted:
+            return np.zeros((0, len(block.ports)), np.int64)
+        if self._log.hidden.block(block.path) is None:
             problem = f"the log '{self._log.path}' does not say which ticks the real-time run left out"
             raise QuadvisError(f"{problem}: it is of an earlier quadvis; {AGAIN}")
-        found = self._log.hidden.arrays(topic)[1].reshape(-1, 2)
-        return found[np.argsort(found[:, 0], kind="stable")]
+        found = self._log.hidden.arrays(block.path)[1].reshape(-1, len(block.ports))
+        return found[np.argsort(found[:, by], kind="stable")]
 
     @cached_property
     def played(self) -> frozenset[str]:
@@ -94,15 +101,22 @@ class RecordedPart:
         first, count = self.left_out[:, 0], self.left_out[:, 1]
         return int(np.clip(end - first, 0, count).sum())
 
+    def begun(self, task: Task, end: int) -> Whole:
+        """Return the ticks before ``end`` at which a task was due and began, and those at which it did."""
+        number = self.graph.tasks.index(task)
+        if number and self.dispatched:
+            return begins(self.graph, number, self.left_out, self.releases, end)
+        due = np.arange(self.graph.ticks(task.offset), end, self.graph.ticks(task.period), dtype=np.int64)
+        ran = due[without(due, self.left_out)]
+        return np.stack((ran, ran), axis=1)
+
     def ticks_of(self, path: str, every: int, end: int) -> Whole:
         """Return the ticks before ``end`` at which a block had a row, if one in ``every`` was taken."""
         task = self.graph[path].task
-        period = self.graph.ticks(task.period) * every
-        found = np.arange(self.graph.ticks(task.offset), end, period, dtype=np.int64)
-        if len(self.left_out):
-            place = np.searchsorted(self.left_out[:, 0], found, "right") - 1
-            found = found[(place < 0) | (found >= self.left_out[place].sum(axis=1))]
-        return found
+        ran: Whole = self.begun(task, end)[:, 0]
+        rhythm = self.graph.ticks(task.period) * every
+        rows: Whole = ran[(ran - self.graph.ticks(task.offset)) % rhythm == 0]
+        return rows
 
     def known_to(self, end: int) -> int:
         """Return the number of ticks, up to ``end``, whose outputs from outside the log holds."""

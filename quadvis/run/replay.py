@@ -20,6 +20,7 @@ from quadvis.run.loops import REAL_TIME, Progress, Takers, advance, paced_taps
 from quadvis.run.outside import outside
 from quadvis.run.playback import RecordedClock, with_playback
 from quadvis.run.played_files import check_played_files
+from quadvis.run.played_tasks import PlayedTasks
 from quadvis.run.recorded_run import RecordedPart, RecordedRun
 from quadvis.run.row_comparison import FoundDifference, Lack, RowComparison
 from quadvis.run.rows import signals_of
@@ -151,11 +152,15 @@ class _Repeated:
         self.clock, self._run, self._diagram = run.clock, run, diagram
         self.graphs = [part.graph for part in run.parts]
         self.early = "" if run.whole else "the log that was replayed goes no further"
-        self.computers = [part.computer for part in run.parts] if run.clock == REAL_TIME else []
+        paced = run.parts if run.clock == REAL_TIME else []
+        self.computers, self.measured = {part.computer: part.graph for part in paced}, False
         self._engines = [self._engine(part) for part in run.parts]
         self._choice, *_ = choices = [choose(made, run.ticks, engine, announce) for made in self._engines]
-        for made, choice in zip(self._engines, choices, strict=True):
-            use(made, choice)
+        for part, made, choice in zip(run.parts, self._engines, choices, strict=True):
+            if len(part.releases) or (part.dispatched and len(part.left_out)):
+                _play_tasks(part, made, choice, run.ticks)
+            else:
+                use(made, choice)
 
     def _engine(self, part: RecordedPart) -> Engine:
         """Return the engine of a computer."""
@@ -176,7 +181,8 @@ class _Repeated:
                 if tap.block in part.graph:
                     engine.attach(tap)
             if part.computer in self.computers:
-                takers.left_out(part.computer, part.left_out)
+                takers.notes.left_out(part.computer, part.left_out)
+                takers.notes.releases(part.computer, part.releases)
             engine.tuning.noted = takers.changed
             stack.enter_context(engine)
         try:
@@ -187,3 +193,9 @@ class _Repeated:
         for each in paced:
             each.end(self._run.ticks)
         return self._choice, None
+
+
+def _play_tasks(part: RecordedPart, engine: Engine, choice: Choice, end: int) -> None:
+    """Let the tasks of an engine begin at the ticks at which they did in a run."""
+    begun = [part.begun(task, end) for task in part.graph.tasks[1:]]
+    engine.run_with(lambda interpreter: PlayedTasks(interpreter, choice, begun))

@@ -7,11 +7,18 @@ from typing import NamedTuple
 
 from quadvis.diagram.diagram import Diagram
 from quadvis.graph.graph import Graph, Node
-from quadvis.output.recording import RecordedBlock, RecordedPort, ports
+from quadvis.output.recording import TASK_TIMES, RecordedBlock, RecordedPort, ports
 from quadvis.run.outside import outside
 
 FOLDER = "/_replay"  # of the topics that only a replay needs
 LEFT_OUT = (RecordedPort("first", "int64"), RecordedPort("count", "int64"))  # ticks that a run left out
+# What a task that runs by itself missed: its number, a tick at which it was due, how many times from then on
+# it did not begin; the tick at which it began late after these, or -1.
+RELEASES = tuple(RecordedPort(name, "int64") for name in ("task", "tick", "count", "late"))
+# The lateness and the execution time of a task's step, and how many overruns the task had until its end.
+TIMES = (
+    RecordedPort("lateness", unit="s"), RecordedPort("tet", unit="s"), RecordedPort("overruns", "int64"),
+)  # fmt: skip
 
 
 class RecordedNode(NamedTuple):
@@ -58,4 +65,18 @@ def input_topic(path: str) -> str:
 
 def left_out(computer: str) -> RecordedBlock:
     """Return the topic of the ticks that a computer has left out in a real-time run: the first, how many."""
-    return RecordedBlock("/".join(filter(None, (FOLDER, "left_out", computer))), LEFT_OUT, hidden=True)
+    return RecordedBlock(_topic(FOLDER, "left_out", computer), LEFT_OUT, hidden=True)
+
+
+def releases(computer: str) -> RecordedBlock:
+    """Return the topic of what tasks that run by themselves missed on a computer."""
+    return RecordedBlock(_topic(FOLDER, "releases", computer), RELEASES, hidden=True)
+
+
+def times_of(computer: str, task: str) -> RecordedBlock:
+    """Return the topic of the times of a task, at each tick at which it ran."""
+    return RecordedBlock(_topic(f"/{TASK_TIMES}", computer, task), TIMES, task, hidden=True)
+
+
+def _topic(*names: str) -> str:
+    return "/".join(filter(None, names))

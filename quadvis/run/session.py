@@ -14,20 +14,17 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
 from quadvis.engine.taps import Tap
 from quadvis.engine.tuning import Change
 from quadvis.native.choice import AUTO, Announce
 from quadvis.output.kept import ALL, RowJudge, RunSignals
 from quadvis.output.recording import RecordedBlock
-from quadvis.output.stretch import stamps_of
+from quadvis.run.logged_notes import LoggedNotes
 from quadvis.run.loops import SIMULATED, Paced, Progress, RunLoop, Simulated, Taken, Takers
 from quadvis.run.played_files import files_text, played_files
 from quadvis.run.result import Result
 from quadvis.run.row_tap import RowTap, Taker
-from quadvis.run.rows import inputs_of, left_out, signals_of
+from quadvis.run.rows import inputs_of, signals_of
 from quadvis.run.verdict import Judging, Outcome
 from quadvis.version import __version__
 
@@ -92,8 +89,9 @@ def recorded(
     with ExitStack() as stack:
         stack.enter_context(diagram.guarded(log))
         writer = None
+        notes = LoggedNotes(loop.computers, len(logged), measured=loop.measured)
         if log is not None:
-            blocks = [*(each.block for each in logged), *map(left_out, loop.computers)]
+            blocks = [*(each.block for each in logged), *notes.blocks]
             about = (
                 metadata(diagram, loop.clock)
                 | {"files": files_text(played_files(diagram))}
@@ -108,11 +106,6 @@ def recorded(
                 tap = RowTap(each.node.path, each.every, diagram.graph.tick, takers)
                 taken.append(Taken(each.node, judge, tap))
 
-        def leave_out(computer: str, ticks: NDArray[np.int64]) -> None:
-            if writer and len(ticks):
-                index = len(logged) + list(loop.computers).index(computer)
-                writer.write_rows(index, stamps_of(ticks[:, 0], diagram.graph.tick), ticks)
-
         def change(made: Change) -> None:
             if writer:
                 writer.write_change(*made)
@@ -123,7 +116,7 @@ def recorded(
             if progress:
                 progress(reached, spent)
 
-        choice, flight = loop.run(Takers(taken, taps, leave_out, change, tend), stack)
+        choice, flight = loop.run(Takers(taken, taps, notes.taker(writer), change, tend), stack)
         for row in taken:
             row.judge.flush()
         outcome = judging.outcome()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,3 +36,15 @@ class Package:
 
     def __len__(self) -> int:
         return len(self.ticks)
+
+    def followed_by(self, newer: Package) -> Package:
+        """Return the samples of a newer package, and as many before them as make a package of this length."""
+        begin = len(newer)
+        return replace(
+            newer,
+            ticks=np.concatenate((self.ticks, newer.ticks))[begin:],
+            times=np.concatenate((self.times, newer.times))[begin:],
+            samples=np.concatenate((self.samples, newer.samples))[begin:],
+            trigger=None,
+            lost=self.lost + newer.lost,
+        )

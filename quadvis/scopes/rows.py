@@ -39,7 +39,7 @@ class BlockRows:
         """Take rows (N, slots) of ticks (N,) in ascending order, all of them from tick ``settled`` on."""
         if not len(ticks):
             return
-        if ticks[0] < settled or ticks[0] <= self._last or (np.diff(ticks) <= 0).any():
+        if ticks[0] < settled or ticks[0] <= self._last or (ticks[1:] <= ticks[:-1]).any():
             raise ValueError(f"rows of the ticks {ticks[0]} to {ticks[-1]} come too late, or in no order")
         self._pieces.append((ticks, rows))
         self._last = int(ticks[-1])
@@ -78,21 +78,25 @@ class Sampler:
 
     def take(self, settled: Mapping[str, SettledRows]) -> tuple[Ticks, Samples]:
         """Return the ticks (N,) and the samples (N, columns); NaN where a block has had no row yet."""
-        ticks = _union([settled[block].ticks for block in self.plan.grid if block in settled])
+        grid = {block: settled[block].ticks for block in self.plan.grid if block in settled}
+        ticks, together = _union(list(grid.values()))
         samples = np.empty((len(ticks), self._width))
         if not len(ticks):
             return ticks, samples
         for block, kind, columns, slots in self._parts:
             found = settled.get(block)
-            samples[:, columns] = np.nan if found is None else _newest(found, kind, slots, ticks)
+            if found is None:
+                samples[:, columns] = np.nan
+            elif together and block in grid:
+                samples[:, columns] = _floats(found.rows[:, slots], kind)
+            else:
+                samples[:, columns] = _newest(found, kind, slots, ticks)
         return ticks, samples
 
 
 def _newest(found: SettledRows, kind: str, slots: slice | list[int], ticks: Ticks) -> Samples:
     """Return the values (N, columns) of the newest row at or before each tick."""
     values = _floats(found.rows[:, slots], kind)
-    if found.ticks is ticks or np.array_equal(found.ticks, ticks):
-        return values
     first = _floats(found.before[:, slots], kind)
     if not len(first):
         first = np.full((1, values.shape[1]), np.nan)
@@ -113,9 +117,12 @@ def _indices(numbers: Iterable[int]) -> slice | list[int]:
     return slice(found[0], found[0] + len(found)) if neighbours else found
 
 
-def _union(ticks: Sequence[Ticks]) -> Ticks:
-    """Return all ticks in ascending order, each once; blocks of one task have the same ones as a rule."""
+def _union(ticks: Sequence[Ticks]) -> tuple[Ticks, bool]:
+    """Return all ticks in ascending order, each once, and whether each array has them all.
+
+    Blocks of one task have the same ticks as a rule.
+    """
     first = ticks[0] if ticks else NO_TICKS
-    if all(other is first or np.array_equal(other, first) for other in ticks[1:]):
-        return first
-    return np.unique(np.concatenate(ticks))
+    if all(len(other) == len(first) and (other == first).all() for other in ticks[1:]):
+        return first, True
+    return np.unique(np.concatenate(ticks)), False

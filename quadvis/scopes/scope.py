@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from quadvis.errors import QuadvisError
 from quadvis.output.stretch import NANOSECONDS, stamps_of
+from quadvis.scopes.collecting import SampleBuffer, crossings
 from quadvis.scopes.package import Package
-from quadvis.scopes.properties import AT_END, FALLING, FILE, FREERUN, RISING, SIGNAL
+from quadvis.scopes.properties import AT_END, FILE, FREERUN, SIGNAL
 from quadvis.scopes.ring import SampleRing
 from quadvis.scopes.rows import NO_TICKS, Samples, Ticks
 from quadvis.scopes.settings import ScopeSettings
@@ -80,9 +81,7 @@ class SignalScope:
         self._ready = 0  # the first row that can be a trigger
         self._forced = False  # triggered by hand
         self._caused: int | None = None  # triggered by another scope, at this row
-        self._first = self._last = self._filled = 0  # rows of the package; samples of it that are there
-        self._kept_ticks: Ticks = NO_TICKS
-        self._kept: Samples = np.zeros((0, 0))
+        self._buffer = SampleBuffer(0, 0, 1, 0)
         self._before: tuple[int, int] | None = None  # row and tick of the last sample, if no gap may follow
 
     @property
@@ -118,8 +117,8 @@ class SignalScope:
 
     def stop(self) -> None:
         """End at once. A file scope hands on what it has collected; others forget it."""
-        if self._phase is Phase.COLLECTING and self.settings.Type == FILE and self._filled:
-            self._hand_on(self._filled)
+        if self._phase is Phase.COLLECTING and self.settings.Type == FILE and self._buffer.filled:
+            self._hand_on(self._buffer.filled)
         self._phase = Phase.STOPPED
         self._cycles.clear()
 
@@ -165,7 +164,7 @@ class SignalScope:
         if self._phase is Phase.WAITING:
             rows += self._own_triggers()
         elif self._phase is Phase.COLLECTING:
-            rows.append(max(self._last, self._base))
+            rows.append(max(self._buffer.last, self._base))
         row = min(rows, default=self._end)
         return (int(self._ticks[row - self._base]), row) if row < self._end else None
 
@@ -173,7 +172,7 @@ class SignalScope:
         """Let the next event happen; return the samples that others may wait for and that are at this row."""
         if self._phase is Phase.WAITING and row in self._own_triggers():
             self._begin(row)
-        elif self._phase is Phase.COLLECTING and max(self._last, self._base) == row:
+        elif self._phase is Phase.COLLECTING and max(self._buffer.last, self._base) == row:
             self._finish()
         else:
             found = [sample for cycle in self._cycles for sample in self._take_seen(cycle, row)]
@@ -199,19 +198,11 @@ class SignalScope:
             found.append(self._caused)
         if self.settings.TriggerMode == SIGNAL:
             if self._crossings is None:
-                self._crossings = self._find_crossings()
+                level, slope = self.settings.TriggerLevel, self.settings.TriggerSlope
+                self._crossings = crossings(self._level, self._samples[:, -1], level, slope) + self._base
             place = int(np.searchsorted(self._crossings, ready))
             found += self._crossings[place : place + 1].tolist()
         return found
-
-    def _find_crossings(self) -> NDArray[np.int64]:
-        """Return the open rows at which the trigger's signal crosses the level."""
-        level, slope = self.settings.TriggerLevel, self.settings.TriggerSlope
-        now = self._samples[:, -1]
-        before = np.concatenate(([self._level], now[:-1])) if len(now) else now
-        rising, falling = (before < level) & (now >= level), (before > level) & (now <= level)
-        crossed = {RISING: rising, FALLING: falling}.get(slope, rising | falling)
-        return np.flatnonzero(crossed) + self._base
 
     def _seen(self, cycle: Cycle) -> dict[int, int]:
         """Return the rows of the samples for which others wait, by sample, as far as they are to come."""
@@ -242,60 +233,44 @@ class SignalScope:
         """Begin a package whose trigger is at a row."""
         step, count = self.settings.Decimation, self.settings.NumSamples
         self._phase = Phase.COLLECTING
-        self._first = row + self.settings.shift * step
-        self._last = self._first + (count - 1) * step
-        self._filled = 0
-        self._kept_ticks, self._kept = np.empty(count, np.int64), np.empty((count, self._width))
+        self._buffer = SampleBuffer(row + self.settings.shift * step, count, step, self._width)
         self._cycles = [cycle for cycle in self._cycles if self._seen(cycle)]
-        self._cycles.append(Cycle(row, self._last + step, row))
+        self._cycles.append(Cycle(row, self._buffer.last + step, row))
 
     def _collect(self, end: int) -> None:
-        """Take the samples of the package from the ring and from the open rows before a row."""
-        step = self.settings.Decimation
-        first = self._first + self._filled * step
-        rows = range(first, min(end, self._last + 1), step)
-        old = rows[: len(range(first, min(self._base, rows.stop), step))]
-        if old:
-            self._keep(*self._ring.take(old))
-        new = rows[len(old) :]
-        if new:
-            places = slice(new.start - self._base, new.stop - self._base, step)
-            self._keep(self._ticks[places], self._samples[places, : self._width])
-
-    def _keep(self, ticks: Ticks, samples: Samples) -> None:
-        part = slice(self._filled, self._filled + len(ticks))
-        self._kept_ticks[part], self._kept[part] = ticks, samples
-        self._filled = part.stop
+        """Take the samples of the package before a row."""
+        self._buffer.collect(end, self._base, self._ticks, self._samples, self._ring)
 
     def _finish(self) -> None:
         """Hand the package on, and begin anew if this is so set."""
-        self._collect(self._last + 1)
-        trigger = self._cycles[-1].trigger
-        self._hand_on(self.settings.NumSamples)
+        last, trigger = self._buffer.last, self._cycles[-1].trigger
+        self._collect(last + 1)
+        package = self._hand_on(self.settings.NumSamples)
         if not self.settings.restarts:
             self._phase = Phase.DONE
         elif self.settings.TriggerMode == FREERUN:
-            self._before = self._last, int(self._kept_ticks[-1])
-            self._begin(self._last + self.settings.Decimation)
+            self._before = last, int(package.ticks[-1])
+            self._begin(last + self.settings.Decimation)
         else:
-            self._arm(max(self._last, trigger) + 1)
+            self._arm(max(last, trigger) + 1)
 
-    def _hand_on(self, count: int) -> None:
+    def _hand_on(self, count: int) -> Package:
         """Hand the first samples of the package on."""
         self.latest = self._package(count)
         self._sequence += 1
         self._take(self.latest)
+        return self.latest
 
     def _package(self, count: int) -> Package:
-        ticks = self._kept_ticks[:count]
-        last = self._first + (count - 1) * self.settings.Decimation
-        row, tick = self._before or (self._first, int(ticks[0]))
+        ticks, samples = self._buffer.samples(count)
+        last = self._buffer.first + (count - 1) * self._buffer.step
+        row, tick = self._before or (self._buffer.first, int(ticks[0]))
         return Package(
             scope=self.number,
             sequence=self._sequence,
             ticks=ticks,
             times=stamps_of(ticks, self.tick) / NANOSECONDS,
-            samples=self._kept[:count],
+            samples=samples,
             names=tuple(trace.name for trace in self.plan.traces),
             units=tuple(trace.unit for trace in self.plan.traces),
             trigger=None if self.settings.TriggerMode == FREERUN else -self.settings.shift,
@@ -304,20 +279,10 @@ class SignalScope:
 
     def picture(self) -> Package | None:
         """Return its newest samples, whole or not, at most as many as a package has; None without any."""
-        filled = self._filled if self._phase is Phase.COLLECTING else 0
+        filled = self._buffer.filled if self._phase is Phase.COLLECTING else 0
         if not filled:
             return self.latest
         now = self._package(filled)
         if self.latest is None or filled >= len(self.latest):
             return now
-        old = self.latest
-        return Package(
-            scope=self.number,
-            sequence=now.sequence,
-            ticks=np.concatenate((old.ticks, now.ticks))[filled:],
-            times=np.concatenate((old.times, now.times))[filled:],
-            samples=np.concatenate((old.samples, now.samples))[filled:],
-            names=old.names,
-            units=old.units,
-            lost=old.lost + now.lost,
-        )
+        return self.latest.followed_by(now)

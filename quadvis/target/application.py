@@ -216,6 +216,24 @@ class Application:
         session.helm.tune(group).add_done_callback(done)
         return told
 
+    def picture(self, signal: str) -> Future[Any]:
+        """Return the newest picture of a signal as JPEG; QuadvisError if nothing runs."""
+        session = self._session
+        if session is None or not self.running:
+            raise QuadvisError(f"{self.name} does not run, so there are no pictures")
+        found: Future[Any] = Future()
+
+        def see() -> None:
+            from quadvis.target.picture import encoded
+
+            try:
+                found.set_result(encoded(self.diagram, session.helm, signal))
+            except Exception as error:
+                found.set_exception(error)
+
+        threading.Thread(target=see, daemon=True).start()
+        return found
+
     def drawing(self) -> Future[Any]:
         """Return the picture of the diagram as SVG; it is drawn once."""
         if self._drawing is None:

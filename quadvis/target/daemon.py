@@ -103,7 +103,7 @@ class Daemon:
     def start(self, application: str) -> None:
         """Load and start an application."""
         self.kernel.load(application).result()
-        self.kernel.start().result()
+        self.kernel.start(None).result()
 
     def run(self, idle: float | None) -> None:
         """Serve until SIGTERM, SIGHUP or Ctrl-C."""

@@ -265,6 +265,10 @@ class Kernel:
             file.seek(offset)
             return {"data": file.read(count), "size": path.stat().st_size}
 
+    def picture(self, signal: str) -> Future[Any]:
+        """Return the newest picture of a signal as JPEG."""
+        return self._loaded.picture(signal)
+
     def drawing(self) -> Future[Any]:
         """Return the picture of the diagram as SVG."""
         return self._loaded.drawing()

@@ -51,10 +51,11 @@ def drive_output(block: Block, **inputs: Any) -> DrivenOutput:
         words = context.RawArray("q", words_for(1))
         interval = round(block.interval * NANOSECONDS)
         port = OutputPort("block", path, block.settings, interval, block.initial_frame(), block.safe_frame())
-        guard = Guard(context, [port], words, [], SAFE, Standing())
+        guard = Guard(context, words, [], SAFE, Standing())
         sender = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
         try:
-            guard.start(lambda _: None)
+            guard.start()
+            guard.open([port], lambda _: None)
             guard.watch(sender.pid)
             initial = reader.whole(port.initial)
             (box,) = outboxes(words)

@@ -6,6 +6,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Hashable
+from contextlib import suppress
 
 _MOST = 1000  # buckets; full ones are forgotten first
 
@@ -81,7 +82,8 @@ def sparing(
         if not budget.spend(""):
             unsaid += 1
             return
-        say(f"{words} ({unsaid} sentences were left out before)" if unsaid else words)
+        with suppress(Exception):  # a terminal that is closed must not end a target
+            say(f"{words} ({unsaid} sentences were left out before)" if unsaid else words)
         unsaid = 0
 
     return said

@@ -67,13 +67,14 @@ class Client:
         self.close()
 
     def connect(self, timeout: float = PATIENCE) -> dict[str, Any]:
-        """Wait for the connection and return what the target says of itself.
+        """Wait for the connection (s) and return what the target says of itself.
 
         NoAnswerError, WrongTargetError, NotAllowedError or BusyError say why there is none.
         """
-        if self._courier.wait(timeout) != CONNECTED:
-            raise self._trouble()
-        hello: dict[str, Any] = self.request("hello", timeout)
+        end = time.monotonic() + timeout
+        if self._courier.wait(timeout * 0.75) != CONNECTED:
+            raise self._trouble(max(0.1, end - time.monotonic()))
+        hello: dict[str, Any] = self.request("hello", max(0.1, end - time.monotonic()))
         return hello
 
     def request(self, cmd: str, deadline: float = PATIENCE, **args: Any) -> Any:
@@ -96,6 +97,9 @@ class Client:
 
     def send(self, cmd: str, deadline: float = PATIENCE, **args: Any) -> Future[Reply]:
         """Send a request and return at once; a wrong verb or argument raises WireError before."""
+        return self._send(cmd, deadline, args)
+
+    def _send(self, cmd: str, deadline: float, args: dict[str, Any], *, first: bool = False) -> Future[Reply]:
         verb = find_verb(cmd, STREAM if cmd in ("subscribe", "unsubscribe") else CONTROL)
         checked(verb, args)
         if self._closed:
@@ -106,7 +110,7 @@ class Client:
             self._waiting[number] = future
         future.add_done_callback(lambda _: self._waiting.pop(number, None))
         data = pack_request(Request(number, cmd, args, deadline))
-        self._courier.post(data, lambda: not future.done(), verb.socket)
+        self._courier.post(data, lambda: not future.done(), verb.socket, first=first)
         return future
 
     def operate(self, on_lost: Callable[[WireError], object] = lambda error: None) -> None:
@@ -171,8 +175,8 @@ class Client:
         for subscription in self._subscriptions:
             subscription.end(GoneError(f"the connection to {self.name} is closed"))
 
-    def _trouble(self) -> WireError:
-        """Return why there is no connection."""
+    def _trouble(self, patience: float = 1.0) -> WireError:
+        """Return why there is no connection; a target that may have another key is asked for it."""
         state = self._courier.state()
         if state == DENIED:
             mine = "" if self._pair is None else self._pair.public.hex()
@@ -185,7 +189,7 @@ class Client:
             return BusyError(f"{self.name} has no room for another connection; close one")
         if not self.address.path and self._public:
             try:
-                _, public = introduced(self.address, 1.0)
+                _, public = introduced(self.address, patience)
                 check_same(KnownTarget(self.name, str(self.address), self._public), public)
             except (NoAnswerError, WrongTargetError) as error:
                 return type(error)(
@@ -230,6 +234,9 @@ class Client:
             self._fail(
                 NoAnswerError(f"the connection to {self.name} is lost; what was asked for may have been done")
             )
+        if socket == CONTROL and state == CONNECTED and self._token:
+            self._next_renewal = 0.0  # the lease comes along to the new connection before any request
+            self._beat()
         if socket == STREAM and state == CONNECTED:
             with self._lock:
                 topics = sorted({topic for each in self._subscriptions for topic in each.topics})
@@ -262,7 +269,7 @@ class Client:
             else:
                 self._next_renewal = now + RENEWAL
                 token = self._token
-                self.send("renew", LEASE, token=token).add_done_callback(
+                self._send("renew", LEASE, {"token": token}, first=True).add_done_callback(
                     lambda d: self._renewed(now, token, d)
                 )
                 return RENEWAL / 4

@@ -135,6 +135,8 @@ class Courier:
     def state(self, socket: str = CONTROL) -> str:
         """Return the state of a connection."""
         end = self._ends.get(socket)
+        if self._closing:
+            return LOST
         return CONNECTING if end is None else end.state
 
     @property
@@ -142,9 +144,17 @@ class Courier:
         """Whether anything listens at the address."""
         return self._ends[CONTROL].reached
 
-    def post(self, data: bytes, wanted: Callable[[], bool], socket: str = CONTROL) -> None:
-        """Send a message once there is a connection, unless ``wanted()`` is false by then."""
-        self._call(lambda: self._ends[socket].outgoing.append((data, wanted)))
+    def post(
+        self, data: bytes, wanted: Callable[[], bool], socket: str = CONTROL, *, first: bool = False
+    ) -> None:
+        """Send a message once there is a connection, unless ``wanted()`` is false by then.
+
+        ``first`` puts it before all that waits; only callbacks can ask for this.
+        """
+        if first:
+            self._ends[socket].outgoing.appendleft((data, wanted))
+        else:
+            self._call(lambda: self._ends[socket].outgoing.append((data, wanted)))
 
     def open_stream(self, address: WireAddress) -> None:
         """Connect to the second socket."""

@@ -24,6 +24,7 @@ from quadvis.wire.refusals import BadError, BusyError, GoneError, RefusedError, 
 from quadvis.wire.verbs import CONTROL, Verb, check_level, checked, find_verb
 from quadvis.wire.who import Who
 
+_MOST_WARNED = 1000
 Send = Callable[[bytes], object]
 Handle = Callable[[str, Mapping[str, Any], Who], Any]
 
@@ -87,21 +88,21 @@ class Desk:
     def answer(self, who: Who, data: bytes, send: Send, socket: str = CONTROL) -> None:
         """Answer a message, now or later, once or not at all."""
         self.counts.add("messages")
-        if not self._budget.spend(who.public):
+        if not self._budget.spend(who.payer):
             self._too_many(who, data, send)
             return
-        self._warned.discard(who.public)
+        self._warned.discard(who.payer)
         try:
             request = read_request(data)
         except UnreadableError as error:
             self.counts.add("malformed")
-            self._budget.charge(who.public, min(len(data), ITEMS) / ITEMS_A_REQUEST)
+            self._budget.charge(who.payer, min(len(data), ITEMS) / ITEMS_A_REQUEST)
             self._say(f"a message of {who.name} cannot be read: {error}")
             if error.id is not None:
                 self._reply(Reply(error.id, error=BadError(self._worded(error))), send)
             return
         if request.items > ITEMS_A_REQUEST:
-            self._budget.charge(who.public, request.items / ITEMS_A_REQUEST)
+            self._budget.charge(who.payer, request.items / ITEMS_A_REQUEST)
         verb = None
         try:
             verb = find_verb(request.cmd, socket)
@@ -145,10 +146,10 @@ class Desk:
         self._finish(who, verb, request, args, found, send)
 
     def _wait(self, future: Future[Any], request: _Open) -> None:
-        if self._waiting[request.who.public] >= PENDING:
+        if self._waiting[request.who.payer] >= PENDING:
             future.cancel()
             raise BusyError(f"{PENDING} requests of this key are under way already")
-        self._waiting[request.who.public] += 1
+        self._waiting[request.who.payer] += 1
         self._open[future] = request
         future.add_done_callback(lambda future: self._later(lambda: self._settle(future)))
 
@@ -174,9 +175,9 @@ class Desk:
         return min((request.until - now for request in self._open.values()), default=None)
 
     def _no_longer_waits(self, request: _Open) -> None:
-        self._waiting[request.who.public] -= 1
-        if not self._waiting[request.who.public]:
-            del self._waiting[request.who.public]
+        self._waiting[request.who.payer] -= 1
+        if not self._waiting[request.who.payer]:
+            del self._waiting[request.who.payer]
 
     def _finish(
         self, who: Who, verb: Verb, request: Request, args: Mapping[str, Any], found: Any, send: Send
@@ -222,9 +223,11 @@ class Desk:
     def _too_many(self, who: Who, data: bytes, send: Send) -> None:
         """Drop a request; the first one after an accepted one is answered."""
         self.counts.add("dropped")
-        if who.public in self._warned:
+        if who.payer in self._warned:
             return
-        self._warned.add(who.public)
+        if len(self._warned) > _MOST_WARNED:
+            self._warned.clear()
+        self._warned.add(who.payer)
         try:
             number = read_request(data).id
         except UnreadableError:

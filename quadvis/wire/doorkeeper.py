@@ -35,16 +35,17 @@ class Doorkeeper:
     def answer(self, entrances: Mapping[str, Entrance]) -> None:
         """Answer the handshakes that wait."""
         while self.socket.poll(0):
-            version, number, domain, address, _, mechanism, *shown = self.socket.recv_multipart()
+            version, number, domain, place, _, mechanism, *shown = self.socket.recv_multipart()
+            address = place.decode("ascii", "replace")
             entrance = entrances.get(domain.decode("ascii", "replace"))
-            user = self._user(entrance, address.decode("ascii", "replace"), mechanism, shown)
+            user = self._user(entrance, address, mechanism, shown)
             status = b"400"
             if user and entrance is not None:
-                status = b"200" if entrance.let_in(user) else b"500"
+                status = b"200" if entrance.let_in(user, address) else b"500"
             if status != b"200":
                 why = "a key that is not on the list" if status == b"400" else "a host too many"
                 key = f", {shown[0].hex()}" if len(shown) == 1 and len(shown[0]) == 32 else ""
-                self._say(f"turned away {why}, from {address.decode('ascii', 'replace') or 'here'}{key}")
+                self._say(f"turned away {why}, from {address or 'here'}{key}")
             self._counts.add({b"200": "let in", b"400": "turned away", b"500": "no room"}[status])
             reply = [version, number, status, b"", user.encode() if status == b"200" else b"", b""]
             self.socket.send_multipart(reply)

@@ -1,16 +1,19 @@
-"""One ROUTER socket of a target: it opens, counts who is connected, and gives each message with its sender.
+"""One ROUTER socket of a target: it opens, bounds who is connected, and gives each message with its sender.
 
-The listening TCP socket is ours; ZeroMQ gets a copy of it. If too many connections have shown no key yet, the
-copy is closed until they are gone: meanwhile the system keeps a few new ones waiting, and we hold nothing.
+ZeroMQ itself accepts any number of TCP connections that never show a key, each of which is a descriptor of
+this process. Its monitor tells of each; beyond a number we shut the oldest of those that are too young to
+be cut off by ZeroMQ. The address from which a key was let in of late is spared if there is another one.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import socket
 import time
 from collections import deque
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import zmq
@@ -43,6 +46,13 @@ class Letter(NamedTuple):
     data: bytes | None
 
 
+@dataclass
+class _Connection:
+    since: float
+    address: str
+    shut: bool = False
+
+
 class Entrance:
     """A ROUTER socket; ``pair`` is the target's key, or None for CURVE's absence on this computer."""
 
@@ -63,11 +73,10 @@ class Entrance:
             made.curve_secretkey, made.curve_publickey = pair.private, pair.public
         self.monitor = made.get_monitor_socket(_EVENTS)
         self.outbox = Outbox(made)
-        self.listener: socket.socket | None = None
         self.place: int | str = 0
-        self._endpoint = ""
-        self._since: dict[int, float] = {}  # when each open connection was accepted, by its descriptor
-        self._let_in: deque[tuple[float, str]] = deque()  # who has shown which key since a handshake's time
+        self.shut = 0  # connections that were too many
+        self._open: dict[int, _Connection] = {}  # by descriptor, as the monitor tells
+        self._let_in: deque[tuple[float, str, str]] = deque()  # when which key, from where, of late
 
     def open_path(self, path: str) -> None:
         """Listen at a path of this computer."""
@@ -76,43 +85,62 @@ class Entrance:
 
     def open_port(self, listener: socket.socket) -> None:
         """Listen at a TCP socket that is bound."""
-        self.listener = listener
         self.place = listener.getsockname()[1]
         if listener.family == socket.AF_INET6:
             self.socket.ipv6 = True
-        listener.listen(CONNECTIONS)
-        self._open()
-
-    def _open(self) -> None:
-        assert self.listener is not None
-        self.socket.setsockopt(zmq.USE_FD, os.dup(self.listener.fileno()))
-        host = "[::]" if self.listener.family == socket.AF_INET6 else "0.0.0.0"
-        self.socket.bind(f"tcp://{host}:{self.place}")
-        self._endpoint = self.socket.last_endpoint.decode()
+        with suppress(OSError, AttributeError):  # Linux: who is silent is not even accepted
+            listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_DEFER_ACCEPT, math.ceil(HANDSHAKE))
+        listener.listen(2 * HALF_OPEN)  # a short queue would keep good hosts waiting in an attack
+        self.socket.setsockopt(zmq.USE_FD, listener.detach())  # the address below is not used
+        self.socket.bind(f"tcp://127.0.0.1:{self.place}")
 
     def count(self) -> int:
-        """Note who came and went; shut or open the port. Return how many are connected."""
+        """Note who came and went, and shut who is too many; return how many are connected."""
         while self.monitor.poll(0):
             event = recv_monitor_message(self.monitor)
+            descriptor = int(event["value"])
             if event["event"] == zmq.Event.ACCEPTED:
-                self._since[int(event["value"])] = time.monotonic()
+                self._open[descriptor] = _Connection(time.monotonic(), self._peer(descriptor))
             else:
-                self._since.pop(int(event["value"]), None)
-        if self.listener is None:
-            return len(self._since)
-        if self._endpoint and len(self._since) >= CONNECTIONS + HALF_OPEN:
-            self.socket.unbind(self._endpoint)
-            self._endpoint = ""
-        elif not self._endpoint and len(self._since) < CONNECTIONS + HALF_OPEN // 2:
-            self._open()
-        return len(self._since)
+                self._open.pop(descriptor, None)
+        if isinstance(self.place, int):
+            self._bound()
+        return len(self._open)
 
-    @property
-    def shut(self) -> bool:
-        """Whether the port is closed for new connections."""
-        return self.listener is not None and not self._endpoint
+    def _bound(self) -> None:
+        """Shut the connections that are too many."""
+        young = time.monotonic() - HANDSHAKE
+        excess = sum(not each.shut for each in self._open.values()) - CONNECTIONS - HALF_OPEN
+        if excess <= 0:
+            return
+        spared = {address for _, _, address in self._let_in}
+        found = [
+            (each.address in spared, each.since, descriptor)
+            for descriptor, each in self._open.items()
+            if not each.shut and each.since > young
+        ]
+        for _, _, descriptor in sorted(found)[:excess]:
+            self._open[descriptor].shut = True
+            self.shut += 1
+            with suppress(OSError), self._connection(descriptor) as connection:
+                connection.shutdown(socket.SHUT_RDWR)
 
-    def let_in(self, user: str) -> bool:
+    def _peer(self, descriptor: int) -> str:
+        try:
+            with self._connection(descriptor) as connection:
+                return str(connection.getpeername()[0])
+        except (OSError, IndexError):
+            return ""
+
+    def _connection(self, descriptor: int) -> socket.socket:
+        """Return a copy of a connection; OSError if it is another file by now, or of another port."""
+        found = socket.socket(fileno=os.dup(descriptor))
+        if found.family not in (socket.AF_INET, socket.AF_INET6) or found.getsockname()[1] != self.place:
+            found.close()
+            raise OSError("no connection of this port")
+        return found
+
+    def let_in(self, user: str, address: str) -> bool:
         """Note that someone has shown a key; return whether there is room.
 
         ZeroMQ does not say which connection a key came from. One that is older than a handshake may take has
@@ -122,12 +150,12 @@ class Entrance:
         while self._let_in and self._let_in[0][0] < now - HANDSHAKE:
             self._let_in.popleft()
         self.count()
-        settled = sum(since < now - HANDSHAKE for since in self._since.values())
+        settled = sum(each.since < now - HANDSHAKE for each in self._open.values())
         if settled + len(self._let_in) >= CONNECTIONS:
             return False
-        if sum(name == user for _, name in self._let_in) >= HANDSHAKES:
+        if sum(name == user for _, name, _ in self._let_in) >= HANDSHAKES:
             return False
-        self._let_in.append((now, user))
+        self._let_in.append((now, user, address))
         return True
 
     def receive(self) -> Letter | None:
@@ -153,5 +181,3 @@ class Entrance:
         self.socket.disable_monitor()
         self.monitor.close(0)
         self.socket.close(100)
-        if self.listener is not None:
-            self.listener.close()

@@ -13,8 +13,6 @@ from quadvis.wire.keys import fingerprint, own_key
 from quadvis.wire.known import KnownTarget, KnownTargets, check_same
 from quadvis.wire.refusals import NoAnswerError
 
-_INTRODUCTION = 1.5  # s
-
 
 def meet(
     target: str,
@@ -27,16 +25,17 @@ def meet(
     """Return a connection to a target: a name that is known here, host:port, or a path.
 
     ``key`` is the name of our key, if there are several. A target that is met for the first time is pinned,
-    and ``say`` gets its fingerprint. NoAnswerError, WrongTargetError and NotAllowedError say what is wrong.
+    and ``say`` gets its fingerprint. NoAnswerError, WrongTargetError and NotAllowedError say within
+    ``timeout`` (s) what is wrong.
     """
     known = KnownTargets(folder)
     found = known.find(target)
     if found is None and _is_local(target):
         path = target.removeprefix("ipc://") if "/" in target else str(local_path(target))
         return _connected(Client(read_address(path), target), timeout)
-    found = _introduced(target, found, known, say)
     pair = own_key(key, folder)
-    return _connected(Client(read_address(found.address), found.name, pair, found.public), timeout)
+    found = _introduced(target, found, known, say, timeout / 3)
+    return _connected(Client(read_address(found.address), found.name, pair, found.public), timeout * 2 / 3)
 
 
 def _is_local(target: str) -> bool:
@@ -49,12 +48,16 @@ def _is_local(target: str) -> bool:
 
 
 def _introduced(
-    target: str, found: KnownTarget | None, known: KnownTargets, say: Callable[[str], object]
+    target: str,
+    found: KnownTarget | None,
+    known: KnownTargets,
+    say: Callable[[str], object],
+    timeout: float,
 ) -> KnownTarget:
     """Return a target with the key that it must have; refuse one that says it has another one."""
     address = read_address(found.address if found else target)
     try:
-        name, public = introduced(address, _INTRODUCTION)
+        name, public = introduced(address, timeout)
     except NoAnswerError as error:
         if found is not None:  # a firewall may let the other ports through
             return found

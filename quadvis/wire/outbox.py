@@ -22,7 +22,8 @@ class Outbox:
         self._socket, self._lag = socket, lag
         self._waiting: dict[bytes, deque[tuple[Sequence[bytes], int]]] = {}
         self._bytes: Counter[bytes] = Counter()
-        self.dropped: Counter[bytes] = Counter()
+        self.dropped: Counter[bytes] = Counter()  # by connection, as long as there is one
+        self.all_dropped = 0
 
     @property
     def waits(self) -> bool:
@@ -42,6 +43,7 @@ class Outbox:
         while self._bytes[identity] > self._lag and len(waiting) > 1:
             self._bytes[identity] -= waiting.popleft()[1]
             self.dropped[identity] += 1
+            self.all_dropped += 1
         return True
 
     def flush(self) -> list[bytes]:

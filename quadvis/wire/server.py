@@ -108,6 +108,7 @@ class Server:
                 "a target needs a key to listen at a port; make one with 'quadvis keys new NAME'"
             )
         control, introductions, stream = listeners(host, port)
+        first = int(control.getsockname()[1])
         pair = None if insecure else self._pair
         for entrance, listener in zip(self._two_entrances(pair), (control, stream), strict=True):
             entrance.open_port(listener)
@@ -116,7 +117,7 @@ class Server:
         else:
             introductions.listen(limits.CONNECTIONS)
             self._introductions.append(introductions)
-        return int(control.getsockname()[1])
+        return first
 
     def _two_entrances(self, pair: KeyPair | None) -> list[Entrance]:
         number = len(self._entrances)
@@ -154,12 +155,15 @@ class Server:
         return {
             "counts": self.counts.all(),
             "connections": [entrance.count() for entrance in self._entrances],
+            "shut": sum(entrance.shut for entrance in self._entrances),
+            "dropped": sum(entrance.outbox.all_dropped for entrance in self._entrances),
             "subscribers": list(self._feed.subscribers()),
             "audit_lost": 0 if self._audit is None else self._audit.lost,
         }
 
     def run(self) -> None:
         """Serve until `close` is called."""
+        self._thread = threading.current_thread()
         poller = zmq.Poller()
         places: list[Any] = [self._waker, self._doorkeeper.socket, *self._introductions]
         places += [each.socket for each in self._entrances] + [each.monitor for each in self._entrances]
@@ -263,7 +267,11 @@ class Server:
     def _lost(self, who: Who) -> None:
         if self._audit is not None:
             self._audit.note(f"the lease of {who.name} is lost")
-        self._on_lost(who)
+        try:
+            self._on_lost(who)
+        except Exception as error:
+            self.counts.add("failed")
+            self._say(f"what follows the loss of the lease failed: {type(error).__name__}: {error}")
 
     def _public(self) -> bytes:
         return b"" if self._pair is None else self._pair.public

@@ -16,3 +16,8 @@ class Who:
     level: int
     public: bytes
     connection: tuple[int, bytes]
+
+    @property
+    def payer(self) -> bytes:
+        """Who pays for a request: the key, or the connection of who has none."""
+        return self.public or b"%d " % self.connection[0] + self.connection[1]

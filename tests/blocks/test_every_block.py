@@ -63,6 +63,7 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
         "values": [[1.0, 2.0], [3.0, -1.0], [0.0, 0.0]],
         "during": [[0.3, 0.6]],
         "port": "pty:line",
+        "device": "/dev/video0",
         "channels": [1, 3, 2],
         "lowest": [-1.0, 0.0, 1.0],
         "highest": [1.0, 1.0, -1.0],

@@ -15,6 +15,7 @@ import json
 import shutil
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,23 +23,38 @@ import numpy as np
 import yaml
 
 import quadvis
+from quadvis.block import Device
 from quadvis.diagram.diagram import Diagram
+from quadvis.library.catalogue import Catalogue
 
 DIAGRAMS = Path(__file__).parents[2] / "diagrams"
 FILE = Path(__file__).with_name("golden.json")
 DURATION = 1.5  # s; all tasks, transitions and cameras have worked by then
 MISSING = 0.123  # stands for NaN
-ON_DEVICES = {("flight.yaml", "hil")}  # these run in real time alone
+
+
+def every_case() -> Iterator[tuple[str, str | None, bool]]:
+    """Yield every diagram by itself and with each of its variants, and whether that reaches devices."""
+    catalogue = Catalogue()
+    for path in sorted(DIAGRAMS.glob("*.yaml")):
+        variants = yaml.safe_load(path.read_text()).get("variants", {})
+        yield path.name, None, False
+        for name, variant in variants.items():
+            lineage = [variant]
+            while base := lineage[-1].get("base"):
+                lineage.append(variants[base])
+            kinds = [block.get("block") for each in lineage for block in each.get("slots", {}).values()]
+            yield path.name, name, any(issubclass(catalogue.find(kind), Device) for kind in kinds if kind)
 
 
 def cases() -> list[tuple[str, str | None]]:
     """Return every diagram that can be simulated, by itself and with each of its variants."""
-    return [
-        (path.name, variant)
-        for path in sorted(DIAGRAMS.glob("*.yaml"))
-        for variant in (None, *yaml.safe_load(path.read_text()).get("variants", {}))
-        if (path.name, variant) not in ON_DEVICES
-    ]
+    return [(name, variant) for name, variant, has_devices in every_case() if not has_devices]
+
+
+def on_devices() -> list[tuple[str, str | None]]:
+    """Return the variants with devices, which run in real time alone."""
+    return [(name, variant) for name, variant, has_devices in every_case() if has_devices]
 
 
 def loaded(folder: Path, name: str, variant: str | None) -> Diagram:

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +17,10 @@ from quadvis.cli import main
 from quadvis.diff.difference import diff
 from quadvis.errors import QuadvisError
 from quadvis.output.log_reader import read_log
-from tests.diagrams.golden import DIAGRAMS, ON_DEVICES
+from quadvis_blocks.hardware.imu_in import message_of
+from tests.diagrams.golden import DIAGRAMS, on_devices
+from tests.diagrams.stand_in_world import World
+from tests.processes import children, gone
 
 FLIGHT = DIAGRAMS / "flight.yaml"
 CALM = quadvis.RealTime(priority=0, poll="0 s")
@@ -23,12 +30,22 @@ name: bench
 base: {{file: {}, variant: hil}}
 overload: {{action: warn}}
 """
+AIRBORNE = """
+quadvis: 1
+name: airborne
+base: {{file: {}, variant: flight}}
+overload: {{max: 1000, consecutive: 100, action: warn}}
+params: {{circles_out: "", circles_in: ""}}
+"""
+FLOWN, PATIENCE = 400, 120.0  # ticks of 10 ms; s
+LATE, MISSED = 0.05, 0.05  # s, and a share of the ticks: beyond these nobody can fly
 SLOTS = ("outputs", "receiver")
 COMPUTERS = {"world", "vision_pc", "target"}
 
 
 def test_devices_need_real_time_and_no_other_variant_does() -> None:
-    for name, variant in ON_DEVICES:
+    assert on_devices() == [("flight.yaml", "hil"), ("flight.yaml", "flight")]
+    for name, variant in on_devices():
         with pytest.raises(QuadvisError, match="only a real-time run may do so"):
             quadvis.load(DIAGRAMS / name, variant=variant).run()
 
@@ -45,9 +62,42 @@ def test_desk_and_bench_differ_in_slots_and_links_alone() -> None:
 def test_check_says_what_desk_and_bench_share(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(FLIGHT)]) == 0
     assert (
-        "  sim, hil differ in outputs, receiver; 39 blocks are the same to the bit\n"
-        in capsys.readouterr().out
+        "  sim, hil, flight differ in craft, eyes, outputs, receiver, computers, links, solver; "
+        "33 blocks are the same to the bit\n" in capsys.readouterr().out
     )
+
+
+def test_a_bad_line_of_circles_fails_the_flight(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.yaml"
+    line = "links: {circle_line: {from: vision_pc, to: target, via: serial, baud: 115200, flips: 0.001}}"
+    bad.write_text(f"quadvis: 1\nname: bad\nbase: {FLIGHT}\n{line}\n")
+    for path, met in ((FLIGHT, True), (bad, False)):
+        verdicts = quadvis.load(path, stop_time="4 s").run().outcome.verdicts
+        counters = [each for each in verdicts if "circle_line" in str(each)]
+        assert len(counters) == 2 and all(each.met for each in counters) == met
+
+
+def test_in_flight_nothing_is_left_of_the_world() -> None:
+    flight = quadvis.load(FLIGHT, variant="flight")
+    assert set(flight.graph.computers) == COMPUTERS - {"world"}
+    assert [link.name for link in flight.links] == ["circle_line"]
+    assert not any("craft/" in node.path or "receiver" in node.path for node in flight.graph.nodes)
+
+
+def test_the_inertial_unit_of_the_flight_speaks_as_that_of_the_bench_does() -> None:
+    bench = {link.name: link for link in quadvis.load(FLIGHT, variant="hil").links}["imu_line"]
+    unit = quadvis.load(FLIGHT, variant="flight").graph["craft"].block
+    assert message_of(unit.sender).layout == bench.message.layout
+    assert unit.settings.baud == bench.baud
+
+
+@pytest.mark.slow
+def test_each_port_that_is_missing_is_reported_in_a_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", str(FLIGHT), "--variant", "flight", "--real-time", "--log", ""]) == 1
+    lines = [line for line in capsys.readouterr().err.splitlines() if " is missing; " in line]
+    assert [line.partition(":")[0] for line in lines] == [
+        *("block 'craft'", "block 'eyes'", "block 'outputs'", "link 'circle_line'", "link 'circle_line'")
+    ]
 
 
 @pytest.mark.slow
@@ -66,3 +116,41 @@ def test_the_bench_flies_as_the_desk_does_and_is_replayed_to_the_bit(tmp_path: P
     assert json.loads(held.summary["real time"])["lost_rows"] == 0
     again = quadvis.replay(log)
     assert again.same and again.rows > 10_000
+
+
+@pytest.mark.slow
+def test_the_flight_flies_with_stand_ins_for_its_devices(tmp_path: Path) -> None:
+    """The camera is one of the network, radio and inertial unit are ptys, and a simulated world is behind.
+
+    It flies until it has flown for a while, however late everybody is, and is ended by Ctrl-C. Whether it
+    holds its place is judged if the machine has kept the times.
+    """
+    log, airborne = tmp_path / "flight.mcap", tmp_path / "airborne.yaml"
+    airborne.write_text(AIRBORNE.format(FLIGHT))
+    with World(tmp_path) as world:
+        ports = {"camera": world.camera, "imu": world.imu, "rc": world.rc, "eyes.exposure": "0 s"}
+        settings = [text for name, value in ports.items() for text in ("--set", f"{name}={value}")]
+        command = ["run", str(airborne), "--real-time", "--priority", "0", "--log", str(log), *settings]
+        flight = subprocess.Popen([sys.executable, "-m", "quadvis", *command], stderr=subprocess.DEVNULL)
+        end = time.monotonic() + PATIENCE
+        while len(world.positions) < FLOWN and flight.poll() is None and time.monotonic() < end:
+            time.sleep(0.05)
+        flown = np.array(world.positions)
+        members = children(flight)
+        flight.send_signal(signal.SIGINT)
+        assert flight.wait(PATIENCE) == 130
+    assert len(flown) >= FLOWN and len(members) >= 4
+    assert all(gone(member) for member in members)
+    held = read_log(log)
+    age = held.times("craft.age")
+    missed = 1 - len(age) / (age[-1] / 20e-3)  # one row in two is logged
+    if world.latest < LATE and missed < MISSED:
+        assert np.abs(flown - [0, 0, 1.5]).max() < 1.0
+        assert held["detector.lost"].sum() <= 2
+    fresh = held["eyes.fresh"]
+    assert fresh.sum() >= 20 and (np.diff(held["eyes.stamp"][fresh]) > 0).all()
+    assert held["detector.fresh"].sum() >= 20 and held["detector.found"].sum() >= 10
+    for counter in ("eyes.refused", "craft.refused", "circle_line.refused"):
+        assert held[counter].max() <= 1
+    assert held["craft.age"].size > FLOWN / 2 and world.commands > 100
+    assert quadvis.replay(log).same

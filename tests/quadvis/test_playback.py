@@ -110,7 +110,7 @@ class Flown(Simulated):
     def __init__(self, diagram: Diagram) -> None:
         super().__init__(diagram, "python", None)
         parts = live_parts(diagram.graph)
-        self.computers, self.graphs = [*parts], [*parts.values()]
+        self.computers, self.graphs = parts, [*parts.values()]
 
 
 @pytest.mark.usefixtures("folder")

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import yaml
 
+import quadvis
 from benchmarks.commands import QUADVIS, kept, seconds
 from benchmarks.rows import ROOT, Row, medians
+from quadvis.graph.devices import devices
 
 ENGINES = ("python", "native", "auto")
 
@@ -25,7 +26,7 @@ def choices(rounds: int, options: Sequence[str] = ("--log", "")) -> Iterator[Row
         shutil.copytree(ROOT / "diagrams", folder)  # some diagrams write files beside themselves
         for path in sorted(folder.glob("*.yaml")):
             variants = yaml.safe_load(path.read_text()).get("variants", {})
-            for variant in ("", *(name for name in variants if not _has_ports(variants[name]))):
+            for variant in ("", *(name for name in variants if not _has_devices(path, name))):
                 of = ("--variant", variant) if variant else ()
                 command = (*QUADVIS, "run", str(path), *of, *options, "--engine")
                 works: dict[str, Callable[[], float]] = {
@@ -40,6 +41,6 @@ def choices(rounds: int, options: Sequence[str] = ("--log", "")) -> Iterator[Row
                 yield Row(what, auto - min(python, native), "s of CPU", None, "<= 0.3")
 
 
-def _has_ports(variant: Mapping[str, Any]) -> bool:
+def _has_devices(path: Path, variant: str) -> bool:
     """Return whether blocks of a variant reach a port, which only a real-time run may do."""
-    return any("port" in block.get("with", {}) for block in variant.get("slots", {}).values())
+    return any(devices(quadvis.load(path, variant=variant).graph))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from quadvis.errors import QuadvisError
 from quadvis_vision.calibrate.colour_names import check_order
 from quadvis_vision.calibrate.colour_search import RADIUS_MAX, RADIUS_MIN, Sighting, find_circles
-from quadvis_vision.detection.circles import Pixels, CircleTarget
+from quadvis_vision.detection.circles import CircleTarget, Pixels
 from quadvis_vision.detection.colour_provenance import DIGITS, ColourEvidence
 from quadvis_vision.detection.colours import NAMES, THRESHOLD, ColourCalibration
 from quadvis_vision.detection.detect import search

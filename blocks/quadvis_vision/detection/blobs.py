@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from quadvis_vision.detection.circles import Ceiling, Pixels, CircleTarget, mean, over
+from quadvis_vision.detection.circles import Ceiling, CircleTarget, Pixels, mean, over
 from quadvis_vision.detection.colours import Colour
 from quadvis_vision.detection.square import Blob
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis_vision.detection.blobs import looks
-from quadvis_vision.detection.circles import SMALLEST, Ceiling, Disc, Pixels, CircleTarget, locate, refine
+from quadvis_vision.detection.circles import SMALLEST, Ceiling, CircleTarget, Disc, Pixels, locate, refine
 from quadvis_vision.detection.colours import Colour
 from quadvis_vision.detection.partial import Known, three_of_four, two_of_four, whole
 from quadvis_vision.detection.square import (

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis_vision.detection.blobs import looks
-from quadvis_vision.detection.circles import Ceiling, Disc, Pixels, CircleTarget, discs, locate
+from quadvis_vision.detection.circles import Ceiling, CircleTarget, Disc, Pixels, discs, locate
 from quadvis_vision.detection.detect import (
     QUALITY_MIN,
     CirclePlace,

@@ -6,13 +6,14 @@ from typing import Any, NamedTuple
 
 from quadvis.diagram.sections.blocks import BLOCKS
 from quadvis.diagram.sections.computers import COMPUTERS
-from quadvis.diagram.sections.forms import TEXT, Schema, closed, list_of
+from quadvis.diagram.sections.forms import TEXT, Schema, closed
 from quadvis.diagram.sections.links import LINKS
 from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.rates import RATES
 from quadvis.diagram.sections.section import FileSection, Section
 from quadvis.diagram.sections.summary import SUMMARY
 from quadvis.diagram.sections.variants import VARIANTS
+from quadvis.diagram.sections.without import Without, names_schema, read_names
 from quadvis.document import YamlMap, YamlNode
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown
 
@@ -59,9 +60,6 @@ class BaseSection(FileSection[BaseSpec | Unknown | None]):
         return {"anyOf": [TEXT, chosen], "description": "the diagram on which this one stands"}
 
 
-Without = dict[str, dict[str, Place]]  # by section: the names, and where they are written
-
-
 class WithoutSection(FileSection[Without]):
     """The entries of the base that are taken away."""
 
@@ -73,17 +71,11 @@ class WithoutSection(FileSection[Without]):
 
     def read(self, node: YamlNode | None, faults: Faults) -> Without:
         """Return the names, by section."""
-        fields = faults.collect(node.fields, (), WITHOUT_KEYS, faults) if node is not None else None
-        found: Without = {}
-        for key, names in fields.pairs() if fields is not None else ():
-            items = faults.collect(names.items) or []
-            texts = [(faults.collect(item.text), item.place) for item in items]
-            found[key.value] = {text: place for text, place in texts if text is not None}
-        return found
+        return read_names(node, WITHOUT_KEYS, faults)
 
     def schema(self) -> Schema:
         """Return the schema: lists of names by section."""
-        return closed(WITHOUT_KEYS, {key: list_of(TEXT, "names of the base") for key in WITHOUT_KEYS})
+        return names_schema(WITHOUT_KEYS)
 
 
 BASE, WITHOUT = BaseSection(), WithoutSection()

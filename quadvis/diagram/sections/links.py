@@ -110,11 +110,24 @@ def link_values(
     """Return what a link says of its carrier, as `Link` takes it; a parameter may stand for any value."""
     found: dict[str, Any] = {}
     for key, node in spec.fields.items():
-        value = substitute(node, params, faults)
+        value = _substituted(node, params, faults)
         read = faults.read(_READERS[key], value) if known(value) else UNKNOWN
         if known(read):
             found["ports" if key == "port" else key] = read
     return found if len(found) == len(spec.fields) else UNKNOWN
+
+
+def _substituted(
+    node: YamlNode, params: Mapping[str, YamlNode | Unknown], faults: Faults
+) -> YamlNode | Unknown:
+    """Return a value with parameters replaced, also those of the two ports."""
+    if not isinstance(node, YamlMap) or not set(node) <= {*ENDS}:
+        return substitute(node, params, faults)
+    found = {key: substitute(value, params, faults) for key, value in node.values.items()}
+    whole = {key: value for key, value in found.items() if known(value)}
+    if len(whole) < len(found):
+        return UNKNOWN
+    return YamlMap(node.keys, whole, node.file, node.line, node.column, node.key)
 
 
 def _baud(node: YamlNode) -> int:

@@ -121,7 +121,7 @@ def test_a_picture_that_is_too_large_stops_the_sender_in_a_sentence() -> None:
 
 def test_none_stays_open_if_one_end_cannot_be_opened() -> None:
     graph = network(made_link(SLOW, FAST), SLOW, FAST)
-    with pytest.raises(QuadvisError, match="port '/dev/none' is missing"):
+    with pytest.raises(QuadvisError, match=r"^link 'line', sender: port '/dev/none' is missing"):
         open_carriers(graph.part_of("near"), {"line": "/dev/none"})
 
 

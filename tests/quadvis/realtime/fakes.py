@@ -22,7 +22,7 @@ from quadvis.realtime.control import SharedMemory
 from quadvis.realtime.crew import Crew, lead
 from quadvis.realtime.pacer import Pacer
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
-from quadvis.realtime.streams import RowStream
+from quadvis.realtime.streams import RowStream, room_for
 from quadvis.realtime.times import TaskTimes
 
 ROOM = 64  # words for a group of parameters
@@ -59,12 +59,17 @@ class FakeClock:
         self.sleeps = 0
         self._functions = C_FUNCTION(self._get), C_FUNCTION(self._wait)
         self.words = machine_words(*self._functions)
-        self.words[clocks.START] = BEFORE
+        self.words[clocks.START] = self.words[clocks.BASE] = BEFORE
+        self.shift = 0
 
     def now(self) -> int:
-        return self.instant
+        return self.instant - self.shift
+
+    def follow(self, shift: int) -> None:
+        self.shift = shift
 
     def sleep(self, until: int) -> None:
+        until += self.shift
         self.instant = max(self.instant, until) + self.late.get(self.sleeps, 0)
         self.sleeps += 1
 
@@ -74,7 +79,7 @@ class FakeClock:
 
     def _wait(self, _: int, __: int, place: int, ___: int) -> int:
         until = Timespec.from_address(place).value - BEFORE
-        self.sleep(until)
+        self.sleep(until - self.shift)
         return 0 if self.instant >= until else errno.EINTR
 
 
@@ -131,16 +136,20 @@ class Paced:
         limits: OverloadLimits = WARN,
         streams: Sequence[RowStream] = (),
         engine: str = "python",
+        computer: str = "",
     ) -> None:
         graph, self._clock = diagram.graph, clock
         rings = [stream.ring for stream in streams]
-        words = np.zeros(SharedMemory.size(len(graph.tasks), rings, ROOM), np.int64)
-        self.shared = SharedMemory(words, len(graph.tasks), rings, ROOM)
+        rooms = [room_for(task.period) for task in graph.tasks]
+        words = np.zeros(SharedMemory.size(rooms, rings, ROOM), np.int64)
+        self.shared = SharedMemory(words, rooms, rings, ROOM)
         self.schedule = Schedule.of(graph)
         self._tasks = graph.tasks
         names = [task.name for task in graph.tasks]
         each = [limits.of(name) for name in names]
-        self.pacer = Pacer(self.schedule, names, each, self.shared, clock, lambda: self.engine.hold_safe())
+        self.pacer = Pacer(
+            self.schedule, names, each, self.shared, clock, lambda: self.engine.hold_safe(), computer
+        )
         self.engine = Engine(graph, diagram.seed, self.pacer)
         self.pacer.write_into(self.engine.memory)
         native, choice = engine == NATIVE, choose(self.engine, 10**9, engine)

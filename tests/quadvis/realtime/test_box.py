@@ -34,7 +34,7 @@ def put(paced: Paced, values: dict[tuple[str, str], float], tasks: int = -1, not
 
 
 def noted(paced: Paced) -> list[list[int]]:
-    return np.array(paced.shared.noted.take(last=True)).tolist()
+    return np.array(paced.shared.notes.groups.take(last=True)).tolist()
 
 
 @engines

@@ -57,6 +57,7 @@ def test_a_lane_says_when_to_look_again() -> None:
 def test_a_cable_carries_bytes_both_ways_and_ends_with_its_supervisor() -> None:
     cables = Cables(multiprocessing.get_context("spawn"), [Cable("one", SBUS), Cable("two", SBUS)], 0)
     cables.start()
+    cables.make()
     try:
         ends = [open_port(path, SBUS) for name in ("one", "two") for path in cables.ends[name]]
         data = [os.urandom(300) for _ in ends]

@@ -144,17 +144,17 @@ def test_a_tick_of_a_slow_task_that_the_fastest_overran_begins_late(engine: str)
 def test_a_task_waits_for_outputs_of_a_faster_one_that_are_under_way() -> None:
     made, clock = diagram(), CrewClock()
     paced = Paced(made, clock)
-    plan, shared, times, *_, crew, memory = paced.pacer.words
+    plan, shared, times, noted, *_, crew, memory = paced.pacer.words
     row = dispatch.HEAD + 2 * dispatch.ROW
     own = memoryview(np.array([0, 1], np.int64))
 
     def state() -> tuple[int, int]:
         return crew[row + dispatch.STATE], crew[row + dispatch.WAITS]
 
-    assert dispatch.release(plan, shared, times, crew, memory, 0) == GO
+    assert dispatch.release(plan, shared, times, noted, crew, memory, 0) == GO
     assert state() == (dispatch.IDLE, 0)
     dispatch.hand_over(crew, memory, own[:1])
-    assert dispatch.release(plan, shared, times, crew, memory, 2) == GO
+    assert dispatch.release(plan, shared, times, noted, crew, memory, 2) == GO
     assert state() == (dispatch.BUSY, 2)
     dispatch.hand_over(crew, memory, own[:1])
     assert state() == (dispatch.BUSY, 1)

@@ -22,22 +22,24 @@ from tests.quadvis.realtime.ptys import Pty, ptys
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="ports are Linux's")
 
 
-def guard_of(*lines: Pty) -> tuple[Guard, Any]:
-    """Return a guardian that is not started yet, and its words."""
+def started(*lines: Pty) -> tuple[Guard, Any, list[OutputPort]]:
+    """Return a guardian that is started, its words, and its ports, which it has not opened yet."""
     context = multiprocessing.get_context("spawn")
     words = context.RawArray("q", words_for(len(lines)))
     ports = [
         OutputPort(f"out{number}", line.path, Line(10**6), 5_000_000, b"first", b"safe!")
         for number, line in enumerate(lines)
     ]
-    return Guard(context, ports, words, [], SAFE, Standing()), words
+    guard = Guard(context, words, [], SAFE, Standing())
+    guard.start()
+    return guard, words, ports
 
 
 def test_frames_come_from_its_own_process_until_it_is_closed() -> None:
     with ptys(1) as (line,):
-        guard, words = guard_of(line)
+        guard, words, ports = started(line)
         said: list[str] = []
-        guard.start(said.append)
+        guard.open(ports, said.append)
         assert said[0].startswith("real time, guardian: ")
         line.wait_for(b"first")
         outboxes(words)[0].put(b"going")
@@ -53,8 +55,8 @@ def test_frames_come_from_its_own_process_until_it_is_closed() -> None:
 @pytest.mark.slow
 def test_a_guardian_that_is_lost_is_replaced_by_the_supervisor_port_by_port() -> None:
     with ptys(2) as (line, other):
-        guard, _ = guard_of(line, other)
-        guard.start(lambda _: None)
+        guard, _, ports = started(line, other)
+        guard.open(ports, lambda _: None)
         other.wait_for(b"first")
         assert guard.process.pid is not None
         os.kill(guard.process.pid, signal.SIGKILL)
@@ -71,8 +73,16 @@ def test_a_port_that_refuses_is_the_error_of_the_start() -> None:
     with ptys(1) as (line,):
         missing = Pty()
         missing.close()
-        guard, _ = guard_of(line, missing)
+        guard, _, ports = started(line, missing)
         with pytest.raises(RunError, match=r"block 'out1': port '/dev/pts/\d+' is missing"):
-            guard.start(lambda _: None)
+            guard.open(ports, lambda _: None)
         line.wait_for(b"safe!")
         assert guard.close() == []
+
+
+@pytest.mark.slow
+def test_a_guardian_that_has_no_ports_yet_ends_when_it_is_asked() -> None:
+    with ptys(1) as (line,):
+        guard, _, _ = started(line)
+        guard.make_safe()
+        assert (guard.close(), guard.process.exitcode, line.read()) == ([], 0, b"")

@@ -97,7 +97,7 @@ class Rig:
     def follow(self) -> None:
         """Let a watched application command both ports."""
         self.application = self.process()
-        self.link.send(Watch(self.application.pid, 0))
+        self.link.send(Watch(self.application.pid))
         for box in self.boxes:
             box.put(b"going")
         self.until_wire(b"going", b"going")
@@ -153,10 +153,6 @@ def kill(made: Rig) -> None:
     made.application.kill()
 
 
-def finish_both(made: Rig) -> None:
-    made.control[control.LEFT] = made.other[control.LEFT] = control.AT_STOP_TIME
-
-
 def end_thread(made: Rig) -> None:
     made.control[control.START] = time.monotonic_ns() + 10**15
     made.loop_ends.set()
@@ -178,27 +174,13 @@ def lose_host(made: Rig) -> None:
     made.supervisor.kill()
 
 
-@pytest.mark.parametrize("cause", [kill, finish_both, end_thread, order, end, leave, lose_host])
+@pytest.mark.parametrize("cause", [kill, end_thread, order, end, leave, lose_host])
 def test_every_end_makes_all_ports_safe_for_ever(rig: Any, cause: Any) -> None:
     made = rig()
     made.follow()
     cause(made)
     made.stays_safe()
     assert made.alarms() == []  # the supervisor knows
-
-
-def test_a_loop_that_has_reached_the_stop_time_before_others_leaves_the_ports_to_them(rig: Any) -> None:
-    made = rig()
-    made.follow()
-    made.control[control.LEFT] = control.AT_STOP_TIME
-    made.application.kill()
-    made.until(lambda: made.guardian._applications.any_ended)
-    made.guardian.look()
-    assert not made.guardian.safe
-    made.boxes[0].put(b"still")
-    made.until_wire(b"still", b"going")
-    made.other[control.LEFT] = control.AT_STOP_TIME
-    made.stays_safe()
 
 
 def hang(made: Rig) -> None:

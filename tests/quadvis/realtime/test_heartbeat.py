@@ -14,7 +14,6 @@ from quadvis.realtime.schedule import Rhythm, Schedule
 
 MS = 10**6
 START = 10**9
-TICKS = 100
 SCHEDULE = Schedule(Fraction(1, 100), [Rhythm(1, 2), Rhythm(5, 3)])  # 100 Hz from 20 ms on, 20 Hz
 
 
@@ -25,7 +24,7 @@ class Loop:
         self.words = np.zeros(control.WORDS, np.int64)
         self.instant = -5
         allowed = OverloadLimits(**limits)  # type: ignore[arg-type]
-        patience = Patience.of("target", self.words, SCHEDULE, allowed, TICKS)
+        patience = Patience.of("target", self.words, SCHEDULE, allowed)
         self.heart = Heartbeat(patience, lambda: START + MS * self.instant)
 
     def start(self) -> Loop:
@@ -58,14 +57,6 @@ def test_a_step_that_does_not_end_hangs_after_two_periods() -> None:
     loop.begin(100)
     assert [loop.look(instant) for instant in (110, 120, 121)] == [Sign.WELL, Sign.WELL, Sign.HANGS]
     assert loop.heart.complaint == "the loop of 'target' has given no sign of life for 0.02 s"
-
-
-@pytest.mark.parametrize(("tick", "sign"), [(98, Sign.HANGS), (99, Sign.PAUSES)])
-def test_at_its_last_tick_a_loop_only_pauses(tick: int, sign: Sign) -> None:
-    loop = Loop(startup=0).start()
-    loop.words[control.TICK] = tick
-    loop.begin(10 * tick)
-    assert loop.look(10 * tick + 1000) is sign
 
 
 def test_a_loop_that_does_not_wake_hangs_after_two_periods() -> None:
@@ -105,15 +96,16 @@ def test_in_the_first_steps_and_with_warnings_a_loop_pauses_and_may_go_on() -> N
     assert warned.look(521) is Sign.PAUSES
 
 
-def test_a_loop_that_has_reached_the_stop_time_has_finished_and_not_died() -> None:
-    loop = Loop().start()
-    loop.words[control.LEFT] = control.AT_STOP_TIME
-    assert loop.look(10**6) is Sign.FINISHED
-    loop.words[control.END] = 1
-    assert loop.look(10**6) is Sign.ENDS
+def test_a_loop_that_waits_for_others_after_its_last_tick_gives_signs_of_life() -> None:
+    loop = Loop(startup=0).start()
+    loop.begin(20)
+    for instant in range(20, 500, 15):
+        loop.end()
+        assert loop.look(instant) is Sign.WELL
+    assert loop.look(530) is Sign.HANGS
 
 
-@pytest.mark.parametrize("word", [control.END, control.LEFT])
+@pytest.mark.parametrize("word", [control.END, control.LEFT, control.SAFE])
 def test_an_end_is_seen_whatever_the_loop_does(word: int) -> None:
     loop = Loop().start()
     loop.words[word] = 1

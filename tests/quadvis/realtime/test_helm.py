@@ -6,7 +6,6 @@ import math
 import os
 import signal
 import sys
-import threading
 import time
 from concurrent.futures import Future
 from contextlib import ExitStack
@@ -17,21 +16,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-import quadvis
 from quadvis import read_log, replay
-from quadvis.api import Diagram, load_text
+from quadvis.api import load_text
 from quadvis.block import ParameterError
 from quadvis.engine.tuning import NewValue
 from quadvis.errors import DiagramError, QuadvisError, RunError
 from quadvis.realtime.helm import ENDLESS, Helm
+from quadvis.realtime.note_taker import NoteTaker
 from quadvis.run.loops import Paced, Takers
-from quadvis.run.result import Result
-from quadvis.run.session import recorded
 from tests.processes import children, wait_for
+from tests.quadvis.realtime.steered import CALM, Steered
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="real time is Linux's")
 
-CALM = quadvis.RealTime(priority=0, poll="0 s")
 TEXT = """\
 quadvis: 1
 name: flight
@@ -70,41 +67,6 @@ def on_two_computers() -> str:
     return text
 
 
-class Steered:
-    """A run in a thread, with the helm in this one."""
-
-    def __init__(self, diagram: Diagram, engine: str = "python", log: Path | None = None) -> None:
-        self.helm, self.error = Helm(), None
-        self.result: Result | None = None
-        self._loop = Paced(diagram, engine, None, CALM, self.helm)
-        self._diagram, self._log = diagram, log
-        self._thread = threading.Thread(target=self._run)
-
-    def _run(self) -> None:
-        try:
-            self.result = recorded(self._diagram, self._loop, log=self._log, keep=("*",))
-        except BaseException as error:
-            self.error = error
-
-    def __enter__(self) -> Steered:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.helm.stop()
-        self._thread.join()
-
-    def reach(self, state: str) -> None:
-        wait_for(lambda: self.helm.state == state)
-
-    def end(self) -> Result:
-        self._thread.join()
-        if self.error is not None:
-            raise self.error
-        assert self.result is not None
-        return self.result
-
-
 def value(path: str, name: str, number: object) -> NewValue:
     return NewValue(path, name, number)
 
@@ -113,7 +75,7 @@ def tuned(steered: Steered, *values: NewValue) -> int:
     return steered.helm.tune(values).result(30)
 
 
-NOBODY = Takers([], [], lambda *_: None, lambda _: None, lambda *_: None)
+NOBODY = Takers([], [], NoteTaker(*3 * [lambda *_: None]), lambda _: None, lambda *_: None)
 
 
 def changes(log: Path) -> list[tuple[int, str, str, str]]:
@@ -132,7 +94,7 @@ def test_a_run_waits_at_the_helm_is_tuned_stopped_and_repeated(tmp_path: Path) -
             wrong.result(30)
         assert (helm.state, helm.tick, early.done()) == ("ready", 0, False)
         helm.begin()
-        assert early.result(30) == 0
+        first = early.result(30)  # 0, if the loop was not late
         steered.reach("running")
         with pytest.raises(QuadvisError, match="the run has begun"):
             helm.stop_time = 3.0
@@ -153,12 +115,13 @@ def test_a_run_waits_at_the_helm_is_tuned_stopped_and_repeated(tmp_path: Path) -
     log = read_log(tmp_path / "run.mcap")
     assert log.complete and log.summary["stopped"] == result.flight.early and log.summary["passed"] == "true"
     assert changes(tmp_path / "run.mcap") == [
-        (0, "law", "factor", "6.0"), (tick, "law", "factor", "8.0"), (tick, "back", "factor", "0.5"),
+        (first, "law", "factor", "6.0"), (tick, "law", "factor", "8.0"), (tick, "back", "factor", "0.5"),
     ]  # fmt: skip
     ticks = np.rint(result.times("law.y") / 0.005)
+    assert ticks[0] == first
     factor = np.where(ticks < tick, 6.0, 8.0)
     np.testing.assert_array_equal(result["law.y"], factor * result["noise.y"])
-    assert result["ramp.y"][-1] == pytest.approx(helm.time)
+    assert result.times("ramp.y")[-1] == helm.time
     found = replay(log, engine="python")
     assert found.same and not found.whole and found.time == helm.time
 
@@ -194,7 +157,9 @@ def test_many_changes_are_all_taken_and_a_replay_has_the_same_bits(
 @pytest.mark.slow
 def test_several_computers_change_at_one_tick(tmp_path: Path) -> None:
     with Steered(load_text(on_two_computers()), log=tmp_path / "run.mcap") as steered:
+        early = steered.helm.tune([value("law", "factor", 0.5), value("back", "factor", 0.5)])
         steered.helm.begin()
+        early.result(30)
         steered.reach("running")
         tick = 0
         for number in (1.0, 2.0, 3.0):
@@ -204,12 +169,15 @@ def test_several_computers_change_at_one_tick(tmp_path: Path) -> None:
         result = steered.end()
     assert set(steered.helm.times()) == {"near", "far"}
     found = changes(tmp_path / "run.mcap")
-    for number in ("1.0", "2.0", "3.0"):
+    for number in ("0.5", "1.0", "2.0", "3.0"):
         near, far = (
             next(each[0] for each in found if each[1] == path and each[3] == number)
             for path in ("law", "back")
         )
-        assert abs(near - far) < 4  # 'back' is due at every fourth tick
+        for signal_name, own in (("law.y", near), ("integral.y", far)):  # at every tick of their computers
+            ticks = np.rint(result.times(signal_name) / 0.005)
+            before = 0 if number == "0.5" else min(near, far)
+            assert not ((ticks >= before) & (ticks < own)).any()
     assert result.flight is not None and result.flight.early
     assert replay(tmp_path / "run.mcap").same
 
@@ -220,8 +188,43 @@ def test_the_stop_time_is_set_at_the_helm(tmp_path: Path) -> None:
         steered.helm.begin()
         result = steered.end()
     assert result.flight is not None and result.flight.early == "its stop time was set to 100 ms"
-    assert (result.duration, result["ramp.y"][-1]) == (0.1, pytest.approx(0.1))
+    assert result.duration == 0.1 and result["ramp.y"][-1] <= 0.1
     assert result.passed and replay(tmp_path / "run.mcap").same
+
+
+@pytest.mark.slow
+def test_computers_wait_for_each_other_at_the_stop_time_that_was_set(tmp_path: Path) -> None:
+    text = on_two_computers().replace("slow: 50 Hz", "slow: 5 Hz")
+    with Steered(load_text(text), log=tmp_path / "run.mcap") as steered:
+        steered.helm.stop_time = "310 ms"
+        steered.helm.begin()
+        result = steered.end()
+    assert result.flight is not None and result.flight.early == "its stop time was set to 310 ms"
+    assert [share.ticks for share in result.flight.shares] == [63, 63]
+    (fast,) = [task for share in result.flight.shares for task in share.tasks if task.task == "fast"]
+    assert fast.steps + fast.overruns == 63 and result.duration == 0.31
+    assert result.passed and replay(tmp_path / "run.mcap").same
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_a_computer_that_waits_for_others_at_the_stop_time_is_stopped(engine: str, tmp_path: Path) -> None:
+    text = on_two_computers().replace("slow: 50 Hz", "slow: 0.01 Hz")
+    text = text.replace("block: signal.integrator,", "block: signal.gain, rate: slow,")
+    with Steered(load_text(text), engine, tmp_path / "run.mcap") as steered:
+        steered.helm.begin()
+        steered.reach("running")
+        tuned(steered, value("law", "factor", 3.0))
+        steered.until(lambda: all(task.steps + task.overruns for task in steered.helm.times()["far"]))
+        near = steered.helm.times()["near"][0].steps
+        steered.until(lambda: steered.helm.times()["near"][0].steps > near + 20)
+        steered.helm.stop()
+        result = steered.end()
+    assert result.flight is not None
+    assert result.flight.early == f"it was stopped at t = {result.times('law.y')[-1]:.9g} s"
+    assert result.duration == result.times("law.y")[-1] > steered.helm.time == 0
+    assert len(result["back.y"]) <= 1 and len(result["law.y"]) > 20
+    assert replay(tmp_path / "run.mcap").same
 
 
 @pytest.mark.slow
@@ -235,7 +238,8 @@ def test_a_run_without_end_is_stopped(text: str, engine: str) -> None:
         steered.helm.stop()
         result = steered.end()
     assert result.flight is not None and "stopped at" in result.flight.early
-    assert result.times("ramp.y")[-1] == steered.helm.time >= 0.15
+    # Tasks in threads may not have begun the last tick for which they were released.
+    assert result.times("integral.y")[-1] == steered.helm.time >= 0.15
 
 
 def test_a_run_that_has_not_begun_is_stopped_and_can_lose_a_process(tmp_path: Path) -> None:

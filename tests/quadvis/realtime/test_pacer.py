@@ -104,6 +104,26 @@ def test_a_tick_runs_late_until_the_next_one_is_due() -> None:
     assert times.lateness.most == (MS - 1) / 1e9
 
 
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_ticks_are_due_later_or_earlier_as_the_supervisor_shifts_them(engine: str) -> None:
+    clock = FakeClock()
+    paced = Paced(diagram(), clock, engine=engine)
+    starts: list[int] = []
+    shifts = {20: 300_000, 60: -200_000}
+
+    def note(tick: int) -> None:
+        starts.append(clock.instant)
+        paced.shared.control[control.SHIFT] = shifts.get(tick, paced.shared.control[control.SHIFT])
+
+    paced.engine.observe("fast", note)
+    times = paced.run(100)["fast"]
+    expected = [tick * MS + (0 if tick <= 20 else 300_000 if tick <= 60 else -200_000) for tick in range(100)]
+    assert starts == expected
+    assert (times.steps, times.overruns) == (100, 0)
+    assert times.lateness is not None
+    assert times.lateness.most == 0.0
+
+
 def test_time_follows_the_ticks_and_the_period_does_not() -> None:
     clock = FakeClock()
     paced = Paced(diagram(), clock)
@@ -180,7 +200,8 @@ def told(engine: str, takes: dict[int, float], late: dict[int, float], limits: O
         bytes(paced.shared.control),
         clock.instant,
         message,
-        (paced.shared.left_out.take(last=True).tolist()),
+        (paced.shared.notes.left_out.take(last=True).tolist()),
+        [ring.take(last=True).tolist() for ring in paced.shared.notes.times],
     )
 
 
@@ -271,6 +292,13 @@ def test_a_loop_that_wakes_late_says_so() -> None:
 )
 def test_the_limits_of_xpc_target(limits: OverloadLimits, takes: dict[int, float], stops: bool) -> None:
     assert bool(overloaded(takes, limits)) == stops
+
+
+def test_where_there_are_computers_an_overload_names_its_own() -> None:
+    paced = Paced(diagram(), FakeClock(), OverloadLimits(startup=0), computer="world")
+    busy(paced, paced.pacer.clock, {10: 1.5})
+    with pytest.raises(RunError, match=r"task 'fast' of 'world': overload limit \(0\) exceeded"):
+        paced.run(20)
 
 
 def test_the_first_steps_of_a_slow_task_may_last() -> None:

@@ -15,13 +15,14 @@ import quadvis
 from quadvis import Log, read_log, replay
 from quadvis.api import load_text
 from quadvis.cli import main
+from quadvis.engine.tuning import NewValue
 from quadvis.errors import QuadvisError
 from tests.processes import children, gone, wait_for
 from tests.quadvis.realtime.fakes import FakeClock, Paced
+from tests.quadvis.realtime.steered import CALM, Steered
 from tests.quadvis.relogged import rewritten, without
 
 FAR = {"integral": "far", "delayed": "far"}
-CALM = quadvis.RealTime(priority=0, poll="0 s")
 TEXT = """\
 quadvis: 1
 name: flight
@@ -38,6 +39,9 @@ blocks:
   delayed: {block: signal.gain, rate: slow, in: {u: {from: integral.y, across: delay}}}
 log: {every: {fast: 4}}
 """
+BACK = """\
+  back: {block: signal.gain, rate: fast, in: {u: {from: delayed.y, across: newest}}}
+  sum: {block: signal.sum, rate: fast, in: {a: back.y,"""
 COUNTER = '''
 """A block that reads a clock, which never says the same twice, and sometimes too slowly."""
 
@@ -100,6 +104,92 @@ def test_a_run_with_overruns_is_the_same_to_the_bit() -> None:
         replay(rewritten(log, without("/_replay/left_out", longest)))
 
 
+DRAG = '''
+"""A block that is sometimes too slow for its task."""
+
+import time as clock
+
+from quadvis.block import Block, In, Out, Param, State
+
+
+class Drag(Block, numeric=False):
+    """Adds up its input, and amplifies it."""
+
+    u = In(unit="m")
+    y = Out(unit="m")
+    factor = Param(1.0, tune=True)
+    count = State()
+    sum = State()
+
+    def output(self, u):
+        factor = self.factor
+        if self.count in (2, 5, 6):
+            clock.sleep(0.09)
+        assert self.factor == factor
+        return self.sum + factor * u
+
+    def update(self, u):
+        self.count += 1.0
+        self.sum += u
+'''
+
+
+def write_dragged() -> None:
+    """Write a diagram whose tasks run by themselves and miss ticks."""
+    Path("blocks/own/drag.py").write_text(DRAG)
+    text = TEXT.replace("seed: 7", "seed: 7\ntasking: multi").replace("across: hold", "across: newest")
+    text = text.replace("  delayed: {block: signal.gain,", "  delayed: {block: own.drag,")
+    text = text.replace("  sum: {block: signal.sum, rate: fast, in: {a: noise.y,", BACK)
+    text = text.replace("from: integral.y, across: delay", "from: sum.y, across: newest")
+    Path("flight.yaml").write_text(text)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="real time is Linux's")
+def test_tasks_that_run_by_themselves_are_the_same_to_the_bit_with_what_each_missed() -> None:
+    write_dragged()
+    result = quadvis.load("flight.yaml").run(log="run.mcap", real_time=CALM)
+    assert result.flight is not None
+    tasks = {each.task: each for each in result.flight.shares[0].tasks}
+    assert tasks["slow"].overruns >= 2 and tasks["fast"].overruns >= 3 * 4
+    log = read_log("run.mcap")
+    missed = log.hidden.arrays("/_replay/releases")[1]
+    assert missed[:, 2].sum() == sum(each.overruns for each in result.flight.shares[0].tasks[1:])
+    assert len(log["delayed.y"]) == tasks["slow"].steps
+    for name, task in tasks.items():
+        assert len(log[f"_times/{name}.lateness"]) == task.steps
+    found = replay(log, output="new.mcap")
+    assert found.same and found.whole
+    assert replay("new.mcap").same
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="real time is Linux's")
+def test_tasks_that_are_tuned_and_miss_ticks_are_the_same_to_the_bit_when_the_run_is_stopped() -> None:
+    write_dragged()
+    with Steered(quadvis.load("flight.yaml"), log=Path("run.mcap")) as steered:
+        steered.helm.stop_time = "60 s"
+        steered.helm.begin()
+        steered.reach("running")
+        ticks = []
+        for number in range(40):
+            group = {"delayed": 1.0 + number, "back": 0.5 / (1 + number)}
+            values = [NewValue(path, "factor", value) for path, value in group.items()]
+            ticks.append(steered.helm.tune(values).result(30))
+        wait_for(lambda: steered.helm.tick > ticks[-1] + 20)
+        steered.helm.stop()
+        result = steered.end()
+    assert result.flight is not None and "stopped at" in result.flight.early
+    tasks = {each.task: each for each in result.flight.shares[0].tasks}
+    assert tasks["slow"].overruns >= 2 and tasks["fast"].overruns >= 3 * 4
+    log = read_log("run.mcap")
+    assert [int(each["tick"]) for each in log.changes] == [tick for tick in ticks for _ in range(2)]
+    assert ticks == sorted(set(ticks))
+    found = replay(log, output="new.mcap")
+    assert found.same and not found.whole
+    assert replay("new.mcap").same and read_log("new.mcap").changes == log.changes
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="real time is Linux's")
 @pytest.mark.parametrize("via", ["memory", "serial, baud: 230400"])
@@ -154,6 +244,6 @@ def test_the_loop_notes_each_run_of_ticks_that_it_leaves_out() -> None:
     ran: list[int] = []
     paced.engine.observe("continuous", ran.append)
     paced.run(60)
-    found = np.array(paced.shared.left_out.take(last=True))
+    found = np.array(paced.shared.notes.left_out.take(last=True))
     missed = [tick for first, count in found.tolist() for tick in range(first, first + count)]
     assert len(found) == 2 and sorted(missed + ran) == list(range(60))

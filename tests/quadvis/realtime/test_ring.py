@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadvis.realtime.ring import RecordRing, put_pair
+from quadvis.realtime.ring import RecordRing
 
 
 @given(
@@ -70,21 +70,3 @@ def test_the_words_of_a_ring_are_exactly_used(room: int) -> None:
         ring.put(number + 1, memoryview(np.full(2, 9, np.int64)).cast("B"), [slice(0, 16)])
     assert words[-1] == 9
     assert ring.lost == 0
-
-
-@given(st.integers(1, 5), st.lists(st.one_of(st.integers(1, 4), st.just("take")), max_size=30))
-def test_pairs_are_records_of_two_words(room: int, actions: list[int | str]) -> None:
-    made = [memoryview(np.zeros(RecordRing.size(room, 2), np.int64)) for _ in range(2)]
-    rings = [RecordRing(words, room, 2) for words in made]
-    raw, number = memoryview(np.zeros(1, np.int64)).cast("B").cast("q"), 0
-    for action in actions:
-        if action == "take":
-            one, two = (ring.take() for ring in rings)
-            assert one.tolist() == two.tolist()
-            continue
-        for _ in range(int(action)):
-            raw[0] = -number
-            rings[0].put(number, raw.cast("B"), [slice(0, 8)])
-            put_pair(rings[1].words, room, number, -number)
-            number += 1
-    assert bytes(made[0]) == bytes(made[1])

@@ -33,7 +33,7 @@ def test_the_next_and_the_latest_due_tick_are_those_of_a_list(
     ticks = [each for each in range(COUNT) if any(due(rhythm, each) for rhythm in rhythms)]
     deadline = {each: floor(each * period * 10**9) for each in range(COUNT)}
     assert all(schedule.deadline(each) == deadline[each] for each in deadline)
-    plan = make_plan(schedule, [OverloadLimits()] * len(rhythms))
+    plan = make_plan(schedule, [OverloadLimits()] * len(rhythms), [1] * len(rhythms))
     assert all(grid.deadline(plan, each) == deadline[each] for each in deadline)
     assert grid.following(plan, tick, instant) == min(
         each for each in ticks if each >= tick and deadline[each] >= instant
@@ -57,7 +57,7 @@ def test_the_grid_has_no_drift_in_a_year(rate: str) -> None:
     year = 365 * 24 * 3600
     tick = floor(year / graph.tick)
     assert schedule.deadline(tick) == floor(tick * graph.tick * 10**9)
-    plan = make_plan(schedule, [OverloadLimits()])
+    plan = make_plan(schedule, [OverloadLimits()], [1])
     assert grid.deadline(plan, tick) == schedule.deadline(tick)
     assert grid.following(plan, 0, year * 10**9 - 10**9) - tick == pytest.approx(-1 / graph.tick, abs=1)
     assert schedule.interval == floor(graph.tick * 10**9)

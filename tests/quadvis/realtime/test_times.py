@@ -48,6 +48,14 @@ def test_the_spread_is_that_of_the_times(found: list[int]) -> None:
         for part, given_as in ((0.99, spread.p99), (0.999, spread.p999)):
             exact = np.quantile(found, part, method="inverted_cdf") / 1e9
             assert exact <= given_as <= min(exact * 17 / 16 + 1e-9, spread.most)
+        edges = [edge for start, end, _ in spread.bins for edge in (start, end)]
+        assert edges == sorted(edges)
+        counts = [
+            sum(start * 1e9 - 0.1 < each < end * 1e9 - 0.1 for each in found) for start, end, _ in spread.bins
+        ]
+        assert counts == [count for _, _, count in spread.bins] and sum(counts) == len(found)
+        facts = spread.facts()["histogram"]
+        assert [tuple(each.values()) for each in facts] == list(spread.bins)
 
 
 def test_a_task_without_a_step_has_no_times() -> None:

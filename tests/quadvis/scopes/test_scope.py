@@ -295,3 +295,16 @@ def test_a_new_run_begins_at_tick_0_and_finds_running_scopes_waiting() -> None:
     assert [each.sequence for each in bench.packages] == [0, 1]
     bench.board.end()
     assert bench.status() == "Interrupted"
+
+
+def test_scopes_trigger_each_other_in_the_order_of_ticks_in_one_batch_too() -> None:
+    bench = Bench(
+        {"NumSamples": 10},
+        {"NumSamples": 2, "TriggerMode": "Scope", "TriggerScope": 1, "TriggerSample": 3, "Type": "target"},
+        {"NumSamples": 1, "TriggerMode": "Scope", "TriggerScope": 2, "TriggerSample": -1, "AutoRestart": 1},
+    )
+    for number in (1, 2, 3):
+        bench.board.start(number)
+    bench.to(50)
+    assert bench.ticks(2) == [[3, 4], [13, 14], [23, 24], [33, 34], [43, 44]]
+    assert bench.ticks(3) == [[5], [15], [25], [35], [45]]

@@ -157,7 +157,9 @@ def test_a_bundle_is_the_same_as_data() -> None:
 
 def test_a_block_with_another_source_is_refused(store: Store) -> None:
     bundle = sent(store, HOVER)
-    other = ApplicationBundle.read(bundle.plain() | {"sources": {**bundle.sources, "vision.pose_n_points": "0" * 64}})
+    other = ApplicationBundle.read(
+        bundle.plain() | {"sources": {**bundle.sources, "vision.pose_n_points": "0" * 64}}
+    )
     with pytest.raises(QuadvisError, match=r"'vision.pose_n_points' is not the same on host and target"):
         admit(other, store.place(other))
 

@@ -152,15 +152,20 @@ class Proxy:
     def __init__(self, port: int, change: Callable[[int, bytes], bytes] = lambda count, data: data) -> None:
         self.sent = bytearray()
         self._port, self._change = port, change
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.port = int(self._listener.getsockname()[1])
+        self.port = 0
         self._open: list[socket.socket] = []
-        threading.Thread(target=self._accept, daemon=True).start()
+        self.listen()
 
-    def _accept(self) -> None:
+    def listen(self) -> None:
+        """Listen, again at the same port after `close`."""
+        self._listener = socket.create_server(("127.0.0.1", self.port))
+        self.port = int(self._listener.getsockname()[1])
+        threading.Thread(target=self._accept, args=(self._listener,), daemon=True).start()
+
+    def _accept(self, listener: socket.socket) -> None:
         while True:
             try:
-                near, _ = self._listener.accept()
+                near, _ = listener.accept()
                 far = socket.create_connection(("127.0.0.1", self._port))
             except OSError:
                 return
@@ -185,7 +190,7 @@ class Proxy:
         self._open.clear()
 
     def close(self) -> None:
-        self._listener.close()
+        with_shutdown(self._listener)  # else the thread that waits there takes one more
         self.cut()
 
 

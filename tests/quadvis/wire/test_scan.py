@@ -85,6 +85,7 @@ def nested(levels: int) -> bytes:
 BOMBS = {
     "a million empty maps": b"\xdd" + struct.pack(">I", 1_000_000) + b"\x80" * 1_000_000,
     "maps by the number of lists": (b"\xdc\xff\xff" + b"\xdc\x00\x40" * 65535)[: 1 << 18],
+    "whole lists of whole lists": b"\xdc\x01\x2c" + (b"\xdc\x01\x2c" + b"\xc0" * 300) * 300,
     "a list longer than any memory": b"\xdd\xff\xff\xff\xff",
     "a map longer than any memory": b"\xdf\xff\xff\xff\xff",
     "a text longer than the message": b"\xdb\xff\xff\xff\xff",

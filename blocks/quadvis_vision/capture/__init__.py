@@ -1,0 +1,1 @@
+"""Cameras: devices found, opened within time limits, set up, and read by a process of their own."""

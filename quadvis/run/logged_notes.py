@@ -1,0 +1,61 @@
+"""What loops have noted in a real-time run, on its way into the log: ticks left out, releases, times."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadvis.graph.graph import MULTI, Graph
+from quadvis.output.recording import RecordedBlock
+from quadvis.output.stretch import stamps_of
+from quadvis.realtime.note_taker import NoteTaker
+from quadvis.run.rows import left_out, releases, times_of
+
+if TYPE_CHECKING:
+    from quadvis.output.log import LogWriter
+
+NANOSECOND = 1e-9  # s
+Whole = NDArray[np.int64]
+
+
+class LoggedNotes:
+    """The topics of the notes of computers, whose ``graphs`` are given by their names.
+
+    ``blocks`` describes them; they follow ``before`` other blocks of the log. Times are noted only by a run
+    that is ``measured``.
+    """
+
+    def __init__(self, graphs: Mapping[str, Graph], before: int, *, measured: bool) -> None:
+        blocks: dict[tuple[str, ...], RecordedBlock] = {}
+        for computer, graph in graphs.items():
+            blocks["left out", computer] = left_out(computer)
+            if graph.tasking == MULTI:
+                blocks["releases", computer] = releases(computer)
+            for task in graph.tasks if measured else ():
+                blocks["times", computer, task.name] = times_of(computer, task.name)
+        self.blocks: Sequence[RecordedBlock] = [*blocks.values()]
+        self._places = {key: before + number for number, key in enumerate(blocks)}
+        self._periods = {computer: graph.tick for computer, graph in graphs.items()}
+
+    def taker(self, writer: LogWriter | None) -> NoteTaker:
+        """Return who writes notes into a log, if there is one."""
+
+        def write(computer: str, key: tuple[str, ...], ticks: Whole, rows: Whole) -> None:
+            if writer and len(rows) and key in self._places:
+                writer.write_rows(self._places[key], stamps_of(ticks, self._periods[computer]), rows)
+
+        def leave_out(computer: str, ticks: Whole) -> None:
+            write(computer, ("left out", computer), ticks[:, 0], ticks)
+
+        def release(computer: str, missed: Whole) -> None:
+            write(computer, ("releases", computer), np.maximum.accumulate(missed[:, 1]), missed)
+
+        def time(computer: str, task: str, times: Whole) -> None:
+            rows = np.ascontiguousarray(times[:, 1:])
+            rows[:, :2] = (rows[:, :2] * NANOSECOND).view(np.int64)
+            write(computer, ("times", computer, task), times[:, 0], rows)
+
+        return NoteTaker(leave_out, release, time)
