@@ -24,7 +24,7 @@ from quadvis.web.listener import Listener
 from quadvis.web.rate import Allowance
 from quadvis.web.viewed import ViewedTarget
 from quadvis.web.viewer import FRESH, Viewer
-from quadvis.web.watch import Watch
+from quadvis.web.watch import SignalWatch
 
 VIEWERS = 8  # open pages
 TOKEN = 2.0  # s until a page has shown its token
@@ -42,7 +42,7 @@ class Gateway:
         self.target = target
         self.lost = 0  # messages of the target that the event loop was too slow for
         self._announce = announce
-        self._watch = Watch(target, self._found, self._state)
+        self._watch = SignalWatch(target, self._found, self._state)
         self._streams: dict[str, Callable[[], None]] = {}  # by topic: what ends it
         self._last: dict[str, str] = {}  # the newest status
         self._workers = ThreadPoolExecutor(PENDING // 2, "request")
@@ -180,7 +180,7 @@ class Gateway:
             elif "deadline" in request.arguments:
                 raise QuadvisError("a page has no 'deadline'")
             work = partial(self.target.request, request.verb, **request.arguments)
-        found = await self._loop.run_in_executor(self._workers, work)
+        found: Any = await self._loop.run_in_executor(self._workers, work)
         if request.verb == "addscope":
             viewer.scopes.add(found)
         return found

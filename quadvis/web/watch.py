@@ -15,7 +15,7 @@ EVERY = 0.1  # s between two requests: a person reads no faster
 SIGN = 0.4  # s without a word from the target until it is asked how it is
 
 
-class Watch:
+class SignalWatch:
     """A thread that asks a target for values, and whether it is still there.
 
     ``found`` takes the values by name, ``status`` that of the target, both in this thread. ``heard`` is the

@@ -84,7 +84,7 @@ export class Block {
     const note = make("p", { className: "note", textContent: bounds(parameter) });
     const row = make("form", { className: "parameter", autocomplete: "off" }, label);
     if (!parameter.tunable || !this.connection.may("setparam")) {
-      row.append(make("span", { className: "fixed", textContent: typed(parameter.value), title: parameter.tunable ? "" : "cannot be changed in a run" }));
+      row.append(make("span", { className: "fixed", textContent: unit(typed(parameter.value)), title: parameter.tunable ? "" : "cannot be changed in a run" }));
       if (parameter.tunable) row.append(note);
       return row;
     }

@@ -7,7 +7,7 @@ const EVERY = 200; // ms between two pictures
 const AGAIN = 1500; // ms after a refusal
 const DETECTOR = "vision.circle_detector";
 const QUALITY = 0.9; // of a circle that counts as a whole one
-const RADIUS = 9; // px of a circle whose size is not said
+const RADIUS = 0.16; // of a mark, as a part of the distance between neighbours
 
 export class Camera {
   #names = []; // of signals that may be pictures; the first one is shown
@@ -81,9 +81,12 @@ export class Camera {
   #found() {
     if (!this.detected) return [];
     const [centres, quality] = Object.values(this.detected).map((name) => this.model.values.get(name)?.[0] ?? []);
+    const seen = centres.map((pair) => pair.map(Number)).filter(([u]) => Number.isFinite(u));
+    const apart = seen.flatMap(([u, v], index) => seen.slice(index + 1).map(([x, y]) => Math.hypot(u - x, v - y)));
+    const radius = RADIUS * Math.min(...apart, this.canvas.width / 3);
     return centres.map(([u, v], index) => {
       const kept = Number(quality[index]) >= QUALITY;
-      return { u: Number(u), v: Number(v), radius: RADIUS, label: `${index + 1}`, kept, reason: kept ? "" : "partly hidden" };
+      return { u: Number(u), v: Number(v), radius, label: `${index + 1}`, kept, reason: kept ? "" : "partly hidden" };
     }).filter(({ u }) => Number.isFinite(u));
   }
 }

@@ -5,11 +5,13 @@ import { colour, colours } from "./colours.js";
 import { number, unit } from "./format.js";
 
 const FRAME = 40; // ms between two drawings
+const SHARE = 5; // at most one part in so many of the time goes into drawing
 
 export class Curves {
   #plot = null;
   #due = false;
   #last = 0;
+  #cost = 0; // ms of a drawing, of late
 
   /** `onzoom` is called when a person chooses a stretch, `oncursor` with the values under the pointer or null. */
   constructor(box, { onzoom, oncursor }) {
@@ -58,7 +60,7 @@ export class Curves {
     this.data = data;
     if (this.#due || !this.#plot) return;
     this.#due = true;
-    const wait = Math.max(0, this.#last + FRAME - performance.now());
+    const wait = Math.max(0, this.#last + Math.max(FRAME, SHARE * this.#cost) - performance.now());
     setTimeout(() => requestAnimationFrame(() => this.#now()), wait);
   }
 
@@ -71,6 +73,8 @@ export class Curves {
       this.#plot.setData(lists, false);
       this.#plot.setScale("x", { min: from, max: to });
     });
+    // What the canvas takes shows when the next task has its turn.
+    setTimeout(() => (this.#cost += (performance.now() - this.#last - this.#cost) / 4));
   }
 
   #select(plot) {

@@ -6,7 +6,7 @@ import { makeSvg } from "./svg.js";
 const SIZE = 9; // of the type, in units of the drawing
 const LARGEST = 27; // where the drawing is small on the screen
 const LEGIBLE = 9.5; // px of the screen
-const MOST = 16; // characters for which a label keeps its place free
+const SCALAR = 10, VECTOR = 22; // characters for which a label keeps its place free
 const WIDTH = 0.56; // of a character, in sizes of the type
 
 /** Return the horizontal stretches of a line as [left, right, y], from its beginning. */
@@ -80,7 +80,7 @@ export class Labels {
     this.#size = size;
     const taken = [];
     for (const label of this.#labels) {
-      const width = Math.min(label.right - label.left, MOST * WIDTH * size);
+      const width = Math.min(label.right - label.left, (label.signal.shape.length ? VECTOR : SCALAR) * WIDTH * size);
       const box = [label.left, label.y - size, label.left + width, label.y];
       const free = width > 3 * size && !taken.some((other) => overlap(box, other));
       if (free) taken.push(box);

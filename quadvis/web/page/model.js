@@ -41,6 +41,7 @@ export class Model {
   /** Ask for all that does not change while an application is loaded. */
   async load() {
     for (const map of [this.signals, this.values, this.past, this.kinds, this.tasks, this.parameters]) map.clear();
+    const parameters = this.connection.may("parameters") ? this.loadParameters() : null;
     for (const signal of await this.#all("signals")) {
       const { 0: block } = signal.name.match(/^.*(?=\.)/);
       Object.assign(signal, { path: block, port: signal.name.slice(block.length + 1), words: null });
@@ -48,7 +49,7 @@ export class Model {
       this.kinds.set(block, signal.block);
       this.tasks.set(block, signal.task);
     }
-    if (this.connection.may("parameters")) await this.loadParameters();
+    await parameters;
   }
 
   async loadParameters() {

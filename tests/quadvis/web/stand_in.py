@@ -283,7 +283,8 @@ class Scope:
         self.target, self.number, self.status = target, number, "Interrupted"
         self.properties = {
             "Signals": [], "NumSamples": 20, "Decimation": 1, "NumPrePostSamples": 0,
-            "TriggerMode": "FreeRun", "TriggerSignal": "", "TriggerLevel": 0.0, "TriggerSlope": "Either", "AutoRestart": False,
+            "TriggerMode": "FreeRun", "TriggerSignal": "", "TriggerLevel": 0.0, "TriggerSlope": "Either",
+            "AutoRestart": False,
         }  # fmt: skip
         self.forced, self.sequence = False, 0
 

@@ -83,6 +83,9 @@ def test_every_file_that_the_page_names_is_served(running: Running) -> None:
     for path in FOLDER.glob("*.js"):
         named |= set(re.findall(r'from "\./([^"]+)"', path.read_text(encoding="utf-8")))
     assert len(named) >= 20
+    preloaded = set(re.findall(r'modulepreload" href="([^"]+)"', (FOLDER / "index.html").read_text("utf-8")))
+    modules = {path.relative_to(FOLDER).as_posix() for path in FOLDER.rglob("*.js")}
+    assert preloaded == modules - {"main.js"}
     for name in sorted(named):
         assert status_of(running.get(f"/{name}")) == 200, name
 

@@ -262,7 +262,7 @@ def test_numbers_and_words_are_made_for_people(browser: Browser, running: Runnin
       word: f.value(
         {unit: '1', type: 'int64', words: w.words('mode', '0 MANUAL, 1 MIXED, 2 AUTOMATIC', '')}, 2),
       table: [...w.words('reason', 'reason for the mode: 0 to 13, see above',
-        'x\\n\\n====== ===\\nreason meaning\\n====== ===\\n3      the IMU is stale\\n10     frozen\\n====== ===\\n')],
+        'x\\n\\n=== ==\\nreason meaning\\n=== ==\\n3   the IMU is stale\\n10  frozen\\n=== ==\\n')],
       none: w.words('count', 'how often, 0 to 3', '').size,
     }))"""
     assert browser.run(code) == {
