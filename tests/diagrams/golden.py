@@ -15,6 +15,7 @@ import json
 import shutil
 import sys
 import tempfile
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -31,14 +32,15 @@ MISSING = 0.123  # stands for NaN
 ON_DEVICES = {("flight.yaml", "hil")}  # these run in real time alone
 
 
-def cases() -> list[tuple[str, str | None]]:
+@cache
+def cases() -> tuple[tuple[str, str | None], ...]:
     """Return every diagram that can be simulated, by itself and with each of its variants."""
-    return [
+    return tuple(
         (path.name, variant)
         for path in sorted(DIAGRAMS.glob("*.yaml"))
-        for variant in (None, *yaml.safe_load(path.read_text()).get("variants", {}))
+        for variant in (None, *yaml.load(path.read_text(), yaml.CSafeLoader).get("variants", {}))
         if (path.name, variant) not in ON_DEVICES
-    ]
+    )
 
 
 def loaded(folder: Path, name: str, variant: str | None) -> Diagram:
