@@ -15,7 +15,11 @@ import json
 import shutil
 import sys
 import tempfile
+<<<<<<< HEAD
 from collections.abc import Iterator
+=======
+from functools import cache
+>>>>>>> diet
 from pathlib import Path
 from typing import Any
 
@@ -47,14 +51,24 @@ def every_case() -> Iterator[tuple[str, str | None, bool]]:
             yield path.name, name, any(issubclass(catalogue.find(kind), Device) for kind in kinds if kind)
 
 
-def cases() -> list[tuple[str, str | None]]:
+@cache
+def cases() -> tuple[tuple[str, str | None], ...]:
     """Return every diagram that can be simulated, by itself and with each of its variants."""
+<<<<<<< HEAD
     return [(name, variant) for name, variant, has_devices in every_case() if not has_devices]
 
 
 def on_devices() -> list[tuple[str, str | None]]:
     """Return the variants with devices, which run in real time alone."""
     return [(name, variant) for name, variant, has_devices in every_case() if has_devices]
+=======
+    return tuple(
+        (path.name, variant)
+        for path in sorted(DIAGRAMS.glob("*.yaml"))
+        for variant in (None, *yaml.load(path.read_text(), yaml.CSafeLoader).get("variants", {}))
+        if (path.name, variant) not in ON_DEVICES
+    )
+>>>>>>> diet
 
 
 def loaded(folder: Path, name: str, variant: str | None) -> Diagram:
