@@ -15,11 +15,8 @@ import json
 import shutil
 import sys
 import tempfile
-<<<<<<< HEAD
 from collections.abc import Iterator
-=======
 from functools import cache
->>>>>>> diet
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +38,7 @@ def every_case() -> Iterator[tuple[str, str | None, bool]]:
     """Yield every diagram by itself and with each of its variants, and whether that reaches devices."""
     catalogue = Catalogue()
     for path in sorted(DIAGRAMS.glob("*.yaml")):
-        variants = yaml.safe_load(path.read_text()).get("variants", {})
+        variants = yaml.load(path.read_text(), yaml.CSafeLoader).get("variants", {})
         yield path.name, None, False
         for name, variant in variants.items():
             lineage = [variant]
@@ -54,21 +51,13 @@ def every_case() -> Iterator[tuple[str, str | None, bool]]:
 @cache
 def cases() -> tuple[tuple[str, str | None], ...]:
     """Return every diagram that can be simulated, by itself and with each of its variants."""
-<<<<<<< HEAD
-    return [(name, variant) for name, variant, has_devices in every_case() if not has_devices]
+    return tuple((name, variant) for name, variant, has_devices in every_case() if not has_devices)
 
 
-def on_devices() -> list[tuple[str, str | None]]:
+@cache
+def on_devices() -> tuple[tuple[str, str | None], ...]:
     """Return the variants with devices, which run in real time alone."""
-    return [(name, variant) for name, variant, has_devices in every_case() if has_devices]
-=======
-    return tuple(
-        (path.name, variant)
-        for path in sorted(DIAGRAMS.glob("*.yaml"))
-        for variant in (None, *yaml.load(path.read_text(), yaml.CSafeLoader).get("variants", {}))
-        if (path.name, variant) not in ON_DEVICES
-    )
->>>>>>> diet
+    return tuple((name, variant) for name, variant, has_devices in every_case() if has_devices)
 
 
 def loaded(folder: Path, name: str, variant: str | None) -> Diagram:
