@@ -23,6 +23,7 @@ from quadvis.wire.desk import Done
 if TYPE_CHECKING:
     from quadvis.target.kernel import Publish
 
+AUTOSAVE = "autosave"  # the parameter set with what was tuned at the end of the last run
 STOPPED, LOADING, READY, RUNNING, STOPPING = "stopped", "loading", "ready", "running", "stopping"
 
 
@@ -164,6 +165,8 @@ class Application:
         session = self._session
         assert session is not None
         self.problem, self.result = session.problem, session.result
+        if self.parameters.tuned:
+            self.parameters.save(self._store.set_path(self.name, AUTOSAVE))
         self.scopes.end()
         self._event("stopped", problem=self.problem)
 
