@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
@@ -52,6 +52,7 @@ class Diagram:
     files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of every file that was read, by path
     knobs: Mapping[str, Knob] = field(default_factory=dict)  # parameters of its own and of parts
     own_blocks: bool = True  # whether code beside the diagram may be run
+    here: tuple[str, ...] = ()  # the computers that a real-time run of this machine has; all of them if empty
 
     @cached_property
     def inputs(self) -> tuple[Path, ...]:
@@ -133,6 +134,23 @@ class Diagram:
     def links(self) -> Sequence[Link]:
         """What carries wires between its computers."""
         return links_of(self.graph)
+
+    @property
+    def computers(self) -> tuple[str, ...]:
+        """The computers that a real-time run of this machine has."""
+        return self.here or self.graph.computers
+
+    @property
+    def graph_here(self) -> Graph:
+        """The graph without the blocks that run on other machines."""
+        if not self.here:
+            return self.graph
+        return replace(self.graph, nodes=[node for node in self.graph.nodes if node.computer in self.here])
+
+    @property
+    def links_here(self) -> Sequence[Link]:
+        """The links that have an end on this machine."""
+        return [link for link in self.links if {link.source, link.target} & set(self.computers)]
 
     def computer(self, name: str) -> ComputerSpec | None:
         """Return what it says of one of its computers; None if it says nothing."""

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from multiprocessing.context import SpawnContext
 from typing import Any
 
+from quadvis.errors import QuadvisError, sentence
 from quadvis.links.link import MEMORY, SERIAL, Link
 from quadvis.machine.serial_port import Line, missing_port
 from quadvis.realtime.cables import Cable, Ends
@@ -18,11 +19,11 @@ class Lines:
     """The resources of links, from the ends of their `cables` on.
 
     ``sending`` and ``receiving`` have what each end of a link is opened with, by the link's name; they are
-    complete after `lay`.
+    complete after `lay`. ``here`` are the computers of this machine.
     """
 
-    def __init__(self, context: SpawnContext, links: Sequence[Link]) -> None:
-        self._links = links
+    def __init__(self, context: SpawnContext, links: Sequence[Link], here: Sequence[str]) -> None:
+        self._links, self._here = links, here
         self.sending: dict[str, Any] = {}
         self.receiving: dict[str, Any] = {}
         self._memory = {link.name for link in links if link.via == MEMORY}
@@ -57,7 +58,8 @@ class Lines:
     def missing(self) -> Iterator[str]:
         """Yield a sentence for each port of a link that is not there."""
         for link in self._links:
-            for port in dict.fromkeys(filter(None, link.ports)):
+            ends = zip((link.source, link.target), link.ports, strict=True)
+            for port in dict.fromkeys(port for end, port in ends if port and end in self._here):
                 if words := missing_port(port):
                     yield f"link '{link.name}': {words}"
 
@@ -71,6 +73,25 @@ class Lines:
                 yield link.name, self.sending.get(link.name)
             elif link.target == computer:
                 yield link.name, self.receiving.get(link.name)
+
+
+def check_reach(links: Sequence[Link], here: Sequence[str]) -> None:
+    """Raise QuadvisError if a link from or to another machine does not say how it gets there."""
+    for link in links:
+        if link.source in here and link.target in here:
+            continue
+        if link.via == MEMORY:
+            lack, remedy = "memory is not shared between machines", "write 'via: udp' or 'via: serial'"
+        elif link.via == SERIAL and not all(link.ports):
+            lack, remedy = "it has no ports", "give it 'port: {from: ..., to: ...}'"
+        elif link.via != SERIAL and not link.address:
+            lack, remedy = "it has no address", "give it the 'address' at which the receiver listens"
+        else:
+            continue
+        problem = (
+            f"link '{link.name}' joins '{link.source}' and '{link.target}', which are two machines: {lack}"
+        )
+        raise QuadvisError(sentence(problem, remedy))
 
 
 def _cable(link: Link) -> str:

@@ -87,15 +87,15 @@ class _Supervisor:
         self._steering = steering
         context = multiprocessing.get_context("spawn")
         self._announce = announce
-        asked = {name: wishes.on(diagram.computer(name)) for name in diagram.graph.computers}
+        asked = {name: wishes.on(diagram.computer(name)) for name in diagram.computers}
         priority = max(each.priority or 0 for each in asked.values())
         standing = Standing.to(list(asked.values()))
-        self._devices = Devices(context, diagram.graph, diagram.on_host_loss, standing)
-        self._lines = Lines(context, diagram.links)
+        self._devices = Devices(context, diagram.graph_here, diagram.on_host_loss, standing)
+        self._lines = Lines(context, diagram.links_here, diagram.computers)
         self._cables = Cables(context, [*self._devices.cables, *self._lines.cables], priority)
         self._members = []
-        last_ticks = context.RawArray("q", len(diagram.graph.computers))
-        for place, computer in enumerate(diagram.graph.computers):
+        last_ticks = context.RawArray("q", len(diagram.computers))
+        for place, computer in enumerate(diagram.computers):
             part = diagram.graph.part_of(computer)
             own = [tap for tap in taps if tap.block in part]
             bindings = self._devices.bindings

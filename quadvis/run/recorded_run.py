@@ -25,6 +25,7 @@ from quadvis.run.rows import all_logged, input_topic, left_out, releases
 
 Whole = NDArray[np.int64]
 NOTED = tuple(block.path.strip("/") for block in (left_out(""), releases("")))
+COMPUTERS = "computers"  # a fact of a log: the computers of the machine on which it was written
 AGAIN = "run the diagram again with this quadvis"
 
 
@@ -41,6 +42,8 @@ class RecordedRun:
         self.whole = log.complete and not {"stopped", "lost"} & log.summary.keys() and not _lost_rows(log)
         is_paced = self.clock == REAL_TIME
         graphs = live_parts(diagram.graph) if is_paced else {"": diagram.graph}
+        if is_paced:
+            graphs = {name: graph for name, graph in graphs.items() if name in diagram.computers}
         self.parts = [
             RecordedPart(log, diagram, computer, graph, is_paced) for computer, graph in graphs.items()
         ]

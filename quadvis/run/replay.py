@@ -21,7 +21,7 @@ from quadvis.run.outside import outside
 from quadvis.run.playback import RecordedClock, with_playback
 from quadvis.run.played_files import check_played_files
 from quadvis.run.played_tasks import PlayedTasks
-from quadvis.run.recorded_run import RecordedPart, RecordedRun
+from quadvis.run.recorded_run import COMPUTERS, RecordedPart, RecordedRun
 from quadvis.run.row_comparison import FoundDifference, Lack, RowComparison
 from quadvis.run.rows import signals_of
 from quadvis.run.session import recorded
@@ -131,7 +131,8 @@ def _loaded(log: Log, folder: str | Path | None, own_blocks: OwnBlocks, settings
     """Return the diagram of a log; DiagramError says which of its files is missing or is another one."""
     where = log.metadata.get("folder", ".") if folder is None else folder
     try:
-        return load_text(log.diagram, where, LOGGED, own_blocks, settings)
+        here = tuple(filter(None, log.metadata.get(COMPUTERS, "").split(", ")))
+        return replace(load_text(log.diagram, where, LOGGED, own_blocks, settings), here=here)
     except DiagramError as error:
         inside = str(Path(where) / LOGGED)
         mine = [fault.place.file == inside for fault in error.faults]

@@ -35,7 +35,7 @@ def signals_of(diagram: Diagram) -> list[RecordedNode]:
         RecordedNode(
             node, RecordedBlock(f"/{node.path}", ports(node), node.task.name), diagram.decimation(node.path)
         )
-        for node in diagram.graph.nodes
+        for node in diagram.graph_here.nodes
         if diagram.logs(node.path) and ports(node)
     ]
 

@@ -22,6 +22,7 @@ from quadvis.output.recording import RecordedBlock
 from quadvis.run.logged_notes import LoggedNotes
 from quadvis.run.loops import SIMULATED, Paced, Progress, RunLoop, Simulated, Taken, Takers
 from quadvis.run.played_files import files_text, played_files
+from quadvis.run.recorded_run import COMPUTERS
 from quadvis.run.result import Result
 from quadvis.run.row_tap import RowTap, Taker
 from quadvis.run.rows import inputs_of, signals_of
@@ -169,6 +170,7 @@ def metadata(diagram: Diagram, clock: str = SIMULATED) -> dict[str, str]:
         "python": platform.python_version(),
         "folder": os.path.abspath(diagram.path.parent),
         "clock": clock,
+        COMPUTERS: ", ".join(diagram.here),
         PORTS: json.dumps(dict(diagram.ports)),
         "diagram": diagram.resolved,
     }

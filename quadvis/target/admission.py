@@ -37,7 +37,8 @@ def admit(bundle: ApplicationBundle, place: Path) -> Diagram:
         raise QuadvisError(
             f"the diagram has no computer {quoted(bundle.computer)}; it has {', '.join(computers)}"
         )
-    return replace(diagram, ports=_ports(bundle, diagram), knobs=_knobs(bundle, diagram))
+    here = (bundle.computer,) if bundle.computer else ()
+    return replace(diagram, ports=_ports(bundle, diagram), knobs=_knobs(bundle, diagram), here=here)
 
 
 def _ports(bundle: ApplicationBundle, diagram: Diagram) -> dict[str, str]:

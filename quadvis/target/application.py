@@ -13,7 +13,7 @@ from quadvis.errors import QuadvisError
 from quadvis.run.result import Result
 from quadvis.run.tuned import new_values
 from quadvis.target.bundle import ApplicationBundle
-from quadvis.target.newest import Newest
+from quadvis.target.newest import NewestValues
 from quadvis.target.parameters import Parameters, as_written
 from quadvis.target.scopes import ApplicationScopes
 from quadvis.target.session import Session
@@ -36,7 +36,7 @@ class Application:
     def __init__(self, bundle: ApplicationBundle, diagram: Diagram, store: Store, publish: Publish) -> None:
         self.bundle, self.diagram = bundle, diagram
         self.parameters = Parameters(diagram)
-        self.newest = Newest(diagram)
+        self.newest = NewestValues(diagram)
         self.scopes = ApplicationScopes(diagram, store.scope_folder(bundle.name), publish)
         self.result: Result | None = None
         self.problem = ""

@@ -23,7 +23,7 @@ class Value(NamedTuple):
     tick: int
 
 
-class Newest:
+class NewestValues:
     """Keeps the newest row of every block of a diagram; the taps put it there, any thread reads it."""
 
     def __init__(self, diagram: Diagram) -> None:

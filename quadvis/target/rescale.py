@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -40,7 +41,8 @@ def lasting(diagram: Diagram, stop_time: float) -> Diagram | None:
 
 
 def _read(written: dict[str, Any], diagram: Diagram) -> Diagram:
-    return load_text(dump_yaml(written), diagram.path.parent, diagram.path.name, diagram.own_blocks)
+    found = load_text(dump_yaml(written), diagram.path.parent, diagram.path.name, diagram.own_blocks)
+    return replace(found, ports=diagram.ports, knobs=diagram.knobs, here=diagram.here)
 
 
 def _exact(time: float) -> Fraction:

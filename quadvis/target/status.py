@@ -48,7 +48,7 @@ def status(name: str, application: Application | None, session_time: float) -> d
     }
     found |= _execution([each for _, each in tasks])
     result = application.result
-    if result is not None and result.flight is not None and not result.flight.early:
+    if result is not None and result.flight is not None and not (result.flight.early or diagram.here):
         found["Passed"] = result.passed
         found["Verdicts"] = [str(verdict) for verdict in result.outcome.verdicts]
         found["NotMet"] = [str(verdict) for verdict in result.outcome.verdicts if not verdict.met]

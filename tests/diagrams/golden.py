@@ -16,6 +16,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +38,7 @@ def every_case() -> Iterator[tuple[str, str | None, bool]]:
     """Yield every diagram by itself and with each of its variants, and whether that reaches devices."""
     catalogue = Catalogue()
     for path in sorted(DIAGRAMS.glob("*.yaml")):
-        variants = yaml.safe_load(path.read_text()).get("variants", {})
+        variants = yaml.load(path.read_text(), yaml.CSafeLoader).get("variants", {})
         yield path.name, None, False
         for name, variant in variants.items():
             lineage = [variant]
@@ -47,14 +48,16 @@ def every_case() -> Iterator[tuple[str, str | None, bool]]:
             yield path.name, name, any(issubclass(catalogue.find(kind), Device) for kind in kinds if kind)
 
 
-def cases() -> list[tuple[str, str | None]]:
+@cache
+def cases() -> tuple[tuple[str, str | None], ...]:
     """Return every diagram that can be simulated, by itself and with each of its variants."""
-    return [(name, variant) for name, variant, has_devices in every_case() if not has_devices]
+    return tuple((name, variant) for name, variant, has_devices in every_case() if not has_devices)
 
 
-def on_devices() -> list[tuple[str, str | None]]:
+@cache
+def on_devices() -> tuple[tuple[str, str | None], ...]:
     """Return the variants with devices, which run in real time alone."""
-    return [(name, variant) for name, variant, has_devices in every_case() if has_devices]
+    return tuple((name, variant) for name, variant, has_devices in every_case() if has_devices)
 
 
 def loaded(folder: Path, name: str, variant: str | None) -> Diagram:

@@ -75,7 +75,7 @@ def test_no_control_jumps_in_a_take_over_by_stick_or_by_switch(variant: str | No
 
 
 def test_the_pilots_stick_counts_within_one_tick_of_the_control() -> None:
-    result = fly("takeover", stop_time=11)
+    result = fly("takeover")
     times, stick = result.times("radio.y"), result["radio.y"][:, 1]
     taken = result["control/switch.source"][:, 1] == MANUAL
     assert times[np.argmax(taken)] == times[np.argmax(np.abs(stick) > 0.3)]

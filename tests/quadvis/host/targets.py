@@ -7,7 +7,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
@@ -48,8 +48,10 @@ class Running(NamedTuple):
 
 
 @contextmanager
-def running_target(*arguments: str, name: str = "lab", home: Path | None = None) -> Iterator[Running]:
-    """Start a target; end it at the end, whatever happened."""
+def running_target(
+    *arguments: str, name: str = "lab", home: Path | None = None, before: Sequence[str] = ()
+) -> Iterator[Running]:
+    """Start a target; end it at the end, whatever happened. ``before`` is what starts its command."""
     folder = Path(tempfile.mkdtemp(prefix="q"))  # short: the path of a socket has an end
     environment = os.environ | {
         "QUADVIS_HOME": str(home or folder / "home"), "XDG_RUNTIME_DIR": str(folder),
@@ -58,7 +60,7 @@ def running_target(*arguments: str, name: str = "lab", home: Path | None = None)
     }  # fmt: skip
     with (folder / "output.txt").open("w") as output:
         process = subprocess.Popen(
-            [sys.executable, "-m", "quadvis", "target", "--name", name, *arguments], env=environment,
+            [*before, sys.executable, "-m", "quadvis", "target", "--name", name, *arguments], env=environment,
             text=True, stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True,
         )  # fmt: skip
     try:

@@ -13,7 +13,7 @@ from quadvis.host.local import _answers
 from quadvis.host.target import PROPERTIES, Target
 from quadvis.output.log_reader import Log
 from tests.processes import linux, wait_for
-from tests.quadvis.host.targets import LOOP, Running, running_target
+from tests.quadvis.host.targets import LOOP, ROOT, Running, running_target
 
 pytestmark = linux
 
@@ -322,3 +322,28 @@ def test_a_local_target_starts_and_ends_by_itself(
     socket = Path(folder) / "_DIR" / "quadvis" / "local"
     assert socket.exists()
     wait_for(lambda: not _answers(socket))
+
+
+@pytest.mark.slow
+def test_pictures_of_a_run_are_shown_to_who_asks_and_change_nothing(
+    tg: Target, lab: Running, tmp_path: Path
+) -> None:
+    import cv2
+
+    path = tmp_path / "seen.yaml"
+    lasting = "overload: {max: 1000000, consecutive: 1000000, action: warn}"
+    path.write_text(f"quadvis: 1\nname: seen\nbase: {ROOT / 'diagrams/hover.yaml'}\n{lasting}\n")
+    tg.load(quadvis.load(path, stop_time="60 s"))
+    with pytest.raises(QuadvisError, match="seen does not run, so there are no pictures"):
+        tg.request("picture", signal="eyes/camera.frame")
+    tg.start()
+    wait_for(lambda: tg.ExecTime > 0.5)
+    first = tg.request("picture", signal="eyes/camera.frame")
+    pixels = cv2.imdecode(np.frombuffer(first["data"], np.uint8), cv2.IMREAD_COLOR)
+    assert pixels.shape == (first["height"], first["width"], 3)
+    assert pixels.std() > 5  # four circles on a ceiling, and not one colour
+    wait_for(lambda: tg.request("picture", signal="eyes/camera.frame")["sequence"] > first["sequence"])
+    with pytest.raises(QuadvisError, match=r"no signal with pictures; did you mean 'eyes/camera\.frame'"):
+        tg.request("picture", signal="eyes/camera.frme")
+    tg.stop()
+    assert quadvis.replay(tg.fetchlog()).same

@@ -1,0 +1,181 @@
+"""One diagram on several targets: at one instant, at one pace, and with the verdicts of one run."""
+
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import quadvis
+from quadvis.errors import QuadvisError
+from quadvis.host.several import Several, read_places
+from quadvis.host.target import Target
+from quadvis.wire.hosts import allow
+from quadvis.wire.keys import new_key
+from tests.processes import linux
+from tests.quadvis.host.targets import running_target
+
+pytestmark = linux
+
+LOOP = """\
+quadvis: 1
+name: two
+rates: {fast: 100 Hz}
+stop_time: 3 s
+overload: {max: 1000000, consecutive: 1000000, action: warn}
+computers: {a: {}, b: {}}
+links:
+  there: {from: a, to: b, via: udp, address: "ADDRESS_B:5911"}
+  back: {from: b, to: a, via: udp, address: "ADDRESS_A:5912"}
+blocks:
+  wave: {block: sources.sine, rate: fast, at: a, with: {amplitude: 1 m, frequency: 1 Hz}}
+  law:
+    block: signal.gain
+    rate: fast
+    at: b
+    in: {u: {from: wave.y, over: there, initial: 0 m}}
+    with: {factor: 3}
+  echo:
+    block: signal.gain
+    rate: fast
+    at: a
+    in: {u: {from: law.y, over: back, initial: 0 m}}
+    with: {factor: 1}
+expect:
+  - {signal: echo.y, within: 4 m}
+  - {signal: there.age, after: 1 s, within: 500 ms}
+"""
+
+
+def written(folder: Path, a: str = "127.0.0.1", b: str = "127.0.0.1") -> Path:
+    path = folder / "two.yaml"
+    path.write_text(LOOP.replace("ADDRESS_A", a).replace("ADDRESS_B", b))
+    return path
+
+
+def check_flight(several: Several, folder: Path) -> None:
+    """Fly, and find that the ages of messages are as long as the ticks say: both have one time."""
+    several.load()
+    several.start()
+    several.wait()
+    logs = several.logs(folder)
+    outcome = several.judge(logs)
+    assert outcome.passed, outcome.verdicts
+    found = {name: quadvis.read_log(path) for name, path in logs.items()}
+    ages = found["b"]["there.age"][100:]
+    assert (ages > 0).all()  # nothing has come from the future
+    assert np.median(ages) <= 0.05
+    law, wave = found["b"]["law.y"][100:], found["a"]
+    sent = np.interp(found["b"].times("law.y")[100:] - ages, wave.times("wave.y"), wave["wave.y"])
+    np.testing.assert_allclose(law, 3 * sent, atol=1e-6)
+    for path in logs.values():
+        assert quadvis.replay(path).same
+
+
+@pytest.mark.slow
+def test_two_targets_fly_one_diagram(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with ExitStack() as stack:
+        targets = {}
+        for name in ("a", "b"):
+            lab = stack.enter_context(running_target(name=name))
+            for key in ("QUADVIS_HOME", "XDG_RUNTIME_DIR"):
+                monkeypatch.setenv(key, lab.environment[key])
+            targets[name] = stack.enter_context(Target(name))
+        several = stack.enter_context(Several(quadvis.load(written(tmp_path)), targets))
+        check_flight(several, tmp_path)
+
+
+ADDRESSES = {"host": "10.77.61.1", "a": "10.77.61.2", "b": "10.77.61.3"}
+AHEAD = 5000  # s by which the clock of the second machine is ahead
+
+
+def ip(*words: str) -> None:
+    subprocess.run(["ip", *words], check=True, capture_output=True)
+
+
+@contextmanager
+def machines() -> Iterator[Mapping[str, str]]:
+    """Make two machines on one network, as namespaces; skip the test where this is not granted."""
+    if shutil.which("ip") is None or os.geteuid() != 0:
+        pytest.skip("namespaces need iproute2 and root")
+    names = {name: f"quadvis-{os.getpid()}-{name}" for name in ("a", "b")}
+    bridge = f"qv{os.getpid() % 10**6}"
+    try:
+        try:
+            ip("link", "add", bridge, "type", "bridge")
+            ip("addr", "add", f"{ADDRESSES['host']}/24", "dev", bridge)
+            ip("link", "set", bridge, "up")
+            for name, space in names.items():
+                ip("netns", "add", space)
+                ip("link", "add", f"{bridge}{name}", "type", "veth", "peer", "name", "eth0", "netns", space)
+                ip("link", "set", f"{bridge}{name}", "master", bridge, "up")
+                ip("-n", space, "addr", "add", f"{ADDRESSES[name]}/24", "dev", "eth0")
+                for device in ("eth0", "lo"):
+                    ip("-n", space, "link", "set", device, "up")
+        except subprocess.CalledProcessError as error:
+            pytest.skip(f"namespaces are not granted: {error.stderr.decode().strip()}")
+        yield names
+    finally:
+        for space in names.values():
+            subprocess.run(["ip", "netns", "del", space], check=False, capture_output=True)
+        subprocess.run(["ip", "link", "del", bridge], check=False, capture_output=True)
+
+
+@pytest.mark.slow
+def test_two_machines_with_clocks_of_their_own_fly_one_diagram(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each is in a network namespace; the monotonic clock of the second one is 5000 s ahead."""
+    monkeypatch.setenv("QUADVIS_HOME", str(tmp_path / "bench"))
+    bench, _ = new_key("bench")
+    with machines() as spaces, ExitStack() as stack:
+        targets = {}
+        for name, space in spaces.items():
+            home = tmp_path / name
+            new_key(name, home)
+            allow("bench", bench.public.hex(), 0, folder=home)
+            own_time = ["unshare", "--time", "--monotonic", str(AHEAD), "--fork"] if name == "b" else []
+            before = ["ip", "netns", "exec", space, *own_time]
+            stack.enter_context(
+                running_target("--listen", ADDRESSES[name], name=name, home=home, before=before)
+            )
+            targets[name] = stack.enter_context(Target(ADDRESSES[name]))
+        several = stack.enter_context(
+            Several(quadvis.load(written(tmp_path, ADDRESSES["a"], ADDRESSES["b"])), targets)
+        )
+        check_flight(several, tmp_path)
+        offsets = several.offsets
+        assert abs(offsets["b"].offset - offsets["a"].offset - AHEAD * 10**9) < 10**9
+
+
+def test_a_link_that_cannot_leave_a_machine_is_reported(tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    from quadvis.realtime.lines import check_reach
+
+    text = written(tmp_path).read_text()
+    for new, words in (
+        ("via: memory", "memory is not shared between machines"),
+        ("via: udp", "it has no address"),
+        ("via: serial, baud: 115200", "it has no ports"),
+    ):
+        path = tmp_path / "one.yaml"
+        path.write_text(text.replace('via: udp, address: "127.0.0.1:5911"', new))
+        diagram = replace(quadvis.load(path), here=("a",))
+        with pytest.raises(QuadvisError, match=f"link 'there' joins 'a' and 'b'.*{words}"):
+            check_reach(diagram.links_here, diagram.computers)
+        check_reach(diagram.links, diagram.graph.computers)
+
+
+def test_each_computer_needs_one_target(tmp_path: Path) -> None:
+    diagram = quadvis.load(written(tmp_path))
+    with pytest.raises(QuadvisError, match="a computer of the diagram has no target: a, b"):
+        Several(diagram, {})
+    assert read_places(["a=lab1", "b = 10.0.0.2"]) == {"a": "lab1", "b": "10.0.0.2"}
+    for text, words in ((["a"], "write COMPUTER=TARGET"), (["a=x", "a=y"], "given twice")):
+        with pytest.raises(QuadvisError, match=words):
+            read_places(text)
