@@ -68,7 +68,7 @@ export class Block {
   update() {
     if (!this.path) return;
     const values = this.box.querySelectorAll(".outputs dd");
-    this.outputs.forEach((signal, index) => say(values[index], value(signal, this.model.values.get(signal.name)?.[0]) || "\u2013"));
+    this.outputs.forEach((signal, index) => say(values[index], value(signal, this.model.values.get(signal.name)) || "\u2013"));
   }
 
   /** Show the first sentence of a documentation, and all of it when asked. */

@@ -80,7 +80,7 @@ export class Camera {
   /** Return what the detector of circles says: circles with a quality below the least are dropped. */
   #found() {
     if (!this.detected) return [];
-    const [centres, quality] = Object.values(this.detected).map((name) => this.model.values.get(name)?.[0] ?? []);
+    const [centres, quality] = Object.values(this.detected).map((name) => this.model.values.get(name) ?? []);
     const seen = centres.map((pair) => pair.map(Number)).filter(([u]) => Number.isFinite(u));
     const apart = seen.flatMap(([u, v], index) => seen.slice(index + 1).map(([x, y]) => Math.hypot(u - x, v - y)));
     const radius = RADIUS * Math.min(...apart, this.canvas.width / 3);

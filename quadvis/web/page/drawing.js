@@ -54,6 +54,15 @@ export class Drawing {
     this.#scaled();
   }
 
+  /** Show a sentence in the place of a drawing. */
+  clear(sentence) {
+    this.#wires = [];
+    this.#blocks.clear();
+    this.labels = this.svg = this.view.svg = null;
+    this.colours.replaceChildren();
+    this.frame.replaceChildren(make("p", { className: "empty", textContent: sentence }));
+  }
+
   /** Show the colours of the tasks. */
   #legend(legend) {
     const texts = legend ? [...legend.querySelectorAll("text")] : [];
@@ -129,7 +138,7 @@ export class Drawing {
 
   #fill() {
     const [, text, canvas] = this.hint.children;
-    text.textContent = value(this.#hovered, this.model.values.get(this.#hovered.name)?.[0], 9);
+    text.textContent = value(this.#hovered, this.model.values.get(this.#hovered.name), 9);
     draw(canvas, this.model.past.get(this.#hovered.name));
   }
 }

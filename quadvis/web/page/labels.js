@@ -93,7 +93,7 @@ export class Labels {
   update() {
     for (const label of this.#labels) {
       const found = this.model.values.get(label.signal.name);
-      if (found && label.element.style.display === "") label.show(found[0], this.#size);
+      if (found !== undefined && label.element.style.display === "") label.show(found, this.#size);
     }
   }
 }

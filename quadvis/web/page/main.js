@@ -46,17 +46,23 @@ async function ask(verb, args) {
 /** Show another application, or the same one after the connection was lost. */
 async function begin(key) {
   if (!connection.may("drawing")) return;
+  const other = loaded !== "" && loaded !== key;
   loaded = key;
+  if (other || !drawing.svg) drawing.clear("the target draws the diagram");
   try {
-    const [picture] = await Promise.all([connection.request("drawing"), model.load()]);
-    drawing.take(picture);
-    const modes = [...(await status.begin()), ...camera.begin(drawing.pictures)];
+    const picture = connection.request("drawing");
+    picture.catch(() => {});
+    await model.load();
+    const modes = await status.begin();
+    watch(modes);
     scope.renew(true);
     if (block.path && model.kinds.has(block.path)) block.open(block.path);
     else block.close();
-    watch(modes);
+    findWords();
+    drawing.take(await picture); // which takes a while when it is the first one to be asked for
+    watch([...modes, ...camera.begin(drawing.pictures)]);
+    mark();
     show(find("#zoom"), true);
-    await findWords();
   } catch (error) {
     loaded = "";
     if (connection.hello) refuse(error.message);
@@ -143,15 +149,15 @@ connection.on("lost", () => {
 });
 
 // Old data is greyed, with the time since.
-let greyed = true;
+let greyed = null; // until there was something to see
 setInterval(() => {
   const silent = performance.now() - connection.heard;
   const old = !connection.hello || silent > OLD;
   const text = !old ? "" : Number.isFinite(silent) ? `no news for ${since(silent / 1000)}` : "waiting for the target";
   document.body.dataset.connection = old ? "old" : "live";
   say(find("#connection"), text || (connection.dropped ? `${connection.dropped} messages dropped` : ""));
-  if (old !== greyed && Number.isFinite(silent)) events.add({ event: old ? "the connection is lost" : "the connection is back" }, true);
-  greyed = old;
+  if (greyed !== null && old !== greyed) events.add({ event: old ? "the connection is lost" : "the connection is back" }, true);
+  if (greyed !== null || !old) greyed = old;
 }, 100);
 
 find("#start").onclick = () => ask("start");

@@ -27,7 +27,7 @@ class Past {
 export class Model {
   signals = new Map(); // by name
   parameters = new Map(); // lists by block
-  values = new Map(); // [value, tick] by name
+  values = new Map(); // by name; null before the first one
   past = new Map();
   kinds = new Map(); // the name of the block type, by block
   tasks = new Map(); // the task, by block
@@ -79,15 +79,15 @@ export class Model {
   }
 
   take(values) {
+    const runs = this.status.Status === "running";
     for (const [name, found] of Object.entries(values)) {
-      const last = this.values.get(name);
       this.values.set(name, found);
-      if (found[0] === null || (last && last[1] === found[1])) continue;
+      if (found === null || !runs) continue;
       if (!this.past.has(name)) {
         const shape = this.signals.get(name)?.shape ?? [];
         this.past.set(name, new Past(shape.reduce((product, size) => product * size, 1)));
       }
-      this.past.get(name).add(found[0]);
+      this.past.get(name).add(found);
     }
   }
 

@@ -166,7 +166,7 @@ export class Scope {
     if (!(row[0] > this.data.end || Number.isNaN(this.data.end))) return;
     for (const { name, signal } of this.#curves) {
       const index = [...name.slice(signal.name.length).matchAll(/\d+/g)].map(Number);
-      row.push(Number(index.reduce((inner, at) => inner?.[at], this.model.values.get(signal.name)?.[0] ?? NaN)));
+      row.push(Number(index.reduce((inner, at) => inner?.[at], this.model.values.get(signal.name) ?? NaN)));
     }
     this.data.add(row);
     this.#draw();

@@ -1,9 +1,11 @@
 // The left side: state, modes, verdicts, tasks, ages.
 
 import { find, make, say, show } from "./dom.js";
-import { since, time, unit, value } from "./format.js";
+import { time, value } from "./format.js";
 
 const MODES = /^(?:mode|reason|state|status|stale|landed|descend|source|blind|found|lost)$/;
+
+const BAR = 4; // px of a bar of a histogram
 
 export class Status {
   overran = new Map(); // by task: performance.now() until which it is ringed
@@ -14,6 +16,7 @@ export class Status {
     this.model = model;
     this.tasks = find("#tasks");
     this.verdicts = find("#verdicts");
+    this.problem = find("#problem");
   }
 
   /** Choose the signals of modes and ages; return their names. */
@@ -43,11 +46,13 @@ export class Status {
   values() {
     for (const [name, row] of this.#rows) {
       const signal = this.model.signals.get(name);
-      say(row, value(signal, this.model.values.get(name)?.[0]) || "\u2013");
+      say(row, value(signal, this.model.values.get(name)) || "\u2013");
     }
   }
 
   take(status) {
+    show(this.problem, Boolean(status.Problem));
+    say(find("p", this.problem), status.Problem ?? "");
     this.#tasks(status.Tasks ?? []);
     const verdicts = status.Verdicts ?? [];
     show(this.verdicts, verdicts.length > 0);
@@ -102,16 +107,16 @@ function spread(row, facts, period) {
   const style = getComputedStyle(canvas);
   context.clearRect(0, 0, width, height);
   context.fillStyle = style.color;
-  const bars = facts.histogram ?? [];
-  const most = Math.max(...bars.map(([, count]) => count), 1);
-  for (const [end, count] of bars) {
-    const [left, right] = [x(end / 2), x(end)];
-    const tall = Math.max(1.5, (Math.log1p(count) / Math.log1p(most)) * (height - 3));
-    context.globalAlpha = 0.55;
-    context.fillRect(left, height - tall, Math.max(1, right - left - 0.5), tall);
-  }
+  const bars = new Float64Array(Math.ceil(width / BAR));
+  for (const { from_s: begin, to_s: end, count } of facts.histogram ?? []) bars[Math.floor(x((begin + end) / 2) / BAR)] += count;
+  const most = Math.max(...bars, 1);
+  context.globalAlpha = 0.55;
+  bars.forEach((count, index) => {
+    const tall = count && Math.max(1.5, (Math.log1p(count) / Math.log1p(most)) * (height - 3));
+    context.fillRect(index * BAR, height - tall, BAR - 0.5, tall);
+  });
   context.globalAlpha = 1;
-  if (!bars.length) context.fillRect(x(facts.min_s), height / 2 - 1, Math.max(1, x(facts.max_s) - x(facts.min_s)), 2);
+  if (!facts.histogram) context.fillRect(x(facts.min_s), height / 2 - 1, Math.max(1, x(facts.max_s) - x(facts.min_s)), 2);
   context.fillRect(x(facts.mean_s) - 1, 2, 2, height - 2);
   context.fillStyle = facts.max_s > period ? style.outlineColor : style.borderTopColor;
   context.fillRect(x(period), 0, 1.5, height);

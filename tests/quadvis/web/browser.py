@@ -33,7 +33,14 @@ class Browser:
             [CHROMIUM, *OPTIONS, f"--user-data-dir={folder / 'profile'}", "about:blank"],
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
-        port = folder / "profile" / "DevToolsActivePort"
+        try:
+            self._connect()
+        except BaseException:
+            self._process.kill()
+            raise
+
+    def _connect(self) -> None:
+        port = self.folder / "profile" / "DevToolsActivePort"
         self.until(lambda: port.exists() and len(port.read_text().splitlines()) > 1)
         address = f"http://127.0.0.1:{port.read_text().splitlines()[0]}/json"
         with urllib.request.urlopen(address) as answer:

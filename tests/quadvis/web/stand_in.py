@@ -5,7 +5,6 @@ It answers the verbs in the words of `quadvis.target.kernel`. Its scopes sample 
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from collections import defaultdict, deque
@@ -20,8 +19,6 @@ from quadvis.block import Frame
 from quadvis.errors import QuadvisError, quoted
 from quadvis.output.log_reader import read_log
 from quadvis.realtime.times import (
-    BINS,
-    COUNTS,
     LATENESS,
     OVERRUNS,
     STEPS,
@@ -31,7 +28,6 @@ from quadvis.realtime.times import (
     bin_of,
     clear,
     count,
-    end_of,
 )
 from quadvis.run.live import LiveRun
 from quadvis.run.tuned import find_value
@@ -156,10 +152,7 @@ class StandIn:
     def do_getsignal(self, names: list[str]) -> dict[str, Any]:
         with self._lock:
             run = self._flight.run if self._flight else None
-            if run is None:
-                return {name: [None, -1] for name in names}
-            tick = round(run.time / float(self.diagram.graph.tick)) - 1
-            return {name: [_plain(run[name]), tick] for name in names}
+            return {name: None if run is None else _plain(run[name]) for name in names}
 
     def do_parameters(self, first: int = 0) -> list[dict[str, Any]]:
         return self.parameters.facts()
@@ -425,20 +418,8 @@ class Flight:
         for name, shared in self._times.items():
             words = shared.copy()  # the run goes on
             facts = TaskTimes.read(name, periods[name], words).facts()
-            for key, at in (("lateness", LATENESS), ("execution", TET)):
-                if facts[key] is not None:
-                    facts[key]["histogram"] = _octaves(words[at + COUNTS : at + COUNTS + BINS])
             found.append({"computer": "", "task": name, **facts})
         return found
-
-
-def _octaves(counts: Any) -> list[list[float]]:
-    """Return [end of a bin (s), count] for bins of a factor of two."""
-    found: dict[float, int] = {}
-    for number in np.flatnonzero(counts):
-        end = 2.0 ** math.ceil(math.log2(max(1, end_of(int(number))))) / 1e9
-        found[end] = found.get(end, 0) + int(counts[number])
-    return [[end, number] for end, number in sorted(found.items())]
 
 
 def _plain(value: Any) -> Any:

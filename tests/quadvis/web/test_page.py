@@ -192,7 +192,7 @@ def test_each_level_sees_what_it_may(browser: Browser, running: Running, target:
     visible = f"{controls}.filter((each) => each.offsetParent).map((each) => each.id)"
     if level == 4:
         browser.until("document.querySelectorAll('.task').length === 4")
-        assert browser.run(visible) == [] and "no diagram" in browser.text("#drawing")
+        assert browser.run(visible) == [] and "nothing to show" in browser.text("#drawing")
         return
     browser.until("document.querySelectorAll('g.wire').length > 20")
     browser.until("[...document.querySelectorAll('.value')].some((each) => each.textContent)")
