@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from quadvis.block import METHODS
@@ -14,6 +16,7 @@ from quadvis.testing.rig import PERIOD, STEPS, Rig, Subject, Whole, rigs, source
 # Compiled and interpreted agree to the last bit where both use the C library's functions and one order of
 # summation. numba promises neither on every machine, so a few last bits are allowed.
 TOLERANCE = 1e-12
+START = "start"
 
 
 def compiles(subject: Subject) -> None:
@@ -26,35 +29,42 @@ def compiles(subject: Subject) -> None:
     if not subject.block.numeric:
         return
     for rig in rigs(subject, missing=True):
-        kind, ops = _compiled(rig)
+        calls = _compiled(rig)
         with rig.engine:
             for step in range(STEPS):
                 rig.feed(step)
-                _agree(rig, kind, ops, step)
+                _agree(rig, calls, step)
 
 
-def _compiled(rig: Rig) -> tuple[BlockType, dict[str, Op]]:
-    """Return the block's type, compiled, and a call of each of its methods."""
+def _compiled(rig: Rig) -> dict[str, tuple[BlockType, Op]]:
+    """Return a call of each of the block's methods, with the type in which it is compiled.
+
+    A type of its own has ``start``, which a run calls interpreted: the other one is that of diagrams.
+    """
     placed = rig.placed
     arguments = rig.block.interface.arguments
     ops = {
         method: Op(0, method, tuple(sources(placed, names)), tuple(targets(placed, method).values()))
         for method, names in arguments.items()
     }
-    block = rig.engine.graph.nodes[0].block
-    kind = BlockType.of(type(block), placed.record, tuple(map(MethodType.of, ops.values())))
-    library().prepare([kind])
-    assert kind not in library().refusals, f"it cannot be compiled: {library().refusals[kind]}"
-    return kind, ops
+    block = type(rig.engine.graph.nodes[0].block)
+    calls = {}
+    for together in ([op for op in ops.values() if (op.method == START) is alone] for alone in (True, False)):
+        if together:
+            kind = BlockType.of(block, placed.record, tuple(map(MethodType.of, together)))
+            library().prepare([kind])
+            assert kind not in library().refusals, f"it cannot be compiled: {library().refusals[kind]}"
+            calls |= {op.method: (kind, op) for op in together}
+    return calls
 
 
-def _agree(rig: Rig, kind: BlockType, ops: dict[str, Op], step: int) -> None:
+def _agree(rig: Rig, calls: Mapping[str, tuple[BlockType, Op]], step: int) -> None:
     """Call every method both ways; then take an Euler step, to reach another state."""
     program, memory = rig.engine.program, rig.memory
     memory.write(TIME, float(step * PERIOD))
     for method in METHODS:
-        call = getattr(rig.block, "start", None) if method == "start" else rig.call(method)
-        if call is None or (method == "start" and step > 0):
+        call = getattr(rig.block, START, None) if method == START else rig.call(method)
+        if call is None or (method == START and step > 0):
             continue
         before = rig.whole()
         failed = False
@@ -64,7 +74,8 @@ def _agree(rig: Rig, kind: BlockType, ops: dict[str, Op], step: int) -> None:
             failed = True
         interpreted = rig.whole()
         rig.put_back(before)
-        passed = library().call(kind, ops[method], memory, rig.placed.position)
+        kind, op = calls[method]
+        passed = library().call(kind, op, memory, rig.placed.position)
         if failed:
             # What is an error when interpreted stops a run: there is no result to agree with.
             assert not passed, f"{method} at step {step}: interpreted, it raises an exception; compiled, none"
