@@ -1,7 +1,8 @@
 """Machine code kept on disk, under a key that changes with everything that the code depends on.
 
 A file has a header with the checksum of the rest, so that a damaged one is compiled again. Files are replaced
-in one step, so two processes never see half of one. Whatever the disk refuses: the run goes on without.
+in one step, so two processes never see half of one; a claim keeps them from compiling the same at the same
+time. Whatever the disk refuses: the run goes on without.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import json
 import os
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from quadvis.machine.files import reason
 FOLDER = "QUADVIS_CACHE"  # environment variable: the folder for the cache
 MAGIC = b"quadvis machine code 1\n"
 SUFFIX = ".native"
+CLAIM = ".claim"
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,37 @@ def keep(key: str, code: MachineCode) -> bool:
     except (OSError, RuntimeError):
         return False
     return True
+
+
+@contextmanager
+def claim(key: str, *, wait: bool = True) -> Iterator[bool]:
+    """Keep other processes from compiling what a key stands for, yield whether that is granted.
+
+    It ends with its process, too. Who waited finds the machine code kept, if the other one could compile it.
+    Without locks of files every claim is granted.
+    """
+    try:
+        import fcntl
+
+        path = _path(key).with_suffix(CLAIM)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = open(path, "wb")  # noqa: SIM115
+    except (ImportError, OSError, RuntimeError):
+        yield True
+        return
+    with file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        except BlockingIOError:
+            yield False
+            return
+        except OSError:  # no locks on this disk
+            pass
+        try:
+            yield True
+        finally:
+            with suppress(OSError):
+                path.unlink()
 
 
 def files() -> Iterator[tuple[Path, int]]:

@@ -57,10 +57,16 @@ class Library:
             key = _key(text)
             code = cache.load(key)
             if code is None or not self._add(text, code):
-                from quadvis.native.compiler import compile_routine
-
-                self._add(text, _kept(key, compile_routine(routine, _prefix(key))))
+                self._compile_routine(routine, key)
         return self._functions[text][ROUTINE].address
+
+    def _compile_routine(self, routine: Routine, key: str) -> None:
+        from quadvis.native.compiler import compile_routine
+
+        with cache.claim(key):
+            code = cache.load(key)  # another process may have been at it
+            if code is None or not self._add(routine.text, code):
+                self._add(routine.text, _kept(key, compile_routine(routine, _prefix(key))))
 
     def loop(self) -> int:
         """Return the address of the compiled loop."""
@@ -75,15 +81,26 @@ class Library:
         return code is not None and self._add(kind, code)
 
     def prepare(self, kinds: Iterable[BlockType], announce: Announce | None = None) -> None:
-        """Load block types, and compile those that are not kept."""
+        """Load block types, and compile those that are not kept; last those that another process compiles."""
         missing = self.missing(kinds)
-        for number, kind in enumerate(missing, 1):
-            from quadvis.native.compiler import compile_block
-
+        places = {kind: f"{number} of {len(missing)} block types" for number, kind in enumerate(missing, 1)}
+        claimed = [kind for kind in missing if not self._compile(kind, places[kind], announce, wait=False)]
+        for kind in claimed:
             if announce:
-                announce(f"compiling {kind.block.__name__}, {number} of {len(missing)} block types, once")
-            key = _key(kind.text)
-            self._add(kind, _kept(key, compile_block(kind, _prefix(key))))
+                announce(f"waiting for another process, which compiles {kind.block.__name__}")
+            self._compile(kind, places[kind], announce, wait=True)
+
+    def _compile(self, kind: BlockType, place: str, announce: Announce | None, *, wait: bool) -> bool:
+        """Compile a block type that is still not kept; return whether no other process has claimed it."""
+        key = _key(kind.text)
+        with cache.claim(key, wait=wait) as granted:
+            if granted and not self._load(kind):
+                from quadvis.native.compiler import compile_block
+
+                if announce:
+                    announce(f"compiling {kind.block.__name__}, {place}, once")
+                self._add(kind, _kept(key, compile_block(kind, _prefix(key))))
+        return granted
 
     def load_functions(self, functions: Sequence[NativeFunction]) -> bool:
         """Bind functions that are kept together; return whether they are."""
@@ -95,7 +112,9 @@ class Library:
         from quadvis.native.compiler import compile_functions
 
         key = _key(repr([function.text for function in functions]))
-        self._bind(functions, _kept(key, compile_functions(functions, _prefix(key))))
+        with cache.claim(key):
+            if not self.load_functions(functions):  # another process may have been at it
+                self._bind(functions, _kept(key, compile_functions(functions, _prefix(key))))
 
     def _bind(self, functions: Sequence[NativeFunction], code: MachineCode) -> bool:
         if not code.refusal:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import types
 from collections.abc import Callable
+from contextlib import ExitStack
 from fractions import Fraction
 from itertools import product
 from pathlib import Path
@@ -506,6 +507,39 @@ def test_a_block_type_is_compiled_once_and_then_loaded_in_any_process(folder: Pa
     assert len(gained(scaled(), Library())) == 1
     assert gained(scaled(), Library()) == []
     assert [path.suffix for path, _ in cache.files()] == [cache.SUFFIX]
+
+
+def test_what_another_process_compiles_comes_last_and_is_loaded(folder: Path) -> None:
+    first, second = (
+        next(iter(block_types(engine.program, [engine.graph[ALONE].block]).values()))
+        for engine in (scaled(), alone(Gives(), {"u": 7.0}, {}, Fraction(1)))
+    )
+    Library().prepare([first])
+    ((path, _),) = cache.files()
+    whole, said = path.read_bytes(), []
+    path.unlink()
+    with ExitStack() as elsewhere:
+        assert elsewhere.enter_context(cache.claim(path.stem))
+
+        def announce(text: str) -> None:
+            said.append(text)
+            if text.startswith("waiting"):
+                path.write_bytes(whole)
+                elsewhere.close()
+
+        Library().prepare([first, second], announce)
+    assert said == [
+        "compiling Gives, 2 of 2 block types, once",
+        "waiting for another process, which compiles Scaled",
+    ]
+    assert [each.suffix for each in folder.iterdir()] == [cache.SUFFIX] * 2
+
+
+def test_a_claim_is_granted_to_one_at_a_time(folder: Path) -> None:
+    with cache.claim("x") as first, cache.claim("x", wait=False) as second, cache.claim("y") as third:
+        assert (first, second, third) == (True, False, True)
+    with cache.claim("x", wait=False) as again:
+        assert again
 
 
 def cut(data: bytes) -> bytes:

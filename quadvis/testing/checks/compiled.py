@@ -48,7 +48,7 @@ def _compiled(rig: Rig) -> dict[str, tuple[BlockType, Op]]:
         for method, names in arguments.items()
     }
     block = type(rig.engine.graph.nodes[0].block)
-    calls = {}
+    calls: dict[str, tuple[BlockType, Op]] = {}
     for together in ([op for op in ops.values() if (op.method == START) is alone] for alone in (True, False)):
         if together:
             kind = BlockType.of(block, placed.record, tuple(map(MethodType.of, together)))
