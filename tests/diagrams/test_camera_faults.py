@@ -45,6 +45,7 @@ def test_a_frame_of_another_place_after_a_gap_sets_no_speed(
 
 # One flight for each kind, and of few kinds one with each design, at one place after the other;
 # ``python -m tests.diagrams.faults`` flies all kinds at all places in as many seeds as are asked for.
+# As machine code, which the second stage compiles for test_every_diagram.py in any case.
 TURNS = [
     (kind, design, ("blackout", "descent", "touchdown", "takeover")[(number + 2 * turn) % 4])
     for number, kind in enumerate(OF_POINTS)
@@ -62,7 +63,7 @@ PICTURE_TURNS = [
 def test_no_fault_of_stamps_or_measurements_loses_a_craft(
     kind: str, design: str | None, place: str, tmp_path: Path
 ) -> None:
-    flight = fly(tmp_path, place, design, kind, seed=1, pictures=False)
+    flight = fly(tmp_path, place, design, kind, seed=1, pictures=False, engine="native")
     check(flight, kind)
     assert flight.back
 
@@ -70,6 +71,6 @@ def test_no_fault_of_stamps_or_measurements_loses_a_craft(
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "design", "place"), PICTURE_TURNS)
 def test_no_fault_of_pictures_does(kind: str, design: str | None, place: str, tmp_path: Path) -> None:
-    flight = fly(tmp_path, place, design, kind, seed=1, pictures=True)
+    flight = fly(tmp_path, place, design, kind, seed=1, pictures=True, engine="native")
     check(flight, kind)
     assert flight.back
