@@ -7,19 +7,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadvis.testing import Driven, drive
-from quadvis_blocks.supervision.capture import CaptureProcess
+from quadvis_blocks.supervision.capture import Capture
 
 NOBODY = [False] * 4
 PLACE = [0.4, -0.3, 1.8]
 
 
-def hold(engaged: Any, block: CaptureProcess | None = None, **more: Any) -> Driven:
+def hold(engaged: Any, block: Capture | None = None, **more: Any) -> Driven:
     """Hold 0, 0, 1.5 m at heading 0 with the craft at PLACE, turned by 0.2 rad; drive at 20 Hz."""
     inputs = {
         "position_reference": [0.0, 0.0, 1.5], "heading_reference": 0.0, "position": PLACE, "heading": 0.2,
         "engaged": engaged,
     }  # fmt: skip
-    return drive(block or CaptureProcess(), rate="20 Hz", **{**inputs, **more})
+    return drive(block or Capture(), rate="20 Hz", **{**inputs, **more})
 
 
 def test_the_law_takes_over_at_the_place_where_the_craft_is() -> None:
@@ -62,7 +62,7 @@ def test_a_moving_reference_moves_on_from_there() -> None:
 
 
 def test_with_a_return_speed_the_craft_goes_back_in_a_straight_line() -> None:
-    found = hold([[True] * 4] + [NOBODY] * 40, CaptureProcess(return_speed=0.5))
+    found = hold([[True] * 4] + [NOBODY] * 40, Capture(return_speed=0.5))
     away = np.linalg.norm(found.shifted_position - [0.0, 0.0, 1.5], axis=1)
     length = math.sqrt(0.4**2 + 0.3**2 + 0.3**2)
     assert away == pytest.approx(np.maximum(length - 0.5 * found.time, 0.0), abs=1e-12)

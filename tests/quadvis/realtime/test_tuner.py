@@ -17,10 +17,10 @@ from quadvis.engine.tuning import Change, NewValue
 from quadvis.errors import QuadvisError
 from quadvis.links.endpoints import live_parts
 from quadvis.realtime import dispatch, pacing, plan
-from quadvis.realtime.box import NOTED, NUMBER, ParameterBox
+from quadvis.realtime.box import NUMBER, ParameterBox
 from quadvis.realtime.helm import Wanted
-from quadvis.realtime.ring import RecordRing
-from quadvis.realtime.tuner import BEFORE, Tuned, Tuner, room_for
+from quadvis.realtime.notes import Notes
+from quadvis.realtime.tuner import BEFORE, Tuned, Tuner, box_room
 from quadvis.realtime.words import whole_words
 
 TEXT = """\
@@ -43,16 +43,16 @@ class Loop:
 
     def __init__(self, computer: str) -> None:
         part = DIAGRAM.graph.part_of(computer)
-        self.engine, room = Engine(live_parts(DIAGRAM.graph)[computer]), room_for(part)
+        self.engine, room = Engine(live_parts(DIAGRAM.graph)[computer]), box_room(part)
         self.box = ParameterBox(whole_words(ParameterBox.size(room)), room)
-        self.noted = RecordRing(whole_words(RecordRing.size(*NOTED)), *NOTED)
+        self.notes = Notes(whole_words(Notes.size([])), [])
         self.tuned = Tuned(part, self.box, self.engine.program.tunables)
         self._plan, self._crew = whole_words(plan.HEAD), whole_words(dispatch.HEAD)
 
     def step(self, tick: int) -> None:
         memory = self.engine.memory.raw.cast("q")
         if self.box.words[NUMBER] != self._plan[plan.TAKEN]:
-            pacing._take(self._plan, self.box.words, self.noted.words, self._crew, memory, tick)
+            pacing._take(self._plan, self.box.words, self.notes.words, self._crew, memory, tick)
 
 
 class Rig:
@@ -70,7 +70,7 @@ class Rig:
 
     def look(self) -> None:
         for name, loop in self.loops.items():
-            self.tuner.noted(name, np.array(loop.noted.take(last=True)))
+            self.tuner.noted(name, np.array(loop.notes.groups.take(last=True)))
         self.tuner.send(self.tick)
 
     def step(self, *computers: str) -> None:

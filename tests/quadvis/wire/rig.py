@@ -29,6 +29,7 @@ from quadvis.wire.who import Who
 DIGEST = "0" * 64
 # What may be asked for, by verb: arguments that are right.
 RIGHT: dict[str, dict[str, Any]] = {
+    "align": {"shift": 5},
     "renew": {"token": "0" * 32}, "release": {"token": "0" * 32}, "load": {"application": "hover"},
     "getsignal": {"names": ["craft.position"]}, "getparam": {"names": ["roll.gain"]},
     "setparam": {"values": {"roll.gain": 2.0}}, "settime": {"StopTime": 5.0},
