@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -23,6 +24,8 @@ class HostConnection:
         self._client = client
         hello = client.request("hello")
         self.name, self.level = str(hello["target"]), int(hello["level"])
+        self._lock = threading.Lock()
+        self._operators = 0  # threads that are the operator now
         self._subscriptions: dict[str, Subscription] = {}
 
     def request(self, verb: str, deadline: float = PATIENCE, **arguments: Any) -> Any:
@@ -32,19 +35,25 @@ class HostConnection:
     def operate(self, verb: str, deadline: float = PATIENCE, **arguments: Any) -> Any:
         """Do as `request`, as the operator if the verb needs one; the lease is held for this moment."""
         declared = VERBS.get(verb)
-        if declared is None or not declared.leased or self._client.operates:
+        if declared is None or not declared.leased:
             return self.request(verb, deadline, **arguments)
         with self.operator():
             return self.request(verb, deadline, **arguments)
 
     @contextmanager
     def operator(self) -> Iterator[None]:
-        """Be the operator inside."""
-        if self._client.operates:
+        """Be the operator inside; several threads may be there, and the last one gives the lease back."""
+        with self._lock:
+            if not self._client.operates:
+                self._client.operate()
+            self._operators += 1
+        try:
             yield
-            return
-        with self._client.operating():
-            yield
+        finally:
+            with self._lock:
+                self._operators -= 1
+                if not self._operators:
+                    self._client.release()
 
     def subscribe(self, topic: str, take: Callable[[Mapping[str, Any], Any], object]) -> None:
         """Let ``take(header, array)`` be called with the data of a topic, in the client's thread."""
