@@ -6,10 +6,13 @@ import math
 import threading
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quadvis.diagram.diagram import Diagram
 from quadvis.errors import QuadvisError
+from quadvis.machine.files import SVG, write_output
 from quadvis.run.result import Result
 from quadvis.run.tuned import new_values
 from quadvis.target.bundle import ApplicationBundle
@@ -238,17 +241,22 @@ class Application:
         return found
 
     def drawing(self) -> Future[Any]:
-        """Return the picture of the diagram as SVG; it is drawn once."""
+        """Return the picture of the diagram as SVG; it is drawn once, and kept."""
         if self._drawing is None:
             self._drawing = Future()
-            threading.Thread(target=_draw, args=(self.diagram, self._drawing), daemon=True).start()
+            place = self._store.drawing(self.diagram.hash)
+            work = partial(_draw, self.diagram, place, self._drawing)
+            threading.Thread(target=work, daemon=True).start()
         return self._drawing
 
 
-def _draw(diagram: Diagram, drawing: Future[Any]) -> None:
+def _draw(diagram: Diagram, place: Path, drawing: Future[Any]) -> None:
+    """Draw a diagram, or find the drawing in its place."""
     from quadvis.diagram.picture import draw_diagram
 
     try:
-        drawing.set_result(draw_diagram(diagram))
+        if not place.exists():
+            write_output(place, SVG, draw_diagram(diagram))
+        drawing.set_result(place.read_text())
     except Exception as error:
         drawing.set_exception(error)

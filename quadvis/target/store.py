@@ -3,6 +3,7 @@
 folder/files/<SHA-256>              contents of files, each once
 folder/applications/<name>/         bundle.json, and the folder `tree` as the diagram's blocks see it
 folder/sets/<name>/<set>.yaml       parameter sets of an application
+folder/drawings/<hash>.svg          drawings of diagrams
 folder/scopes/<name>/               files of file scopes
 folder/logs/<name>-<number>.mcap    the logs of its runs
 """
@@ -22,6 +23,7 @@ from quadvis.target.bundle import DIGEST, NAME, ApplicationBundle, inner_path
 MOST_BYTES = 256_000_000  # of a file
 MOST_BUNDLE = 4_000_000
 PARTLY = 8  # files that may be on their way at the same time
+DRAWINGS = 20  # that are kept
 LOGS = 100  # of one application; older ones are removed
 
 
@@ -30,7 +32,7 @@ class Store:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        for name in ("files", "applications", "sets", "logs"):
+        for name in ("files", "applications", "sets", "logs", "drawings"):
             (folder / name).mkdir(mode=0o700, parents=True, exist_ok=True)
         for left in (folder / "files").glob("*.part"):
             left.unlink()
@@ -166,6 +168,13 @@ class Store:
         folder = self.folder / "scopes" / _checked(name)
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         return folder
+
+    def drawing(self, digest: str) -> Path:
+        """Return the path of the drawing of the diagram with a hash; if there are many, the oldest go."""
+        kept = sorted((self.folder / "drawings").glob("*.svg"), key=_age)
+        for path in kept[:-DRAWINGS]:
+            path.unlink(missing_ok=True)
+        return self.folder / "drawings" / f"{digest}.svg"
 
     # logs
 

@@ -349,3 +349,15 @@ def test_pictures_of_a_run_are_shown_to_who_asks_and_change_nothing(
         tg.request("picture", signal="eyes/camera.frme")
     tg.stop()
     assert quadvis.replay(tg.fetchlog()).same
+
+
+def test_the_diagram_is_drawn_once(tg: Target, lab: Running, diagram: Path) -> None:
+    tg.load(diagram)
+    drawn = tg.request("drawing", deadline=60)
+    assert drawn.startswith("<svg") and 'data-source="wave.y"' in drawn
+    kept = lab.folder / f"state/quadvis/lab/drawings/{tg.Hash}.svg"
+    assert kept.read_text() == drawn
+    kept.write_text("<svg/>")
+    tg.load(diagram)
+    assert tg.request("drawing", deadline=60) == "<svg/>"
+    kept.unlink()
