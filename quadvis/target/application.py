@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from quadvis.diagram.diagram import Diagram
 from quadvis.errors import QuadvisError
 from quadvis.machine.files import SVG, write_output
+from quadvis.realtime.helm import ENDED
 from quadvis.run.result import Result
 from quadvis.run.tuned import new_values
 from quadvis.target.bundle import ApplicationBundle
@@ -76,9 +77,11 @@ class Application:
         session = self._session
         if session is None or not session.running:
             return STOPPED
-        if session.stopped:
+        if session.stopped or session.helm.state == ENDED:
             return STOPPING
-        return {"starting": LOADING, "ready": READY, "running": RUNNING}.get(session.helm.state, STOPPING)
+        if session.helm.is_begun:  # of which the supervisor may not have heard yet
+            return RUNNING
+        return READY if session.helm.state == READY else LOADING
 
     # from loaded to stopped
 

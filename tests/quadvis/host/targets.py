@@ -64,7 +64,8 @@ def running_target(
             text=True, stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True,
         )  # fmt: skip
     try:
-        wait_for(lambda: (folder / "quadvis" / name).exists() or process.poll() is not None)
+        last = "hosts with keys" if "--listen" in arguments else "this machine's user"
+        wait_for(lambda: last in (folder / "output.txt").read_text() or process.poll() is not None)
         yield Running(name, process, folder, environment)
     finally:
         process.terminate()

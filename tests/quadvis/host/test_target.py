@@ -293,7 +293,8 @@ def test_the_shell_has_the_same_verbs(tg: Target, lab: Running, diagram: Path, t
     assert code == 0
     assert "wave.y" in out
     code, out, _ = quadvis_says(lab, "console", *to, input="get law.factor\nsets save kept\nsets\nstop\n")
-    assert (code, out.splitlines()[:2]) == (0, ["law.factor: 4.0", "kept"])
+    assert (code, out.splitlines()[0]) == (0, "law.factor: 4.0")
+    assert "kept" in out.splitlines()
     code, out, _ = quadvis_says(lab, "log", "-o", str(tmp_path / "x.mcap"), *to)
     assert (code, out) == (0, f"{tmp_path / 'x.mcap'}\n")
     assert quadvis_says(lab, "unload", *to) == (0, "", "")
