@@ -9,14 +9,15 @@ from typing import Any
 
 from quadvis.engine.memory import packed
 from quadvis.machine.garbage import uncollected
+from quadvis.native.arrays import METHODS, OtherBits, methods
 from quadvis.native.block_type import BlockType, Kind, MethodType
 from quadvis.native.cache import MachineCode
-from quadvis.native.checked import power, replacements
+from quadvis.native.checked import instead, power, replacements
 from quadvis.native.foreign import intrinsics
 from quadvis.native.functions import LOOPS, ArrayKind, NativeFunction
 from quadvis.native.machine_code import Compiled, Unlinkable, emit
 from quadvis.native.routine import ROUTINE, Routine, plain
-from quadvis.native.source import POWER, Unreadable, fingerprint, names_in, prepared
+from quadvis.native.source import METHOD, POWER, Unreadable, fingerprint, names_in, prepared
 
 # A division by zero and a wrong index are noticed. Nobody calls the functions from Python.
 OPTIONS = {"error_model": "python", "boundscheck": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
@@ -186,15 +187,19 @@ class _Scope:
             checked = replacements()
             scope = dict(function.__globals__)
             scope |= {"int": checked[int], "round": checked[round], "pow": checked[pow], POWER: power()}
+            scope |= {METHOD.format(name): value for name, value in methods().items()}
             copy = prepared(function, self._arrays, scope)
+            for name in METHODS - methods().keys():
+                if METHOD.format(name) in names_in(copy.__code__):
+                    raise OtherBits(name)
             jit: Any = numba.njit
             known[key] = jit(copy, **OPTIONS)
             for name in names_in(function.__code__):
                 value = function.__globals__.get(name)
                 if isinstance(value, types.FunctionType):
                     scope[name] = self.jit(value)
-                elif _hashable(value) and value in checked:
-                    scope[name] = checked[value]
+                elif name in function.__globals__:
+                    scope[name] = instead(value)
         return known[key]
 
 
@@ -208,10 +213,6 @@ def _meets_self(function: types.FunctionType, seen: set[types.FunctionType]) -> 
     return "self" in (*code.co_varnames, *code.co_freevars) or any(
         _meets_self(each, seen) for each in called if isinstance(each, types.FunctionType)
     )
-
-
-def _hashable(value: Any) -> bool:
-    return isinstance(value, types.ModuleType | types.BuiltinFunctionType | type)
 
 
 def _pointed(kind: Kind) -> Any:

@@ -31,6 +31,7 @@ from quadvis.native.tables import Function
 
 LOOP = Routine(loop, POINTERS)
 COMPILER = (
+    "arrays",
     "block_type",
     "checked",
     "compiler",

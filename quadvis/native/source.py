@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from quadvis.native.arrays import METHODS
 from quadvis.native.functions import LOOPS
 
-POWER = "__power__"
+POWER, METHOD = "__power__", "__array_{}__"
 PLAIN = (int, float, complex, str, bytes, bool, type(None), type(...), frozenset, range, np.generic)
 
 
@@ -33,14 +34,15 @@ def names_in(code: types.CodeType) -> Iterator[str]:
 
 
 def prepared(function: types.FunctionType, arrays: Collection[str], scope: dict[str, Any]) -> Any:
-    """Return a function again, with its globals in ``scope`` and two things written out for numba.
+    """Return a function again, with its globals in ``scope`` and three things written out for numba.
 
     ``self.last = value`` becomes ``self.last[...] = value`` where ``last`` is one of ``arrays``: interpreted,
     the two are the same, but numba gives the fields of a record arrays of the exact type only. ``x ** y``
-    becomes a call, since numba's power refuses less than Python's. Lines keep their numbers. Unreadable if
-    the file was edited after the function was made.
+    becomes a call, since numba's power refuses less than Python's and has other bits. So does ``x.sum()``,
+    and what else numba adds up or chooses in another order. Lines keep their numbers. Unreadable if the file
+    was edited after the function was made.
     """
-    rewriting = _Rewriting(arrays)
+    rewriting = _Rewriting(arrays, {name for name in scope if isinstance(scope[name], types.ModuleType)})
     code = function.__code__
     if rewriting.concerns(function):
         code = _rewritten(function, rewriting)
@@ -50,14 +52,14 @@ def prepared(function: types.FunctionType, arrays: Collection[str], scope: dict[
 
 
 class _Rewriting(ast.NodeTransformer):
-    """Writes out stores to arrays, and powers."""
+    """Writes out stores to arrays, powers, and methods of arrays."""
 
-    def __init__(self, arrays: Collection[str]) -> None:
-        self.arrays = frozenset(arrays)
+    def __init__(self, arrays: Collection[str], modules: Collection[str]) -> None:
+        self.arrays, self.modules = frozenset(arrays), frozenset(modules)
 
     def concerns(self, function: types.FunctionType) -> bool:
         """Return whether anything may have to be written out."""
-        if self.arrays & set(names_in(function.__code__)):
+        if (self.arrays | METHODS) & set(names_in(function.__code__)):
             return True
         try:
             return "**" in inspect.getsource(function)
@@ -71,6 +73,17 @@ class _Rewriting(ast.NodeTransformer):
             return node
         field = ast.Attribute(node.value, node.attr, ast.Load())
         return ast.copy_location(ast.Subscript(field, ast.Constant(...), ast.Store()), node)
+
+    def visit_Call(self, node: ast.Call) -> ast.expr:
+        """Replace a method of an array by a function."""
+        self.generic_visit(node)
+        method = node.func
+        if not isinstance(method, ast.Attribute) or method.attr not in METHODS:
+            return node
+        if isinstance(method.value, ast.Name) and method.value.id in self.modules:
+            return node
+        called = ast.Name(METHOD.format(method.attr), ast.Load())
+        return ast.copy_location(ast.Call(called, [method.value, *node.args], node.keywords), node)
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         """Replace a power by a call."""

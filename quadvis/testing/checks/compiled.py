@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -13,9 +14,6 @@ from quadvis.native.block_type import BlockType, MethodType
 from quadvis.native.library import library
 from quadvis.testing.rig import PERIOD, STEPS, Rig, Subject, Whole, rigs, sources, targets
 
-# Compiled and interpreted agree to the last bit where both use the C library's functions and one order of
-# summation. numba promises neither on every machine, so a few last bits are allowed.
-TOLERANCE = 1e-12
 START = "start"
 
 
@@ -23,8 +21,8 @@ def compiles(subject: Subject) -> None:
     """Check that every method of a numeric block, compiled, agrees with the interpreted one.
 
     Over random inputs, some of them NaN, and random parameters; both start from the same memory at every
-    call, so that errors do not add up. Whole numbers agree exactly, floats to ``TOLERANCE``, absolute and
-    relative. Where the interpreted method raises an exception, the compiled one fails, too.
+    call, so that a difference is found where it arises. They agree to the bit; one NaN is as good as another.
+    Where the interpreted method raises an exception, the compiled one fails, too.
     """
     if not subject.block.numeric:
         return
@@ -95,6 +93,16 @@ def _same(rig: Rig, interpreted: Whole, where: str) -> None:
     rig.put_back(interpreted)
     for name, slot in slots.items():
         wanted = memory.read(slot)
-        tolerance = TOLERANCE if slot.scalar == "float64" else 0.0
-        same = np.allclose(compiled[name], wanted, rtol=tolerance, atol=tolerance, equal_nan=True)
-        assert same, f"{where}: {name} is {wanted} interpreted, {compiled[name]} compiled"
+        assert _has_bits(compiled[name], wanted), (
+            f"{where}: {name} is {wanted!r} interpreted, {compiled[name]!r} compiled"
+        )
+
+
+def _has_bits(found: Any, wanted: Any) -> bool:
+    """Return whether all elements are equal, zeros with their signs; one NaN is as good as another."""
+    a, b = np.asarray(found), np.asarray(wanted)
+    if a.dtype.kind != "f":
+        return bool(np.array_equal(a, b))
+    return bool(
+        np.array_equal(a, b, equal_nan=True) and (np.isnan(a) | (np.signbit(a) == np.signbit(b))).all()
+    )

@@ -6,7 +6,9 @@ import pytest
 from scipy.linalg import block_diag, expm, solve_discrete_are
 from scipy.stats import chi2
 
+from quadvis.native.functions import native, prepare
 from quadvis.testing import Driven, drive
+from quadvis_blocks.estimation._chain import predict
 from quadvis_blocks.estimation.position_filter import PositionFilter
 from tests.stages import mostly_slow
 
@@ -385,3 +387,22 @@ def test_it_begins_at_its_initial_position_and_is_not_ok_before_a_frame() -> Non
         stamp=np.nan, rate=RATE, steps=5,
     )  # fmt: skip
     assert (result.estimate == [1.0, 2.0, 3.0]).all() and not result.ok.any()
+
+
+@native(takes=("float64[3,9]", "float64[3]", "float64[3]", "float64", "float64[10]"), gives=("float64[3,9]",))
+def predicted(chains: Any, before: Any, after: Any, step: float, model: Any) -> Any:
+    found = chains.copy()
+    predict(found, before, after, step, model)
+    return found
+
+
+@pytest.mark.slow
+def test_machine_code_predicts_to_the_bit_what_the_interpreter_predicts() -> None:
+    prepare([predicted])
+    assert predicted.is_native
+    rng = np.random.default_rng(4)
+    for _ in range(500):
+        chains, model = rng.uniform(0.0, 0.01, (3, 9)), rng.uniform(0.1, 12.0, 10)
+        before, after = rng.normal(size=(2, 3))
+        given = chains, before, after, rng.uniform(0.001, 0.1), model
+        assert np.array_equal(predicted(*given), predicted.function(*given))
