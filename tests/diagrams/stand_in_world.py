@@ -34,7 +34,7 @@ quadvis: 1
 name: world
 base: {flight}
 without: {{blocks: [detector, pose, estimate, setpoint, control, outputs, receiver],
-  variants: [sim, hil, flight], computers: [vision_pc, target], links: [circle_line, imu_line],
+  variants: [sim, hil, flight], computers: [vision_pc, target], links: [pictures, circle_line, imu_line],
   params: [target, idle, camera, imu, rc, circles_out, circles_in],
   summary: [xy, h, yaw, frames without target], rates: [control]}}
 overload: {{}}
