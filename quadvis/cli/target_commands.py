@@ -14,8 +14,6 @@ from quadvis.errors import QuadvisError, quoted
 if TYPE_CHECKING:
     from quadvis.host.target import Target
 
-LIVE = 0.1  # s between two pictures of a live scope
-
 
 def target(options: argparse.Namespace) -> int:
     """Be a target until SIGTERM or Ctrl-C; or write the systemd unit of one."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from quadvis.errors import QuadvisError, quoted
 from quadvis.machine.shipped import PREFIX, named_file
-from quadvis.target.admission import source_digest
+from quadvis.target.admission import sources_of
 from quadvis.target.bundle import ApplicationBundle
 from quadvis.version import __version__
 
@@ -59,15 +59,6 @@ def pack(
         computer,
     )
     return ApplicationBundle.read(bundle.plain()), paths
-
-
-def sources_of(diagram: Diagram) -> dict[str, str]:
-    """Return the SHA-256 of the Python file of each block of a diagram, by the name of the block."""
-    found: dict[str, str] = {}
-    for node in diagram.graph.nodes:
-        if not node.origin and node.kind not in found:
-            found[node.kind] = source_digest(type(node.block))
-    return found
 
 
 def _listed(diagram: Diagram) -> Mapping[str, str]:

@@ -79,8 +79,8 @@ class Member:
         self._control[control.TICKS] = diagram.ticks
         Lifeline(self._control[control.LIFELINE]).make()
         self._link, self._theirs = context.Pipe()
-        shows = watched and bool(picture_signals(part))
-        pictures = context.RawArray("q", PictureBox.size()) if shows else None
+        self._picture_signals = picture_signals(part) if watched else []
+        pictures = context.RawArray("q", PictureBox.size()) if self._picture_signals else None
         setup = Setup(
             diagram.resolved, str(diagram.path.parent), diagram.path.name, diagram.own_blocks,
             IS_COMMAND.get(), computer, engine, wishes, rooms, streams, words, self._theirs, devices,
@@ -112,12 +112,12 @@ class Member:
 
     def has_picture(self, path: str, port: str) -> bool:
         """Return whether a signal is a picture of this computer."""
-        return self._pictures is not None and (path, port) in picture_signals(self._part)
+        return (path, port) in self._picture_signals
 
     def picture(self, path: str, port: str) -> Picture | None:
         """Return the newest picture of a signal that is one; None if there is none yet."""
         assert self._pictures is not None
-        return self._pictures.newest(picture_signals(self._part).index((path, port)) + 1)
+        return self._pictures.newest(self._picture_signals.index((path, port)) + 1)
 
     def rest(self) -> None:
         """Ask for no more pictures if nobody wants to see one."""

@@ -27,8 +27,11 @@ def admit(bundle: ApplicationBundle, place: Path) -> Diagram:
     tree = place
     for _ in Path(bundle.place).parts:
         tree = tree.parent
+    for kind, digest in sources_of(diagram).items():
+        if bundle.sources.get(kind) != digest:
+            problem = f"the block {quoted(kind)} is not the same on host and target"
+            raise QuadvisError(f"{problem}{_versions(bundle)}")
     for node in diagram.graph.nodes:
-        _check_source(node, bundle)
         _check_paths(node, tree)
     if diagram.hash != bundle.hash:
         raise QuadvisError(f"the diagram reads otherwise here than on the host{_versions(bundle)}")
@@ -63,19 +66,13 @@ def _knobs(bundle: ApplicationBundle, diagram: Diagram) -> dict[str, Knob]:
     return found
 
 
-def source_digest(made: type) -> str:
-    """Return the SHA-256 of the Python file that defines a class."""
-    return hashlib.sha256(Path(inspect.getfile(made)).read_bytes()).hexdigest()
-
-
-def _check_source(node: Node, bundle: ApplicationBundle) -> None:
-    """Refuse a block that is another one on the host."""
-    if node.origin:
-        return
-    if bundle.sources.get(node.kind) != source_digest(type(node.block)):
-        raise QuadvisError(
-            f"the block {quoted(node.kind)} is not the same on host and target{_versions(bundle)}"
-        )
+def sources_of(diagram: Diagram) -> dict[str, str]:
+    """Return the SHA-256 of the Python file that defines each block of a diagram, by the block's name."""
+    made = {node.kind: type(node.block) for node in diagram.graph.nodes if not node.origin}
+    return {
+        kind: hashlib.sha256(Path(inspect.getfile(block)).read_bytes()).hexdigest()
+        for kind, block in made.items()
+    }
 
 
 def _check_paths(node: Node, tree: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import threading
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from functools import partial
@@ -16,6 +15,7 @@ from quadvis.machine.files import SVG, write_output
 from quadvis.realtime.helm import ENDED
 from quadvis.run.result import Result
 from quadvis.run.tuned import new_values
+from quadvis.target.background import in_thread
 from quadvis.target.bundle import ApplicationBundle
 from quadvis.target.newest import NewestValues
 from quadvis.target.parameters import Parameters, as_written
@@ -183,8 +183,7 @@ class Application:
 
     def values(self, names: Sequence[str]) -> dict[str, Any]:
         """Return the newest values of signals by name; of all if none is named. None is one not there yet."""
-        found = [self.newest.value(name) for name in (names or self.newest.names)]
-        return {each.name: each.value for each in found}
+        return {name: self.newest.value(name) for name in names or self.newest.names}
 
     def tune(self, values: Mapping[str, Any]) -> Future[Any]:
         """Give parameters values, all at one tick.
@@ -230,36 +229,22 @@ class Application:
         session = self._session
         if session is None or not self.running:
             raise QuadvisError(f"{self.name} does not run, so there are no pictures")
-        found: Future[Any] = Future()
+        from quadvis.target.picture import encoded
 
-        def see() -> None:
-            from quadvis.target.picture import encoded
-
-            try:
-                found.set_result(encoded(self.diagram, session.helm, signal))
-            except Exception as error:
-                found.set_exception(error)
-
-        threading.Thread(target=see, daemon=True).start()
-        return found
+        return in_thread(partial(encoded, self.diagram, session.helm, signal))
 
     def drawing(self) -> Future[Any]:
         """Return the picture of the diagram as SVG; it is drawn once, and kept."""
         if self._drawing is None:
-            self._drawing = Future()
             place = self._store.drawing(self.diagram.hash)
-            work = partial(_draw, self.diagram, place, self._drawing)
-            threading.Thread(target=work, daemon=True).start()
+            self._drawing = in_thread(partial(_drawn, self.diagram, place))
         return self._drawing
 
 
-def _draw(diagram: Diagram, place: Path, drawing: Future[Any]) -> None:
-    """Draw a diagram, or find the drawing in its place."""
+def _drawn(diagram: Diagram, place: Path) -> str:
+    """Return the drawing of a diagram, from its place if it has been drawn before."""
     from quadvis.diagram.picture import draw_diagram
 
-    try:
-        if not place.exists():
-            write_output(place, SVG, draw_diagram(diagram))
-        drawing.set_result(place.read_text())
-    except Exception as error:
-        drawing.set_exception(error)
+    if not place.exists():
+        write_output(place, SVG, draw_diagram(diagram))
+    return place.read_text()

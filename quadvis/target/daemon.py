@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
@@ -64,11 +63,9 @@ class Daemon:
 
         self._say = say
         self._stack = ExitStack()
-        self._folder = folder
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         self._stack.enter_context(_alone(folder, name))
         self._asked = time.monotonic()
-        self._told: dict[str, Any] = {}
         pair = own_key(name) if name in own_names() else None
         self._server = Server(
             name, self._handle, hosts=AuthorizedHosts(), pair=pair, audit=Audit(folder / "audit.jsonl"),
@@ -76,7 +73,6 @@ class Daemon:
         )  # fmt: skip
         self.kernel = Kernel(name, Store(folder), self._server.publish)
         self._notifier = Notifier()
-        self._end = threading.Event()
 
     def __enter__(self) -> Daemon:
         return self
@@ -108,7 +104,8 @@ class Daemon:
     def run(self, idle: float | None) -> None:
         """Serve until SIGTERM, SIGHUP or Ctrl-C."""
         due = alive = 0.0
-        while not self._end.wait(LOOK):
+        while True:
+            time.sleep(LOOK)
             now = time.monotonic()
             if now >= due:
                 due = now + STATE
@@ -129,9 +126,7 @@ class Daemon:
     def _handle(self, verb: str, arguments: Mapping[str, Any], who: Who) -> Any:
         self._asked = time.monotonic()
         found = self.kernel.call(verb, arguments)
-        if verb == "status":
-            return found | self._operator() | {"Wire": self._server.facts()}
-        return found
+        return found | self._operator() if verb == "status" else found
 
 
 class _alone:

@@ -7,13 +7,12 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
-from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.sections.on_host_loss import CONTINUE, SAFE
 from quadvis.errors import QuadvisError
 from quadvis.target.admission import admit
 from quadvis.target.application import Application
 from quadvis.target.bundle import DIGEST, ApplicationBundle
-from quadvis.target.parameters import compared, read_set
+from quadvis.target.parameters import read_set
 from quadvis.target.status import status
 from quadvis.target.store import Store
 
@@ -159,11 +158,6 @@ class Kernel:
             raise QuadvisError("no application is loaded: load one first")
         return self._application
 
-    @property
-    def diagram(self) -> Diagram:
-        """The diagram of the application that is loaded."""
-        return self._loaded.diagram
-
     # signals and parameters
 
     def signals(self, first: int, count: int) -> list[dict[str, Any]]:
@@ -210,13 +204,6 @@ class Kernel:
     def deleteparamset(self, name: str) -> None:
         """Remove a parameter set."""
         self.store.known_set(self._loaded.name, name).unlink()
-
-    def compareparamsets(self, first: str, second: str) -> list[dict[str, Any]]:
-        """Return what differs between two parameter sets; "" is that of the present values."""
-        return compared(self._set(first), self._set(second))
-
-    def _set(self, name: str) -> dict[str, Any]:
-        return self.getparamset(name) if name else self.getparam(())
 
     # scopes
 

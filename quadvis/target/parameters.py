@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -137,15 +137,6 @@ def read_set(path: Path) -> dict[str, Any]:
 def as_written(value: Any) -> Any:
     """Return a value of a set as a setting is written: ``{value: [1, 2], unit: m}`` as one text."""
     return f"{{value: {value['value']}, unit: {value['unit']}}}" if isinstance(value, dict) else value
-
-
-def compared(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the parameters that differ between two sets, with both values; None where one has no value."""
-    return [
-        {"name": name, "old": first.get(name), "new": second.get(name)}
-        for name in sorted({*first, *second})
-        if first.get(name) != second.get(name)
-    ]
 
 
 def _first(*values: float | None) -> float | None:

@@ -39,7 +39,7 @@ def status(name: str, application: Application | None, session_time: float) -> d
         "StopTime": application.stop_time,
         "SampleTime": float(diagram.graph.tick),
         "CPUOverload": DETECTED if any(each.overruns for _, each in tasks) else NONE,
-        "NumSignals": sum(1 for _ in application.newest.names),
+        "NumSignals": len(application.newest.names),
         "NumParameters": len(application.parameters.names),
         "Tasks": [{"computer": computer, "task": each.task, **each.facts()} for computer, each in tasks],
         "Log": session.log.stem if session is not None else "",
