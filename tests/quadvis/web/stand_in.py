@@ -36,6 +36,16 @@ from quadvis.target.parameters import Parameters
 PIECE = 200_000  # bytes of a log in one reply
 
 
+DRAWN: dict[str, str] = {}  # what the diagrams of the tests look like, by their hashes
+
+
+def drawn(diagram: Diagram) -> str:
+    """Return the drawing of a diagram, which is drawn once for all tests."""
+    if diagram.hash not in DRAWN:
+        DRAWN[diagram.hash] = diagram.draw()
+    return DRAWN[diagram.hash]
+
+
 class StandIn:
     """A target with one application, ``level`` is that of the key."""
 
@@ -61,7 +71,7 @@ class StandIn:
     def _load(self, diagram: Diagram) -> None:
         self.diagram, self.parameters = diagram, Parameters(diagram)
         self.state, self.problem, self.verdicts = "stopped", "", None
-        self.picture = ""
+        self.picture = ""  # another drawing than that of the diagram
         self.scopes.clear()
 
     # the interface
@@ -132,8 +142,7 @@ class StandIn:
         self.publish("event", {"event": "loaded", "application": application})
 
     def do_drawing(self) -> str:
-        self.picture = self.picture or self.diagram.draw()
-        return self.picture
+        return self.picture or drawn(self.diagram)
 
     def do_signals(self, first: int = 0) -> list[dict[str, Any]]:
         found = []
@@ -181,6 +190,7 @@ class StandIn:
         return found
 
     def do_start(self) -> str:
+        drawn(self.diagram)  # before the run, which shares the interpreter with it
         if self.state == "running":
             raise QuadvisError(f"{self.diagram.name} runs already")
         self._number += 1

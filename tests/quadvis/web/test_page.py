@@ -235,12 +235,12 @@ def test_a_phone_shows_state_and_stop_first_and_pans(
 def test_a_drawing_brings_no_script_into_the_page(
     browser: Browser, running: Running, target: StandIn
 ) -> None:
-    target.do_drawing()
+    drawing = target.do_drawing()
     evil = (
         '<script>window.evil = 1</script><a href="javascript:evil()"><rect onclick="evil()"/></a>'
         '<image href="x" onerror="evil()"/><foreignObject><p>x</p></foreignObject>'
     )
-    target.picture = target.picture.replace('<g class="block"', f'{evil}<g onclick="evil()" class="block"')
+    target.picture = drawing.replace('<g class="block"', f'{evil}<g onclick="evil()" class="block"')
     opened(browser, running)
     assert (
         browser.run(
