@@ -242,7 +242,7 @@ def _real_time_options(parser: Parser) -> None:
     parser.add_argument("--real-time", action="store_true", help=words)
     words = "with --real-time: the processor for the loop"
     parser.add_argument("--cpu", type=int, metavar="N", help=words)
-    words = "with --real-time: its priority, 1 to 99, or 0 for none; default 80"
+    words = "with --real-time: the priority of the fastest task, 1 to 99, or 0 for none; default 80"
     parser.add_argument("--priority", type=int, metavar="P", help=words)
     words = "with --real-time: look at the clock so long before each tick, such as '60 us'; default auto"
     parser.add_argument("--poll", metavar="T", help=words)

@@ -59,9 +59,10 @@ GRACE = 2.0  # s that a step has to end, once it was asked to
 class Setup:
     """What an application needs: a resolved diagram, how to run it, what it shares with its supervisor.
 
-    ``computer`` is the one whose blocks it runs, "" in a diagram without computers. ``rooms`` are those of
-    the notes, ``box`` that of the parameter box; ``pictures`` are the words of the picture box, if there is
-    one. ``lines`` has the words of its links in memory, by their names.
+    ``computer`` is the one whose blocks it runs, "" in a diagram without computers. ``ladder`` has the
+    priorities of its tasks. ``rooms`` are those of the notes, ``box`` that of the parameter box; ``pictures``
+    are the words of the picture box, if there is one. ``lines`` has the words of its links in memory, by
+    their names.
     """
 
     text: str
@@ -72,6 +73,7 @@ class Setup:
     computer: str
     engine: str
     wishes: RealTime
+    ladder: tuple[int, ...]
     rooms: tuple[int, ...]
     streams: tuple[RowStream, ...]
     words: Any
@@ -218,7 +220,7 @@ class _Application:
             stack.enter_context(engine)
             stack.callback(self._leave)
             warm(engine, choice)
-            grants = ask_all(setup.wishes)
+            grants = ask_all(replace(setup.wishes, priority=setup.ladder[0]))
             if native:
                 clock.hear_signals()
             clock.polled = _polled(setup.wishes, schedule, clock)
@@ -256,10 +258,9 @@ class _Application:
         return lead(engine, choice, pacer, self._tend)
 
     def _tend(self, task: int) -> None:
-        """Give the thread of a task its priority: rate-monotonic, below that of the fastest."""
-        wanted = self._setup.wishes.priority
-        if wanted:
-            raise_thread(max(1, wanted - task))
+        """Give the thread of a task its priority, see `quadvis.realtime.priorities`."""
+        if priority := self._setup.ladder[task]:
+            raise_thread(priority)
 
     def _leave(self) -> None:
         """Let the guardian know that no step follows, and nothing interrupt the closing of the blocks."""

@@ -44,8 +44,8 @@ class Member:
     """One application: its process, the words that it shares, and the rows that come from it.
 
     ``part`` is the graph of the computer, with the base tick of the whole; ``lines`` has the words of its
-    links in memory. ``ready`` is what the application
-    said before its run, ``ending`` what it said after it.
+    links in memory, ``ladder`` the priorities of its tasks. ``ready`` is what the application said before
+    its run, ``ending`` what it said after it.
     """
 
     def __init__(
@@ -55,6 +55,7 @@ class Member:
         computer: str,
         part: Graph,
         wishes: RealTime,
+        ladder: tuple[int, ...],
         engine: str,
         taps: Sequence[Tap],
         taker: NoteTaker,
@@ -83,7 +84,7 @@ class Member:
         pictures = context.RawArray("q", PictureBox.size()) if self._picture_signals else None
         setup = Setup(
             diagram.resolved, str(diagram.path.parent), diagram.path.name, diagram.own_blocks,
-            IS_COMMAND.get(), computer, engine, wishes, rooms, streams, words, self._theirs, devices,
+            IS_COMMAND.get(), computer, engine, wishes, ladder, rooms, streams, words, self._theirs, devices,
             lines, last_ticks, box, pictures,
         )  # fmt: skip
         self._pictures = PictureBox(pictures) if pictures is not None else None

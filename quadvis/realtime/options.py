@@ -24,11 +24,12 @@ BUSIEST = 0.9  # share of a period; near 0.95 Linux halts real-time programs for
 class RealTime:
     """How the loop of a real-time run is to be treated by the system; what it grants is another matter.
 
-    ``cpu`` is the processor to stay on. ``priority`` is that of SCHED_FIFO, 1 to 99; 0 asks for no priority.
-    ``poll`` is the time before each deadline in which the loop does not sleep, but looks at the clock: a
-    time such as "60 us", or ``auto``: as long as the system needs to wake the loop, measured at the start, at
-    most a tenth of the shortest period. What is None is as the diagram says of the computer, or else any
-    processor, a priority of 80, and ``auto``. ``profile`` asks for the time of every call of a block.
+    ``cpu`` is the processor to stay on. ``priority`` is that of SCHED_FIFO, 1 to 99, for the fastest task; 0
+    asks for no priority. ``poll`` is the time before each deadline in which the loop does not sleep, but
+    looks at the clock: a time such as "60 us", or ``auto``: as long as the system needs to wake the loop,
+    measured at the start, at most a tenth of the shortest period. What is None is as the diagram says of the
+    computer, or else any processor, a priority of 80, and ``auto``. ``profile`` asks for the time of every
+    call of a block.
     """
 
     cpu: int | None = None

@@ -25,6 +25,7 @@ from quadvis.realtime.lines import Lines
 from quadvis.realtime.member import Member
 from quadvis.realtime.note_taker import NoteTaker
 from quadvis.realtime.options import RealTime
+from quadvis.realtime.priorities import ladders
 from quadvis.realtime.steering import Steering
 
 if TYPE_CHECKING:
@@ -88,6 +89,7 @@ class _Supervisor:
         context = multiprocessing.get_context("spawn")
         self._announce = announce
         asked = {name: wishes.on(diagram.computer(name)) for name in diagram.computers}
+        ladder = ladders(diagram, asked)
         priority = max(each.priority or 0 for each in asked.values())
         standing = Standing.to(list(asked.values()))
         self._devices = Devices(context, diagram.graph_here, diagram.on_host_loss, standing)
@@ -106,6 +108,7 @@ class _Supervisor:
                     computer,
                     part,
                     asked[computer],
+                    ladder[computer],
                     engine,
                     own,
                     taker,
