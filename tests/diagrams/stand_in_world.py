@@ -33,17 +33,17 @@ WORLD = """
 quadvis: 1
 name: world
 base: {flight}
-without: {{blocks: [detector, pose, estimate, setpoint, control, outputs, receiver],
+without: {{blocks: [detector, pose, estimate, setpoint, supervision, control, gate, outputs, receiver],
   variants: [sim, hil, flight], computers: [vision_pc, target], links: [pictures, circle_line, imu_line],
   params: [target, idle, camera, imu, rc, circles_out, circles_in],
-  summary: [xy, h, yaw, frames without target], rates: [control]}}
+  summary: [xy, h, yaw, frames without target], rates: [sight, vision, control]}}
 overload: {{}}
 blocks:
   thrust: {{block: sources.constant, at: world, rate: imu, with: {{value: $hover}}}}
   craft: {{part: {parts}/craft.yaml, with: {{vehicle: $vehicle}}, in: {{thrust: thrust.y}}}}
   eyes:
     block: vision.rendered_camera
-    rate: vision
+    rate: camera
     with: {{calibration: $calibration, ceiling: $ceiling, side: $side}}
     in:
       position: {{from: craft.position, across: sample}}
