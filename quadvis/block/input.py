@@ -40,6 +40,7 @@ class Input(LineDevice):
     refused = Out("int64", doc="messages that were damaged")
 
     actual_port = ""  # what a real-time run puts in the place of `pty:NAME`
+    adopted = -1  # the descriptor of the port, if that is the one of an output device
 
     def decode(self, received: bytearray) -> Iterator[Any]:
         """Take all whole messages off the beginning of ``received``, and leave the rest there.
@@ -55,9 +56,12 @@ class Input(LineDevice):
         self._age, self._counts = math.nan, {Counted.LOST: 0, Counted.REFUSED: 0}
         self._newest = self._nothing()
         path = self.actual_port or self.port_given
-        if path.startswith(CABLE):
+        if self.adopted >= 0:
+            self._port = self.settings.adopt(self.adopted)
+        elif path.startswith(CABLE):
             raise PortError(f"{path} is a cable, and only a real-time run makes cables")
-        self._port = self.settings.open(path)
+        else:
+            self._port = self.settings.open(path)
 
     def read(self, time: float) -> None:
         """Take all messages that have come."""

@@ -68,7 +68,11 @@ class Datagrams(NamedTuple):
             opened.close()
             what = "listen at" if listens else "send to"
             raise PortError(f"cannot {what} {quoted(port)}: {reason(error)}") from error
-        return OpenDatagrams(opened)
+        return OpenDatagrams(opened, answers=self.sends and listens)
+
+    def adopt(self, descriptor: int) -> OpenPort:
+        """Return a socket that another process has opened."""
+        return OpenDatagrams(socket.socket(fileno=descriptor), answers=True)
 
     def missing(self, port: str) -> str:
         """Return "": only who opens it finds out."""
@@ -92,11 +96,16 @@ class Datagrams(NamedTuple):
 
 
 class OpenDatagrams(OpenPort):
-    """A socket of datagrams."""
+    """A socket of datagrams; one that ``answers`` sends to the first who speaks, and hears nobody else."""
 
-    def __init__(self, opened: socket.socket) -> None:
-        self.socket = opened
+    def __init__(self, opened: socket.socket, *, answers: bool = False) -> None:
+        self.socket, self._answers = opened, answers
         self._dropped = self._drops()
+
+    @property
+    def descriptor(self) -> int:
+        """The descriptor of the socket."""
+        return self.socket.fileno()
 
     def write(self, piece: bytes) -> int:
         """Send a datagram; 0 if the system does not take it now. One that nobody hears is sent."""
@@ -116,6 +125,8 @@ class OpenDatagrams(OpenPort):
         """Return the datagrams that have come."""
         drops = self._drops()
         found: list[bytes] = []
+        if self._answers:
+            self._answers = not self._answer()
         while len(found) < MOST:
             try:
                 found.append(self.socket.recv(LARGEST))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
 from typing import Any
 
-from quadvis.block import CABLE, Block, Device, Input, LineDevice, Output
+from quadvis.block import CABLE, Block, Card, Device, Input, LineDevice, Output
 from quadvis.engine.engine import Engine
 from quadvis.errors import RunError
 from quadvis.graph.devices import devices
@@ -29,10 +30,11 @@ class PortBindings:
     words: Any = None
     boxes: Mapping[str, int] = field(default_factory=dict)
 
-    def bind(self, engine: Engine, ports: Mapping[str, str]) -> None:
+    def bind(self, engine: Engine, ports: Mapping[str, str], lent: Mapping[str, int]) -> None:
         """Bind the devices of an engine, before it opens them.
 
-        ``ports`` are the paths of the ptys of those inputs that are at the end of a cable.
+        ``ports`` are the paths of the ptys of those inputs that are at the end of a cable, ``lent`` the
+        descriptors of those that read the port of an output.
         """
         boxes = outboxes(self.words) if self.boxes else []
         for path, device in devices(engine.graph):
@@ -41,6 +43,8 @@ class PortBindings:
                 block.deliver = boxes[self.boxes[path]].put
             elif path in ports:
                 block.actual_port = ports[path]
+            elif path in lent:
+                block.adopted = lent[path]
 
 
 class Devices:
@@ -54,6 +58,13 @@ class Devices:
         words = context.RawArray("q", words_for(len(self._outputs))) if self._outputs else None
         boxes = {path: number for number, path in enumerate(self._outputs)}
         self.ports: dict[str, str] = {}  # of inputs at the end of a cable, by path, from `open` on
+        self.lent: dict[str, int] = {}  # descriptors for inputs at the port of an output, from `open` on
+        owners = {device.port_given: path for path, device in self._outputs.items() if not _on_cable(device)}
+        self._owners = {
+            path: owners[device.port_given]
+            for path, device in self._inputs.items()
+            if device.port_given in owners and not isinstance(device.settings, Card)
+        }  # the output whose port an input reads
         self.bindings = PortBindings(words, boxes)
         lines = {device.port_given: device.settings for device in self._all() if _on_cable(device)}
         self.cables = [Cable(port, line) for port, line in lines.items() if isinstance(line, Line)]
@@ -77,7 +88,14 @@ class Devices:
                 self.ports[path] = ends[device.port_given].b
         if self._guard is not None:
             ports = [self._output_port(path, device, ends) for path, device in self._outputs.items()]
-            self._guard.open(ports, announce)
+            found = self._guard.open(ports, announce)
+            self.lent = {path: found[owner] for path, owner in self._owners.items()}
+
+    def forget_lent(self) -> None:
+        """Close the descriptors that the applications have got."""
+        for descriptor in self.lent.values():
+            os.close(descriptor)
+        self.lent = {}
 
     def missing(self) -> Iterator[str]:
         """Yield a sentence for each device whose port is surely not there."""
@@ -114,7 +132,7 @@ class Devices:
 
     def _output_port(self, path: str, device: Output, ends: Mapping[str, Ends]) -> OutputPort:
         port = ends[device.port_given].a if _on_cable(device) else device.port_given
-        return OutputPort.of(device, path, port)
+        return OutputPort.of(device, path, port, lent=path in self._owners.values())
 
 
 def guards_all(part: Graph) -> bool:

@@ -9,6 +9,7 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
 from multiprocessing.process import BaseProcess
+from multiprocessing.reduction import recv_handle
 from typing import Any
 
 from quadvis.errors import RunError
@@ -64,8 +65,11 @@ class Guard:
         self._started = True
         self._theirs.close()
 
-    def open(self, ports: Sequence[OutputPort], announce: Announce) -> None:
-        """Wait until all ports have their initial frames; RunError if one refuses."""
+    def open(self, ports: Sequence[OutputPort], announce: Announce) -> dict[str, int]:
+        """Wait until all ports have their initial frames; RunError if one refuses.
+
+        Return the descriptors of the ports that are lent, by their blocks.
+        """
         self._ports = tuple(ports)
         self._say(self._ports)
         until = time.monotonic() + START
@@ -74,7 +78,7 @@ class Guard:
                 said = self._receive()
                 if isinstance(said, Guarding):
                     announce(f"real time, guardian: {said.grants}")
-                    return
+                    return {port.block: recv_handle(self._link) for port in self._ports if port.lent}
                 raise RunError(said.reason, block=said.block)
         raise RunError(f"the guardian was not ready after {START:g} s")
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import send_handle
 from typing import Any, NamedTuple
 
 from quadvis.block.output import LONGEST
@@ -91,7 +92,10 @@ class Watch:
 
 @dataclass(frozen=True)
 class Guarding:
-    """The ports are open and have their initial frames; what the system has granted."""
+    """The ports are open and have their initial frames; what the system has granted.
+
+    The descriptors of the ports that are lent come after it, in their order.
+    """
 
     grants: Grants
 
@@ -159,6 +163,11 @@ class Guardian:
         for outlet, refusal in refused:
             self._fail(outlet, refusal)
         return not refused
+
+    @property
+    def lent(self) -> list[int]:
+        """The descriptors of the ports that input devices read."""
+        return [outlet.descriptor for outlet in self._outlets if outlet.port.lent]
 
     def run(self) -> None:
         """Serve the ports until nobody needs them any more."""
@@ -293,4 +302,6 @@ def guard(setup: GuardianSetup) -> None:
     guardian.look()
     if opened:
         setup.link.send(Guarding(grants))
+        for descriptor in guardian.lent:
+            send_handle(setup.link, descriptor, os.getppid())
     guardian.run()

@@ -19,7 +19,8 @@ class OutputPort:
 
     ``path`` is the port, ``interval`` the time from one frame to the next (ns); ``initial`` and ``safe`` are
     whole frames. ``beginning`` and ``ending`` are sent once, before and after all frames. After safe frames
-    for the time ``held`` (ns) none follow; 0 means that there is no such time.
+    for the time ``held`` (ns) none follow; 0 means that there is no such time. An input device reads a port
+    that is ``lent``.
     """
 
     block: str
@@ -32,9 +33,10 @@ class OutputPort:
     beginning: bytes = b""
     ending: bytes = b""
     held: int = 0
+    lent: bool = False
 
     @staticmethod
-    def of(device: Output, block: str, path: str) -> OutputPort:
+    def of(device: Output, block: str, path: str, lent: bool = False) -> OutputPort:
         """Return the port of a device."""
         return OutputPort(
             block,
@@ -47,6 +49,7 @@ class OutputPort:
             device.beginning(),
             device.ending(),
             round(device.held * NANOSECONDS),
+            lent,
         )
 
 
@@ -68,6 +71,11 @@ class Outlet:
         self._safe_since = 0  # the instant of the first safe frame; 0 if the newest frame was none
         self._released = False
         self._safe_frames = 0
+
+    @property
+    def descriptor(self) -> int:
+        """The descriptor of the open port."""
+        return self._opened.descriptor if self._opened is not None else -1
 
     @property
     def is_open(self) -> bool:
