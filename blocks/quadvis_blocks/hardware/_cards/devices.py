@@ -55,6 +55,11 @@ class CardInput(CardDevice, Input):
 
     spacing = Param(10e-3, unit="s", min=2e-4, max=10.0, doc="from one reading of a card to the next")
 
+    @classmethod
+    def used_outside(cls) -> set[str]:
+        """Return the names of the parameters that say how the port is used."""
+        return super().used_outside() | {"spacing"}
+
     @property
     def settings(self) -> PortSettings:
         """The settings of the port: those of a driver, or of a line."""
