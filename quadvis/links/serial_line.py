@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from quadvis.machine.ports import PortError
 from quadvis.machine.serial_port import (
     Line,
+    PortReader,
     close_port,
     has_low_latency,
     open_port,
-    read_waiting,
     write_some,
 )
 
@@ -24,6 +24,7 @@ class SerialLine:
     def __init__(self, path: str, baud: int) -> None:
         self.path = path
         self._descriptor = open_port(path, Line(baud))
+        self._reader = PortReader(self._descriptor)
         self.low_latency = has_low_latency(self._descriptor)
         self._unsent = b""
 
@@ -45,7 +46,7 @@ class SerialLine:
     def read(self) -> Iterator[bytes]:
         """Yield the bytes that have come; none if the port is gone, which the age of a link shows."""
         try:
-            yield read_waiting(self._descriptor)
+            yield self._reader.read()
         except PortError:
             return
 

@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 import termios
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -19,12 +20,16 @@ from serial.tools.list_ports_common import ListPortInfo
 from quadvis.machine.ports import PortError
 from quadvis.machine.serial_port import (
     MOST,
+    SILENT,
     Line,
+    PortReader,
     close_port,
     has_low_latency,
     open_port,
     read_waiting,
 )
+from tests.processes import wait_for
+from tests.quadvis.realtime.ptys import arrive
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="ports are Linux's")
 
@@ -207,5 +212,42 @@ def test_a_peer_that_is_gone_is_noticed() -> None:
     os.close(peer)
     with pytest.raises(PortError, match="the port is gone"):
         read_waiting(port)
+    close_port(port)
+    os.close(mine)
+
+
+def test_a_reader_asks_for_bytes_only_where_some_are_or_the_port_may_be_gone(
+    pty: tuple[int, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    port, asked, now = open_port(pty[1], SBUS), [0], 0.0
+    reader, read = PortReader(port), os.read
+
+    def counted_read(file: int, count: int) -> bytes:
+        asked[0] += file == port
+        return read(file, count)
+
+    monkeypatch.setattr(os, "read", counted_read)
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    assert (reader.read(), asked[0]) == (b"", 1)  # nothing has ever come
+    arrive(pty[0], port, b"one")
+    assert (reader.read(), asked[0]) == (b"one", 2)
+    now = SILENT - 0.01
+    assert (reader.read(), asked[0]) == (b"", 2)
+    now = SILENT
+    assert (reader.read(), asked[0]) == (b"", 3)
+    arrive(pty[0], port, b"two")
+    assert (reader.read(), asked[0]) == (b"two", 4)
+    close_port(port)
+
+
+def test_a_reader_notices_that_a_silent_peer_is_gone() -> None:
+    peer, mine = os.openpty()
+    port = open_port(os.ttyname(mine), SBUS)
+    reader = PortReader(port)
+    arrive(peer, port, b"last")
+    assert reader.read() == b"last"
+    os.close(peer)
+    with pytest.raises(PortError, match="the port is gone"):
+        wait_for(reader.read)
     close_port(port)
     os.close(mine)

@@ -12,19 +12,20 @@ import numpy as np
 from quadvis.block import Input, parameter_sizes
 from quadvis.testing.alone import ALONE, alone
 from quadvis.units import parse_period
+from tests.quadvis.realtime.ptys import arrive
 
 
 class Board:
     """A peer that sends, and the block that reads."""
 
-    def __init__(self, block: Input, peer: int) -> None:
-        self.block, self._peer = block, peer
+    def __init__(self, block: Input, peer: int = -1, port: int = -1) -> None:
+        self.block, self._peer, self._port = block, peer, port
         self.engine = alone(block, {}, parameter_sizes(block), parse_period("100 Hz"))
 
     def step(self, came: bytes = b"") -> dict[str, Any]:
         """Send bytes, run a step, and return the outputs."""
         if came:
-            os.write(self._peer, came)
+            arrive(self._peer, self._port, came)
         self.engine.run(1)
         names = self.block.interface.outputs
         return {name: np.asarray(self.engine.read(ALONE, name)).tolist() for name in names}
@@ -35,7 +36,7 @@ def board(kind: type[Input], **given: Any) -> Iterator[Board]:
     """Yield a block at the end of a pty, opened."""
     peer, port = os.openpty()
     try:
-        made = Board(kind(port=os.ttyname(port), **given), peer)
+        made = Board(kind(port=os.ttyname(port), **given), peer, port)
         with made.engine:
             yield made
     finally:
@@ -46,6 +47,6 @@ def board(kind: type[Input], **given: Any) -> Iterator[Board]:
 @contextmanager
 def at_card(block: Input) -> Iterator[Board]:
     """Yield a block at a card, opened: a process of its own reads it."""
-    made = Board(block, -1)
+    made = Board(block)
     with made.engine:
         yield made

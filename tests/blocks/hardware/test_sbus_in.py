@@ -16,6 +16,7 @@ from quadvis.units import parse_period
 from quadvis_blocks.hardware._sbus import encode
 from quadvis_blocks.hardware.sbus_in import SbusIn
 from tests.blocks.hardware.sbus_frames import CENTRE, SWITCHES
+from tests.quadvis.realtime.ptys import arrive
 
 NAMES = ("age", "lost", "refused", "command", "failsafe")
 
@@ -31,7 +32,7 @@ class Reader:
 
     def step(self, came: bytes = b"") -> Any:
         if came:
-            os.write(self.peer, came)
+            arrive(self.peer, self.port, came)
         self.engine.run(1)
         found = {name: self.engine.read(ALONE, name) for name in NAMES}
         return [np.asarray(found[name]).tolist() for name in NAMES]

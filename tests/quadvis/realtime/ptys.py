@@ -40,6 +40,12 @@ class Pty:
         os.close(self._port)
 
 
+def arrive(peer: int, port: int, data: bytes) -> None:
+    """Send bytes from the peer of a pty, and wait until a reader of the port need not wait for them."""
+    os.write(peer, data)
+    assert select.select([port], [], [], 60)[0]
+
+
 @contextmanager
 def ptys(count: int) -> Iterator[list[Pty]]:
     """Yield so many ptys."""
