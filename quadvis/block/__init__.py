@@ -16,21 +16,24 @@ from quadvis.block.declare import (
     State,
     Work,
 )
-from quadvis.block.device import CABLE, Counted, Device, Input, LineDevice, Output
+from quadvis.block.device import CABLE, Device, LineDevice
 from quadvis.block.elements import all_finite, clip, copied, inward, saturated, zeros_like
+from quadvis.block.input import Counted, Input
 from quadvis.block.instants import INSTANT, passed, reached
+from quadvis.block.output import Output, Sealer
 from quadvis.block.random import fill_normal, fill_uniform, normal, normal_like, random_signs, uniform
 from quadvis.block.signals import NO_FRAME, SCALARS, Frame, Shape, SignalType, Sizes
 from quadvis.block.sizes import parameter_sizes, units_of
 from quadvis.machine.capture import CaptureRequest
+from quadvis.machine.ports import Card, ChannelError, OpenPort, PortError, PortSettings, Waiting
 from quadvis.machine.serial_port import Line
 
 __all__ = [
     "CABLE", "INSTANT", "METHODS", "NO_FRAME", "OUTSIDE", "OWN_MODULES", "SCALARS", "TAGS", "Block",
-    "CaptureRequest", "CapturedInput", "Counted", "Declared", "Derived", "Device", "FixedInput", "Frame",
-    "In", "Initial", "Input", "Interface", "Line", "LineDevice", "Out", "Output", "Param",
-    "ParameterError", "Random", "Safe", "Shape", "SignalType", "Sizes", "SourceRecord", "State", "Work",
-    "all_finite", "clip", "copied", "fill_normal", "fill_uniform", "inward", "normal", "normal_like",
-    "parameter_sizes", "passed", "random_signs", "reached", "saturated", "uniform", "units_of",
-    "zeros_like",
+    "CaptureRequest", "CapturedInput", "Card", "ChannelError", "Counted", "Declared", "Derived", "Device",
+    "FixedInput", "Frame", "In", "Initial", "Input", "Interface", "Line", "LineDevice", "OpenPort", "Out",
+    "Output", "Param", "ParameterError", "PortError", "PortSettings", "Random", "Safe", "Sealer", "Shape",
+    "SignalType", "Sizes", "SourceRecord", "State", "Waiting", "Work", "all_finite", "clip", "copied",
+    "fill_normal", "fill_uniform", "inward", "normal", "normal_like", "parameter_sizes", "passed",
+    "random_signs", "reached", "saturated", "uniform", "units_of", "zeros_like",
 ]  # fmt: skip

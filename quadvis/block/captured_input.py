@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Protocol
 from quadvis.block.declare import Out
 from quadvis.block.device import Device
 from quadvis.machine.capture import ENDED, OPENING, UNLIKE, CaptureRequest
-from quadvis.machine.serial_port import PortError
+from quadvis.machine.ports import PortError
 
 LOST = (OPENING, UNLIKE, ENDED)  # the status of a device of which nothing that counts comes
 

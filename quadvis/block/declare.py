@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from quadvis.block.signals import SCALARS, SignalType
 from quadvis.errors import QuadvisError, sentence, suggestion
+from quadvis.machine.datagrams import UDP, Address
 from quadvis.units import parse_units
 
-PORT_WANTED = "the path of a port, such as /dev/ttyUSB0, or pty:NAME"
-PORT = re.compile(r"pty:[A-Za-z_]\w*|(?!pty:).+")
+PORT_WANTED = "the path of a port, such as /dev/ttyUSB0, udp:HOST:PORT or pty:NAME"
+CABLE_PORT = re.compile(r"pty:[A-Za-z_]\w*")
 
 
 class ParameterError(QuadvisError):
@@ -121,8 +122,8 @@ class Param(Declared):
     A diagram must give a parameter that has no default. With ``choices`` the value is one of these names; the
     methods see the index of the name. With ``tune=True`` the value may change between ticks of a run. A value
     of type ``file`` is a path relative to the diagram. It names a file or folder that the block reads, or
-    writes if ``writes=True``. A value of type ``port`` is the path of a serial port, or ``pty:NAME``: one end
-    of a cable that a real-time run makes.
+    writes if ``writes=True``. A value of type ``port`` is the path of a serial port, ``udp:HOST:PORT``, what
+    the driver of a card takes, or ``pty:NAME``: one end of a cable that a real-time run makes.
     """
 
     def __init__(
@@ -168,7 +169,7 @@ class Param(Declared):
         if self.is_text:
             if not isinstance(value, str):
                 raise ParameterError(self.name, f"{self.name} must be a text, got {value!r}")
-            if self.is_port and not PORT.fullmatch(value):
+            if self.is_port and not _is_port(value):
                 raise ParameterError(self.name, f"{self.name} must be {PORT_WANTED}, got {value!r}")
             return value
         if type(value) is float and self._takes_number and not math.isnan(value):
@@ -253,6 +254,15 @@ _WORDS = {
     "bool": ("true or false", "true or false"),
     "str": ("a text", "texts"),
 }
+
+
+def _is_port(value: str) -> bool:
+    """Return whether a text can be a port; udp:// begins the address of a stream of pictures."""
+    if value.startswith("pty:"):
+        return CABLE_PORT.fullmatch(value) is not None
+    if value.startswith(UDP) and not value.startswith(f"{UDP}//"):
+        return Address.of(value) is not None
+    return bool(value)
 
 
 def _numbers(value: Any) -> NDArray[np.float64] | None:

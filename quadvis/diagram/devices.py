@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from quadvis.block import CABLE, Device, LineDevice, Output
 from quadvis.diagram.draft import Draft
-from quadvis.diagram.outputs import file_key
 from quadvis.errors import Faults, Place
+from quadvis.machine.files import file_key
+from quadvis.machine.serial_port import Line
 
 
 def check_devices(drafts: Sequence[Draft], faults: Faults) -> None:
@@ -20,16 +21,25 @@ def check_devices(drafts: Sequence[Draft], faults: Faults) -> None:
             continue
         port, place = device.port_given, draft.places.get(device.port_parameter, draft.place)
         is_cable = port.startswith(CABLE)
-        key = (port, isinstance(device, Output)) if is_cable else file_key(port)
+        keys = list(_keys(device))
         with faults.about(f"block '{draft.path}'"):
-            if key in taken:
+            if other := next((taken[key] for key in keys if key in taken), ""):
                 ends = "; a cable has one end for an output and one for an input" if is_cable else ""
-                faults.add(place, f"port '{port}' is that of block '{taken[key]}'", f"name another one{ends}")
-            if is_cable and isinstance(device, LineDevice):
+                faults.add(place, f"port '{port}' is that of block '{other}'", f"name another one{ends}")
+            if is_cable and isinstance(device, LineDevice) and isinstance(device.settings, Line):
                 _check_ends(cables.setdefault(port, device), device, place, faults)
             elif is_cable:
                 faults.add(place, f"'{port}' is a cable for bytes", f"write such as {device.port_example}")
-        taken.setdefault(key, draft.path)
+        for key in keys:
+            taken.setdefault(key, draft.path)
+
+
+def _keys(device: Device) -> Iterable[object]:
+    """Return what a device has for itself alone."""
+    port = device.port_given
+    if port.startswith(CABLE):
+        return [(port, isinstance(device, Output))]
+    return device.settings.claims(port) if isinstance(device, LineDevice) else [file_key(port)]
 
 
 def _check_ends(one: LineDevice, other: LineDevice, place: Place, faults: Faults) -> None:

@@ -11,7 +11,7 @@ from quadvis.block import Block
 from quadvis.diagram.draft import Draft
 from quadvis.errors import Faults, Place, QuadvisError, quoted
 from quadvis.library.own_package import own_files
-from quadvis.machine.files import same_file
+from quadvis.machine.files import file_key, same_file
 from quadvis.machine.source_line import file_of
 
 
@@ -88,15 +88,6 @@ def check_log(path: str | os.PathLike[str], blocks: Iterable[Block]) -> None:
         raise QuadvisError(
             f"cannot write the log '{path}': a block of the diagram writes that; choose another name"
         )
-
-
-def file_key(path: str | os.PathLike[str]) -> object:
-    """Return an identity that is equal for two names of one file or folder, even if it does not exist yet."""
-    try:
-        found = os.stat(path)
-    except (OSError, ValueError):
-        return os.path.realpath(path)
-    return found.st_dev, found.st_ino
 
 
 def _written(block: Block) -> Iterator[tuple[str, str]]:

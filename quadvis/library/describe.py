@@ -60,7 +60,11 @@ def _tags(block: type[Block]) -> dict[str, str]:
 def _device(block: type[Device]) -> str:
     """Say what a device does with its port."""
     rate = f", a frame every '{block.rate}'" if issubclass(block, Output) else ""
-    line = f", {block.line}" if issubclass(block, LineDevice) else ", read by a process of its own"
+    if issubclass(block, LineDevice):
+        serial = block.serial_line()
+        line = f", {serial}" if serial is not None else ""
+    else:
+        line = ", read by a process of its own"
     return f"{'output' if rate else 'input'} by the port of '{block.port_parameter}'{line}{rate}"
 
 

@@ -20,7 +20,7 @@ class {name}(Output):
     line = Line(115_200)
     rate = "50 Hz"
 
-    port = Param(type="port", doc="serial port, or a cable such as pty:name")
+    port = Param(type="port", doc="serial port, udp:HOST:PORT, or a cable: pty:name")
     initial = Initial("command", doc="before the first command")
     safe = Safe("command", doc="at every end")
     command = In("float64[n]", doc="the commands, each from -1 to 1")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from quadvis.machine.ports import PortError
 from quadvis.machine.serial_port import (
     Line,
-    PortError,
     close_port,
     has_low_latency,
     open_port,

@@ -27,8 +27,8 @@ from quadvis.machine.capture import (
 )
 from quadvis.machine.keeper import keep
 from quadvis.machine.mailbox import LAST
+from quadvis.machine.ports import PortError
 from quadvis.machine.processes import launching
-from quadvis.machine.serial_port import PortError
 
 START = 6.0  # s that a device has until its first record
 LOOK = 0.01  # s between two looks while the start waits

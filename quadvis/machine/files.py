@@ -230,6 +230,15 @@ def same_file(path: PathLike, others: Iterable[PathLike]) -> Path | None:
         return None
 
 
+def file_key(path: PathLike) -> object:
+    """Return an identity that is equal for two names of one file or folder, even if it does not exist yet."""
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError):
+        return os.path.realpath(path)
+    return _identity(found)
+
+
 def reason(error: OSError | ValueError) -> str:
     """Return the system's reason for an error, as a part of a sentence; ValueError is that of a bad name."""
     if isinstance(error, FileNotFoundError):

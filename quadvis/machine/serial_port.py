@@ -10,12 +10,14 @@ from __future__ import annotations
 import errno
 import os
 import struct
+from collections.abc import Iterable
 from contextlib import suppress
 from typing import NamedTuple
 
-from quadvis.errors import QuadvisError, quoted, sentence
+from quadvis.errors import quoted, sentence
 from quadvis.errors.words import on_one_line
-from quadvis.machine.files import reason
+from quadvis.machine.files import file_key, reason
+from quadvis.machine.ports import OpenPort, PortError, Waiting
 
 PARITIES = ("none", "even", "odd")
 MOST = 1 << 16  # bytes at one reading: a flood must not hold up a loop
@@ -30,10 +32,6 @@ TIOCNXCL = 0x540D
 # <linux/serial.h>: struct serial_struct, in 32-bit words.
 SERIAL_STRUCT, FLAGS, ASYNC_LOW_LATENCY = struct.Struct("18i"), 4, 1 << 13
 NAMED = 4  # ports at most in a message
-
-
-class PortError(QuadvisError):
-    """A port that cannot be opened, read or written."""
 
 
 class Line(NamedTuple):
@@ -61,10 +59,48 @@ class Line(NamedTuple):
         """Return how long so many bytes take (s)."""
         return count * self.bits_of_byte / int(self.baud)
 
+    def open(self, port: str) -> OpenPort:
+        """Open, lock and set up a port; PortError in one sentence if that cannot be."""
+        return OpenLine(open_port(port, self))
+
+    def missing(self, port: str) -> str:
+        """Return a sentence if there is no port of this path, else ""."""
+        return missing_port(port)
+
+    def claims(self, port: str) -> Iterable[object]:
+        """Return the identity of the port, which may have several names."""
+        return [file_key(port)]
+
     def __str__(self) -> str:
         """Return the usual text, such as "100000 baud 8E2"."""
         baud = f"'{self.baud}'" if isinstance(self.baud, str) else self.baud
         return f"{baud} baud {self.bits}{self.parity[0].upper()}{self.stop_bits}"
+
+
+class OpenLine(OpenPort):
+    """An open serial port."""
+
+    whole = False
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+
+    def write(self, piece: bytes) -> int:
+        """Write as many bytes as there is room for; return their number."""
+        return write_some(self._descriptor, piece)
+
+    def unsent(self) -> int:
+        """Return how many bytes still wait in the system for the line."""
+        return unsent(self._descriptor)
+
+    def read_waiting(self) -> Waiting:
+        """Return the bytes that have come, in one piece."""
+        found = read_waiting(self._descriptor)
+        return Waiting((found,), late=len(found) >= BACKLOG)
+
+    def close(self) -> None:
+        """Let others open the port again, and close it."""
+        close_port(self._descriptor)
 
 
 def open_port(path: str, line: Line) -> int:

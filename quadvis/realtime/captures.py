@@ -12,7 +12,7 @@ from quadvis.engine.engine import Engine
 from quadvis.errors import RunError
 from quadvis.graph.devices import devices
 from quadvis.machine.capture_process import CaptureProcess
-from quadvis.machine.serial_port import PortError
+from quadvis.machine.ports import PortError
 from quadvis.realtime.schedule import NANOSECONDS
 
 

@@ -13,13 +13,13 @@ from quadvis.engine.engine import Engine
 from quadvis.errors import RunError
 from quadvis.graph.devices import devices
 from quadvis.graph.graph import Graph
+from quadvis.machine.serial_port import Line
 from quadvis.native.choice import Announce
 from quadvis.realtime.cables import Cable, Ends
 from quadvis.realtime.guard import Guard
 from quadvis.realtime.guardian import Alarm, Standing, outboxes, words_for
 from quadvis.realtime.heartbeat import Patience
 from quadvis.realtime.outlet import OutputPort
-from quadvis.realtime.schedule import NANOSECONDS
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Devices:
         self.ports: dict[str, str] = {}  # of inputs at the end of a cable, by path, from `open` on
         self.bindings = PortBindings(words, boxes)
         lines = {device.port_given: device.settings for device in self._all() if _on_cable(device)}
-        self.cables = [Cable(port, line) for port, line in lines.items()]
+        self.cables = [Cable(port, line) for port, line in lines.items() if isinstance(line, Line)]
         self._guard: Guard | None = None
 
     def start(self, patiences: Sequence[Patience]) -> int | None:
@@ -114,9 +114,7 @@ class Devices:
 
     def _output_port(self, path: str, device: Output, ends: Mapping[str, Ends]) -> OutputPort:
         port = ends[device.port_given].a if _on_cable(device) else device.port_given
-        interval = round(device.interval * NANOSECONDS)
-        initial, safe = device.initial_frame(), device.safe_frame()
-        return OutputPort(path, port, device.settings, interval, initial, safe)
+        return OutputPort.of(device, path, port)
 
 
 def guards_all(part: Graph) -> bool:

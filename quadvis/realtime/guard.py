@@ -12,8 +12,8 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from quadvis.errors import RunError
+from quadvis.machine.ports import PortError
 from quadvis.machine.processes import launching
-from quadvis.machine.serial_port import PortError
 from quadvis.native.choice import Announce
 from quadvis.realtime.guardian import (
     Alarm,
@@ -109,7 +109,8 @@ class Guard:
             return []
         self._started = False
         self._say(Order.CLOSE)
-        self.process.join(0 if self._lost else END)
+        held = max([port.held for port in self._ports], default=0) / NANOSECONDS
+        self.process.join(0 if self._lost else END + held)
         if self.process.exitcode == 0:
             return []
         self.process.kill()
@@ -137,5 +138,5 @@ def _in_its_place(port: OutputPort) -> list[str]:
     except PortError as error:
         return [f"block '{port.block}': its safe values could not be sent: {error}"]
     finally:
-        outlet.close()
+        outlet.finish(time.monotonic_ns())
     return []

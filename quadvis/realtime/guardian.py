@@ -20,11 +20,11 @@ from functools import partial
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
 
-from quadvis.block.device import LONGEST
+from quadvis.block.output import LONGEST
 from quadvis.diagram.sections.on_host_loss import SAFE
 from quadvis.machine.interrupts import leave_to_parent
 from quadvis.machine.mailbox import Mailbox
-from quadvis.machine.serial_port import PortError
+from quadvis.machine.ports import ChannelError, PortError
 from quadvis.realtime.heartbeat import Heartbeat, Patience, Sign
 from quadvis.realtime.lives import Lives
 from quadvis.realtime.options import HIGHEST, RealTime
@@ -141,6 +141,8 @@ class Guardian:
         self._supervisor.watch(setup.supervisor)
         shortest = min([patience.allowed // LOOKS for patience in setup.patiences], default=LONGEST_LOOK)
         self._look_every = min(max(shortest, SHORTEST_LOOK), LONGEST_LOOK)
+        self._held = max([port.held for port in setup.ports], default=0)
+        self._partly: list[Outlet] = []  # whose loss has been reported
         self.safe = self._paused = False
         self._closing = 0  # the instant at which it was told to close
         self._listening = True
@@ -168,7 +170,7 @@ class Guardian:
     def _finish(self) -> None:
         """Close all ports."""
         for outlet in self._outlets:
-            outlet.close()
+            outlet.finish(time.monotonic_ns())
 
     def look(self) -> None:
         """Look at everything once, and send what is due."""
@@ -191,8 +193,8 @@ class Guardian:
             self._closing = self._closing or now
         if not self._closing:
             return False
-        served = all(not outlet.is_open or outlet.safe_frames >= FAREWELL for outlet in self._outlets)
-        return served or now - self._closing > LAST
+        served = all(outlet.has_its_farewell(FAREWELL) for outlet in self._outlets)
+        return served or now - self._closing > LAST + self._held
 
     def _watch(self) -> None:
         """Look at the loops and at the lives of everybody."""
@@ -249,8 +251,12 @@ class Guardian:
             outlet.hurry(now)
 
     def _fail(self, outlet: Outlet, error: PortError) -> None:
-        """Give up a port, and report it once the others are safe."""
-        outlet.close()
+        """Give up a port, and report it once the others are safe; one that has channels left is kept."""
+        if not isinstance(error, ChannelError):
+            outlet.close()
+        elif outlet in self._partly:
+            return
+        self._partly.append(outlet)
         self._make_safe(Alarm(str(error), outlet.port.block))
 
     def _wait(self) -> None:

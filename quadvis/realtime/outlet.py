@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
-from quadvis.machine.serial_port import Line, PortError, close_port, open_port, unsent, write_some
+from quadvis.block import Output, Sealer
+from quadvis.machine.ports import ChannelError, OpenPort, PortError, PortSettings
 from quadvis.realtime.schedule import NANOSECONDS
 
 STUCK = NANOSECONDS  # ns after which a port that takes no bytes counts as lost
@@ -13,18 +15,39 @@ STUCK = NANOSECONDS  # ns after which a port that takes no bytes counts as lost
 
 @dataclass(frozen=True)
 class OutputPort:
-    """What the guardian knows of an output device: bytes and times, no code.
+    """What the guardian knows of an output device: bytes and times, no code but that of the ``sealer``.
 
-    ``path`` is that of the port, ``interval`` the time from one frame to the next (ns), ``initial`` and
-    ``safe`` are whole frames.
+    ``path`` is the port, ``interval`` the time from one frame to the next (ns); ``initial`` and ``safe`` are
+    whole frames. ``beginning`` and ``ending`` are sent once, before and after all frames. After safe frames
+    for the time ``held`` (ns) none follow; 0 means that there is no such time.
     """
 
     block: str
     path: str
-    line: Line
+    settings: PortSettings
     interval: int
     initial: bytes
     safe: bytes
+    sealer: Sealer | None = None
+    beginning: bytes = b""
+    ending: bytes = b""
+    held: int = 0
+
+    @staticmethod
+    def of(device: Output, block: str, path: str) -> OutputPort:
+        """Return the port of a device."""
+        return OutputPort(
+            block,
+            path,
+            device.settings,
+            round(device.interval * NANOSECONDS),
+            device.initial_frame(),
+            device.safe_frame(),
+            device.sealer(),
+            device.beginning(),
+            device.ending(),
+            round(device.held * NANOSECONDS),
+        )
 
 
 class Outlet:
@@ -36,56 +59,104 @@ class Outlet:
     def __init__(self, port: OutputPort, newest: Callable[[], bytes | None]) -> None:
         self.port, self._newest = port, newest
         self._frame = port.initial
-        self._descriptor = -1
-        self._rest = b""  # of a frame that the port has taken in part
+        self._opened: OpenPort | None = None
+        self._beginning = port.beginning
+        self._rest = b""  # of what the port has taken in part
         self._free = 0  # the instant from which the line can take a frame
         self.due = 0  # the instant of the next frame
         self._taken = 0  # the instant at which the port last took bytes
-        self.safe_frames = 0
+        self._safe_since = 0  # the instant of the first safe frame; 0 if the newest frame was none
+        self._released = False
+        self._safe_frames = 0
 
     @property
     def is_open(self) -> bool:
         """True if the port is open."""
-        return self._descriptor >= 0
+        return self._opened is not None
 
     def open(self) -> None:
         """Open the port."""
-        self._descriptor = open_port(self.port.path, self.port.line)
+        self._opened = self.port.settings.open(self.port.path)
 
     def close(self) -> None:
         """Close the port."""
-        if self.is_open:
-            close_port(self._descriptor)
-            self._descriptor = -1
+        if self._opened is not None:
+            self._opened.close()
+            self._opened = None
+
+    def finish(self, now: int) -> None:
+        """Send what comes after all frames, and close the port."""
+        with suppress(PortError):
+            self._release(now)
+        self.close()
 
     def hurry(self, now: int) -> None:
         """Make the next frame due as soon as the line can take it."""
         self.due = max(now, self._free)
 
+    def has_its_farewell(self, frames: int) -> bool:
+        """Return whether so many safe frames were sent, or those of the time for which it is held."""
+        if not self.is_open or self._released:
+            return True
+        return not self.port.held and self._safe_frames >= frames
+
     def serve(self, now: int, *, safe: bool) -> None:
         """Send what is due: the safe frame, or the newest, or before the first one the initial frame."""
-        if not self.is_open or now < self.due:
+        if self._opened is None or now < self.due:
             return
         self._frame = self._newest() or self._frame
         interval = self.port.interval
         self.due += interval if now < self.due + interval else interval * (1 + (now - self.due) // interval)
         self._taken = self._taken or now
         try:
-            if self._rest or unsent(self._descriptor):
+            if self._rest or self._opened.unsent():
                 self._write(self._rest, now)
-                return
-            self._write(self.port.safe if safe else self._frame, now)
+            elif self._beginning:
+                piece, self._beginning = self._beginning, b""
+                self._write(piece, now)
+                self.hurry(now)
+            elif safe:
+                self._send_safe(now)
+            else:
+                self._safe_since, self._released = 0, False
+                self._write(self._sealed(self._frame, now), now)
         except PortError as error:
-            raise PortError(f"{self.port.path}: {error}") from error
-        self.safe_frames += safe and not self._rest
+            raise type(error)(f"{self.port.path}: {error}") from error
+
+    def _send_safe(self, now: int) -> None:
+        self._safe_since = self._safe_since or now
+        if self.port.held and now - self._safe_since >= self.port.held:
+            self._release(now)
+            return
+        try:
+            self._write(self._sealed(self.port.safe, now), now)
+        except ChannelError:  # the other channels have it
+            self._safe_frames += 1
+            raise
+        self._safe_frames += not self._rest
+
+    def _release(self, now: int) -> None:
+        """Send what comes after all frames, once."""
+        if self._opened is not None and not self._released:
+            self._released = True
+            self._write(self._rest + self.port.ending, now)
+
+    def _sealed(self, frame: bytes, now: int) -> bytes:
+        sealer = self.port.sealer
+        try:
+            return frame if sealer is None else sealer.seal(frame, now)
+        except Exception as error:
+            raise PortError(f"a frame cannot be sealed: {error}") from error
 
     def _write(self, piece: bytes, now: int) -> None:
         """Write as much as the port takes at once."""
-        count = write_some(self._descriptor, piece)
+        assert self._opened is not None
+        count = self._opened.write(piece) if piece else 0
         self._rest = piece[count:]
         if count:
             self._taken = now
-            taken = self.port.line.time(count) + (0.0 if self._rest else self.port.line.gap)
+            settings = self.port.settings
+            taken = settings.time(count) + (0.0 if self._rest else settings.gap)
             self._free = now + int(NANOSECONDS * taken)
         elif now - self._taken > STUCK:
             raise PortError("the port takes no bytes")

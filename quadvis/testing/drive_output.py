@@ -5,22 +5,25 @@ from __future__ import annotations
 import multiprocessing
 import os
 import select
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from quadvis.block import Block, Output, parameter_sizes
-from quadvis.block.device import checked_frame
+from quadvis.block.output import checked_frame
 from quadvis.diagram.sections.on_host_loss import SAFE
+from quadvis.machine.datagrams import HERE, UDP, Datagrams
+from quadvis.machine.serial_port import Line
 from quadvis.realtime.guard import Guard
 from quadvis.realtime.guardian import Standing, outboxes, words_for
 from quadvis.realtime.outlet import OutputPort
-from quadvis.realtime.schedule import NANOSECONDS
 from quadvis.testing.drive import series_of
 
 WAIT = 20.0  # s in which each frame must have come
@@ -39,18 +42,18 @@ class DrivenOutput(NamedTuple):
 def drive_output(block: Block, **inputs: Any) -> DrivenOutput:
     """Send commands through the guardian, kill their sender with SIGKILL, and return what a peer has read.
 
-    Each input is one value, or an array with a leading time axis. A pty takes the place of the block's port.
-    AssertionError if a frame does not come, or if anything else comes in between.
+    Each input is one value, or an array with a leading time axis. A pty takes the place of a serial port, a
+    socket of this computer that of `udp:HOST:PORT`. Frames come without what a sealer would add: that differs
+    from one to the next. AssertionError if a frame does not come.
     """
     if not isinstance(block, Output):
         raise TypeError(f"{type(block).__name__} is no output device")
     frames = [checked_frame(frame) for frame in _frames(block, inputs)]
-    with _pty() as (peer, path):
+    with _peer(block) as (peer, path):
         reader = _Reader(peer)
         context = multiprocessing.get_context("spawn")
         words = context.RawArray("q", words_for(1))
-        interval = round(block.interval * NANOSECONDS)
-        port = OutputPort("block", path, block.settings, interval, block.initial_frame(), block.safe_frame())
+        port = replace(OutputPort.of(block, "block", path), sealer=None)
         guard = Guard(context, words, [], SAFE, Standing())
         sender = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
         try:
@@ -114,10 +117,18 @@ def _frames(block: Output, inputs: dict[str, Any]) -> Iterator[bytes]:
 
 
 @contextmanager
-def _pty() -> Iterator[tuple[int, str]]:
-    peer, port = os.openpty()
-    try:
-        yield peer, os.ttyname(port)
-    finally:
-        os.close(peer)
-        os.close(port)
+def _peer(block: Output) -> Iterator[tuple[int, str]]:
+    """Yield the descriptor at which a peer reads, and the port that leads there."""
+    if isinstance(block.settings, Datagrams):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as heard:
+            heard.bind((HERE, 0))
+            yield heard.fileno(), f"{UDP}{HERE}:{heard.getsockname()[1]}"
+    elif isinstance(block.settings, Line):
+        peer, port = os.openpty()
+        try:
+            yield peer, os.ttyname(port)
+        finally:
+            os.close(peer)
+            os.close(port)
+    else:
+        raise TypeError(f"{type(block).__name__} reaches a driver; test it with one that stands in for it")

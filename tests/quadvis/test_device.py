@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import socket
+import struct
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,12 +12,12 @@ import numpy as np
 import pytest
 
 import quadvis
-from quadvis.block import Counted, In, Initial, Input, Line, Out, Output, Param, ParameterError, Safe
+from quadvis.block import Counted, In, Initial, Input, Line, Out, Output, Param, ParameterError, Safe, Sealer
 from quadvis.cli import main
 from quadvis.errors import DiagramError, QuadvisError
 from quadvis.library.describe import description
 from quadvis.sweeps.sweep import sweep
-from quadvis.testing import check_block, drive
+from quadvis.testing import check_block, drive, drive_output
 from quadvis.testing.conformance import CHECKS, Subject
 
 
@@ -69,6 +71,73 @@ def test_frames_are_delivered_at_each_step_and_the_safe_one_at_the_end(
     monkeypatch.setattr(Thruster, "deliver", staticmethod(sent.append))
     drive(Thruster(**GIVEN), thrust=[[5.0, 6.0], [7.0, 8.0]])
     assert sent == [b"T\5\6", b"T\7\x08", b"T\3\4"]
+
+
+def test_a_port_of_datagrams_needs_no_line() -> None:
+    devices = Thruster(**GIVEN | {"port": "udp:craft:9"}), Scale(port="udp::9")
+    assert [str(device.settings) for device in devices] == ["datagrams", "datagrams"]
+    found = drive_output(Thruster(**GIVEN | {"port": "udp:craft:9", "baud": 1}), thrust=[[5.0, 6.0]])
+    assert (found.initial, found.commands, found.safe) == (b"T\1\2", [b"T\5\6"], b"T\3\4")
+
+
+class Networked(Scale):
+    """Weights over a network alone."""
+
+    line = None
+
+
+def test_a_device_without_a_line_has_no_other_port_than_datagrams() -> None:
+    with pytest.raises(ParameterError) as caught:
+        Networked(port="/dev/ttyUSB0")
+    assert str(caught.value) == "port must be such as udp:192.168.0.5:14550, got '/dev/ttyUSB0'"
+    assert "device: input by the port of 'port'\n" in description("own.networked", Networked)
+
+
+def test_of_datagrams_the_newest_counts_and_no_piece_belongs_to_the_next() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.bind(("127.0.0.1", 0))
+        place = sender.getsockname()
+        sender.connect(place)
+        scale = Scale(port=f"udp::{place[1]}")
+        sender.close()
+        scale.open()
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            for datagram in (b"W\1W\2W", b"W\3x", b"X\4", b"W\5"):
+                sender.sendto(datagram, place)
+            scale.read(1.0)
+    assert scale.output() == (0.0, 3, 1, 5.0)
+    scale.close()
+
+
+def test_the_frames_of_a_device_say_how_long_it_is_held() -> None:
+    class Held(Thruster):
+        hold = "1.5 s"
+
+    class HeldAsGiven(Thruster):
+        hold = "keep"
+        keep = Param(2.0, unit="s", doc="time of safe frames")
+
+    assert [Thruster(**GIVEN).held, Held(**GIVEN).held, HeldAsGiven(**GIVEN, keep=3.0).held] == [0, 1.5, 3]
+
+
+def test_what_a_sealer_adds_takes_its_time() -> None:
+    class Numbered(Thruster):
+        def sealer(self) -> Sealer:
+            return Numbering()
+
+    Thruster(**GIVEN, baud=2400)
+    with pytest.raises(ParameterError, match=r"a frame of 7 bytes takes 29\.2 ms at 2400 baud 8N1"):
+        Numbered(**GIVEN, baud=2400)
+
+
+class Numbering:
+    """Adds four bytes."""
+
+    added = 4
+
+    def seal(self, frame: bytes, now_ns: int) -> bytes:
+        """Add the millisecond."""
+        return frame + struct.pack("<I", now_ns // 10**6)
 
 
 def test_devices_of_ones_own_pass_the_conformance_suite() -> None:
@@ -134,7 +203,7 @@ def test_the_suite_finds_what_devices_do_wrong(
         ({"safe": [300.0, 0.0]}, "safe", "safe gives no frame: bytes must be in range(0, 256)"),
         (
             {"port": "pty:1"}, "port",
-            "port must be the path of a port, such as /dev/ttyUSB0, or pty:NAME, got 'pty:1'",
+            "port must be the path of a port, such as /dev/ttyUSB0, udp:HOST:PORT or pty:NAME, got 'pty:1'",
         ),
     ],
 )  # fmt: skip
@@ -211,6 +280,9 @@ SECOND = """\
 """
 
 
+SENDER = SECOND.replace("PORT", '"udp:craft:9"')
+
+
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     (tmp_path / "devices.yaml").write_text(DIAGRAM)
@@ -242,6 +314,10 @@ def test_a_diagram_with_devices_is_checked_but_not_simulated(
             "for an output and one for an input",
         ),
         (SECOND.replace("PORT", "/dev/null"), ""),
+        (
+            SENDER + SENDER.replace("more", "also"),
+            "block 'also': port 'udp:craft:9' is that of block 'more'; name another one",
+        ),
     ],
 )
 def test_a_port_has_one_device(file: Path, more: str, words: str) -> None:

@@ -16,10 +16,10 @@ import pytest
 from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
+from quadvis.machine.ports import PortError
 from quadvis.machine.serial_port import (
     MOST,
     Line,
-    PortError,
     close_port,
     has_low_latency,
     open_port,

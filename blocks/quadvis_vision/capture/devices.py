@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from quadvis.errors import quoted, sentence
-from quadvis.machine.serial_port import PortError
+from quadvis.machine.ports import PortError
 
 SYSTEM = Path("/")
 URL = re.compile(r"[a-zA-Z][a-zA-Z0-9+.-]*://")

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Counted, Input, Output
-from quadvis.block.device import KEPT, checked_frame
+from quadvis.block.input import KEPT
+from quadvis.block.output import checked_frame
 from quadvis.testing.rig import STEPS, Subject, rigs, sources
 
 PIECES = 64  # of random bytes

@@ -100,7 +100,10 @@ def test_a_peer_reads_the_commands_and_after_a_kill_the_safe_bytes() -> None:
         ({"highest": [1.0, -1.0]}, "highest must be different from lowest, element by element"),
         ({"channels": [0, 3]}, "channels must be at least 1, got 0"),
         ({"spacing": 0.005}, "spacing must be at least 0.006 s, got 0.005 s"),
-        ({"port": "pty:"}, "port must be the path of a port, such as /dev/ttyUSB0, or pty:NAME, got 'pty:'"),
+        (
+            {"port": "pty:"},
+            "port must be the path of a port, such as /dev/ttyUSB0, udp:HOST:PORT or pty:NAME, got 'pty:'",
+        ),
     ],
 )
 def test_what_cannot_be_sent_is_refused(given: dict[str, Any], words: str) -> None:

@@ -14,7 +14,7 @@ from quadvis.block import ParameterError, SourceRecord
 from quadvis.engine.engine import Engine
 from quadvis.errors import QuadvisError, RunError
 from quadvis.machine.capture import GOOD, OPENING
-from quadvis.machine.serial_port import PortError
+from quadvis.machine.ports import PortError
 from quadvis.output.log_reader import read_log
 from quadvis.testing import drive
 from quadvis_blocks.vision.camera import Camera

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from quadvis.machine.serial_port import PortError
+from quadvis.machine.ports import PortError
 from quadvis_vision.capture.devices import cameras, lasting_name, missing, stamps_start
 
 

@@ -20,7 +20,7 @@ import pytest
 
 from quadvis.machine.capture import GOOD, OPENING, REFUSING
 from quadvis.machine.capture_process import CaptureProcess
-from quadvis.machine.serial_port import PortError
+from quadvis.machine.ports import PortError
 from quadvis_vision.capture.pixels import unpacked
 from quadvis_vision.capture.request import CameraRequest
 from tests.camera_server import SIZE, CameraServer, jpeg, part, shown

@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from multiprocessing import Pipe
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 import pytest
 
 from quadvis.diagram.sections.on_host_loss import CONTINUE, SAFE, STOP
+from quadvis.machine.ports import Card, ChannelError, OpenPort
 from quadvis.machine.serial_port import Line
 from quadvis.realtime import control
 from quadvis.realtime.guardian import (
@@ -30,7 +32,7 @@ from quadvis.realtime.guardian import (
 from quadvis.realtime.heartbeat import Patience
 from quadvis.realtime.lifeline import Lifeline
 from quadvis.realtime.options import RealTime
-from quadvis.realtime.outlet import OutputPort
+from quadvis.realtime.outlet import Outlet, OutputPort
 from tests.processes import wait_for
 from tests.quadvis.realtime.ptys import Pty, ptys
 
@@ -245,6 +247,58 @@ def test_a_port_that_is_missing_makes_those_safe_that_could_be_opened() -> None:
         assert (alarm.block, "is missing" in alarm.reason) == ("out0", True)
         made.supervisor.kill()
         made.supervisor.wait()
+
+
+@dataclass
+class Relays(Card):
+    """A card of two relays, of which one may refuse."""
+
+    written: list[tuple[int, int]]
+    refused: list[int]
+
+    def open(self, port: str) -> OpenPort:
+        """Open it."""
+        made = OpenRelays()
+        made.card = self
+        return made
+
+
+class OpenRelays(OpenPort):
+    """The card, open."""
+
+    card: Relays
+
+    def write(self, piece: bytes) -> int:
+        """Write to each relay that takes it."""
+        for relay, value in enumerate(piece):
+            if relay not in self.card.refused:
+                self.card.written.append((relay, value))
+        if self.card.refused:
+            raise ChannelError(f"relay {self.card.refused[0]} refuses")
+        return len(piece)
+
+    def close(self) -> None:
+        """End."""
+        self.card.written.append((-1, 0))
+
+
+def test_a_channel_that_fails_keeps_no_other_from_its_safe_value(rig: Any) -> None:
+    made, card = rig(), Relays([], [])
+    port = OutputPort("relays", "card", card, 5 * MS, b"\1\2", b"\3\4")
+    made.guardian._outlets.append(Outlet(port, lambda: b"\5\6"))
+    made.guardian._outlets[-1].open()
+    made.until(lambda: card.written[-2:] == [(0, 5), (1, 6)])
+    card.refused.append(0)
+    made.until(lambda: card.written[-2:] == [(1, 4)] * 2)
+    assert made.alarms() == [Alarm("card: relay 0 refuses", "relays")]
+    made.until_wire(b"safe!", b"safe!")
+    card.refused.clear()
+    made.until(lambda: card.written[-2:] == [(0, 3), (1, 4)])
+    made.link.send(Order.CLOSE)
+    made.supervisor.kill()
+    made.guardian.run()
+    assert card.written[-3:] == [(0, 3), (1, 4), (-1, 0)]
+    assert made.alarms() == []
 
 
 def test_it_closes_the_ports_when_everything_else_has_ended(rig: Any) -> None:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 
-from quadvis.machine.serial_port import Line, PortError
+from quadvis.machine.ports import PortError
+from quadvis.machine.serial_port import Line
 from quadvis.realtime.outlet import STUCK, Outlet, OutputPort
 from tests.quadvis.realtime.ptys import Pty, ptys
 
@@ -22,10 +25,10 @@ LINE = Line(100_000, parity="even", stop_bits=2, gap=3e-3)  # a frame of 5 bytes
 class Rig:
     """An outlet every 10 ms, and the frames that a loop would give it."""
 
-    def __init__(self, pty: Pty) -> None:
+    def __init__(self, pty: Pty, **given: Any) -> None:
         self.pty = pty
         self.newest: list[bytes] = []
-        port = OutputPort("out", pty.path, LINE, 10 * MS, b"first", b"safe!")
+        port = OutputPort("out", pty.path, LINE, 10 * MS, b"first", b"safe!", **given)
         self.outlet = Outlet(port, lambda: self.newest.pop() if self.newest else None)
 
     def serve(self, instant: float, *, safe: bool = False) -> bytes:
@@ -36,12 +39,23 @@ class Rig:
 
 
 @pytest.fixture
-def rig() -> Iterator[Rig]:
+def make() -> Iterator[Any]:
     with ptys(1) as (pty,):
-        made = Rig(pty)
-        made.outlet.open()
-        yield made
-        made.outlet.close()
+        made = []
+
+        def outlet(**given: Any) -> Rig:
+            made.append(Rig(pty, **given))
+            made[0].outlet.open()
+            return made[0]
+
+        yield outlet
+        made[0].outlet.close()
+
+
+@pytest.fixture
+def rig(make: Any) -> Rig:
+    made: Rig = make()
+    return made
 
 
 def test_the_initial_frame_comes_at_once_then_the_newest_is_repeated(rig: Rig) -> None:
@@ -61,7 +75,7 @@ def test_the_safe_frame_comes_as_soon_as_the_line_is_free(rig: Rig) -> None:
     assert rig.serve(0) == b"one.."
     rig.outlet.hurry(BEGIN + MS)
     assert [rig.serve(at, safe=True) for at in (1, 3.5, 3.7)] == [b"", b"", b"safe!"]
-    assert rig.outlet.safe_frames == 1
+    assert [rig.outlet.has_its_farewell(frames) for frames in (1, 2)] == [True, False]
     rig.newest.append(b"two..")
     assert [rig.serve(at, safe=True) for at in (10, 13.7)] == [b"", b"safe!"]
 
@@ -98,3 +112,54 @@ def test_a_port_that_is_unplugged_is_lost(rig: Rig) -> None:
     rig.pty.unplug()
     with pytest.raises(PortError, match=r"/dev/pts/\d+: the port is gone"):
         rig.serve(10)
+
+
+def test_a_beginning_and_an_ending_come_once(make: Any) -> None:
+    rig = make(beginning=b"init", ending=b"bye")
+    assert [rig.serve(at) for at in (0, 3, 3.5, 3.6)] == [b"init", b"", b"first", b""]
+    assert rig.serve(13.6, safe=True) == b"safe!"
+    rig.outlet.finish(BEGIN + 14 * MS)
+    assert rig.pty.read() == b"initfirstsafe!bye"
+    assert not rig.outlet.is_open
+
+
+def test_after_the_time_for_which_it_is_held_a_device_is_released(make: Any) -> None:
+    rig = make(ending=b"bye", held=25 * MS)
+    assert [rig.serve(at, safe=True) for at in (0, 10, 20, 30, 40, 50)] == [b"safe!"] * 3 + [b"bye", b"", b""]
+    assert rig.outlet.has_its_farewell(99)
+    rig.outlet.finish(BEGIN + 60 * MS)
+    assert rig.pty.read() == b"safe!" * 3 + b"bye"
+
+
+def test_a_loop_that_goes_on_takes_a_device_back(make: Any) -> None:
+    rig = make(ending=b"bye", held=15 * MS)
+    assert [rig.serve(at, safe=True) for at in (0, 10, 20, 30)] == [b"safe!", b"safe!", b"bye", b""]
+    assert not rig.serve(39)
+    assert [rig.serve(40), rig.serve(50, safe=True), rig.serve(70, safe=True)] == [b"first", b"safe!", b"bye"]
+
+
+@dataclass
+class Numbered:
+    """Puts a number before each frame, and the millisecond at which it is sent behind it."""
+
+    added: int = 2
+    count: int = 0
+    fails: list[str] = field(default_factory=list)
+
+    def seal(self, frame: bytes, now_ns: int) -> bytes:
+        """Count."""
+        if self.fails:
+            raise ValueError(self.fails[0])
+        self.count += 1
+        return b"%d" % self.count + frame + b"%d" % ((now_ns - BEGIN) // MS % 10)
+
+
+def test_each_frame_is_sealed_at_its_sending_the_safe_ones_too(make: Any) -> None:
+    rig = make(sealer=Numbered())
+    assert [rig.serve(0), rig.serve(12), rig.serve(25, safe=True)] == [b"1first0", b"2first2", b"3safe!5"]
+
+
+def test_a_sealer_that_fails_loses_the_port(make: Any) -> None:
+    rig = make(sealer=Numbered(fails=["no key"]))
+    with pytest.raises(PortError, match=r"/dev/pts/\d+: a frame cannot be sealed: no key"):
+        rig.serve(0)
