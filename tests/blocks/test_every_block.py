@@ -69,6 +69,9 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
         "highest": [1.0, 1.0, -1.0],
         "initial": [0.0, 0.0, 0.5],
         "safe": [0.0, 0.0, 0.0],
+        "roles": "stick throttle switch",
+        "shortest": [1000.0, 1000.0, 900.0],
+        "longest": [2000.0, 2000.0, 2100.0],
         "model": str(ROOT / "diagrams" / "models" / "rotorcraft.xml"),
     }
     required = [key for key, param in block.interface.params.items() if param.required]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -57,7 +57,10 @@ class ReceiverInput(Input):
     ``on_loss`` or its role says. So it is at the start, too. A link is good after 5 valid frames in a row.
 
     A subclass finds the counts of whole frames, see `frames`, and may have outputs of its own, see `more`.
+    ``begin`` is a byte with which a frame begins: a datagram is whole, as if another one followed it.
     """
+
+    begin: ClassVar[int]
 
     channels = Param(type="int64[n]", min=1, doc="channel of each element, from 1")
     lowest = Param(type="float64[n]", unit="a", doc="command of the shortest pulse, for each element")
@@ -97,6 +100,8 @@ class ReceiverInput(Input):
 
     def decode(self, received: bytearray) -> Iterator[Any]:
         """Take whole frames off the beginning, and judge them."""
+        if self._port.whole:
+            received.append(self.begin)
         for found in self.frames(received):
             yield self._refused(found) if isinstance(found, Counted) else self._judged(found)
 

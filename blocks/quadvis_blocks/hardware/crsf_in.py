@@ -9,7 +9,7 @@ from typing import Any
 
 from quadvis.block import Counted, Line, Out, Param
 from quadvis_blocks.hardware._counts import unpacked
-from quadvis_blocks.hardware._crsf import CHANNELS, CrsfDecoder, Spoilt
+from quadvis_blocks.hardware._crsf import CHANNELS, SYNCS, CrsfDecoder, Spoilt
 from quadvis_blocks.hardware._receiver import ReceiverInput
 
 STATISTICS = struct.Struct("BBBb6x")  # what is read of them: of the link to the craft
@@ -28,7 +28,7 @@ class CrsfIn(ReceiverInput):
     link is good after 5 valid frames in a row. Statistics that go on show that the receiver lives.
     """
 
-    line = Line("baud")
+    line, begin = Line("baud"), SYNCS[0]
 
     port = Param(type="port", doc="serial port, or a cable such as pty:rc")
     baud = Param(420_000, type="int64", min=9_600, max=4_000_000, doc="speed of the line (1/s)")

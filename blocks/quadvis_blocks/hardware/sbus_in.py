@@ -25,7 +25,7 @@ class SbusIn(ReceiverInput):
     one frame ends, another begins, and the channels are in their range.
     """
 
-    line = LINE
+    line, begin = LINE, START
 
     port = Param(type="port", doc="serial port, or a cable such as pty:rc")
     failsafe = Out("bool", doc="the newest frame has the failsafe flag: the receiver has lost the pilot")

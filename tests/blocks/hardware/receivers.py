@@ -66,7 +66,7 @@ def receiving(kind: type[ReceiverInput], **parameters: Any) -> Iterator[Receiver
 
 
 def messages(kind: type[ReceiverInput], data: bytes, piece: int = 1, **parameters: Any) -> list[Any]:
-    """Return what the decoder gives for bytes that come piece by piece, the link being good from the start."""
+    """Return what the decoder gives for bytes that come piece by piece, on a good link."""
     received, found = bytearray(), []
     with receiving(kind, **parameters) as made:
         block = made.engine.bound(ALONE)
