@@ -70,6 +70,8 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
         "initial": [0.0, 0.0, 0.5],
         "safe": [0.0, 0.0, 0.0],
         "roles": "stick throttle switch",
+        "codes": "ABS_X ABS_Y BTN_TR",
+        "dead_man": "BTN_TL",
         "shortest": [1000.0, 1000.0, 900.0],
         "longest": [2000.0, 2000.0, 2100.0],
         "model": str(ROOT / "diagrams" / "models" / "rotorcraft.xml"),
