@@ -22,6 +22,7 @@ from quadvis.testing import drive
 from quadvis_blocks.hardware._joystick_worker import JoystickReport
 from quadvis_blocks.hardware.joystick_in import JoystickIn
 from tests.blocks.hardware.events import Fifo, report
+from tests.blocks.hardware.marks import add_mark
 
 GIVEN: dict[str, Any] = {
     "device": "/dev/input/by-id/usb-x-event-joystick", "codes": "ABS_Y ABS_X BTN_TR",
@@ -234,28 +235,6 @@ def test_a_run_ends_in_a_sentence_if_no_joystick_is_there(tmp_path: Path) -> Non
         quadvis.load(diagram(tmp_path, f"{tmp_path}/none")).run(real_time=CALM)
 
 
-OWN = '''
-"""Says that a run has begun."""
-
-from pathlib import Path
-
-from quadvis.block import Block, Out
-
-
-class Mark(Block, numeric=False):
-    """Writes a file at its first step."""
-
-    y = Out()
-
-    def open(self):
-        """Do nothing; but so the block is not tried before the start."""
-
-    def output(self):
-        Path("FOLDER/begun").touch()
-        return 0.0
-'''
-
-
 class Hand(threading.Thread):
     """Full deflection and the dead-man held, reported at 100 Hz, with one silence and one loss."""
 
@@ -298,12 +277,10 @@ class Hand(threading.Thread):
 @pytest.mark.slow
 def test_a_run_is_safe_while_its_joystick_is_silent_or_gone(tmp_path: Path) -> None:
     fifo = Fifo(tmp_path / "joystick")
-    hand = Hand(fifo, tmp_path / "begun")
+    hand = Hand(fifo, add_mark(tmp_path))
     hand.start()
     path = diagram(tmp_path, fifo.path)
     path.write_text(path.read_text() + "  mark: {block: own.mark, rate: fast}\n")
-    (tmp_path / "blocks/own").mkdir(parents=True)
-    (tmp_path / "blocks/own/mark.py").write_text(OWN.replace("FOLDER", str(tmp_path)))
     result = quadvis.load(path, stop_time="6 s").run(real_time=CALM)
     hand.end()
     valid, age = result["hands.valid"], result["hands.age"]
