@@ -24,6 +24,7 @@ from quadvis_blocks.hardware._crsf import (
 from quadvis_blocks.hardware.crsf_in import CrsfIn
 from tests.blocks.hardware.crsf_frames import CENTRE, by_parser, statistics
 from tests.blocks.hardware.receivers import counts, given, messages, receiving, values
+from tests.stages import mostly_slow
 
 TWO = given([1, 3], "stick throttle")
 ALL = given([*range(1, 17)], " ".join(["stick"] * 16))
@@ -96,7 +97,7 @@ def test_of_10000_frames_each_tenth_without_a_byte_all_others_come_and_none_is_w
 
 
 @pytest.mark.parametrize("spoil", ["drop", "add", "flip"])
-@pytest.mark.parametrize("piece", [1, 7, 1000])
+@pytest.mark.parametrize("piece", mostly_slow([1000, 1, 7]))
 def test_a_byte_too_few_too_many_or_wrong_costs_at_most_one_frame(spoil: str, piece: int) -> None:
     random, sent, wanted = np.random.default_rng(8), bytearray(), []
     for number in range(1500):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadvis.block import ParameterError
@@ -95,6 +95,7 @@ def divided(whole: bytes) -> int:
     return sum(bit << place for place, bit in enumerate(bits[-7:])) ^ whole[-1]
 
 
+@settings(max_examples=50)
 @given(
     st.lists(st.integers(1, 24), min_size=1, max_size=24, unique=True),
     st.randoms(use_true_random=False),
@@ -136,6 +137,7 @@ def test_sent_is_in_quarters_and_changes_no_faster_than_it_may() -> None:
     assert sent[:, 1] == pytest.approx([1400.0, 1300.0, 1200.0, 1100.0, 1000.0])
 
 
+@pytest.mark.slow
 def test_a_peer_reads_the_commands_and_after_a_kill_the_order_to_go_home() -> None:
     found = drive_output(device(go_home=True, crc=True), command=[[1500.0, 2000.0]])
     board = Board(True, None)

@@ -73,6 +73,7 @@ def test_sent_is_the_command_in_whole_microseconds_and_changes_no_faster_than_it
     assert sent[:, 1] == pytest.approx([0.8, 0.6, 0.4, 0.2, 0.0, -0.2, -0.4])
 
 
+@pytest.mark.slow
 def test_a_peer_reads_the_commands_and_after_a_kill_the_safe_bytes() -> None:
     found = drive_output(device(baud=115_200, spacing=20e-3), command=[[0.5, 1.0], [-1.0, 0.0]])
     assert found.initial == b"1=15003=1000"

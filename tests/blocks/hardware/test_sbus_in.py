@@ -67,28 +67,10 @@ def test_channels_far_beyond_the_ends_refuse_a_frame(reader: Receiver) -> None:
     assert told(reader.step(SWITCHES[1:]))[:4] == [0.0, 4, 1, [0.0, -640.0]]
 
 
-def test_receivers_that_send_zeros_without_a_flag_move_nothing(reader: Receiver) -> None:
-    """ardupilot #9400: 20 frames with zeros in three channels around a failsafe."""
-    with receiving(
-        SbusIn, rate="50 Hz", **given([1, 3, 5, 9, 10], "stick throttle arm switch switch")
-    ) as made:
-        block = made
-        block.step(GOOD)
-        good = block.step(encode(counts(c3=1200))[1:])
-        held, lost = good["command"], [-0.5, -820.0, -820.0, -820.0, -820.0]
-        spoilt = encode(counts(c3=1500, c5=0, c9=0, c10=0))
-        rows = [block.step(spoilt) for _ in range(40)]
-        assert [row["refused"] for row in rows] == [1, *range(1, 40)]  # without a gap, each with the next
-        assert [row["command"] for row in rows] == 25 * [held] + 15 * [lost]
-        after = [block.step(encode(counts(c3=1300))) for _ in range(6)]
-        assert [row["good"] for row in after] == [False] * 4 + [True] * 2
-        assert [row["command"][1] for row in after] == 4 * [-820.0] + 2 * [308.0]
-
-
 @pytest.mark.parametrize("spoil", ["drop", "add", "flip"])
 def test_a_byte_too_few_too_many_or_wrong_costs_one_frame(spoil: str) -> None:
     random = np.random.default_rng(3)
-    for _ in range(300):
+    for _ in range(80):
         ends = [int(count) for count in random.integers(172, 1812, 24)]
         wanted = list(zip(ends[::2], ends[1::2], strict=True))
         frames = [frame(one, three) for one, three in wanted]
