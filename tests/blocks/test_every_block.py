@@ -74,8 +74,12 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
         "dead_man": "BTN_TL",
         "shortest": [1000.0, 1000.0, 900.0],
         "longest": [2000.0, 2000.0, 2100.0],
+        "ranges": [3, 3, 3],
+        "scale": [1.0, 2.0, -0.5],
         "model": str(ROOT / "diagrams" / "models" / "rotorcraft.xml"),
     }
+    if name == "hardware.digital_out":
+        values["initial"] = [0, 1, 0]
     required = [key for key, param in block.interface.params.items() if param.required]
     if {"file", "folder"} & {*required}:  # few blocks read or write files, and all tests come by here
         folder = request.getfixturevalue("tmp_path")
