@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,8 @@ from hypothesis import settings
 from hypothesis import strategies as st
 
 from quadvis.block import ParameterError
+from quadvis.testing.alone import ALONE, alone
+from quadvis.units import parse_period
 from quadvis_blocks.hardware import _crsf, _sbus
 from quadvis_blocks.hardware._receiver import RadioLink, ReceiverInput
 from quadvis_blocks.hardware.crsf_in import CrsfIn
@@ -81,6 +84,26 @@ def test_what_an_element_becomes_can_be_declared(kind: type[ReceiverInput], enco
         rows = [made.step() for _ in range(8)]
         assert [each["good"] for each in rows] == 5 * [True] + 3 * [False]
         assert rows[-1]["command"] == [-700, -692, 819, -0.5] and rows[-1]["heard"]
+
+
+@pytest.mark.parametrize(("kind", "encode"), KINDS)
+def test_a_datagram_is_a_whole_frame_that_nothing_need_follow(kind: type[ReceiverInput], encode: Any) -> None:
+    random = np.random.default_rng(7)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
+        peer.bind(("127.0.0.1", 0))
+        place = peer.getsockname()
+        peer.close()
+        said = given(CHANNELS, ROLES, port=f"udp:127.0.0.1:{place[1]}")
+        engine = alone(kind(**said), {}, {"n": 4}, parse_period("50 Hz"))
+        with engine, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            for number in range(300):
+                values = [int(value) for value in random.integers(172, 1812, 4)]
+                sender.sendto(sent(encode, values), place)
+                engine.run(1)
+                if number >= 5:
+                    wanted = pytest.approx([value - 992 for value in values])
+                    assert engine.read(ALONE, "command").tolist() == wanted
+            assert engine.read(ALONE, "refused") == 0
 
 
 def test_a_reversed_channel_has_its_low_end_on_the_other_side() -> None:
