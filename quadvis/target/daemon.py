@@ -107,17 +107,14 @@ class Daemon:
         while True:
             time.sleep(LOOK)
             now = time.monotonic()
-            if now >= due:
+            if now >= due and self._server.wants("state"):
                 due = now + STATE
-                self._publish_state()
+                self._server.publish("state", self.kernel.status() | self._operator(), None)
             if self._notifier.period is not None and now >= alive:
                 alive = now + self._notifier.period
                 self._notifier.say(ALIVE)
             if idle is not None and self.kernel.is_idle and now - self._asked > idle:
                 return
-
-    def _publish_state(self) -> None:
-        self._server.publish("state", self.kernel.status() | self._operator(), None)
 
     def _operator(self) -> dict[str, Any]:
         operator = self._server.lease.operator

@@ -140,6 +140,10 @@ class Server:
         """Send data of a topic to all who have subscribed and may see it; it never waits, see `feed.Feed`."""
         self._feed.publish(topic, header, array)
 
+    def wants(self, topic: str) -> bool:
+        """Return whether anybody has subscribed to a topic, so that its data is worth being made."""
+        return self._feed.wants(topic)
+
     def close(self) -> None:
         """Answer what is under way, close all sockets and wait for the end of the thread."""
         self._closing.set()

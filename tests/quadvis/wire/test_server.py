@@ -89,7 +89,9 @@ def test_streams_reach_those_who_may_see_them(rig: Rig) -> None:
     rig.key("anna", 3)
     rig.key("eve", 4)
     anna, eve = rig.client("anna"), rig.client("eve")
+    assert not rig.server.wants("state")
     everything = anna.subscribe("state", "scope/1")
+    assert rig.server.wants("state") and rig.server.wants("scope/1") and not rig.server.wants("scope/2")
     with pytest.raises(
         RefusedError, match=r"may see the status alone \(level 4\); the stream 'scope/1' needs"
     ):
@@ -109,6 +111,8 @@ def test_streams_reach_those_who_may_see_them(rig: Rig) -> None:
     anna.unsubscribe(everything)
     with pytest.raises(GoneError):
         everything.take(1)
+    until(lambda: not rig.server.wants("scope/1"))
+    assert rig.server.wants("state")  # by eve
 
 
 def test_a_key_that_is_lowered_or_revoked_sees_and_does_nothing_more(rig: Rig) -> None:
