@@ -19,7 +19,8 @@ granted, not_granted, unsafe (why its outputs were made safe, or null),
 tasks: {name: {period_s, steps, overruns,
 lateness and execution: {min_s, mean_s, max_s, p99_s, p99.9_s, histogram: [{from_s, to_s, count}]}}}}]};
 summary: {label: {signal, unit, and the statistics by name, final of a vector as a list}};
-expect: [{expectation, signal, kind, unit, limit, found, met, lack (why the run cannot be judged)}];
+expect: [{expectation, signal, kind, unit, limit, found, met, lack (why the run cannot be judged), shown
+(what was found, as text)}];
 margins: the number of expectations that only 'quadvis analyse' judges;
 warnings: [{file, line, column, subject, problem, remedy}], about what runs but is surely a mistake.
 Numbers are in the unit beside them, null for a number that is unknown or infinite.

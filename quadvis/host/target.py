@@ -347,6 +347,10 @@ def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
 def _shown(name: str, value: Any) -> str:
     if name in _TIMES and isinstance(value, float):
         return format_quantity(value, SECOND, 4)
+    if name == "Verdicts":
+        from quadvis.run.verdict import verdict_text
+
+        return "; ".join(map(verdict_text, value))
     if isinstance(value, list):
         return "; ".join(map(str, value)) or "none"
     return "none" if value in ("", None) else str(value)

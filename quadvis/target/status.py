@@ -50,8 +50,7 @@ def status(name: str, application: Application | None, session_time: float) -> d
     result = application.result
     if result is not None and result.flight is not None and not (result.flight.early or diagram.here):
         found["Passed"] = result.passed
-        found["Verdicts"] = [str(verdict) for verdict in result.outcome.verdicts]
-        found["NotMet"] = [str(verdict) for verdict in result.outcome.verdicts if not verdict.met]
+        found["Verdicts"] = [verdict.facts() for verdict in result.outcome.verdicts]
     return found
 
 

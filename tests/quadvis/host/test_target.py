@@ -103,7 +103,9 @@ def test_times_can_be_set_while_it_is_stopped(tg: Target, diagram: Path) -> None
     tg.start()
     wait_for(lambda: tg.Status == "stopped")
     assert tg.Passed
-    assert tg.Verdicts == ["met: law.y within 100 m: 1.902 m"]
+    (verdict,) = tg.Verdicts
+    assert (verdict["met"], verdict["expectation"], verdict["limit"]) == (True, "law.y within 100 m", 100.0)
+    assert "Verdicts       met: law.y within 100 m: 1.902 m" in str(tg)
     times = tg.getlog("TimeLog")
     np.testing.assert_allclose(times, 0.02 * np.arange(26))
     tg.start()
