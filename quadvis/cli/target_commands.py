@@ -244,6 +244,13 @@ def _delete_set(tg: Target, names: Sequence[str]) -> None:
     tg.deleteparamset(*_exactly(names, 1, "delete NAME"))
 
 
+def _default_set(tg: Target, names: Sequence[str]) -> None:
+    if names:
+        tg.setdefaultparamset(*_exactly(names, 2 if len(names) == 2 else 1, "default [NAME [APPLICATION]]"))
+    else:
+        print(tg.DefaultParamSet or "no set")
+
+
 def _exactly(names: Sequence[str], count: int, right: str) -> Sequence[str]:
     if len(names) != count:
         raise QuadvisError(f"write quadvis sets {right}")
@@ -252,5 +259,5 @@ def _exactly(names: Sequence[str], count: int, right: str) -> Sequence[str]:
 
 _SETS: Mapping[str, Callable[[Target, Sequence[str]], None]] = {
     "list": _list_sets, "save": _save_set, "load": _load_set, "show": _show_set, "compare": _compare_sets,
-    "delete": _delete_set,
+    "delete": _delete_set, "default": _default_set,
 }  # fmt: skip

@@ -42,7 +42,7 @@ def add_target_commands(add: Add, diagram_settings: Callable[[Parser], None], en
     log.add_argument("--list", action="store_true", help="list the logs instead")
     log.add_argument("--output", "-o", metavar="PATH", help="default: NAME.mcap")
     sets = add("sets", commands.sets, "keep, show, compare and use parameter sets of the application")
-    actions = ("list", "save", "load", "show", "compare", "delete")
+    actions = ("list", "save", "load", "show", "compare", "delete", "default")
     sets.add_argument("action", choices=actions, nargs="?", default="list")
     sets.add_argument("names", nargs="*", metavar="NAME", help="names of sets")
     web = add("web", commands.web, "serve the live page of a target to browsers on this machine")

@@ -14,6 +14,7 @@ from quadvis.host.connection import HostConnection, connect
 from quadvis.host.scope import HostScope
 from quadvis.machine.columns import table
 from quadvis.units import Unit, format_quantity
+from quadvis.wire.limits import PIECE
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from quadvis.diagram.settings import Files, Given
     from quadvis.output.log_reader import Log
 
-PIECE = 1 << 20  # bytes of a file in one message
 LOADING = 120.0  # s that a target has to get an application ready
 STOPPING = 20.0  # s that a run has to come to its end
 SECOND = Unit.parse("s")
@@ -35,7 +35,7 @@ PROPERTIES: Mapping[str, str] = {
     "SampleTime": "sample_time", "MinTET": "min_tet", "AvgTET": "avg_tet", "MaxTET": "max_tet",
     "NumSignals": "num_signals", "NumParameters": "num_parameters", "Scopes": "scope_numbers",
     "Tasks": "tasks", "Problem": "problem", "Passed": "passed", "Verdicts": "verdicts", "Log": "log_name",
-    "Variant": "variant", "Hash": "hash",
+    "Variant": "variant", "Hash": "hash", "DefaultParamSet": "default_param_set",
 }  # fmt: skip
 _BY_ALIAS = {alias: name for name, alias in PROPERTIES.items()} | {name: name for name in PROPERTIES}
 _TIMES = ("ExecTime", "SessionTime", "StopTime", "SampleTime", "MinTET", "AvgTET", "MaxTET")
@@ -252,6 +252,13 @@ class Target:
     def deleteparamset(self, name: str) -> None:
         """Remove a parameter set from the target."""
         self._connection.operate("deleteparamset", name=name)
+
+    def setdefaultparamset(self, name: str, application: str = "") -> None:
+        """Let the application that is loaded, or another one, have a set whenever it is loaded.
+
+        "" is no set: then it has the values of its diagram.
+        """
+        self._connection.operate("setdefaultparamset", name=name or None, application=application or None)
 
     def compare(self, first: str, second: str = "") -> list[tuple[str, Any, Any]]:
         """Return the parameters that differ between two sets, with both values; "" is the present one."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quadvis.diagram.diagram import Diagram
-from quadvis.errors import QuadvisError
+from quadvis.errors import QuadvisError, quoted, sentence
 from quadvis.machine.files import SVG, write_output
 from quadvis.realtime.helm import ENDED
 from quadvis.run.result import Result
@@ -18,7 +18,7 @@ from quadvis.run.tuned import new_values
 from quadvis.target.background import in_thread
 from quadvis.target.bundle import ApplicationBundle
 from quadvis.target.newest import NewestValues
-from quadvis.target.parameters import Parameters, as_written
+from quadvis.target.parameters import Parameters, as_written, read_set
 from quadvis.target.scopes import ApplicationScopes
 from quadvis.target.session import Session
 from quadvis.target.store import Store
@@ -50,6 +50,22 @@ class Application:
         self._session: Session | None = None
         self._stop_time: float | None = None
         self._drawing: Future[Any] | None = None
+
+    def take_default(self) -> None:
+        """Give parameters the values of the default set, if there is one; QuadvisError if it does not fit."""
+        chosen = self.default_set
+        if not chosen:
+            return
+        try:
+            self.tune(read_set(self._store.known_set(self.name, chosen))).result()
+        except QuadvisError as error:
+            problem = f"{self.name} cannot have its default parameter set {quoted(chosen)}: {error}"
+            raise QuadvisError(sentence(problem, "name another one, or none")) from None
+
+    @property
+    def default_set(self) -> str:
+        """The name of the parameter set that it has when it is loaded; "" for none."""
+        return self._store.default_set(self.name)
 
     @property
     def name(self) -> str:

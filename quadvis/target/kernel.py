@@ -92,7 +92,9 @@ class Kernel:
         bundle = self._bundle(application)
         diagram = admit(bundle, self.store.place(bundle))
         self._unload()
-        self._application = made = Application(bundle, diagram, self.store, self._publish)
+        made = Application(bundle, diagram, self.store, self._publish)
+        made.take_default()
+        self._application = made
         self._event("loaded", application=bundle.name)
         made.prepare().result()
         return {"name": bundle.name, "variant": bundle.variant, "hash": bundle.hash}
@@ -203,7 +205,11 @@ class Kernel:
 
     def deleteparamset(self, name: str) -> None:
         """Remove a parameter set."""
-        self.store.known_set(self._loaded.name, name).unlink()
+        self.store.drop_set(self._loaded.name, name)
+
+    def setdefaultparamset(self, name: str | None, application: str | None) -> None:
+        """Let an application have a parameter set whenever it is loaded; None for none."""
+        self.store.keep_default(application or self._loaded.name, name or "")
 
     # scopes
 

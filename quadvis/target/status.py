@@ -42,6 +42,7 @@ def status(name: str, application: Application | None, session_time: float) -> d
         "NumSignals": len(application.newest.names),
         "NumParameters": len(application.parameters.names),
         "Tasks": [{"computer": computer, "task": each.task, **each.facts()} for computer, each in tasks],
+        "DefaultParamSet": application.default_set,
         "Log": session.log.stem if session is not None else "",
         "Problem": application.problem,
         "Said": application.said[-20:],

@@ -196,6 +196,39 @@ def test_sets_are_kept_compared_and_used(tg: Target, diagram: Path, lab: Running
     assert tg.compare("autosave") == []  # what was tuned is kept at the end of a run
 
 
+def test_an_application_has_its_default_set_when_it_is_loaded(
+    tg: Target, diagram: Path, tmp_path: Path
+) -> None:
+    tg.load(diagram, name="kept")
+    tg.setparam({"law.factor": 3.0, "other.factor": 4.0})
+    tg.saveparamset("mine")
+    assert tg.DefaultParamSet == ""
+    with pytest.raises(QuadvisError, match="there is no parameter set 'mne'; did you mean 'mine'"):
+        tg.setdefaultparamset("mne")
+    tg.setdefaultparamset("mine")
+    tg.unload()
+    tg.load("kept")
+    assert (tg.DefaultParamSet, tg.getparam("law.factor")) == ("mine", 3.0)
+    tg.start()
+    wait_for(lambda: tg.ExecTime > 0.3)
+    tg.stop()
+    log = tg.getlog()
+    sampled = np.interp(log.times("other.y"), log.times("wave.y"), log["wave.y"])
+    np.testing.assert_allclose(log["other.y"], 4.0 * sampled, atol=1e-12)
+    # A diagram for which it was not made is not flown with half of it.
+    changed = tmp_path / "changed.yaml"
+    changed.write_text(LOOP.replace("other:", "second:"))
+    with pytest.raises(QuadvisError, match=r"kept cannot have its default parameter set 'mine': .*other"):
+        tg.load(changed, name="kept")
+    assert tg.Application == ""
+    tg.setdefaultparamset("", "kept")
+    tg.load(changed, name="kept")
+    assert tg.getparam("law.factor") == 2.0
+    tg.setdefaultparamset("mine")
+    tg.deleteparamset("mine")
+    assert tg.DefaultParamSet == ""
+
+
 def test_two_scopes_that_trigger_each_other_lose_nothing(tg: Target, diagram: Path) -> None:
     tg.load(diagram)
     first = tg.addscope("host", signals=["wave.y", "law.y"], NumSamples=20)

@@ -36,7 +36,8 @@ RIGHT: dict[str, dict[str, Any]] = {
     "remscope": {"ids": [1]}, "setscope": {"id": 1, "values": {"NumSamples": 100}},
     "startscope": {"ids": [1]}, "stopscope": {"ids": [1]}, "trigger": {"ids": [1]}, "getscope": {"id": 1},
     "saveparamset": {"name": "a"}, "loadparamset": {"name": "a"}, "getparamset": {"name": "a"},
-    "deleteparamset": {"name": "a"}, "getlog": {"name": "hover.mcap"}, "have": {"files": [DIGEST]},
+    "deleteparamset": {"name": "a"}, "setdefaultparamset": {"name": "a"},
+    "getlog": {"name": "hover.mcap"}, "have": {"files": [DIGEST]},
     "put": {"file": DIGEST, "size": 3, "offset": 0, "data": b"abc"}, "picture": {"signal": "camera.frame"},
     "subscribe": {"topics": ["state"]}, "unsubscribe": {"topics": ["state"]},
 }  # fmt: skip
