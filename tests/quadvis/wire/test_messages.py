@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from quadvis.wire.limits import REQUEST
 from quadvis.wire.messages import (
     Reply,
     Request,
@@ -32,6 +33,13 @@ def test_a_request_and_a_reply_come_back_as_they_were_sent() -> None:
     )
     error = read_reply(pack_reply(Reply(8, error=BusyError("later")))).error
     assert isinstance(error, BusyError) and str(error) == "later"
+
+
+def test_a_request_that_no_target_takes_is_not_sent() -> None:
+    data = bytes(REQUEST - 100)
+    assert read_request(pack_request(Request(1, "put", {"data": data}))).args["data"] == data
+    with pytest.raises(BadError, match=f"the request has 524... bytes, more than {REQUEST}; send less"):
+        pack_request(Request(1, "put", {"data": bytes(REQUEST - 20)}))
 
 
 def test_a_deadline_may_be_left_out() -> None:
