@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -84,7 +85,7 @@ def status(options: argparse.Namespace) -> int:
     """Print the properties of a target."""
     with _target(options) as tg:
         if options.json:
-            _print_json(tg.status())
+            _print_json(_finite(tg.status()))
         else:
             print(tg)
     return 0
@@ -203,6 +204,15 @@ def _text(value: Any) -> str:
     if isinstance(value, dict) and set(value) == {"value", "unit"}:
         return f"{value['value']} {value['unit']}"
     return str(value)
+
+
+def _finite(value: Any) -> Any:
+    """Return plain data with None in place of what is infinite, which JSON does not know."""
+    if isinstance(value, dict):
+        return {name: _finite(each) for name, each in value.items()}
+    if isinstance(value, list):
+        return [_finite(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _scope_settings(options: argparse.Namespace) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.host.connection import HostConnection, connect
+from quadvis.host.logs import PARTS, TargetLogs
 from quadvis.host.scope import HostScope
 from quadvis.machine.columns import table
 from quadvis.units import Unit, format_quantity
@@ -33,11 +34,13 @@ PROPERTIES: Mapping[str, str] = {
     "Application": "application", "Mode": "mode", "Status": "state", "CPUOverload": "cpu_overload",
     "ExecTime": "exec_time", "SessionTime": "session_time", "StopTime": "stop_time",
     "SampleTime": "sample_time", "MinTET": "min_tet", "AvgTET": "avg_tet", "MaxTET": "max_tet",
+    "MaxLogSamples": "max_log_samples", "LogMode": "log_mode", "NumLogWraps": "num_log_wraps",
     "NumSignals": "num_signals", "NumParameters": "num_parameters", "Scopes": "scope_numbers",
     "Tasks": "tasks", "Problem": "problem", "Passed": "passed", "Verdicts": "verdicts", "Log": "log_name",
     "Variant": "variant", "Hash": "hash", "DefaultParamSet": "default_param_set",
 }  # fmt: skip
 _BY_ALIAS = {alias: name for name, alias in PROPERTIES.items()} | {name: name for name in PROPERTIES}
+_PARTS = {alias: name for name, alias in PARTS.items()} | {name: name for name in PARTS}
 _TIMES = ("ExecTime", "SessionTime", "StopTime", "SampleTime", "MinTET", "AvgTET", "MaxTET")
 
 
@@ -45,18 +48,24 @@ class Target:
     """A machine that flies, or this one: ``Target("lab1")``, or ``Target()`` for the target of this machine.
 
     The properties of xPC Target are attributes: ``tg.Status``, ``tg.ExecTime`` (s), ``tg.AvgTET`` (s), and so
-    on, see ``print(tg)``; each also has a name in Python's style, such as ``tg.exec_time``. ``StopTime`` and
-    ``SampleTime`` can be set while the application is stopped. Whoever changes something becomes the operator
-    for that moment, or, inside ``with tg.operator():``, for as long as that lasts.
+    on, see ``print(tg)``; each also has a name in Python's style, such as ``tg.exec_time``. ``StopTime``,
+    ``SampleTime`` and ``MaxLogSamples`` can be set while the application is stopped. The last one bounds the
+    log of a run to so many of the newest samples of the fastest task, and at most twice as many (``LogMode``
+    is "Wrapped" then); infinite, the default, is all of them ("Normal").
+
+    Whoever changes something becomes the operator for that moment, or, inside ``with tg.operator():``, for as
+    long as that lasts.
 
     Without a name, a target on this machine is started if none runs, and ends by itself when it is unused.
     QuadvisError says in a sentence why something is refused, or that the target does not answer.
     """
 
     _connection: HostConnection
+    _logs: TargetLogs
 
     def __init__(self, name: str | None = None, *, connection: HostConnection | None = None) -> None:
-        self.__dict__["_connection"] = connection or connect(name)
+        self.__dict__["_connection"] = made = connection or connect(name)
+        self.__dict__["_logs"] = TargetLogs(made.name, made.request)
 
     def __enter__(self) -> Self:
         return self
@@ -68,6 +77,7 @@ class Target:
 
     def close(self) -> None:
         """End the connection; the target goes on."""
+        self._logs.close()
         self._connection.close()
 
     @property
@@ -105,6 +115,8 @@ class Target:
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
             raise AttributeError(name)
+        if name in _PARTS:
+            return self.getlog(_PARTS[name])
         known = _BY_ALIAS.get(name)
         if known is None:
             problem = f"a target has no '{name}'"
@@ -115,9 +127,14 @@ class Target:
 
     def __setattr__(self, name: str, value: Any) -> None:
         known = _BY_ALIAS.get(name, name)
-        if known not in ("StopTime", "SampleTime"):
-            raise AttributeError(f"'{name}' of a target cannot be set; StopTime and SampleTime can")
-        self._connection.operate("settime", deadline=LOADING, **{known: float(value)})
+        if known in ("StopTime", "SampleTime"):
+            self._connection.operate("settime", deadline=LOADING, **{known: float(value)})
+        elif known == "MaxLogSamples":
+            self._connection.operate("setlog", deadline=LOADING, MaxLogSamples=float(value))
+        else:
+            raise AttributeError(
+                f"'{name}' of a target cannot be set; StopTime, SampleTime and MaxLogSamples can"
+            )
 
     def __repr__(self) -> str:
         return f"<Target {self.name}>"
@@ -298,39 +315,26 @@ class Target:
 
     def logs(self) -> list[dict[str, Any]]:
         """Return the logs that the target keeps, the oldest first."""
-        return list(self.request("logs"))
+        return self._logs.all()
 
     def fetchlog(self, name: str | None = None, path: str | Path | None = None) -> Path:
         """Copy a log of the target, the newest if none is named, to a path here; return the path."""
         if name is None:
-            logs = self.logs()
-            if not logs:
-                raise QuadvisError(f"{self.name} has no log")
-            name = logs[-1]["name"]
+            name = self._logs.newest_name()
         place = Path(path) if path is not None else Path(tempfile.mkdtemp(prefix="quadvis-")) / f"{name}.mcap"
-        with place.open("wb") as file:
-            while True:
-                piece = self.request("getlog", name=name, offset=file.tell(), count=PIECE)
-                file.write(piece["data"])
-                if not piece["data"] or file.tell() >= piece["size"]:
-                    return place
+        return self._logs.copy(name, place)
 
     def getlog(
         self, signal: str | None = None, first: int = 1, count: int | None = None, decimation: int = 1
     ) -> Log | NDArray[np.float64]:
         """Return the newest log, or samples of one of its signals as xPC's `getlog` gives them.
 
-        ``TimeLog`` is the times of the fastest recorded signal. The first sample has the number 1.
+        ``TimeLog``, ``StateLog``, ``OutputLog`` and ``TETLog`` are parts of it, see
+        `quadvis.host.logs.samples_of`; they are also attributes. The first sample has the number 1.
         """
-        from quadvis.output.log_reader import read_log
-
-        log = read_log(self.fetchlog())
         if signal is None:
-            return log
-        rows = max(map(log.times, log), key=len) if signal == "TimeLog" else log[signal]
-        last = None if count is None else first - 1 + count * decimation
-        found: NDArray[np.float64] = rows[first - 1 : last : decimation]
-        return found
+            return self._logs.newest()[-1]
+        return self._logs.samples(signal, first, count, decimation)
 
 
 def _loaded(what: str | Path | Diagram, variant: str | None, settings: Given, params: Files) -> Diagram:

@@ -15,7 +15,7 @@ from quadvis.realtime.note_taker import NoteTaker
 from quadvis.run.rows import left_out, releases, times_of
 
 if TYPE_CHECKING:
-    from quadvis.output.log import LogWriter
+    from quadvis.output.wrapped_log import RunLog
 
 NANOSECOND = 1e-9  # s
 Whole = NDArray[np.int64]
@@ -40,7 +40,7 @@ class LoggedNotes:
         self._places = {key: before + number for number, key in enumerate(blocks)}
         self._periods = {computer: graph.tick for computer, graph in graphs.items()}
 
-    def taker(self, writer: LogWriter | None) -> NoteTaker:
+    def taker(self, writer: RunLog | None) -> NoteTaker:
         """Return who writes notes into a log, if there is one."""
 
         def write(computer: str, key: tuple[str, ...], ticks: Whole, rows: Whole) -> None:

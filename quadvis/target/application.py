@@ -49,6 +49,7 @@ class Application:
         self._store, self._publish = store, publish
         self._session: Session | None = None
         self._stop_time: float | None = None
+        self.log_samples = math.inf  # of the fastest task, which the log of a run has at least
         self._drawing: Future[Any] | None = None
 
     def take_default(self) -> None:
@@ -76,6 +77,12 @@ class Application:
     def session(self) -> Session | None:
         """The run that is going on or was the last one."""
         return self._session
+
+    @property
+    def waiting_log(self) -> Path | None:
+        """The log of a run that has not begun; None if there is none."""
+        session = self._session
+        return session.log if session is not None and self.state in (LOADING, READY) else None
 
     @property
     def stop_time(self) -> float:
@@ -108,7 +115,7 @@ class Application:
         self.scopes.begin()
         self.problem, self.result, self.said = "", None, []
         self._session = Session(
-            self.diagram, self.bundle.engine, self._store.next_log(self.name),
+            self.diagram, self.bundle.engine, self._store.next_log(self.name), self.log_samples,
             [*self.newest.taps, *self.scopes.taps], self._stop_time, self._say, self.scopes.settle,
             self._ended,
         )  # fmt: skip
@@ -178,6 +185,19 @@ class Application:
         self.close()
         self.diagram = changed
         self.prepare().result()
+
+    def set_log(self, samples: float) -> None:
+        """Let the log of the next run have so many samples of the fastest task, at least; `inf` for all."""
+        if self.running:
+            raise QuadvisError("the log cannot change in a run: stop it first")
+        self.log_samples = samples
+        self._prepare_again()
+
+    def _prepare_again(self) -> None:
+        """Begin anew if what waits for its start was begun in another way."""
+        if self.state in (LOADING, READY):
+            self.close()
+            self.prepare().result()
 
     def _say(self, sentence: str) -> None:
         self.said.append(sentence)

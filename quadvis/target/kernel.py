@@ -145,6 +145,10 @@ class Kernel:
         application.refuse_times()
         return self._worker.submit(application.set_times, StopTime, SampleTime)
 
+    def setlog(self, MaxLogSamples: float) -> Future[Any]:
+        """Bound the log of the next run."""
+        return self._worker.submit(self._loaded.set_log, MaxLogSamples)
+
     def status(self) -> dict[str, Any]:
         """Return the state of the target, in xPC's words."""
         return status(self.name, self._application, time.monotonic() - self._born)
@@ -249,7 +253,9 @@ class Kernel:
 
     def logs(self) -> list[dict[str, Any]]:
         """Return the logs that are kept, the oldest first."""
-        return [{"name": path.stem, "size": path.stat().st_size} for path in self.store.logs()]
+        waiting = self._application.waiting_log if self._application is not None else None
+        found = [(path, path.stat()) for path in self.store.logs() if path != waiting]
+        return [{"name": path.stem, "size": at.st_size, "changed": at.st_mtime} for path, at in found]
 
     def getlog(self, name: str, offset: int, count: int) -> dict[str, Any]:
         """Return a piece of a log."""

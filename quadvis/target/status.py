@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from quadvis.target.application import Application
 
 NONE, DETECTED = "none", "detected"  # CPUOverload
+NORMAL, WRAPPED = "Normal", "Wrapped"  # LogMode
 MODES = {True: "Real-Time Multi-Tasking", False: "Real-Time Single-Tasking"}
 
 
@@ -42,6 +44,9 @@ def status(name: str, application: Application | None, session_time: float) -> d
         "NumSignals": len(application.newest.names),
         "NumParameters": len(application.parameters.names),
         "Tasks": [{"computer": computer, "task": each.task, **each.facts()} for computer, each in tasks],
+        "MaxLogSamples": application.log_samples,
+        "LogMode": WRAPPED if math.isfinite(application.log_samples) else NORMAL,
+        "NumLogWraps": session.wraps if session is not None else 0,
         "DefaultParamSet": application.default_set,
         "Log": session.log.stem if session is not None else "",
         "Problem": application.problem,

@@ -6,7 +6,7 @@ folder/sets/<name>/<set>.yaml       parameter sets of an application
 folder/sets/<name>/default          the name of the one that it has when it is loaded
 folder/drawings/<hash>.svg          drawings of diagrams
 folder/scopes/<name>/               files of file scopes
-folder/logs/<name>-<number>.mcap    the logs of its runs
+folder/logs/<name>-<number>.mcap    the logs of its runs; of a bounded one <name>-<number>.before.mcap, too
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from pathlib import Path
 
 from quadvis.errors import QuadvisError, quoted, sentence, suggestion
 from quadvis.machine.files import Kind, write_output
+from quadvis.output.wrapped_log import BEFORE
 from quadvis.target.bundle import DIGEST, NAME, ApplicationBundle, inner_path
 
 MOST_BYTES = 256_000_000  # of a file
@@ -206,7 +207,7 @@ class Store:
     def logs(self, name: str | None = None) -> list[Path]:
         """Return the logs of an application, or all, the oldest first."""
         found = (self.folder / "logs").glob("*.mcap")
-        mine = [path for path in found if name is None or path.stem.rpartition("-")[0] == name]
+        mine = [path for path in found if name is None or _whole(path).rpartition("-")[0] == name]
         return sorted(mine, key=_age)
 
     def next_log(self, name: str) -> Path:
@@ -234,8 +235,13 @@ def _known(name: str, paths: Mapping[str, Path], what: str) -> Path:
     return paths[name]
 
 
+def _whole(path: Path) -> str:
+    """Return the name of a log, also for its part that came before the newest."""
+    return path.stem.removesuffix(BEFORE)
+
+
 def _number(path: Path) -> int:
-    number = path.stem.rpartition("-")[2]
+    number = _whole(path).rpartition("-")[2]
     return int(number) if number.isascii() and number.isdigit() else 0
 
 

@@ -52,6 +52,7 @@ _TOPIC = argument.text(40, "[a-z]+(/[0-9]{1,4})?", "a topic such as 'state' or '
 _ID = argument.whole(1, 9999)
 _COUNT = argument.whole(0, 2**53)
 _TIME = argument.number(0, math.inf, "a time of at least 0 s, which may be infinite")
+_SAMPLES = argument.number(1, math.inf, "a number of at least 1, which may be infinite")
 _INSTANT = argument.whole(0, 2**62)
 _SHIFT = argument.whole(-(10**10), 10**10)
 _PERIOD = argument.number(1e-6, 1e6, "a time from 1e-6 to 1e6 s")
@@ -104,6 +105,10 @@ _DECLARED = (
          (Argument("StopTime", argument.or_none(_TIME), "the stop time (s)", None),
           Argument("SampleTime", argument.or_none(_PERIOD), "the period of the base rate (s)", None)),
          LEASED, CHANGES),
+    Verb("setlog", 0, "bound the log of a run", "nil",
+         (Argument("MaxLogSamples", _SAMPLES,
+                   "how many samples of the fastest task it has at least, of a long run the newest"),),
+         LEASED, CHANGES),
     Verb("addscope", 2, "add a scope", "its number",
          (Argument("id", argument.or_none(_ID), "its number; else the first free one", None),
           Argument("type", _KIND_OF_SCOPE, "where its data goes", "host")), changes=True),
@@ -125,7 +130,7 @@ _DECLARED = (
          (Argument("name", argument.or_none(_SET_NAME), "the name of the set; nil for none"),
           Argument("application", argument.or_none(_NAME), "its name; nil for the one that is loaded", None)),
          LEASED, CHANGES),
-    Verb("logs", 1, "the logs on the target", "a list of maps: name, size, sha256"),
+    Verb("logs", 1, "the logs on the target", "a list of maps: name, size, changed (when, s since 1970)"),
     Verb("getlog", 1, "a piece of a log", "a map: data, size (of the whole log)",
          (Argument("name", _NAME, "the name of the log"),
           Argument("offset", _COUNT, "where the piece begins, from 0", 0), _some(PIECE))),

@@ -91,7 +91,7 @@ def test_the_list_of_properties_reads_as_in_xpc_target(tg: Target, diagram: Path
             assert getattr(tg, name) == getattr(tg, alias)
     with pytest.raises(AttributeError, match="a target has no 'Sttus'; did you mean 'Status'"):
         _ = tg.Sttus
-    with pytest.raises(AttributeError, match="StopTime and SampleTime can"):
+    with pytest.raises(AttributeError, match="StopTime, SampleTime and MaxLogSamples can"):
         tg.Status = "running"
 
 
@@ -105,7 +105,7 @@ def test_times_can_be_set_while_it_is_stopped(tg: Target, diagram: Path) -> None
     assert tg.Passed
     (verdict,) = tg.Verdicts
     assert (verdict["met"], verdict["expectation"], verdict["limit"]) == (True, "law.y within 100 m", 100.0)
-    assert "Verdicts       met: law.y within 100 m: 1.902 m" in str(tg)
+    assert "met: law.y within 100 m: 1.902 m" in str(tg)
     times = tg.getlog("TimeLog")
     np.testing.assert_allclose(times, 0.02 * np.arange(26))
     tg.start()
@@ -227,6 +227,80 @@ def test_an_application_has_its_default_set_when_it_is_loaded(
     tg.setdefaultparamset("mine")
     tg.deleteparamset("mine")
     assert tg.DefaultParamSet == ""
+
+
+SUM = "  sum: {block: signal.integrator, in: {u: {from: wave.y, across: hold}}}\n"
+PAIR = "  pair: {block: sources.constant, rate: fast, with: {value: [2, 3]}}\n"
+
+
+def flown(tg: Target, path: Path, text: str) -> Log:
+    """Fly a diagram to its end, and return the log."""
+    path.write_text(text)
+    tg.load(path)
+    tg.start()
+    wait_for(lambda: tg.Status == "stopped")
+    log = tg.getlog()
+    assert isinstance(log, Log)
+    return log
+
+
+def test_parts_of_a_log_have_the_names_of_xpc_target(tg: Target, tmp_path: Path) -> None:
+    text = LOOP.replace("stop_time: 600 s", "stop_time: 0.5 s").replace("expect:", PAIR + "expect:")
+    log = flown(tg, tmp_path / "loop.yaml", text)
+    time = tg.TimeLog
+    np.testing.assert_array_equal(time, log.times("wave.y"))
+    columns = np.column_stack([log["wave.y"], log["pair.y"]])
+    found = tg.OutputLog
+    assert found.shape == (len(time), 3)
+    assert {tuple(row) for row in found.T} == {tuple(row) for row in columns.T}
+    tet = tg.TETLog
+    fast = next(each for each in tg.Tasks if each["task"] == "fast")
+    assert len(tet) == fast["steps"]
+    np.testing.assert_allclose([tet.min(), tet.mean(), tet.max()], [tg.MinTET, tg.AvgTET, tg.MaxTET])
+    np.testing.assert_array_equal(tg.getlog("TimeLog", 3, 4, 2), time[2:10:2])
+    np.testing.assert_array_equal(tg.getlog("wave.y", 2, 3), log["wave.y"][1:4])
+    with pytest.raises(QuadvisError, match="counted from 1"):
+        tg.getlog("TimeLog", 0)
+    with pytest.raises(QuadvisError, match="has no signal of a block with continuous states"):
+        _ = tg.state_log
+    log = flown(
+        tg,
+        tmp_path / "sum.yaml",
+        text.replace("expect:", SUM + "solver: {method: ode4, step: 5 ms}\nexpect:"),
+    )
+    np.testing.assert_array_equal(tg.StateLog[:, 0], log["sum.y"])
+    np.testing.assert_array_equal(tg.TimeLog, log.times("sum.y"))
+
+
+def test_a_bounded_log_has_the_newest_samples(tg: Target, diagram: Path) -> None:
+    tg.load(diagram)
+    assert (tg.MaxLogSamples, tg.LogMode, tg.NumLogWraps) == (float("inf"), "Normal", 0)
+    before = [each["name"] for each in tg.logs()]
+    tg.MaxLogSamples = 30
+    assert (tg.MaxLogSamples, tg.LogMode, tg.Status) == (30, "Wrapped", "ready")
+    assert [each["name"] for each in tg.logs()] == before  # nothing has been flown
+    tg.start()
+    wait_for(lambda: tg.NumLogWraps >= 3)
+    tick = tg.setparam("law.factor", 5.0)
+    wait_for(lambda: tg.ExecTime > 0.01 * tick + 0.1)
+    with pytest.raises(QuadvisError, match="the log cannot change in a run: stop it first"):
+        tg.MaxLogSamples = 50
+    tg.stop()
+    wraps = tg.NumLogWraps
+    names = [each["name"] for each in tg.logs() if each["name"] not in before]
+    assert names == [f"{tg.Log}.before", tg.Log]
+    time, wave = tg.TimeLog, tg.getlog("wave.y")
+    assert len(time) >= 30 and time[0] > 0.2
+    assert time[-1] == pytest.approx(tg.ExecTime, abs=0.011)
+    np.testing.assert_allclose(wave, np.sin(2 * np.pi * time), atol=1e-9)
+    steps = np.round(np.diff(time) / 0.01)
+    assert (steps == 1).all() or tg.CPUOverload == "detected"
+    log = tg.getlog()
+    assert log.metadata["wraps"] == str(wraps) and log.summary["stopped"].startswith("it was stopped")
+    with pytest.raises(QuadvisError, match="has the end of its run alone, which a replay cannot begin with"):
+        quadvis.replay(log)
+    tg.MaxLogSamples = float("inf")
+    assert tg.LogMode == "Normal"
 
 
 def test_two_scopes_that_trigger_each_other_lose_nothing(tg: Target, diagram: Path) -> None:
