@@ -23,7 +23,8 @@ def target(options: argparse.Namespace) -> int:
     from quadvis.target.daemon import serve
 
     serve(options.name, listen=options.listen, folder=options.folder, startup=options.startup,
-          idle=options.until_idle, say=lambda words: print(words, file=sys.stderr, flush=True))  # fmt: skip
+          idle=options.until_idle, say=lambda words: print(words, file=sys.stderr, flush=True),
+          screen=sys.stdout)  # fmt: skip
     return 0
 
 

@@ -35,6 +35,7 @@ PROPERTIES: Mapping[str, str] = {
     "ExecTime": "exec_time", "SessionTime": "session_time", "StopTime": "stop_time",
     "SampleTime": "sample_time", "MinTET": "min_tet", "AvgTET": "avg_tet", "MaxTET": "max_tet",
     "MaxLogSamples": "max_log_samples", "LogMode": "log_mode", "NumLogWraps": "num_log_wraps",
+    "ViewMode": "view_mode",
     "NumSignals": "num_signals", "NumParameters": "num_parameters", "Scopes": "scope_numbers",
     "Tasks": "tasks", "Problem": "problem", "Passed": "passed", "Verdicts": "verdicts", "Log": "log_name",
     "Variant": "variant", "Hash": "hash", "DefaultParamSet": "default_param_set",
@@ -51,7 +52,8 @@ class Target:
     on, see ``print(tg)``; each also has a name in Python's style, such as ``tg.exec_time``. ``StopTime``,
     ``SampleTime`` and ``MaxLogSamples`` can be set while the application is stopped. The last one bounds the
     log of a run to so many of the newest samples of the fastest task, and at most twice as many (``LogMode``
-    is "Wrapped" then); infinite, the default, is all of them ("Normal").
+    is "Wrapped" then); infinite, the default, is all of them ("Normal"). ``ViewMode`` is "All", or the number
+    of the one target scope that the target shows on its own terminal.
 
     Whoever changes something becomes the operator for that moment, or, inside ``with tg.operator():``, for as
     long as that lasts.
@@ -129,11 +131,14 @@ class Target:
         known = _BY_ALIAS.get(name, name)
         if known in ("StopTime", "SampleTime"):
             self._connection.operate("settime", deadline=LOADING, **{known: float(value)})
+        elif known == "ViewMode":
+            number = None if str(value).lower() == "all" else int(value)
+            self._connection.operate("setview", id=number)
         elif known == "MaxLogSamples":
             self._connection.operate("setlog", deadline=LOADING, MaxLogSamples=float(value))
         else:
             raise AttributeError(
-                f"'{name}' of a target cannot be set; StopTime, SampleTime and MaxLogSamples can"
+                f"'{name}' of a target cannot be set; StopTime, SampleTime, MaxLogSamples and ViewMode can"
             )
 
     def __repr__(self) -> str:

@@ -90,6 +90,11 @@ class Application:
         return float(self.diagram.stop_time if self._stop_time is None else self._stop_time)
 
     @property
+    def time(self) -> float:
+        """The time of the last tick of its run (s)."""
+        return self._session.helm.time if self._session is not None else 0.0
+
+    @property
     def running(self) -> bool:
         """True while the loops run."""
         return self.state in (RUNNING, STOPPING)

@@ -13,8 +13,11 @@ from quadvis.target.admission import admit
 from quadvis.target.application import Application
 from quadvis.target.bundle import DIGEST, ApplicationBundle
 from quadvis.target.parameters import read_set
+from quadvis.target.scopes import ShownScope
 from quadvis.target.status import status
 from quadvis.target.store import Store
+
+ALL = "All"  # the ViewMode that shows all target scopes
 
 Publish = Callable[[str, Mapping[str, Any], Any], None]  # takes a topic, a header, an array or None
 
@@ -31,6 +34,7 @@ class Kernel:
         self._publish = publish
         self._born = time.monotonic()
         self._application: Application | None = None
+        self.view: int | None = None  # the target scope that is shown alone
         # What takes long is done here, one after the other; the verbs are answered meanwhile.
         self._worker = ThreadPoolExecutor(1, "target")
 
@@ -151,7 +155,13 @@ class Kernel:
 
     def status(self) -> dict[str, Any]:
         """Return the state of the target, in xPC's words."""
-        return status(self.name, self._application, time.monotonic() - self._born)
+        found = status(self.name, self._application, time.monotonic() - self._born)
+        return found | {"ViewMode": self.view or ALL}
+
+    @property
+    def application(self) -> Application | None:
+        """The application that is loaded."""
+        return self._application
 
     @property
     def is_idle(self) -> bool:
@@ -244,6 +254,15 @@ class Kernel:
     def scopes(self) -> list[dict[str, Any]]:
         """Return all scopes with their properties; none if nothing is loaded."""
         return self._application.scopes.facts() if self._application is not None else []
+
+    def setview(self, id: int | None) -> None:
+        """Show one target scope alone on the target's own terminal; None for all of them."""
+        self.view = id
+
+    def shown(self) -> list[ShownScope]:
+        """Return the target scopes."""
+        application = self._application
+        return application.scopes.shown() if application is not None else []
 
     def getscope(self, id: int, first: int, count: int) -> dict[str, Any]:
         """Return samples of the newest package of a scope."""

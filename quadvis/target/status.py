@@ -37,7 +37,7 @@ def status(name: str, application: Application | None, session_time: float) -> d
         "Mode": MODES[diagram.graph.tasking == MULTI],
         "Variant": diagram.variant or "",
         "Hash": diagram.hash,
-        "ExecTime": session.helm.time if session is not None else 0.0,
+        "ExecTime": application.time,
         "StopTime": application.stop_time,
         "SampleTime": float(diagram.graph.tick),
         "CPUOverload": DETECTED if any(each.overruns for _, each in tasks) else NONE,

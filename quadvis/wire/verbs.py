@@ -118,6 +118,8 @@ _DECLARED = (
     Verb("startscope", 3, "let scopes acquire", "nil", (_IDS,), changes=True),
     Verb("stopscope", 3, "interrupt scopes", "nil", (_IDS,), changes=True),
     Verb("trigger", 3, "trigger scopes by software", "nil", (_IDS,), changes=True),
+    Verb("setview", 3, "show one target scope alone on the target's own terminal", "nil",
+         (Argument("id", argument.or_none(_ID), "its number; nil for all of them"),), changes=True),
     Verb("scopes", 3, "all scopes with their properties", "a list of maps"),
     Verb("getscope", 3, "the newest whole acquisition of a scope", "a map with the samples",
          (_ID_OF_SCOPE, _FIRST, _some(10_000))),

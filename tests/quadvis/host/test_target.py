@@ -91,7 +91,7 @@ def test_the_list_of_properties_reads_as_in_xpc_target(tg: Target, diagram: Path
             assert getattr(tg, name) == getattr(tg, alias)
     with pytest.raises(AttributeError, match="a target has no 'Sttus'; did you mean 'Status'"):
         _ = tg.Sttus
-    with pytest.raises(AttributeError, match="StopTime, SampleTime and MaxLogSamples can"):
+    with pytest.raises(AttributeError, match="MaxLogSamples and ViewMode can"):
         tg.Status = "running"
 
 

@@ -76,7 +76,8 @@ NOT_FROM_LEVEL = {
         "settime", "setlog", "have", "put", "align"},
     2: {"start", "stop", "logs", "getlog", "lease", "renew", "release"},
     3: {"parameters", "getparam", "listparamsets", "getparamset", "addscope", "remscope"},
-    4: {"signals", "getsignal", "setscope", "startscope", "stopscope", "trigger", "scopes", "getscope",
+    4: {"signals", "getsignal", "setscope", "startscope", "stopscope", "trigger", "setview", "scopes",
+        "getscope",
         "picture", "drawing", "applications", "clock"},
 }  # fmt: skip
 ALWAYS = {"hello", "status", "subscribe", "unsubscribe"}
