@@ -159,6 +159,23 @@ def sets(options: argparse.Namespace) -> int:
     return 0
 
 
+def profile(options: argparse.Namespace) -> int:
+    """Start or stop the profiler, or print what it has found, and write it as a trace."""
+    with _target(options) as tg:
+        if options.action == "start":
+            when = "this run" if tg.startProfiler() else "the next run"
+            print(f"{tg.name}: the profiler is on; the times of blocks come from {when}")
+        elif options.action == "stop":
+            tg.stopProfiler()
+            print(f"{tg.name}: the profiler is off")
+        else:
+            found = tg.getProfilerData()
+            print(found)
+            if options.output:
+                print(f"trace: {found.write(options.output)}")
+    return 0
+
+
 def console(options: argparse.Namespace) -> int:
     """Read commands line by line, and do them on one target."""
     from quadvis.cli.console import run_console

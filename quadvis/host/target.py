@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from quadvis.diagram.diagram import Diagram
     from quadvis.diagram.settings import Files, Given
+    from quadvis.host.profiler import ProfilerData
     from quadvis.output.log_reader import Log
 
 LOADING = 120.0  # s that a target has to get an application ready
@@ -290,6 +291,31 @@ class Target:
             for name in sorted({*one, *two})
             if one.get(name) != two.get(name)
         ]
+
+    # profiler
+
+    def startProfiler(self) -> bool:
+        """Take the times of tasks' steps from now on, and of blocks' calls from the next run on.
+
+        Before a run has begun, that run is the next one; return whether it is. Timing the calls makes it
+        slower, by what `getProfilerData` says; timing the steps costs nothing.
+        """
+        return bool(self._connection.operate("startprofiler", deadline=LOADING)["blocks"])
+
+    def stopProfiler(self) -> None:
+        """Take no more times; what was found stays until the next run."""
+        self._connection.operate("stopprofiler", deadline=LOADING)
+
+    def getProfilerData(self) -> ProfilerData:
+        """Return what was found in the newest run; times of blocks come when it has ended.
+
+        ``print`` it for a report; its method `write` makes a trace for Perfetto.
+        """
+        from quadvis.host.profiler import profiler_data
+
+        return profiler_data(self.request)
+
+    start_profiler, stop_profiler, get_profiler_data = startProfiler, stopProfiler, getProfilerData
 
     # scopes
 

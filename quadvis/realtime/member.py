@@ -291,6 +291,7 @@ class Member:
             self.ticks,
             self.ending.unsafe,
             self.ending.profile,
+            int(self._control[control.START]),
         )
 
     def error(self) -> QuadvisError:

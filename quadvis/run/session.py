@@ -19,7 +19,7 @@ from quadvis.engine.tuning import Change
 from quadvis.native.choice import AUTO, Announce
 from quadvis.output.kept import ALL, RowJudge, RunSignals
 from quadvis.output.recording import RecordedBlock
-from quadvis.run.logged_notes import LoggedNotes
+from quadvis.run.logged_notes import LoggedNotes, Timed
 from quadvis.run.loops import SIMULATED, Paced, Progress, RunLoop, Simulated, Taken, Takers
 from quadvis.run.played_files import files_text, played_files
 from quadvis.run.recorded_run import COMPUTERS
@@ -83,11 +83,12 @@ def recorded(
     taps: Sequence[Tap] = (),
     facts: Mapping[str, str] | None = None,
     open_log: OpenLog | None = None,
+    timed: Timed | None = None,
 ) -> Result:
     """Return the result of a loop's run.
 
-    ``facts`` are more of them for the log, ``taps`` take rows, too. ``open_log`` opens another kind of log
-    than the file that has all rows.
+    ``facts`` are more of them for the log, ``taps`` take rows, too, and ``timed`` the times of tasks.
+    ``open_log`` opens another kind of log than the file that has all rows.
     """
     signals_logged = signals_of(diagram)
     patterns = ((ALL,) if log is None else ()) if keep is None else tuple(keep)
@@ -127,7 +128,7 @@ def recorded(
             if progress:
                 progress(reached, spent)
 
-        choice, flight = loop.run(Takers(taken, taps, notes.taker(writer), change, tend), stack)
+        choice, flight = loop.run(Takers(taken, taps, notes.taker(writer, timed), change, tend), stack)
         for row in taken:
             row.judge.flush()
         outcome = judging.outcome()

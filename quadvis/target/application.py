@@ -19,6 +19,7 @@ from quadvis.target.background import in_thread
 from quadvis.target.bundle import ApplicationBundle
 from quadvis.target.newest import NewestValues
 from quadvis.target.parameters import Parameters, as_written, read_set
+from quadvis.target.profiler import Profiler
 from quadvis.target.scopes import ApplicationScopes
 from quadvis.target.session import Session
 from quadvis.target.store import Store
@@ -43,6 +44,7 @@ class Application:
         self.parameters = Parameters(diagram)
         self.newest = NewestValues(diagram)
         self.scopes = ApplicationScopes(diagram, store.scope_folder(bundle.name), publish)
+        self.profiler = Profiler()
         self.result: Result | None = None
         self.problem = ""
         self.said: list[str] = []  # since the last start
@@ -118,11 +120,12 @@ class Application:
         assert self._session is None or not self._session.running
         self.newest.clear()
         self.scopes.begin()
+        self.profiler.clear()
         self.problem, self.result, self.said = "", None, []
         self._session = Session(
             self.diagram, self.bundle.engine, self._store.next_log(self.name), self.log_samples,
-            [*self.newest.taps, *self.scopes.taps], self._stop_time, self._say, self.scopes.settle,
-            self._ended,
+            self.profiler, [*self.newest.taps, *self.scopes.taps], self._stop_time, self._say,
+            self.scopes.settle, self._ended,
         )  # fmt: skip
         if self.parameters.tuned:
             self._session.helm.tune(self.parameters.tuned)
@@ -197,6 +200,20 @@ class Application:
             raise QuadvisError("the log cannot change in a run: stop it first")
         self.log_samples = samples
         self._prepare_again()
+
+    def profile(self, on: bool) -> bool:
+        """Start or stop the profiler; return whether it has the times of blocks of the run that is next.
+
+        A run that goes on gives the times of its tasks alone: the calls of its blocks were not made ready.
+        """
+        if on:
+            self.profiler.start()
+        else:
+            self.profiler.stop()
+        session = self._session
+        if session is not None and session.is_profiled != on:
+            self._prepare_again()
+        return self._session is None or self._session.is_profiled or not self.running
 
     def _prepare_again(self) -> None:
         """Begin anew if what waits for its start was begun in another way."""

@@ -153,6 +153,25 @@ class Kernel:
         """Bound the log of the next run."""
         return self._worker.submit(self._loaded.set_log, MaxLogSamples)
 
+    def startprofiler(self) -> Future[Any]:
+        """Take the times of tasks from now on, and those of blocks from the next run on."""
+        application = self._loaded
+        return self._worker.submit(lambda: {"blocks": application.profile(True)})
+
+    def stopprofiler(self) -> Future[Any]:
+        """Take no more times; what was found stays."""
+        application = self._loaded
+        return self._worker.submit(lambda: application.profile(False) and None)
+
+    def getprofilerdata(self, task: int | None, computer: int | None, first: int, count: int) -> Any:
+        """Return what the profiler has found: all but single steps and calls, or some of these."""
+        profiler = self._loaded.profiler
+        if task is not None:
+            return profiler.steps(task, first, count)
+        if computer is not None:
+            return profiler.calls(computer, first, count)
+        return profiler.facts(float(self._loaded.diagram.graph.tick))
+
     def status(self) -> dict[str, Any]:
         """Return the state of the target, in xPC's words."""
         found = status(self.name, self._application, time.monotonic() - self._born)

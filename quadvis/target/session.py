@@ -21,13 +21,15 @@ from quadvis.realtime.options import RealTime
 from quadvis.run.loops import Paced
 from quadvis.run.result import Result
 from quadvis.run.session import recorded
+from quadvis.target.profiler import Profiler
 
 
 class Session:
     """One run. ``ready`` is done when it can begin, ``over`` when all has ended.
 
     ``samples`` is how many of the fastest task the log is to have, infinite for all; ``wraps`` counts how
-    often it has begun anew. The log of a run that never began is removed.
+    often it has begun anew. The log of a run that never began is removed. ``profiler`` gets the times of
+    tasks, and those of blocks if it is on when the run begins to be made.
 
     ``result`` is there if it has come to an end in order, ``problem`` says why if not. ``announce`` takes
     sentences, ``settle`` the first tick of which rows may still come, and ``ended`` is called when all is
@@ -40,6 +42,7 @@ class Session:
         engine: str,
         log: Path,
         samples: float,
+        profiler: Profiler,
         taps: Sequence[Tap],
         stop_time: float | None,
         announce: Callable[[str], None],
@@ -54,6 +57,7 @@ class Session:
         self.problem = ""
         self._engine, self._taps, self._samples = engine, taps, samples
         self._wrapped: WrappedLog | None = None
+        self._profiler, self.is_profiled = profiler, profiler.is_on
         self._announce, self._settle, self._ended = announce, settle, ended
         self._thread = threading.Thread(target=self._perform, name="session", daemon=True)
         self._thread.start()
@@ -88,11 +92,19 @@ class Session:
 
     def _perform(self) -> None:
         try:
-            loop = Paced(self.diagram, self._engine, self._announce, RealTime(), self.helm)
+            wishes = RealTime(profile=self.is_profiled)
+            loop = Paced(self.diagram, self._engine, self._announce, wishes, self.helm)
             opened = self._open if math.isfinite(self._samples) else None
             self.result = recorded(
-                self.diagram, loop, log=self.log, keep=(), taps=self._taps, open_log=opened
+                self.diagram,
+                loop,
+                log=self.log,
+                keep=(),
+                taps=self._taps,
+                open_log=opened,
+                timed=self._profiler.take,
             )
+            self._profiler.end(self.result.flight)
         except QuadvisError as error:
             self.problem = "; ".join([str(error), *getattr(error, "__notes__", ())])
         except Exception as error:

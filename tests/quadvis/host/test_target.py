@@ -303,6 +303,51 @@ def test_a_bounded_log_has_the_newest_samples(tg: Target, diagram: Path) -> None
     assert tg.LogMode == "Normal"
 
 
+def test_the_profiler_times_tasks_at_once_and_blocks_from_the_next_run_on(
+    tg: Target, diagram: Path, tmp_path: Path
+) -> None:
+    tg.load(diagram)
+    tg.start()
+    wait_for(lambda: tg.ExecTime > 0.2)
+    assert tg.startProfiler() is False  # blocks come with the next run
+    wait_for(lambda: sum(len(each.ticks) for each in tg.getProfilerData().tasks) > 30)
+    tg.stop()
+    found = tg.getProfilerData()
+    assert found.profiles == {}
+    log = tg.getlog()
+    assert isinstance(log, Log)
+    assert {each.task for each in found.tasks} == {"fast", "slow"}
+    for each in found.tasks:
+        times = log.times(f"_times/{each.task}.tet")
+        assert 0 < len(each.ticks) < len(times)  # not from the beginning on
+        place = np.searchsorted(times, each.due[0] - 1e-9)
+        for name, values in (("tet", each.execution), ("lateness", each.lateness)):
+            logged = log[f"_times/{each.task}.{name}"][place : place + len(values)]
+            np.testing.assert_allclose(values, logged, atol=1e-12)
+    tg.start()
+    wait_for(lambda: tg.ExecTime > 0.3)
+    assert "profile" not in str(tg.getProfilerData())
+    tg.stop()
+    found = tg.get_profiler_data()
+    steps = {each.task: each for each in found.tasks}
+    methods = {(each.block, each.method): each for each in found.profiles[""].methods}
+    # The calls of the warm ticks before the start are among them.
+    assert len(steps["fast"].ticks) <= methods["wave", "output"].calls <= len(steps["fast"].ticks) + 10
+    assert methods["law", "output"].total > 0
+    assert "wave" in found.report() and "fast" in found.report()
+    trace = json.loads(found.write(tmp_path / "trace.json").read_text())["traceEvents"]
+    calls = [each for each in trace if each["name"] == "wave.output"][-len(steps["fast"].ticks) :]
+    drawn = [each for each in trace if each.get("cat") == "step" and each["tid"] == calls[0]["tid"]]
+    for call, step in zip(calls, drawn, strict=True):  # they are on one clock
+        assert step["ts"] - 1 <= call["ts"] <= step["ts"] + step["dur"] + 1
+    tg.stopProfiler()
+    tg.start()
+    wait_for(lambda: tg.ExecTime > 0.1)
+    tg.stop()
+    assert tg.getProfilerData().tasks == []
+    assert tg.startProfiler() is True
+
+
 def test_two_scopes_that_trigger_each_other_lose_nothing(tg: Target, diagram: Path) -> None:
     tg.load(diagram)
     first = tg.addscope("host", signals=["wave.y", "law.y"], NumSamples=20)

@@ -74,11 +74,11 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
 NOT_FROM_LEVEL = {
     1: {"load", "unload", "setparam", "saveparamset", "loadparamset", "deleteparamset", "setdefaultparamset",
         "settime", "setlog", "have", "put", "align"},
-    2: {"start", "stop", "logs", "getlog", "lease", "renew", "release"},
+    2: {"start", "stop", "startprofiler", "stopprofiler", "logs", "getlog", "lease", "renew", "release"},
     3: {"parameters", "getparam", "listparamsets", "getparamset", "addscope", "remscope"},
     4: {"signals", "getsignal", "setscope", "startscope", "stopscope", "trigger", "setview", "scopes",
         "getscope",
-        "picture", "drawing", "applications", "clock"},
+        "picture", "drawing", "applications", "clock", "getprofilerdata"},
 }  # fmt: skip
 ALWAYS = {"hello", "status", "subscribe", "unsubscribe"}
 
