@@ -110,7 +110,7 @@ def parser() -> Parser:
     _real_time_options(run)
     words = "fly it on a target, by its name or address, and bring the log home"
     run.add_argument("--target", metavar="NAME", help=words)
-    words = "let a target be one of the diagram's computers; once for each, such as --on world=lab1"
+    words = "let a target be one of the diagram's computers; once for each computer, such as --on world=lab1"
     run.add_argument("--on", action="append", default=[], metavar="COMPUTER=TARGET", help=words)
     words = "time every call of a block; write a trace for Perfetto or chrome://tracing there, '' for none"
     run.add_argument("--profile", metavar="PATH.json", help=words)

@@ -52,7 +52,7 @@ def run_on_target(diagram: Diagram, log: Path | None, options: argparse.Namespac
 
 
 def run_on_several(diagram: Diagram, log: Path | None, options: argparse.Namespace) -> int:
-    """Fly a diagram on several targets, each as one of its computers; as `run_on_target` besides.
+    """Fly a diagram on several targets, each as one of its computers or several; as `run_on_target` besides.
 
     The logs go into a folder with the name of the log, without its ending.
     """
@@ -61,7 +61,8 @@ def run_on_several(diagram: Diagram, log: Path | None, options: argparse.Namespa
 
     with ExitStack() as stack:
         places = read_places(options.on)
-        targets = {name: stack.enter_context(Target(place)) for name, place in places.items()}
+        met = {place: stack.enter_context(Target(place)) for place in dict.fromkeys(places.values())}
+        targets = {name: met[place] for name, place in places.items()}
         several = stack.enter_context(Several(diagram, targets))
         several.load(options.engine)
         several.start()
@@ -75,7 +76,7 @@ def run_on_several(diagram: Diagram, log: Path | None, options: argparse.Namespa
         folder.mkdir(parents=True, exist_ok=True)
         logs = several.logs(folder)
         outcome = several.judge(logs)
-        tasks = [task for target in targets.values() for task in target.Tasks]
+        tasks = [task for target in met.values() for task in target.Tasks]
     verdicts = [verdict.facts() for verdict in outcome.verdicts]
     if options.json:
         facts = {"Passed": outcome.passed, "Verdicts": verdicts, "Tasks": tasks, "logs": str(folder)}

@@ -51,7 +51,7 @@ def load(options: argparse.Namespace) -> int:
                 what, variant=options.variant, settings=options.set, params=options.params,
                 stop_time=options.stop_time, own_blocks=_own_blocks(options),
             )  # fmt: skip
-            tg.load(diagram, engine=options.engine, name=options.name, computer=options.computer or "")
+            tg.load(diagram, engine=options.engine, name=options.name, computers=options.computer)
         else:
             tg.load(what)
         print(f"{tg.name}: {tg.Application} is loaded, {tg.Status}")

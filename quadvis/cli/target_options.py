@@ -20,7 +20,8 @@ def add_target_commands(add: Add, diagram_settings: Callable[[Parser], None], en
     load.add_argument("--variant", metavar="V", help="one of the diagram's variants")
     load.add_argument("--stop-time", metavar="T", help="such as '20 s'; replaces the diagram's")
     load.add_argument("--name", metavar="NAME", help="of the application; default: that of the diagram")
-    load.add_argument("--computer", metavar="NAME", help="the one that the target is; default: all of them")
+    words = "one that the target is; may be repeated; default: all of them"
+    load.add_argument("--computer", action="append", default=[], metavar="NAME", help=words)
     diagram_settings(load)
     engine(load)
     start = add("start", commands.start, "start the application of a target")

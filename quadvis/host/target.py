@@ -168,23 +168,23 @@ class Target:
         params: Files = (),
         engine: str = "auto",
         name: str | None = None,
-        computer: str = "",
+        computers: Sequence[str] = (),
     ) -> Target:
         """Load a diagram, or an application that the target keeps under a name, in place of the one there.
 
-        ``computer`` is the one of the diagram that this target is to be; "" for all of them.
+        ``computers`` are those of the diagram that this target is to be; none means all of them.
         """
         application = str(what)
         if not isinstance(what, str) or what.endswith((".yaml", ".yml")):
-            application = self._send(_loaded(what, variant, settings, params), name, engine, computer)
+            application = self._send(_loaded(what, variant, settings, params), name, engine, computers)
         self._connection.operate("load", application=application, deadline=LOADING)
         return self
 
-    def _send(self, diagram: Diagram, name: str | None, engine: str, computer: str) -> str:
+    def _send(self, diagram: Diagram, name: str | None, engine: str, computers: Sequence[str]) -> str:
         """Send a diagram with its files as far as they are missing there; return the bundle's SHA-256."""
         from quadvis.host.packing import pack
 
-        bundle, paths = pack(diagram, name, engine, computer)
+        bundle, paths = pack(diagram, name, engine, computers)
         data = bundle.data
         digest = hashlib.sha256(data).hexdigest()
         for missing in self.request("have", files=[*dict.fromkeys([*bundle.files.values(), digest])]):
