@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -126,7 +127,8 @@ class Target:
             raise AttributeError(sentence(problem, suggestion(name, _BY_ALIAS)))
         if known == "Scopes":
             return [each["id"] for each in self.request("scopes")]
-        return self.status().get(known)
+        found = self.status().get(known)
+        return math.inf if known == "MaxLogSamples" and found is None else found
 
     def __setattr__(self, name: str, value: Any) -> None:
         known = _BY_ALIAS.get(name, name)

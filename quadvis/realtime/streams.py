@@ -55,10 +55,11 @@ class RowStream(NamedTuple):
         """Give the rows in records to the taps of each of its blocks; ``between`` is called after each."""
         if not len(records):
             return
-        start = 1
+        start, ticks = 1, records[:, 0].copy()
         for own, size in zip(taps, self.sizes, strict=True):
+            rows = records[:, start : start + size].copy()
             for tap in own:
-                tap.take_all(records[:, 0].copy(), records[:, start : start + size].copy())
+                tap.take_all(ticks, rows)
             start += size
             between()
 

@@ -29,6 +29,7 @@ def status(name: str, application: Application | None, session_time: float) -> d
     if application is None:
         return found
     diagram, session = application.diagram, application.session
+    bounded = math.isfinite(application.log_samples)
     times = session.helm.times() if session is not None else {}
     tasks = [(computer, each) for computer, several in times.items() for each in several]
     found |= {
@@ -44,8 +45,8 @@ def status(name: str, application: Application | None, session_time: float) -> d
         "NumSignals": len(application.newest.names),
         "NumParameters": len(application.parameters.names),
         "Tasks": [{"computer": computer, "task": each.task, **each.facts()} for computer, each in tasks],
-        "MaxLogSamples": application.log_samples,
-        "LogMode": WRAPPED if math.isfinite(application.log_samples) else NORMAL,
+        "MaxLogSamples": application.log_samples if bounded else None,  # JSON has no infinity
+        "LogMode": WRAPPED if bounded else NORMAL,
         "NumLogWraps": session.wraps if session is not None else 0,
         "DefaultParamSet": application.default_set,
         "Log": session.log.stem if session is not None else "",

@@ -79,6 +79,16 @@ def test_random_bytes_are_no_request_and_no_reply(data: bytes) -> None:
             read(data)
 
 
+@pytest.mark.parametrize(
+    "data",
+    [b"\x91" * 60_000, b"\x81\xa1a" * 20_000, b"\xc7\x02\x05ab", msgpack.packb({1: 2}),
+     msgpack.packb({"id": 1, "ok": True, "result": msgpack.ExtType(5, b"x")})],
+)  # fmt: skip
+def test_an_odd_answer_of_a_target_is_refused(data: bytes) -> None:
+    with pytest.raises(BadError):
+        read_reply(data)
+
+
 @given(st.data())
 def test_a_changed_request_is_read_or_refused(draw: st.DataObject) -> None:
     data = bytearray(msgpack.packb(GOOD | {"args": {"names": ["a", "b"], "x": 1.5}}))
