@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from quadvis.host.target import Target
 
 COMMANDS = (
-    "load", "start", "stop", "unload", "status", "get", "set", "scope", "log", "sets",
+    "load", "start", "stop", "unload", "status", "get", "set", "scope", "log", "sets", "profile",
 )  # fmt: skip
 ENDS = ("exit", "quit", "bye")
 

@@ -19,7 +19,8 @@ granted, not_granted, unsafe (why its outputs were made safe, or null),
 tasks: {name: {period_s, steps, overruns,
 lateness and execution: {min_s, mean_s, max_s, p99_s, p99.9_s, histogram: [{from_s, to_s, count}]}}}}]};
 summary: {label: {signal, unit, and the statistics by name, final of a vector as a list}};
-expect: [{expectation, signal, kind, unit, limit, found, met, lack (why the run cannot be judged)}];
+expect: [{expectation, signal, kind, unit, limit, found, met, lack (why the run cannot be judged), shown
+(what was found, as text)}];
 margins: the number of expectations that only 'quadvis analyse' judges;
 warnings: [{file, line, column, subject, problem, remedy}], about what runs but is surely a mistake.
 Numbers are in the unit beside them, null for a number that is unknown or infinite.
@@ -109,7 +110,7 @@ def parser() -> Parser:
     _real_time_options(run)
     words = "fly it on a target, by its name or address, and bring the log home"
     run.add_argument("--target", metavar="NAME", help=words)
-    words = "let a target be one of the diagram's computers; once for each, such as --on world=lab1"
+    words = "let a target be one of the diagram's computers; once for each computer, such as --on world=lab1"
     run.add_argument("--on", action="append", default=[], metavar="COMPUTER=TARGET", help=words)
     words = "time every call of a block; write a trace for Perfetto or chrome://tracing there, '' for none"
     run.add_argument("--profile", metavar="PATH.json", help=words)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quadvis.errors import QuadvisError
-from quadvis.machine.columns import table
 from quadvis.machine.status_line import ProgressLine
 from quadvis.units import Unit, format_quantity
 
@@ -51,7 +52,7 @@ def run_on_target(diagram: Diagram, log: Path | None, options: argparse.Namespac
 
 
 def run_on_several(diagram: Diagram, log: Path | None, options: argparse.Namespace) -> int:
-    """Fly a diagram on several targets, each as one of its computers; as `run_on_target` besides.
+    """Fly a diagram on several targets, each as one of its computers or several; as `run_on_target` besides.
 
     The logs go into a folder with the name of the log, without its ending.
     """
@@ -60,7 +61,8 @@ def run_on_several(diagram: Diagram, log: Path | None, options: argparse.Namespa
 
     with ExitStack() as stack:
         places = read_places(options.on)
-        targets = {name: stack.enter_context(Target(place)) for name, place in places.items()}
+        met = {place: stack.enter_context(Target(place)) for place in dict.fromkeys(places.values())}
+        targets = {name: met[place] for name, place in places.items()}
         several = stack.enter_context(Several(diagram, targets))
         several.load(options.engine)
         several.start()
@@ -74,16 +76,16 @@ def run_on_several(diagram: Diagram, log: Path | None, options: argparse.Namespa
         folder.mkdir(parents=True, exist_ok=True)
         logs = several.logs(folder)
         outcome = several.judge(logs)
-        tasks = {name: target.Tasks for name, target in targets.items()}
+        tasks = [task for target in met.values() for task in target.Tasks]
+    verdicts = [verdict.facts() for verdict in outcome.verdicts]
+    if options.json:
+        facts = {"Passed": outcome.passed, "Verdicts": verdicts, "Tasks": tasks, "logs": str(folder)}
+        print(json.dumps({"diagram": diagram.name, "targets": places} | facts))
+        return 0 if outcome.passed else FAILED
     print(f"{diagram.name} on {', '.join(f'{name} ({place})' for name, place in places.items())}")
-    for verdict in outcome.verdicts:
-        print(f"  {verdict}")
-    for line in table([_task_row(task) for each in tasks.values() for task in each]):
-        print(f"  {line}")
+    print("\n".join(_lines(verdicts, tasks, outcome.passed)))
     for name, offset in several.offsets.items():
         print(f"  clock of {name}: known to {format_quantity(offset.error / 1e9, SECOND, 2)}")
-    met = sum(verdict.met for verdict in outcome.verdicts)
-    print(f"{'PASSED' if outcome.passed else 'FAILED'}: {met} of {len(outcome.verdicts)} expectations met")
     print(f"logs: {folder}")
     return 0 if outcome.passed else FAILED
 
@@ -107,38 +109,17 @@ def _bring(tg: Target, log: Path | None) -> Path | None:
 def _print(diagram: Diagram, found: dict[str, Any], options: argparse.Namespace) -> None:
     """Print the verdicts and the times of the tasks."""
     if options.json:
-        import json
-
         print(json.dumps(found))
         return
     variant = f" ({diagram.variant})" if diagram.variant else ""
     print(f"{diagram.name}{variant} on {found['Target']}: {found['ExecTime']:g} s")
-    for verdict in found.get("Verdicts", []):
-        print(f"  {verdict}")
-    for line in table([_task_row(task) for task in found.get("Tasks", [])]):
-        print(f"  {line}")
-    if "Passed" not in found:
-        return
-    missed = len(found["NotMet"])
-    count = len(found["Verdicts"])
-    print(f"{'PASSED' if found['Passed'] else 'FAILED'}: {count - missed} of {count} expectations met")
+    print("\n".join(_lines(found.get("Verdicts", []), found.get("Tasks", []), found.get("Passed", False))))
 
 
-def _task_row(task: dict[str, Any]) -> tuple[str, ...]:
-    def spread(name: str) -> str:
-        times = task[name]
-        if not times:
-            return f"{name} none"
-        shown = [format_quantity(times[key], SECOND, 3) for key in ("min_s", "mean_s", "max_s")]
-        return f"{name} min {shown[0]}, avg {shown[1]}, max {shown[2]}"
+def _lines(verdicts: Sequence[Any], tasks: Sequence[Any], passed: bool) -> list[str]:
+    from quadvis.run.report import outcome_lines, task_lines, verdict_lines
 
-    name = f"task {task['task']}" + (f" of {task['computer']}" if task["computer"] else "")
-    return (
-        name,
-        f"{task['steps']} steps, {task['overruns']} overruns",
-        spread("lateness"),
-        spread("execution"),
-    )
+    return [*verdict_lines(verdicts), *task_lines(tasks), *outcome_lines(verdicts, passed)]
 
 
 def check_options(options: argparse.Namespace) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -22,7 +23,8 @@ def target(options: argparse.Namespace) -> int:
     from quadvis.target.daemon import serve
 
     serve(options.name, listen=options.listen, folder=options.folder, startup=options.startup,
-          idle=options.until_idle, say=lambda words: print(words, file=sys.stderr, flush=True))  # fmt: skip
+          idle=options.until_idle, say=lambda words: print(words, file=sys.stderr, flush=True),
+          screen=sys.stdout)  # fmt: skip
     return 0
 
 
@@ -49,7 +51,7 @@ def load(options: argparse.Namespace) -> int:
                 what, variant=options.variant, settings=options.set, params=options.params,
                 stop_time=options.stop_time, own_blocks=_own_blocks(options),
             )  # fmt: skip
-            tg.load(diagram, engine=options.engine, name=options.name, computer=options.computer or "")
+            tg.load(diagram, engine=options.engine, name=options.name, computers=options.computer)
         else:
             tg.load(what)
         print(f"{tg.name}: {tg.Application} is loaded, {tg.Status}")
@@ -84,7 +86,7 @@ def status(options: argparse.Namespace) -> int:
     """Print the properties of a target."""
     with _target(options) as tg:
         if options.json:
-            _print_json(tg.status())
+            _print_json(_finite(tg.status()))
         else:
             print(tg)
     return 0
@@ -157,6 +159,23 @@ def sets(options: argparse.Namespace) -> int:
     return 0
 
 
+def profile(options: argparse.Namespace) -> int:
+    """Start or stop the profiler, or print what it has found, and write it as a trace."""
+    with _target(options) as tg:
+        if options.action == "start":
+            when = "this run" if tg.startProfiler() else "the next run"
+            print(f"{tg.name}: the profiler is on; the times of blocks come from {when}")
+        elif options.action == "stop":
+            tg.stopProfiler()
+            print(f"{tg.name}: the profiler is off")
+        else:
+            found = tg.getProfilerData()
+            print(found)
+            if options.output:
+                print(f"trace: {found.write(options.output)}")
+    return 0
+
+
 def console(options: argparse.Namespace) -> int:
     """Read commands line by line, and do them on one target."""
     from quadvis.cli.console import run_console
@@ -205,6 +224,15 @@ def _text(value: Any) -> str:
     return str(value)
 
 
+def _finite(value: Any) -> Any:
+    """Return plain data with None in place of what is infinite, which JSON does not know."""
+    if isinstance(value, dict):
+        return {name: _finite(each) for name, each in value.items()}
+    if isinstance(value, list):
+        return [_finite(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def _scope_settings(options: argparse.Namespace) -> dict[str, Any]:
     """Return a scope's settings from the options: `--trigger 'rising eyes.lost'`."""
     found: dict[str, Any] = {
@@ -244,6 +272,13 @@ def _delete_set(tg: Target, names: Sequence[str]) -> None:
     tg.deleteparamset(*_exactly(names, 1, "delete NAME"))
 
 
+def _default_set(tg: Target, names: Sequence[str]) -> None:
+    if names:
+        tg.setdefaultparamset(*_exactly(names, 2 if len(names) == 2 else 1, "default [NAME [APPLICATION]]"))
+    else:
+        print(tg.DefaultParamSet or "no set")
+
+
 def _exactly(names: Sequence[str], count: int, right: str) -> Sequence[str]:
     if len(names) != count:
         raise QuadvisError(f"write quadvis sets {right}")
@@ -252,5 +287,5 @@ def _exactly(names: Sequence[str], count: int, right: str) -> Sequence[str]:
 
 _SETS: Mapping[str, Callable[[Target, Sequence[str]], None]] = {
     "list": _list_sets, "save": _save_set, "load": _load_set, "show": _show_set, "compare": _compare_sets,
-    "delete": _delete_set,
+    "delete": _delete_set, "default": _default_set,
 }  # fmt: skip

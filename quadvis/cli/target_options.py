@@ -20,7 +20,8 @@ def add_target_commands(add: Add, diagram_settings: Callable[[Parser], None], en
     load.add_argument("--variant", metavar="V", help="one of the diagram's variants")
     load.add_argument("--stop-time", metavar="T", help="such as '20 s'; replaces the diagram's")
     load.add_argument("--name", metavar="NAME", help="of the application; default: that of the diagram")
-    load.add_argument("--computer", metavar="NAME", help="the one that the target is; default: all of them")
+    words = "one that the target is; may be repeated; default: all of them"
+    load.add_argument("--computer", action="append", default=[], metavar="NAME", help=words)
     diagram_settings(load)
     engine(load)
     start = add("start", commands.start, "start the application of a target")
@@ -42,15 +43,19 @@ def add_target_commands(add: Add, diagram_settings: Callable[[Parser], None], en
     log.add_argument("--list", action="store_true", help="list the logs instead")
     log.add_argument("--output", "-o", metavar="PATH", help="default: NAME.mcap")
     sets = add("sets", commands.sets, "keep, show, compare and use parameter sets of the application")
-    actions = ("list", "save", "load", "show", "compare", "delete")
+    actions = ("list", "save", "load", "show", "compare", "delete", "default")
     sets.add_argument("action", choices=actions, nargs="?", default="list")
     sets.add_argument("names", nargs="*", metavar="NAME", help="names of sets")
+    profile = add("profile", commands.profile, "time the tasks and blocks of a target's application")
+    profile.add_argument("action", choices=("start", "stop", "show"), nargs="?", default="show")
+    words = "with show: write a trace for Perfetto or chrome://tracing there"
+    profile.add_argument("--output", "-o", metavar="PATH.json", help=words)
     web = add("web", commands.web, "serve the live page of a target to browsers on this machine")
     words = "where; default 22280, 0 for any free one"
     web.add_argument("--port", type=int, default=22280, metavar="N", help=words)
     web.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")
     console = add("console", commands.console, "read such commands line by line")
-    for each in (load, start, stop, unload, status, get, given, scope, log, sets, web, console):
+    for each in (load, start, stop, unload, status, get, given, scope, log, sets, profile, web, console):
         words = "a target by its name or address; default: one on this machine, which is started if needed"
         each.add_argument("--target", metavar="NAME", help=words)
 

@@ -192,8 +192,9 @@ class Engine:
         first = min((begin for _, begin, _ in calls), default=0)
         shifted = sorted((begin - first, number, taken) for number, begin, taken in calls)
         return ProfileReport(
-            tuple(methods), tuple((number, begin, taken) for begin, number, taken in shifted), Profile.cost()
-        )
+            tuple(methods), tuple((number, begin, taken) for begin, number, taken in shifted),
+            Profile.cost(), first,
+        )  # fmt: skip
 
     def snapshot(self) -> Snapshot:
         """Return the whole state between two ticks."""

@@ -101,11 +101,13 @@ class ProfileReport:
 
     ``calls`` are the first ones: the method's place in ``methods``, its begin from the first one on and its
     time (ns). ``cost`` is the time that the timing of one call takes (s), which is in no other number.
+    ``first`` is when the first one began, on the monotonic clock (ns).
     """
 
     methods: tuple[Timed, ...]
     calls: tuple[tuple[int, int, int], ...]
     cost: float
+    first: int = 0
 
 
 def _words(count: int) -> memoryview[int]:

@@ -25,7 +25,7 @@ class Tap(ABC):
         """Take the bytes of the outputs, side by side as in memory; a tap that keeps them makes a copy."""
 
     def take_all(self, ticks: NDArray[np.int64], rows: NDArray[np.int64]) -> None:
-        """Take the rows (N, slots) of N ticks (N,); both are the tap's own from now on."""
+        """Take the rows (N, slots) of N ticks (N,); nobody changes them from now on, nor may a tap."""
         for tick, row in zip(ticks.tolist(), rows, strict=True):
             self.take(tick, memoryview(row).cast("B"))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def pack(
-    diagram: Diagram, name: str | None = None, engine: str = "auto", computer: str = ""
+    diagram: Diagram, name: str | None = None, engine: str = "auto", computers: Sequence[str] = ()
 ) -> tuple[ApplicationBundle, dict[str, Path]]:
     """Return a diagram as a bundle, and the paths of its files by their SHA-256.
 
@@ -56,7 +56,7 @@ def pack(
             for each, knob in diagram.knobs.items()
         },
         engine,
-        computer,
+        tuple(computers),
     )
     return ApplicationBundle.read(bundle.plain()), paths
 

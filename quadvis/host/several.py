@@ -1,4 +1,4 @@
-"""Several targets that fly one diagram together: each is one of its computers."""
+"""Several targets that fly one diagram together: each is one of its computers, or several."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from quadvis.errors import QuadvisError, quoted
 from quadvis.host.offset import PINGS, Offset, measure
 from quadvis.host.target import LOADING, Target
+from quadvis.realtime.lines import check_cables, check_reach
 
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
@@ -32,9 +34,10 @@ FEW = 4  # pings of one look
 class Several:
     """The targets that are the computers of a diagram, by the names of the computers.
 
-    This process is their operator from ``with`` on. All begin at one instant. As long as they run, the clocks
-    of the targets are compared with that of this host, and their ticks are kept at its pace; so times and
-    ages mean the same everywhere, within the error of ``offsets``.
+    A target may be several computers. This process is their operator from ``with`` on. All begin at one
+    instant. As long as they run, the clocks of the targets are compared with that of this host, and their
+    ticks are kept at its pace; so times and ages mean the same everywhere, within the error of ``offsets``,
+    which are by the names of the targets' computers, joined.
     """
 
     def __init__(self, diagram: Diagram, targets: Mapping[str, Target]) -> None:
@@ -44,9 +47,17 @@ class Several:
             problem = f"has no target: {', '.join(missing)}" if missing else f"is none of it: {unknown[0]}"
             computers = ", ".join(filter(None, diagram.graph.computers)) or "none"
             raise QuadvisError(f"a computer of the diagram {problem}; its computers are {computers}")
-        self.diagram, self.targets = diagram, dict(targets)
+        self.diagram = diagram
+        self.computers: dict[str, tuple[str, ...]] = {}  # those of each target, by their names, joined
+        self.targets: dict[str, Target] = {}
+        for target in dict.fromkeys(targets.values()):
+            names = tuple(name for name in diagram.graph.computers if targets[name] is target)
+            self.computers[_joined(names)], self.targets[_joined(names)] = names, target
+        for names in self.computers.values():
+            check_reach(replace(diagram, here=names).links_here, names)
+            check_cables(diagram.graph, names)
         self.offsets: dict[str, Offset] = {}
-        self._pool = ThreadPoolExecutor(len(targets), "target")
+        self._pool = ThreadPoolExecutor(len(self.targets), "target")
         self._stack = ExitStack()
         self._ended = threading.Event()
         self._first: dict[str, Offset] = {}
@@ -66,8 +77,10 @@ class Several:
         self._stack.__exit__(kind, error, trace)
 
     def load(self, engine: str = "auto") -> None:
-        """Load the diagram everywhere, each target as its computer."""
-        self._all(lambda name, target: target.load(self.diagram, engine=engine, computer=name))
+        """Load the diagram everywhere, each target as its computers."""
+        self._all(
+            lambda name, target: target.load(self.diagram, engine=engine, computers=self.computers[name])
+        )
 
     def start(self) -> None:
         """Let all begin at one instant, and keep their ticks at one pace from then on."""
@@ -102,16 +115,18 @@ class Several:
             time.sleep(LOOK)
 
     def logs(self, folder: Path) -> dict[str, Path]:
-        """Copy the newest log of each to a folder; return the paths by computer."""
-        return self._all(lambda name, target: target.fetchlog(path=folder / f"{name}.mcap"))
+        """Copy the newest log of each target to a folder; return the paths by computer."""
+        paths = self._all(lambda name, target: target.fetchlog(path=folder / f"{name}.mcap"))
+        return {each: paths[name] for name, computers in self.computers.items() for each in computers}
 
     def judge(self, logs: Mapping[str, Path]) -> Outcome:
-        """Return the verdicts on the whole flight, from the logs of all."""
+        """Return the verdicts on the whole flight, from the logs of all computers."""
         from quadvis.output.log_reader import read_log
         from quadvis.run.verdict import Judging
 
+        read = {path: read_log(path) for path in dict.fromkeys(logs.values())}
         judging = Judging(self.diagram.summary, self.diagram.expectations)
-        judging.read(Together(self.diagram, {name: read_log(path) for name, path in logs.items()}))
+        judging.read(Together(self.diagram, {name: read[path] for name, path in logs.items()}))
         return judging.outcome()
 
     def _measured(self, pings: int = PINGS) -> dict[str, Offset]:
@@ -131,6 +146,10 @@ class Several:
         """Return what a call gives for each target, all at the same time."""
         futures = {name: self._pool.submit(call, name, target) for name, target in self.targets.items()}
         return {name: future.result() for name, future in futures.items()}
+
+
+def _joined(names: Iterable[str]) -> str:
+    return "+".join(names)
 
 
 class Together:

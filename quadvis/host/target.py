@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -11,9 +12,11 @@ from typing import TYPE_CHECKING, Any, Self
 
 from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.host.connection import HostConnection, connect
+from quadvis.host.logs import PARTS, TargetLogs
 from quadvis.host.scope import HostScope
 from quadvis.machine.columns import table
 from quadvis.units import Unit, format_quantity
+from quadvis.wire.limits import PIECE
 
 if TYPE_CHECKING:
     import numpy as np
@@ -21,9 +24,9 @@ if TYPE_CHECKING:
 
     from quadvis.diagram.diagram import Diagram
     from quadvis.diagram.settings import Files, Given
+    from quadvis.host.profiler import ProfilerData
     from quadvis.output.log_reader import Log
 
-PIECE = 1 << 20  # bytes of a file in one message
 LOADING = 120.0  # s that a target has to get an application ready
 STOPPING = 20.0  # s that a run has to come to its end
 SECOND = Unit.parse("s")
@@ -33,11 +36,14 @@ PROPERTIES: Mapping[str, str] = {
     "Application": "application", "Mode": "mode", "Status": "state", "CPUOverload": "cpu_overload",
     "ExecTime": "exec_time", "SessionTime": "session_time", "StopTime": "stop_time",
     "SampleTime": "sample_time", "MinTET": "min_tet", "AvgTET": "avg_tet", "MaxTET": "max_tet",
+    "MaxLogSamples": "max_log_samples", "LogMode": "log_mode", "NumLogWraps": "num_log_wraps",
+    "ViewMode": "view_mode",
     "NumSignals": "num_signals", "NumParameters": "num_parameters", "Scopes": "scope_numbers",
     "Tasks": "tasks", "Problem": "problem", "Passed": "passed", "Verdicts": "verdicts", "Log": "log_name",
-    "Variant": "variant", "Hash": "hash",
+    "Variant": "variant", "Hash": "hash", "DefaultParamSet": "default_param_set",
 }  # fmt: skip
 _BY_ALIAS = {alias: name for name, alias in PROPERTIES.items()} | {name: name for name in PROPERTIES}
+_PARTS = {alias: name for name, alias in PARTS.items()} | {name: name for name in PARTS}
 _TIMES = ("ExecTime", "SessionTime", "StopTime", "SampleTime", "MinTET", "AvgTET", "MaxTET")
 
 
@@ -45,18 +51,25 @@ class Target:
     """A machine that flies, or this one: ``Target("lab1")``, or ``Target()`` for the target of this machine.
 
     The properties of xPC Target are attributes: ``tg.Status``, ``tg.ExecTime`` (s), ``tg.AvgTET`` (s), and so
-    on, see ``print(tg)``; each also has a name in Python's style, such as ``tg.exec_time``. ``StopTime`` and
-    ``SampleTime`` can be set while the application is stopped. Whoever changes something becomes the operator
-    for that moment, or, inside ``with tg.operator():``, for as long as that lasts.
+    on, see ``print(tg)``; each also has a name in Python's style, such as ``tg.exec_time``. ``StopTime``,
+    ``SampleTime`` and ``MaxLogSamples`` can be set while the application is stopped. The last one bounds the
+    log of a run to so many of the newest samples of the fastest task, and at most twice as many (``LogMode``
+    is "Wrapped" then); infinite, the default, is all of them ("Normal"). ``ViewMode`` is "All", or the number
+    of the one target scope that the target shows on its own terminal.
+
+    Whoever changes something becomes the operator for that moment, or, inside ``with tg.operator():``, for as
+    long as that lasts.
 
     Without a name, a target on this machine is started if none runs, and ends by itself when it is unused.
     QuadvisError says in a sentence why something is refused, or that the target does not answer.
     """
 
     _connection: HostConnection
+    _logs: TargetLogs
 
     def __init__(self, name: str | None = None, *, connection: HostConnection | None = None) -> None:
-        self.__dict__["_connection"] = connection or connect(name)
+        self.__dict__["_connection"] = made = connection or connect(name)
+        self.__dict__["_logs"] = TargetLogs(made.name, made.request)
 
     def __enter__(self) -> Self:
         return self
@@ -68,6 +81,7 @@ class Target:
 
     def close(self) -> None:
         """End the connection; the target goes on."""
+        self._logs.close()
         self._connection.close()
 
     @property
@@ -105,19 +119,30 @@ class Target:
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
             raise AttributeError(name)
+        if name in _PARTS:
+            return self.getlog(_PARTS[name])
         known = _BY_ALIAS.get(name)
         if known is None:
             problem = f"a target has no '{name}'"
             raise AttributeError(sentence(problem, suggestion(name, _BY_ALIAS)))
         if known == "Scopes":
             return [each["id"] for each in self.request("scopes")]
-        return self.status().get(known)
+        found = self.status().get(known)
+        return math.inf if known == "MaxLogSamples" and found is None else found
 
     def __setattr__(self, name: str, value: Any) -> None:
         known = _BY_ALIAS.get(name, name)
-        if known not in ("StopTime", "SampleTime"):
-            raise AttributeError(f"'{name}' of a target cannot be set; StopTime and SampleTime can")
-        self._connection.operate("settime", deadline=LOADING, **{known: float(value)})
+        if known in ("StopTime", "SampleTime"):
+            self._connection.operate("settime", deadline=LOADING, **{known: float(value)})
+        elif known == "ViewMode":
+            number = None if str(value).lower() == "all" else int(value)
+            self._connection.operate("setview", id=number)
+        elif known == "MaxLogSamples":
+            self._connection.operate("setlog", deadline=LOADING, MaxLogSamples=float(value))
+        else:
+            raise AttributeError(
+                f"'{name}' of a target cannot be set; StopTime, SampleTime, MaxLogSamples and ViewMode can"
+            )
 
     def __repr__(self) -> str:
         return f"<Target {self.name}>"
@@ -145,23 +170,23 @@ class Target:
         params: Files = (),
         engine: str = "auto",
         name: str | None = None,
-        computer: str = "",
+        computers: Sequence[str] = (),
     ) -> Target:
         """Load a diagram, or an application that the target keeps under a name, in place of the one there.
 
-        ``computer`` is the one of the diagram that this target is to be; "" for all of them.
+        ``computers`` are those of the diagram that this target is to be; none means all of them.
         """
         application = str(what)
         if not isinstance(what, str) or what.endswith((".yaml", ".yml")):
-            application = self._send(_loaded(what, variant, settings, params), name, engine, computer)
+            application = self._send(_loaded(what, variant, settings, params), name, engine, computers)
         self._connection.operate("load", application=application, deadline=LOADING)
         return self
 
-    def _send(self, diagram: Diagram, name: str | None, engine: str, computer: str) -> str:
+    def _send(self, diagram: Diagram, name: str | None, engine: str, computers: Sequence[str]) -> str:
         """Send a diagram with its files as far as they are missing there; return the bundle's SHA-256."""
         from quadvis.host.packing import pack
 
-        bundle, paths = pack(diagram, name, engine, computer)
+        bundle, paths = pack(diagram, name, engine, computers)
         data = bundle.data
         digest = hashlib.sha256(data).hexdigest()
         for missing in self.request("have", files=[*dict.fromkeys([*bundle.files.values(), digest])]):
@@ -253,6 +278,13 @@ class Target:
         """Remove a parameter set from the target."""
         self._connection.operate("deleteparamset", name=name)
 
+    def setdefaultparamset(self, name: str, application: str = "") -> None:
+        """Let the application that is loaded, or another one, have a set whenever it is loaded.
+
+        "" is no set: then it has the values of its diagram.
+        """
+        self._connection.operate("setdefaultparamset", name=name or None, application=application or None)
+
     def compare(self, first: str, second: str = "") -> list[tuple[str, Any, Any]]:
         """Return the parameters that differ between two sets, with both values; "" is the present one."""
         one, two = self.getparamset(first), self.getparamset(second)
@@ -261,6 +293,31 @@ class Target:
             for name in sorted({*one, *two})
             if one.get(name) != two.get(name)
         ]
+
+    # profiler
+
+    def startProfiler(self) -> bool:
+        """Take the times of tasks' steps from now on, and of blocks' calls from the next run on.
+
+        Before a run has begun, that run is the next one; return whether it is. Timing the calls makes it
+        slower, by what `getProfilerData` says; timing the steps costs nothing.
+        """
+        return bool(self._connection.operate("startprofiler", deadline=LOADING)["blocks"])
+
+    def stopProfiler(self) -> None:
+        """Take no more times; what was found stays until the next run."""
+        self._connection.operate("stopprofiler", deadline=LOADING)
+
+    def getProfilerData(self) -> ProfilerData:
+        """Return what was found in the newest run; times of blocks come when it has ended.
+
+        ``print`` it for a report; its method `write` makes a trace for Perfetto.
+        """
+        from quadvis.host.profiler import profiler_data
+
+        return profiler_data(self.request)
+
+    start_profiler, stop_profiler, get_profiler_data = startProfiler, stopProfiler, getProfilerData
 
     # scopes
 
@@ -291,39 +348,26 @@ class Target:
 
     def logs(self) -> list[dict[str, Any]]:
         """Return the logs that the target keeps, the oldest first."""
-        return list(self.request("logs"))
+        return self._logs.all()
 
     def fetchlog(self, name: str | None = None, path: str | Path | None = None) -> Path:
         """Copy a log of the target, the newest if none is named, to a path here; return the path."""
         if name is None:
-            logs = self.logs()
-            if not logs:
-                raise QuadvisError(f"{self.name} has no log")
-            name = logs[-1]["name"]
+            name = self._logs.newest_name()
         place = Path(path) if path is not None else Path(tempfile.mkdtemp(prefix="quadvis-")) / f"{name}.mcap"
-        with place.open("wb") as file:
-            while True:
-                piece = self.request("getlog", name=name, offset=file.tell(), count=PIECE)
-                file.write(piece["data"])
-                if not piece["data"] or file.tell() >= piece["size"]:
-                    return place
+        return self._logs.copy(name, place)
 
     def getlog(
         self, signal: str | None = None, first: int = 1, count: int | None = None, decimation: int = 1
     ) -> Log | NDArray[np.float64]:
         """Return the newest log, or samples of one of its signals as xPC's `getlog` gives them.
 
-        ``TimeLog`` is the times of the fastest recorded signal. The first sample has the number 1.
+        ``TimeLog``, ``StateLog``, ``OutputLog`` and ``TETLog`` are parts of it, see
+        `quadvis.host.logs.samples_of`; they are also attributes. The first sample has the number 1.
         """
-        from quadvis.output.log_reader import read_log
-
-        log = read_log(self.fetchlog())
         if signal is None:
-            return log
-        rows = max(map(log.times, log), key=len) if signal == "TimeLog" else log[signal]
-        last = None if count is None else first - 1 + count * decimation
-        found: NDArray[np.float64] = rows[first - 1 : last : decimation]
-        return found
+            return self._logs.newest()[-1]
+        return self._logs.samples(signal, first, count, decimation)
 
 
 def _loaded(what: str | Path | Diagram, variant: str | None, settings: Given, params: Files) -> Diagram:
@@ -347,6 +391,10 @@ def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
 def _shown(name: str, value: Any) -> str:
     if name in _TIMES and isinstance(value, float):
         return format_quantity(value, SECOND, 4)
+    if name == "Verdicts":
+        from quadvis.run.verdict import verdict_text
+
+        return "; ".join(map(verdict_text, value))
     if isinstance(value, list):
         return "; ".join(map(str, value)) or "none"
     return "none" if value in ("", None) else str(value)

@@ -27,7 +27,7 @@ class StatusLine:
 
     def show(self, text: str) -> None:
         """Show a text in place of the previous one."""
-        self._put(f"\r\x1b[K{text} ")
+        self.put(f"\r\x1b[K{text} ")
 
     def say(self, text: str) -> None:
         """Show a text in place of the previous one; print it where there is no terminal."""
@@ -36,7 +36,8 @@ class StatusLine:
         else:
             print(text, file=self.stream, flush=True)
 
-    def _put(self, text: str) -> None:
+    def put(self, text: str) -> None:
+        """Write a text as it is, if there is a terminal; what it does not take at once is lost."""
         if not self.shown:
             return
         try:
@@ -59,7 +60,7 @@ class StatusLine:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._put("\r\x1b[K")
+        self.put("\r\x1b[K")
         if self._terminal is not None:
             os.close(self._terminal)
             self._terminal = None
@@ -94,7 +95,7 @@ class AnalysisLine(StatusLine):
 
     def clear(self) -> None:
         """Clear the status line, to make room for a permanent line."""
-        self._put("\r\x1b[K")
+        self.put("\r\x1b[K")
 
 
 class ProgressLine(StatusLine):

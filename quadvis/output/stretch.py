@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 NANOSECONDS = 10**9
+MOST = 2**63 - 1  # of a stamp
 
 
 def stamp(time: Fraction) -> int:
@@ -20,8 +21,12 @@ def stamp(time: Fraction) -> int:
 
 def stamps_of(ticks: NDArray[np.int64], period: Fraction) -> NDArray[np.int64]:
     """Return the stamps (ns) of ticks, rounded down."""
-    numerator, denominator = (period * NANOSECONDS).as_integer_ratio()
-    if len(ticks) and int(ticks[-1]) * numerator > np.iinfo(np.int64).max:
+    return scaled(ticks, *(period * NANOSECONDS).as_integer_ratio())
+
+
+def scaled(ticks: NDArray[np.int64], numerator: int, denominator: int) -> NDArray[np.int64]:
+    """Return ascending ticks times a quotient, rounded down."""
+    if len(ticks) and int(ticks[-1]) * numerator > MOST:
         return np.array([tick * numerator // denominator for tick in ticks.tolist()], np.int64)
     return ticks * numerator // denominator
 

@@ -6,6 +6,7 @@ the group whole, at the first tick from a given one on at which no task of the g
 
 The loop's side is in `pacing`. The number of a group is written last. A processor such as ARM may
 show it before the words of the group; a check over them says so, and the loop looks again at its next tick.
+Its answer is one word, so it is there whole or not at all, and the supervisor need not look twice.
 """
 
 from __future__ import annotations
@@ -14,12 +15,14 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 # Words of the head: the number of the group; the tick before which it must not hold; the tasks with blocks of
-# the group, as bits; how many words follow the head; a check over all of them; how many have room.
-NUMBER, NOT_BEFORE, TASKS, LENGTH, CHECK, ROOM = range(6)
+# the group, as bits; how many words follow the head; a check over all of them; how many have room; and by the
+# loop: the tick from which a group holds, times `ANSWERS`, and the last digit of its number to this base.
+NUMBER, NOT_BEFORE, TASKS, LENGTH, CHECK, ROOM, ANSWER = range(7)
 HEAD = 8
 # Behind the head, for each parameter: its first slot in memory, the number of slots, their contents.
 ENTRY = 2
 LOW = (1 << 48) - 1  # bits of a check that are multiplied: their product fits a word
+ANSWERS = 256  # groups in a row whose answers differ; a tick is below 2**53, so their product fits a word
 
 
 class ParameterBox:
@@ -51,6 +54,11 @@ class ParameterBox:
         words[CHECK] = check(words, number)
         words[NUMBER] = number
         return number
+
+    def taken(self, number: int) -> int | None:
+        """Return the tick from which the newest group, of this number, holds; None if it is not taken yet."""
+        tick, digit = divmod(int(self.words[ANSWER]), ANSWERS)
+        return tick if digit == number % ANSWERS else None
 
 
 def check(box: Any, number: int) -> int:

@@ -17,7 +17,8 @@ class Share:
     """What one computer did in a real-time run; ``computer`` is "" in a diagram without computers.
 
     ``ticks`` is the number of its ticks, those left out included. ``unsafe`` says why its outputs have held
-    their safe values before the end, if they have. ``profile`` is that of its blocks, if it was asked for.
+    their safe values before the end, if they have. ``profile`` is that of its blocks, if it was asked for,
+    ``start`` the instant of the start on the monotonic clock (ns).
     """
 
     computer: str
@@ -27,6 +28,7 @@ class Share:
     ticks: int
     unsafe: str = ""
     profile: ProfileReport | None = None
+    start: int = 0
 
     def facts(self) -> dict[str, Any]:
         """Return it as plain data."""

@@ -215,6 +215,11 @@ class Helm:
         if self._watch is not None:
             self._watch.settled(tick)
 
+    @property
+    def is_asked(self) -> bool:
+        """True if groups have come since the last `take`."""
+        return bool(self._wanted)
+
     def take(self) -> list[Wanted]:
         """Return the groups that have come since the last call."""
         with self._lock:

@@ -7,7 +7,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from multiprocessing.context import SpawnContext
 from typing import Any
 
-from quadvis.errors import QuadvisError, sentence
+from quadvis.block import CABLE
+from quadvis.errors import QuadvisError, quoted, sentence
+from quadvis.graph.devices import devices
+from quadvis.graph.graph import Graph
 from quadvis.links.link import MEMORY, SERIAL, Link
 from quadvis.machine.serial_port import Line, missing_port
 from quadvis.realtime.cables import Cable, Ends
@@ -92,6 +95,22 @@ def check_reach(links: Sequence[Link], here: Sequence[str]) -> None:
             f"link '{link.name}' joins '{link.source}' and '{link.target}', which are two machines: {lack}"
         )
         raise QuadvisError(sentence(problem, remedy))
+
+
+def check_cables(graph: Graph, here: Sequence[str]) -> None:
+    """Raise QuadvisError if a cable joins a device of this machine to one of another machine."""
+    ends: dict[str, list[str]] = {}
+    for path, device in devices(graph):
+        if device.port_given.startswith(CABLE):
+            ends.setdefault(device.port_given, []).append(path)
+    for port, paths in ends.items():
+        mine = [path for path in paths if graph[path].computer in here]
+        others = [path for path in paths if path not in mine]
+        if mine and others:
+            ends_of = f"{quoted(mine[0])} and {quoted(others[0])}, which are on two machines"
+            raise QuadvisError(
+                sentence(f"the cable '{port}' joins {ends_of}", "give each its port, such as /dev/ttyUSB0")
+            )
 
 
 def _cable(link: Link) -> str:

@@ -30,7 +30,7 @@ from quadvis.realtime.options import RealTime
 from quadvis.realtime.pictures import Picture, PictureBox, picture_signals
 from quadvis.realtime.ring import RecordRing, Words
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
-from quadvis.realtime.streams import RowStream, StreamTaps, room_for, streams_of
+from quadvis.realtime.streams import RowStream, StreamTaps, nothing, room_for, streams_of
 from quadvis.realtime.times import TaskTimes
 from quadvis.realtime.tuner import Tuned, box_room
 
@@ -88,7 +88,8 @@ class Member:
             lines, last_ticks, box, pictures,
         )  # fmt: skip
         self._pictures = PictureBox(pictures) if pictures is not None else None
-        self.patience = Patience.of(computer, words, Schedule.of(part), self._limits)
+        self._schedule = Schedule.of(part)
+        self.patience = Patience.of(computer, words, self._schedule, self._limits)
         name = f"application {computer}".rstrip()
         self.process: BaseProcess = context.Process(target=perform, args=(setup,), name=name)
         self._listening, self._supplied = True, False
@@ -173,8 +174,18 @@ class Member:
     @property
     def now(self) -> float:
         """The time since the start (s)."""
+        return max(0, self._instant) / NANOSECONDS
+
+    @property
+    def remaining(self) -> float:
+        """The time until the next tick is due (s); below zero if the loop is late."""
+        return (self._schedule.deadline(self.tick + 1) - self._instant) / NANOSECONDS
+
+    @property
+    def _instant(self) -> int:
+        """The time since the start (ns)."""
         start = self._control[control.START] + self._control[control.SHIFT]
-        return max(0, time.monotonic_ns() - start) / NANOSECONDS
+        return time.monotonic_ns() - start
 
     @property
     def lost(self) -> int:
@@ -208,8 +219,8 @@ class Member:
         """Ask for the end of the run before its next step."""
         self._control[control.END] = 1
 
-    def take(self, *, last: bool = False) -> None:
-        """Hand on what the loop has noted, and the rows that have come.
+    def take(self, *, last: bool = False, between: Callable[[], None] = nothing) -> None:
+        """Hand on what the loop has noted, and the rows that have come; ``between`` is called now and then.
 
         Of all, what it has noted before a row that is handed on: the rows are taken first.
         """
@@ -221,7 +232,7 @@ class Member:
         for task, ring in zip(self._part.tasks, notes.times, strict=True):
             self._taker.times(self.computer, task.name, ring.take(last=last))
         for stream, taps, records in found:
-            stream.hand_on(records, taps)
+            stream.hand_on(records, taps, between)
 
     @property
     def _rings(self) -> Iterable[tuple[tuple[RowStream, StreamTaps], RecordRing]]:
@@ -281,6 +292,7 @@ class Member:
             self.ticks,
             self.ending.unsafe,
             self.ending.profile,
+            int(self._control[control.START]),
         )
 
     def error(self) -> QuadvisError:

@@ -115,6 +115,7 @@ def _take(plan: Any, box: Any, noted: Any, crew: Any, memory: Any, tick: int) ->
         at += count
     plan[TAKEN] = number
     put_group(noted, number, tick)
+    box[box_words.ANSWER] = tick * box_words.ANSWERS + number % box_words.ANSWERS
 
 
 def _begin(plan: Any, shared: Any, tick: int, instant: int) -> None:

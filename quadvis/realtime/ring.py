@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,6 +14,10 @@ from quadvis.native.routine import Routine
 SLOT = 8
 PUT, TAKEN, LOST = range(3)  # numbers of records: put and lost by the producer, taken by the consumer
 HEAD = 8  # words before the records: a line of the processor's cache
+
+# Whether a processor lets others see what it has written in the order in which it wrote, as x86 does:
+# Intel 64 and IA-32 Architectures Software Developer's Manual, volume 3A, section 8.2.2.
+IN_ORDER = platform.machine().lower() in ("x86_64", "amd64")
 
 Words = NDArray[np.int64]
 
@@ -69,13 +74,14 @@ class RecordRing:
         return words.ctypes.data, memory, self._pieces.ctypes.data
 
     def take(self, *, last: bool = False) -> Words:
-        """Return the records (N, width) that were there at the last call already, or all with ``last``.
+        """Return the records (N, width) that are there.
 
         Some processors let another one see the number of records before their words; by the next call these
-        have surely come through. With ``last`` the producer must have ended.
+        have surely come through. There it gives those that were there at the last call already, or all with
+        ``last``, and then the producer must have ended.
         """
         present = int(self.words[PUT])
-        until, self._seen = (present if last else self._seen), present
+        until, self._seen = (present if last or IN_ORDER else self._seen), present
         places = np.arange(self._taken, until) % self._room
         found = self._records[places]
         self._taken = self.words[TAKEN] = until

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
@@ -14,7 +15,7 @@ from quadvis.native.executor import last_exact
 from quadvis.realtime.helm import ENDLESS, READY, RUNNING, Helm
 from quadvis.realtime.member import Member
 from quadvis.realtime.pictures import Picture
-from quadvis.realtime.ring import Words
+from quadvis.realtime.ring import IN_ORDER, Words
 from quadvis.realtime.times import TaskTimes
 from quadvis.realtime.tuner import BEFORE, Tuner
 
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 
 PACE = 5e-4  # by how much of the time the ticks may be moved
 LONGEST_MOVE = 10**8  # ns for which they are moved at once, at most
-LOOK = 0.02  # s between two looks at the rings
-NEAR = 0.001  # s, while somebody waits for a tick
+NEAR = 1e-3  # s between two looks at the box of a loop whose tick is long due
+SOON = 1e-4  # s, the same around the moment at which it is due; and how much later the first look comes
 
 
 class Steering:
@@ -62,8 +63,10 @@ class Steering:
 
     @property
     def pause(self) -> float:
-        """How long (s) the supervisor may wait for something to come."""
-        return NEAR if self._begun and self._tuner is not None and self._tuner.waits else LOOK
+        """How long (s) the supervisor may wait before it calls `look`; `inf` if nobody waits for a tick."""
+        waits_for = self._tuner.waits_for if self._begun and self._tuner is not None else ()
+        left = min((each.remaining for each in self._members if each.computer in waits_for), default=math.inf)
+        return NEAR if left < -NEAR else max(0.0, left) + SOON
 
     @property
     def tick(self) -> int:
@@ -118,12 +121,19 @@ class Steering:
         """When the members are to begin (ns); None for as soon as they are ready."""
         return self._helm.instant if self._helm is not None else None
 
+    def attend(self) -> None:
+        """Do as `look`, if somebody waits: rows are handed on for a while, and nobody is to wait for that."""
+        asked = self._helm is not None and self._helm.is_asked
+        if self._begun and self._tuner is not None and (asked or self._tuner.waits_for):
+            self.look()
+
     def look(self) -> None:
-        """Take what the helm wants."""
+        """Take what the helm wants, and answer it."""
         if self._helm is None or self._tuner is None:
             return
         if self._helm.shift != self._shift:
             self._approach(self._helm.shift)
+        self._tuner.answer()
         for wanted in self._helm.take():
             self._tuner.offer(wanted, self.tick)
         if self._begun:
@@ -141,13 +151,15 @@ class Steering:
     def settle(self, reached: int, *, last: bool = False) -> None:
         """Note how far the rows are that have been handed on, after a look at the rings.
 
-        ``reached`` is the tick before that look. A look hands on what was there at the one before it.
+        ``reached`` is the tick before that look. A look hands on what was there then, or, on some processors,
+        at the look before.
         """
         if self._helm is None or not self._begun:
             return
         for member in self._members:
             member.rest()
-        self._helm.settle(reached + 1 if last else max(0, self._reached - self._late))
+        sure = reached if IN_ORDER else self._reached
+        self._helm.settle(reached + 1 if last else max(0, sure - self._late))
         self._reached = reached
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import partial
 from typing import NamedTuple
@@ -16,6 +16,10 @@ from quadvis.realtime.ring import PUTTING, RecordRing, Words
 HELD = 2.0  # s of rows for which there is room
 SPARE = 16  # records besides
 StreamTaps = Sequence[Sequence[Tap]]  # those of each block of a stream
+
+
+def nothing() -> None:
+    """Do nothing."""
 
 
 class RowStream(NamedTuple):
@@ -47,15 +51,17 @@ class RowStream(NamedTuple):
             machine = MachineCall(library().routine(PUTTING), places, ring)
         engine.observe(self.task, partial(_put, ring, engine.memory.raw, pieces), self.every, machine)
 
-    def hand_on(self, records: Words, taps: StreamTaps) -> None:
-        """Give the rows in records to the taps of each of its blocks."""
+    def hand_on(self, records: Words, taps: StreamTaps, between: Callable[[], None] = nothing) -> None:
+        """Give the rows in records to the taps of each of its blocks; ``between`` is called after each."""
         if not len(records):
             return
-        start = 1
+        start, ticks = 1, records[:, 0].copy()
         for own, size in zip(taps, self.sizes, strict=True):
+            rows = records[:, start : start + size].copy()
             for tap in own:
-                tap.take_all(records[:, 0].copy(), records[:, start : start + size].copy())
+                tap.take_all(ticks, rows)
             start += size
+            between()
 
 
 def streams_of(graph: Graph, taps: Sequence[Tap]) -> list[tuple[RowStream, StreamTaps]]:

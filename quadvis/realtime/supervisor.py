@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 LEAD = 20_000_000  # ns from the moment when all are ready to the start
 HANG = 5.0  # s after which a step that has not ended is ended
+LOOK = 0.02  # s between two looks at the rings
+SHORTEST = 0.002  # s; a wait for something to come is longer, since it may last one millisecond too long
 
 UNSAFE = "its outputs may not be at their safe values"
 
@@ -128,8 +130,7 @@ class _Supervisor:
         """Start the applications and hand rows on until they have ended; an error if this is too early."""
         self._start()
         while any(member.process.is_alive() for member in self._members):
-            sources = [source for member in self._alive for source in member.sources]
-            wait([*sources, *self._devices.sources, *self._steering.sources], self._steering.pause)
+            self._wait()
             reached = self._steering.tick
             self._look()
             self._steering.settle(reached)
@@ -161,6 +162,24 @@ class _Supervisor:
             sum(member.lost for member in self._members),
             *self._steering.early(),
         )
+
+    def _wait(self) -> None:
+        """Wait until it is time for a look at everything; meanwhile do what the helm wants, and answer it."""
+        due = time.monotonic() + LOOK
+        while (left := due - time.monotonic()) > 0 and not self._waited(left):
+            if not self._begun or (self._steering.is_stopped and not self._stopping):
+                return
+            self._steering.look()
+
+    def _waited(self, most: float) -> bool:
+        """Wait for something to come, so long (s) at most; return whether anyone but the helm has come."""
+        pause = self._steering.pause
+        if pause < SHORTEST:
+            time.sleep(pause)
+            return False
+        sources = [*(source for member in self._alive for source in member.sources), *self._devices.sources]
+        came = wait([*sources, *self._steering.sources], min(most, pause - SHORTEST / 2))
+        return any(source in sources for source in came)
 
     def end(self) -> list[str]:
         """End all processes, orderly if possible; return what may be unsafe then, in sentences."""
@@ -256,7 +275,7 @@ class _Supervisor:
         for member in self._members:
             ended = not member.process.is_alive()
             member.listen()
-            member.take(last=last)
+            member.take(last=last, between=self._steering.attend)
             if member.failed and (ended or member.ending) and not (self._stopping and member.stopped):
                 raise self._cause(member)
 

@@ -1,9 +1,13 @@
-"""New values of parameters on their way to the loops: checked here, put into their boxes, noted at a tick."""
+"""New values of parameters on their way to the loops: checked here, put into their boxes, noted at a tick.
+
+A loop says twice that it has taken a group: at once in its box, for who waits for the tick, and in its notes,
+which come together with the rows, for the log.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -66,12 +70,13 @@ class Tuner:
         self._values: dict[Key, Any] = {}
         self._acceptance = Acceptance(tunables, blocks, self._now)
         self._waiting: list[_Group] = []
-        self._flying: dict[str, tuple[int, list[_Group]]] = {}
+        self._flying: dict[str, tuple[int, list[_Group]]] = {}  # by computer: what is in its box
+        self._taken: dict[tuple[str, int], list[_Group]] = {}  # by computer and number: not yet in its notes
 
     @property
-    def waits(self) -> bool:
-        """True while a loop has not yet taken what it was given."""
-        return bool(self._flying)
+    def waits_for(self) -> Collection[str]:
+        """The computers whose loops have not yet taken what they were given."""
+        return self._flying.keys()
 
     def offer(self, wanted: Wanted, tick: int) -> None:
         """Take a group if its blocks accept it; ``tick`` is the present one."""
@@ -110,14 +115,28 @@ class Tuner:
             not_before = tick + self._ahead if computer in together and tick != BEFORE else 0
             self._flying[computer] = self._put(computer, mine, not_before), mine
 
+    def answer(self) -> None:
+        """Report their ticks to those who wait for groups that the loops have taken."""
+        for computer, (number, _) in list(self._flying.items()):
+            tick = self._tuned[computer].box.taken(number)
+            if tick is not None:
+                self._take(computer, tick)
+
+    def _take(self, computer: str, tick: int) -> None:
+        """Note that a computer has taken what is in its box."""
+        number, groups = self._flying.pop(computer)
+        self._taken[computer, number] = groups
+        for group in groups:
+            group.ticks[computer] = tick
+            if group.ticks.keys() == group.computers:
+                group.future.set_result(max(group.ticks.values()))
+
     def noted(self, computer: str, records: Words) -> None:
         """Take what a loop has noted: the number of a group, and its tick."""
         for number, tick in records.tolist():
-            wanted, groups = self._flying.get(computer, (0, []))
-            if number != wanted:
-                continue
-            del self._flying[computer]
-            for group in groups:
+            if self._flying.get(computer, (0, []))[0] == number:
+                self._take(computer, tick)
+            for group in self._taken.pop((computer, number), ()):
                 self._note(group, computer, tick)
 
     def _note(self, group: _Group, computer: str, tick: int) -> None:
@@ -125,9 +144,6 @@ class Tuner:
             if self._computers[path] == computer:
                 value = self._acceptance.as_given(path, name, accepted)
                 self._changed(Change(tick, path, name, value))
-        group.ticks[computer] = tick
-        if group.ticks.keys() == group.computers:
-            group.future.set_result(max(group.ticks.values()))
 
     def end(self) -> None:
         """Report to all who wait that nothing changes any more."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,10 +15,11 @@ from quadvis.realtime.note_taker import NoteTaker
 from quadvis.run.rows import left_out, releases, times_of
 
 if TYPE_CHECKING:
-    from quadvis.output.log import LogWriter
+    from quadvis.output.wrapped_log import RunLog
 
 NANOSECOND = 1e-9  # s
 Whole = NDArray[np.int64]
+Timed = Callable[[str, str, Whole], None]  # takes a computer, a task, and times of its steps (N, 4)
 
 
 class LoggedNotes:
@@ -40,8 +41,8 @@ class LoggedNotes:
         self._places = {key: before + number for number, key in enumerate(blocks)}
         self._periods = {computer: graph.tick for computer, graph in graphs.items()}
 
-    def taker(self, writer: LogWriter | None) -> NoteTaker:
-        """Return who writes notes into a log, if there is one."""
+    def taker(self, writer: RunLog | None, timed: Timed | None = None) -> NoteTaker:
+        """Return who writes notes into a log, if there is one; ``timed`` takes the times of tasks, too."""
 
         def write(computer: str, key: tuple[str, ...], ticks: Whole, rows: Whole) -> None:
             if writer and len(rows) and key in self._places:
@@ -54,6 +55,8 @@ class LoggedNotes:
             write(computer, ("releases", computer), np.maximum.accumulate(missed[:, 1]), missed)
 
         def time(computer: str, task: str, times: Whole) -> None:
+            if timed is not None:
+                timed(computer, task, times)
             rows = np.ascontiguousarray(times[:, 1:])
             rows[:, :2] = (rows[:, :2] * NANOSECOND).view(np.int64)
             write(computer, ("times", computer, task), times[:, 0], rows)

@@ -132,10 +132,11 @@ class Paced:
         wishes: RealTime,
         helm: Helm | None = None,
     ) -> None:
-        from quadvis.realtime.lines import check_reach
+        from quadvis.realtime.lines import check_cables, check_reach
 
         parts = {name: part for name, part in live_parts(diagram.graph).items() if name in diagram.computers}
         check_reach(diagram.links_here, diagram.computers)
+        check_cables(diagram.graph, diagram.computers)
         for computer, part in parts.items():
             wishes.on(diagram.computer(computer)).check(part)
         self._diagram, self._engine, self._announce, self._wishes = diagram, engine, announce, wishes

@@ -18,6 +18,7 @@ from quadvis.links.endpoints import live_parts
 from quadvis.output.log_reader import Log
 from quadvis.output.recording import RecordedBlock, Slots, ports
 from quadvis.output.stretch import NANOSECONDS, stamps_of
+from quadvis.output.wrapped_log import WRAPS
 from quadvis.run.loops import REAL_TIME, SIMULATED
 from quadvis.run.outside import outside
 from quadvis.run.played_tasks import begins, without
@@ -37,6 +38,9 @@ class RecordedRun:
     """
 
     def __init__(self, log: Log, diagram: Diagram) -> None:
+        if WRAPS in log.metadata:
+            problem = f"the log '{log.path}' has the end of its run alone, which a replay cannot begin with"
+            raise QuadvisError(f"{problem}: it was bounded")
         self._log, self._diagram = log, diagram
         self.clock = log.metadata.get("clock", SIMULATED)
         self.whole = log.complete and not {"stopped", "lost"} & log.summary.keys() and not _lost_rows(log)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from quadvis.diagram.requirements import Entry
 from quadvis.errors import counted
 from quadvis.machine.columns import table
 from quadvis.run.result import Result
-from quadvis.run.verdict import Outcome, Verdict
+from quadvis.run.verdict import Outcome, verdict_word
 from quadvis.units import Unit, format_quantity
 
 if TYPE_CHECKING:
     from quadvis.engine.profile import ProfileReport, Timed
-    from quadvis.realtime.times import Spread, TaskTimes
 
 SECOND, MILLISECOND, MICROSECOND, HERTZ = map(Unit.parse, ("s", "ms", "us", "Hz"))
 
@@ -26,23 +26,43 @@ def summary_lines(result: Result) -> list[str]:
     what = f"{diagram.name}{variant}{' with ' if sets else ''}{sets}"
     lines = [f"{what}: {result.duration:g} s, seed {diagram.seed}"]
     lines += [f"  {line}" for line in table([_entry_row(entry, outcome) for entry in diagram.summary])]
-    lines += [f"  {line}" for line in table([_verdict_row(verdict) for verdict in outcome.verdicts])]
+    verdicts = [verdict.facts() for verdict in outcome.verdicts]
+    lines += verdict_lines(verdicts)
     shown = result.duration and result.wall and not result.flight
     speed = f", {result.real_time_factor:.0f} x real time" if shown else ""
     lines.append(f"  {result.wall:.1f} s of wall time{speed}; engine: {result.engine}")
     if result.flight:
         shares = result.flight.shares
-        rows = [_task_row(share.computer, times) for share in shares for times in share.tasks]
-        lines += [f"  {line}" for line in table(rows)]
+        lines += task_lines(
+            [
+                {"computer": share.computer, "task": each.task, **each.facts()}
+                for share in shares
+                for each in share.tasks
+            ]
+        )
         lines += [f"  {_with('real time', share.computer)}: {share.grants}" for share in shares]
     for computer, profile in result.profiles.items():
         lines += [f"  {line}" for line in profile_lines(computer, profile)]
     lines += not_judged(len(diagram.loop_requirements))
-    met = sum(verdict.met for verdict in outcome.verdicts)
-    if outcome.verdicts:
-        count = len(outcome.verdicts)
-        lines.append(f"{'PASSED' if result.passed else 'FAILED'}: {met} of {count} expectations met")
-    return lines
+    return lines + outcome_lines(verdicts, result.passed)
+
+
+def verdict_lines(verdicts: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return verdicts, given as `Verdict.facts` has them, as a table."""
+    rows = [(verdict_word(each), each["expectation"], each["shown"]) for each in verdicts]
+    return [f"  {line}" for line in table(rows)]
+
+
+def outcome_lines(verdicts: Sequence[Mapping[str, Any]], passed: bool) -> list[str]:
+    """Return the line that says whether a run has passed, if anything was expected of it."""
+    met = sum(each["met"] for each in verdicts)
+    words = f"{'PASSED' if passed else 'FAILED'}: {met} of {len(verdicts)} expectations met"
+    return [words] if verdicts else []
+
+
+def task_lines(tasks: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the times of tasks, given as `TaskTimes.facts` has them with their names, as a table."""
+    return [f"  {line}" for line in table(list(map(_task_row, tasks)))]
 
 
 def profile_lines(computer: str, profile: ProfileReport) -> list[str]:
@@ -84,23 +104,16 @@ def _with(words: str, computer: str) -> str:
     return f"{words} of {computer}" if computer else words
 
 
-def _task_row(computer: str, times: TaskTimes) -> tuple[str, ...]:
-    found = f"{counted(times.steps, 'step')}, {counted(times.overruns, 'overrun')}"
-    late, taken = times.lateness, times.execution
+def _task_row(task: Mapping[str, Any]) -> tuple[str, ...]:
     return (
-        _with(f"task {times.task}", computer),
-        format_quantity(1 / times.period, HERTZ),
-        found,
-        f"lateness {_spread(late)}" if late else "",
-        f"execution {_spread(taken)}" if taken else "",
+        _with(f"task {task['task']}", task["computer"]),
+        format_quantity(1 / task["period_s"], HERTZ),
+        f"{counted(task['steps'], 'step')}, {counted(task['overruns'], 'overrun')}",
+        *(f"{name} {_spread(task[name])}" if task[name] else "" for name in ("lateness", "execution")),
     )
 
 
-def _spread(spread: Spread) -> str:
-    shown = {"min": spread.least, "avg": spread.mean, "p99.9": spread.p999, "max": spread.most}
-    unit = next((unit for unit in (SECOND, MILLISECOND) if spread.most >= unit.scale), MICROSECOND)
-    return ", ".join(f"{name} {value / unit.scale:.3g}" for name, value in shown.items()) + f" {unit}"
-
-
-def _verdict_row(verdict: Verdict) -> tuple[str, ...]:
-    return "met" if verdict.met else "NOT MET", str(verdict.expectation), verdict.shown
+def _spread(spread: Mapping[str, float]) -> str:
+    shown = {"min": "min_s", "avg": "mean_s", "p99.9": "p99.9_s", "max": "max_s"}
+    unit = next((unit for unit in (SECOND, MILLISECOND) if spread["max_s"] >= unit.scale), MICROSECOND)
+    return ", ".join(f"{name} {spread[key] / unit.scale:.3g}" for name, key in shown.items()) + f" {unit}"

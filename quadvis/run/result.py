@@ -94,10 +94,10 @@ class Result:
         ``real_time_factor`` is simulated time divided by wall time. ``real_time`` holds what was granted and
         the times of all tasks, None for a simulation. ``summary``
         holds ``{signal, unit, rms, max, ...}`` by label; ``final`` of several elements is a list. ``expect``
-        is a list of ``{expectation, signal, kind, unit, limit, found, met, lack}``; ``lack`` says why the run
-        cannot be judged. ``margins`` is the number of expectations on the loop, which only an analysis
-        judges. Numbers are in the unit beside them; None stands for a number that is unknown or
-        infinite.
+        is a list of ``{expectation, signal, kind, unit, limit, found, met, lack, shown}``; ``lack`` says why
+        the run cannot be judged, ``shown`` is ``found`` as text. ``margins`` is the number of expectations on
+        the loop, which only an analysis judges. Numbers are in the unit beside them; None stands for a number
+        that is unknown or infinite.
         """
         summary = {
             entry.label: {

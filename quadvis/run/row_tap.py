@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from quadvis.engine.taps import Tap
 from quadvis.graph.graph import Graph, Node
 from quadvis.output.kept import RowJudge
-from quadvis.output.stretch import NANOSECONDS, stamps_of
+from quadvis.output.stretch import NANOSECONDS, scaled
 
 Whole = NDArray[np.int64]
 
@@ -32,7 +32,6 @@ class RowTap(Tap):
         self.block, self.every = block, every
         self._one = tuple(taker.one for taker in takers)
         self._many = tuple(taker.many for taker in takers)
-        self._period = period
         self._numerator, self._denominator = (period * NANOSECONDS).as_integer_ratio()
 
     def take(self, tick: int, row: memoryview) -> None:
@@ -43,7 +42,7 @@ class RowTap(Tap):
 
     def take_all(self, ticks: Whole, rows: Whole) -> None:
         """Hand many rows on together."""
-        stamps = stamps_of(ticks, self._period)
+        stamps = scaled(ticks, self._numerator, self._denominator)
         for take in self._many:
             take(stamps, rows)
 
@@ -66,11 +65,18 @@ class PacedTap(Tap):
 
     def take_all(self, ticks: Whole, rows: Whole) -> None:
         """Hand many rows on, those without a gap between them together."""
+        if len(ticks) and int(ticks[-1]) - int(ticks[0]) == self._spacing * (len(ticks) - 1):
+            self._hand_on(ticks, rows)
+            return
         gaps = np.flatnonzero(np.diff(ticks) != self._spacing) + 1
         for some, part in zip(np.split(ticks, gaps), np.split(rows, gaps), strict=True):
-            self._reach(int(some[0]))
-            self._tap.take_all(some, part)
-            self._next += len(some)
+            self._hand_on(some, part)
+
+    def _hand_on(self, ticks: Whole, rows: Whole) -> None:
+        """Hand rows without a gap between them on."""
+        self._reach(int(ticks[0]))
+        self._tap.take_all(ticks, rows)
+        self._next += len(ticks)
 
     def end(self, ticks: int) -> None:
         """Note which rows are missing at the end of a run of so many ticks."""

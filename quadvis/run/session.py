@@ -6,7 +6,7 @@ import json
 import os
 import platform
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -19,7 +19,7 @@ from quadvis.engine.tuning import Change
 from quadvis.native.choice import AUTO, Announce
 from quadvis.output.kept import ALL, RowJudge, RunSignals
 from quadvis.output.recording import RecordedBlock
-from quadvis.run.logged_notes import LoggedNotes
+from quadvis.run.logged_notes import LoggedNotes, Timed
 from quadvis.run.loops import SIMULATED, Paced, Progress, RunLoop, Simulated, Taken, Takers
 from quadvis.run.played_files import files_text, played_files
 from quadvis.run.recorded_run import COMPUTERS
@@ -32,8 +32,11 @@ from quadvis.version import __version__
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
     from quadvis.output.log import LogWriter
+    from quadvis.output.wrapped_log import RunLog
     from quadvis.realtime.flight import Flight
     from quadvis.realtime.options import RealTime
+
+    OpenLog = Callable[[str | Path, Sequence[RecordedBlock], Mapping[str, str]], RunLog]
 
 
 def run(
@@ -79,8 +82,14 @@ def recorded(
     keep: Sequence[str] | None = None,
     taps: Sequence[Tap] = (),
     facts: Mapping[str, str] | None = None,
+    open_log: OpenLog | None = None,
+    timed: Timed | None = None,
 ) -> Result:
-    """Return the result of a loop's run; ``facts`` are more of them for the log, ``taps`` take rows, too."""
+    """Return the result of a loop's run.
+
+    ``facts`` are more of them for the log, ``taps`` take rows, too, and ``timed`` the times of tasks.
+    ``open_log`` opens another kind of log than the file that has all rows.
+    """
     signals_logged = signals_of(diagram)
     patterns = ((ALL,) if log is None else ()) if keep is None else tuple(keep)
     signals = RunSignals([each.block for each in signals_logged], diagram.ports, patterns)
@@ -89,7 +98,7 @@ def recorded(
     wall, cpu = time.perf_counter(), _processor_time()
     with ExitStack() as stack:
         stack.enter_context(diagram.guarded(log))
-        writer = None
+        writer: RunLog | None = None
         notes = LoggedNotes(loop.computers, len(logged), measured=loop.measured)
         if log is not None:
             blocks = [*(each.block for each in logged), *notes.blocks]
@@ -98,7 +107,9 @@ def recorded(
                 | {"files": files_text(played_files(diagram))}
                 | dict(facts or {})
             )
-            writer = stack.enter_context(_writer(log, blocks, about))
+            opened: OpenLog = open_log or _writer
+            writer = opened(log, blocks, about)
+            stack.enter_context(writer)
         taken = []
         for index, each in enumerate(logged):
             judge = RowJudge(each.block, judging)
@@ -117,7 +128,7 @@ def recorded(
             if progress:
                 progress(reached, spent)
 
-        choice, flight = loop.run(Takers(taken, taps, notes.taker(writer), change, tend), stack)
+        choice, flight = loop.run(Takers(taken, taps, notes.taker(writer, timed), change, tend), stack)
         for row in taken:
             row.judge.flush()
         outcome = judging.outcome()
@@ -143,7 +154,7 @@ def _writer(log: str | Path, recorded: Sequence[RecordedBlock], facts: Mapping[s
     return LogWriter(log, recorded, facts)
 
 
-def _takers(index: int, signals: RunSignals, writer: LogWriter | None, judge: RowJudge) -> list[Taker]:
+def _takers(index: int, signals: RunSignals, writer: RunLog | None, judge: RowJudge) -> list[Taker]:
     """Return the consumers of a block's rows."""
     takers: list[Taker] = []
     if index in signals.kept:

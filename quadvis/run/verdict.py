@@ -85,10 +85,21 @@ class Verdict(NamedTuple):
             "found": finite(self.found),
             "met": self.met,
             "lack": self.lack or None,
+            "shown": self.shown,
         }
 
     def __str__(self) -> str:
-        return f"{'met' if self.met else 'NOT MET'}: {self.expectation}: {self.shown}"
+        return verdict_text(self.facts())
+
+
+def verdict_text(facts: Mapping[str, Any]) -> str:
+    """Return a verdict, given as `Verdict.facts` has it, as one text."""
+    return f"{verdict_word(facts)}: {facts['expectation']}: {facts['shown']}"
+
+
+def verdict_word(facts: Mapping[str, Any]) -> str:
+    """Return whether an expectation is met, in words."""
+    return "met" if facts["met"] else "NOT MET"
 
 
 def judge(expectation: Expectation, measured: Measured) -> Verdict:

@@ -36,11 +36,10 @@ def admit(bundle: ApplicationBundle, place: Path) -> Diagram:
     if diagram.hash != bundle.hash:
         raise QuadvisError(f"the diagram reads otherwise here than on the host{_versions(bundle)}")
     computers = diagram.graph.computers
-    if bundle.computer and bundle.computer not in computers:
-        raise QuadvisError(
-            f"the diagram has no computer {quoted(bundle.computer)}; it has {', '.join(computers)}"
-        )
-    here = (bundle.computer,) if bundle.computer else ()
+    for each in bundle.computers:
+        if each not in computers:
+            raise QuadvisError(f"the diagram has no computer {quoted(each)}; it has {', '.join(computers)}")
+    here = tuple(each for each in computers if each in bundle.computers)
     return replace(diagram, ports=_ports(bundle, diagram), knobs=_knobs(bundle, diagram), here=here)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quadvis.diagram.diagram import Diagram
-from quadvis.errors import QuadvisError
+from quadvis.errors import QuadvisError, quoted, sentence
 from quadvis.machine.files import SVG, write_output
 from quadvis.realtime.helm import ENDED
 from quadvis.run.result import Result
@@ -18,7 +18,8 @@ from quadvis.run.tuned import new_values
 from quadvis.target.background import in_thread
 from quadvis.target.bundle import ApplicationBundle
 from quadvis.target.newest import NewestValues
-from quadvis.target.parameters import Parameters, as_written
+from quadvis.target.parameters import Parameters, as_written, read_set
+from quadvis.target.profiler import Profiler
 from quadvis.target.scopes import ApplicationScopes
 from quadvis.target.session import Session
 from quadvis.target.store import Store
@@ -43,13 +44,31 @@ class Application:
         self.parameters = Parameters(diagram)
         self.newest = NewestValues(diagram)
         self.scopes = ApplicationScopes(diagram, store.scope_folder(bundle.name), publish)
+        self.profiler = Profiler()
         self.result: Result | None = None
         self.problem = ""
         self.said: list[str] = []  # since the last start
         self._store, self._publish = store, publish
         self._session: Session | None = None
         self._stop_time: float | None = None
+        self.log_samples = math.inf  # of the fastest task, which the log of a run has at least
         self._drawing: Future[Any] | None = None
+
+    def take_default(self) -> None:
+        """Give parameters the values of the default set, if there is one; QuadvisError if it does not fit."""
+        chosen = self.default_set
+        if not chosen:
+            return
+        try:
+            self.tune(read_set(self._store.known_set(self.name, chosen))).result()
+        except QuadvisError as error:
+            problem = f"{self.name} cannot have its default parameter set {quoted(chosen)}: {error}"
+            raise QuadvisError(sentence(problem, "name another one, or none")) from None
+
+    @property
+    def default_set(self) -> str:
+        """The name of the parameter set that it has when it is loaded; "" for none."""
+        return self._store.default_set(self.name)
 
     @property
     def name(self) -> str:
@@ -62,9 +81,20 @@ class Application:
         return self._session
 
     @property
+    def waiting_log(self) -> Path | None:
+        """The log of a run that has not begun; None if there is none."""
+        session = self._session
+        return session.log if session is not None and self.state in (LOADING, READY) else None
+
+    @property
     def stop_time(self) -> float:
         """The stop time of the next run, or of the one that goes on (s)."""
         return float(self.diagram.stop_time if self._stop_time is None else self._stop_time)
+
+    @property
+    def time(self) -> float:
+        """The time of the last tick of its run (s)."""
+        return self._session.helm.time if self._session is not None else 0.0
 
     @property
     def running(self) -> bool:
@@ -90,11 +120,12 @@ class Application:
         assert self._session is None or not self._session.running
         self.newest.clear()
         self.scopes.begin()
+        self.profiler.clear()
         self.problem, self.result, self.said = "", None, []
         self._session = Session(
-            self.diagram, self.bundle.engine, self._store.next_log(self.name),
-            [*self.newest.taps, *self.scopes.taps], self._stop_time, self._say, self.scopes.settle,
-            self._ended,
+            self.diagram, self.bundle.engine, self._store.next_log(self.name), self.log_samples,
+            self.profiler, [*self.newest.taps, *self.scopes.taps], self._stop_time, self._say,
+            self.scopes.settle, self._ended,
         )  # fmt: skip
         if self.parameters.tuned:
             self._session.helm.tune(self.parameters.tuned)
@@ -162,6 +193,33 @@ class Application:
         self.close()
         self.diagram = changed
         self.prepare().result()
+
+    def set_log(self, samples: float) -> None:
+        """Let the log of the next run have so many samples of the fastest task, at least; `inf` for all."""
+        if self.running:
+            raise QuadvisError("the log cannot change in a run: stop it first")
+        self.log_samples = samples
+        self._prepare_again()
+
+    def profile(self, on: bool) -> bool:
+        """Start or stop the profiler; return whether it has the times of blocks of the run that is next.
+
+        A run that goes on gives the times of its tasks alone: the calls of its blocks were not made ready.
+        """
+        if on:
+            self.profiler.start()
+        else:
+            self.profiler.stop()
+        session = self._session
+        if session is not None and session.is_profiled != on:
+            self._prepare_again()
+        return self._session is None or self._session.is_profiled or not self.running
+
+    def _prepare_again(self) -> None:
+        """Begin anew if what waits for its start was begun in another way."""
+        if self.state in (LOADING, READY):
+            self.close()
+            self.prepare().result()
 
     def _say(self, sentence: str) -> None:
         self.said.append(sentence)

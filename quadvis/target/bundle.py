@@ -29,8 +29,8 @@ class ApplicationBundle:
     ``place`` is where its file lies in the bundle's folder, ``files`` the SHA-256 of the other files there by
     their paths, ``sources`` that of the Python file of each block by the block's name. ``ports`` and
     ``knobs`` are names that the resolved diagram has no more, as `Diagram` has them: ports of parts,
-    parameters of parts. ``engine`` is one of those of `quadvis.native.choice`. ``computer`` is the one of the
-    diagram that the target is; "" for all.
+    parameters of parts. ``engine`` is one of those of `quadvis.native.choice`. ``computers`` are those
+    of the diagram that the target is; none for all.
     """
 
     name: str
@@ -44,7 +44,7 @@ class ApplicationBundle:
     ports: Mapping[str, str] = field(default_factory=dict)
     knobs: Mapping[str, Any] = field(default_factory=dict)
     engine: str = "auto"
-    computer: str = ""
+    computers: tuple[str, ...] = ()
 
     def plain(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -76,7 +76,7 @@ class ApplicationBundle:
                 f"this is no bundle of format {FORMAT}: use the same quadvis on host and target"
             )
         given = {name: plain.get(name) for name in ApplicationBundle.__dataclass_fields__}
-        texts = ("name", "variant", "text", "place", "hash", "version", "engine", "computer")
+        texts = ("name", "variant", "text", "place", "hash", "version", "engine")
         for name in texts:
             if not isinstance(given[name], str):
                 raise QuadvisError(f"the bundle's {name!r} must be a text")
@@ -86,6 +86,10 @@ class ApplicationBundle:
         for name in ("ports", "knobs"):
             if not isinstance(given[name], dict):
                 raise QuadvisError(f"the bundle's {name!r} must be a map")
+        computers = given["computers"]
+        if not isinstance(computers, list | tuple) or not all(isinstance(each, str) for each in computers):
+            raise QuadvisError("the bundle's 'computers' must be a list of texts")
+        given["computers"] = tuple(computers)
         made = ApplicationBundle(**given)  # type: ignore[arg-type]
         if not NAME.fullmatch(made.name):
             raise QuadvisError(

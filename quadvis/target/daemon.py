@@ -7,9 +7,10 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from quadvis.errors import QuadvisError
+from quadvis.target.display import TargetDisplay
 from quadvis.target.kernel import Kernel
 from quadvis.target.notify import ALIVE, READY, STOPPING, Notifier
 from quadvis.target.store import Store
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 STATE = 0.2  # s between two statuses on the stream
 LOOK = 0.1  # s between two looks at the clock
+SHOWN = 0.2  # s between two pictures on the terminal
 
 
 def serve(
@@ -29,14 +31,16 @@ def serve(
     startup: str | None = None,
     idle: float | None = None,
     say: Callable[[str], None],
+    screen: TextIO | None = None,
 ) -> None:
     """Be a target until the process is told to end; then the last run has ended, with safe outputs.
 
     ``listen`` is an address for hosts with keys. ``startup`` names an application that is started at once.
     With ``idle`` it ends when no application is loaded and nobody has asked for anything for so long (s).
+    ``say`` takes sentences; on ``screen``, if it is a terminal, target scopes are shown.
     QuadvisError if another process is this target, or an address is taken.
     """
-    daemon = Daemon(name, Path(folder) if folder else state_folder(name), say)
+    daemon = Daemon(name, Path(folder) if folder else state_folder(name), say, screen)
     with daemon:
         daemon.open(listen)
         if startup:
@@ -55,13 +59,16 @@ def state_folder(name: str) -> Path:
 class Daemon:
     """A target as a process: its kernel, its sockets, its files."""
 
-    def __init__(self, name: str, folder: Path, say: Callable[[str], None]) -> None:
+    def __init__(
+        self, name: str, folder: Path, say: Callable[[str], None], screen: TextIO | None = None
+    ) -> None:
         from quadvis.wire.audit import Audit
         from quadvis.wire.hosts import AuthorizedHosts
         from quadvis.wire.keys import own_key, own_names
         from quadvis.wire.server import Server
 
-        self._say = say
+        self._display = TargetDisplay(screen, say) if screen is not None and screen.isatty() else None
+        self._say = say = self._display.say if self._display is not None else say
         self._stack = ExitStack()
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         self._stack.enter_context(_alone(folder, name))
@@ -79,6 +86,8 @@ class Daemon:
 
     def __exit__(self, *_: object) -> None:
         self._notifier.say(STOPPING)
+        if self._display is not None:
+            self._display.close()
         with self._stack:
             self._server.close()
             self.kernel.close()
@@ -103,21 +112,28 @@ class Daemon:
 
     def run(self, idle: float | None) -> None:
         """Serve until SIGTERM, SIGHUP or Ctrl-C."""
-        due = alive = 0.0
+        due = alive = shown = 0.0
         while True:
             time.sleep(LOOK)
             now = time.monotonic()
-            if now >= due:
+            if now >= due and self._server.wants("state"):
                 due = now + STATE
-                self._publish_state()
+                self._server.publish("state", self.kernel.status() | self._operator(), None)
+            if self._display is not None and now >= shown:
+                shown = now + SHOWN
+                self._display.show(self._head(), self.kernel.shown(), self.kernel.view)
             if self._notifier.period is not None and now >= alive:
                 alive = now + self._notifier.period
                 self._notifier.say(ALIVE)
             if idle is not None and self.kernel.is_idle and now - self._asked > idle:
                 return
 
-    def _publish_state(self) -> None:
-        self._server.publish("state", self.kernel.status() | self._operator(), None)
+    def _head(self) -> str:
+        """Return the line about the target above its scopes."""
+        application = self.kernel.application
+        if application is None:
+            return self.kernel.name
+        return f"{self.kernel.name}: {application.name} is {application.state}, {application.time:.1f} s"
 
     def _operator(self) -> dict[str, Any]:
         operator = self._server.lease.operator

@@ -13,8 +13,11 @@ from quadvis.target.admission import admit
 from quadvis.target.application import Application
 from quadvis.target.bundle import DIGEST, ApplicationBundle
 from quadvis.target.parameters import read_set
+from quadvis.target.scopes import ShownScope
 from quadvis.target.status import status
 from quadvis.target.store import Store
+
+ALL = "All"  # the ViewMode that shows all target scopes
 
 Publish = Callable[[str, Mapping[str, Any], Any], None]  # takes a topic, a header, an array or None
 
@@ -31,6 +34,7 @@ class Kernel:
         self._publish = publish
         self._born = time.monotonic()
         self._application: Application | None = None
+        self.view: int | None = None  # the target scope that is shown alone
         # What takes long is done here, one after the other; the verbs are answered meanwhile.
         self._worker = ThreadPoolExecutor(1, "target")
 
@@ -92,7 +96,9 @@ class Kernel:
         bundle = self._bundle(application)
         diagram = admit(bundle, self.store.place(bundle))
         self._unload()
-        self._application = made = Application(bundle, diagram, self.store, self._publish)
+        made = Application(bundle, diagram, self.store, self._publish)
+        made.take_default()
+        self._application = made
         self._event("loaded", application=bundle.name)
         made.prepare().result()
         return {"name": bundle.name, "variant": bundle.variant, "hash": bundle.hash}
@@ -143,9 +149,38 @@ class Kernel:
         application.refuse_times()
         return self._worker.submit(application.set_times, StopTime, SampleTime)
 
+    def setlog(self, MaxLogSamples: float) -> Future[Any]:
+        """Bound the log of the next run."""
+        return self._worker.submit(self._loaded.set_log, MaxLogSamples)
+
+    def startprofiler(self) -> Future[Any]:
+        """Take the times of tasks from now on, and those of blocks from the next run on."""
+        application = self._loaded
+        return self._worker.submit(lambda: {"blocks": application.profile(True)})
+
+    def stopprofiler(self) -> Future[Any]:
+        """Take no more times; what was found stays."""
+        application = self._loaded
+        return self._worker.submit(lambda: application.profile(False) and None)
+
+    def getprofilerdata(self, task: int | None, computer: int | None, first: int, count: int) -> Any:
+        """Return what the profiler has found: all but single steps and calls, or some of these."""
+        profiler = self._loaded.profiler
+        if task is not None:
+            return profiler.steps(task, first, count)
+        if computer is not None:
+            return profiler.calls(computer, first, count)
+        return profiler.facts(float(self._loaded.diagram.graph.tick))
+
     def status(self) -> dict[str, Any]:
         """Return the state of the target, in xPC's words."""
-        return status(self.name, self._application, time.monotonic() - self._born)
+        found = status(self.name, self._application, time.monotonic() - self._born)
+        return found | {"ViewMode": self.view or ALL}
+
+    @property
+    def application(self) -> Application | None:
+        """The application that is loaded."""
+        return self._application
 
     @property
     def is_idle(self) -> bool:
@@ -203,7 +238,11 @@ class Kernel:
 
     def deleteparamset(self, name: str) -> None:
         """Remove a parameter set."""
-        self.store.known_set(self._loaded.name, name).unlink()
+        self.store.drop_set(self._loaded.name, name)
+
+    def setdefaultparamset(self, name: str | None, application: str | None) -> None:
+        """Let an application have a parameter set whenever it is loaded; None for none."""
+        self.store.keep_default(application or self._loaded.name, name or "")
 
     # scopes
 
@@ -235,6 +274,15 @@ class Kernel:
         """Return all scopes with their properties; none if nothing is loaded."""
         return self._application.scopes.facts() if self._application is not None else []
 
+    def setview(self, id: int | None) -> None:
+        """Show one target scope alone on the target's own terminal; None for all of them."""
+        self.view = id
+
+    def shown(self) -> list[ShownScope]:
+        """Return the target scopes."""
+        application = self._application
+        return application.scopes.shown() if application is not None else []
+
     def getscope(self, id: int, first: int, count: int) -> dict[str, Any]:
         """Return samples of the newest package of a scope."""
         return self._loaded.scopes.samples(id, first, count)
@@ -243,7 +291,9 @@ class Kernel:
 
     def logs(self) -> list[dict[str, Any]]:
         """Return the logs that are kept, the oldest first."""
-        return [{"name": path.stem, "size": path.stat().st_size} for path in self.store.logs()]
+        waiting = self._application.waiting_log if self._application is not None else None
+        found = [(path, path.stat()) for path in self.store.logs() if path != waiting]
+        return [{"name": path.stem, "size": at.st_size, "changed": at.st_mtime} for path, at in found]
 
     def getlog(self, name: str, offset: int, count: int) -> dict[str, Any]:
         """Return a piece of a log."""

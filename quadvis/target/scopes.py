@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from quadvis.engine.taps import Tap
 from quadvis.errors import QuadvisError
 from quadvis.scopes.board import ScopeBoard
 from quadvis.scopes.package import Package
+from quadvis.scopes.properties import TARGET
 from quadvis.scopes.settings import ScopeSettings
 from quadvis.scopes.source import ScopeSource
 from quadvis.scopes.tap import ScopeTap
@@ -23,6 +24,15 @@ from quadvis.scopes.tap import ScopeTap
 PART = 30_000  # numbers in one message of a stream
 
 Publish = Callable[[str, Mapping[str, Any], Any], None]
+
+
+class ShownScope(NamedTuple):
+    """A target scope with its newest package, for whoever shows it."""
+
+    number: int
+    status: str
+    settings: ScopeSettings
+    package: Package | None
 
 
 class ApplicationScopes:
@@ -116,6 +126,16 @@ class ApplicationScopes:
             self._there(numbers)
             for number in numbers:
                 self._board.trigger(number)
+
+    def shown(self) -> list[ShownScope]:
+        """Return all target scopes."""
+        with self._lock:
+            scopes = [(number, self._board[number]) for number in self._board]
+            return [
+                ShownScope(number, scope.status, scope.settings, self._packages.get(number))
+                for number, scope in scopes
+                if scope.settings.Type == TARGET
+            ]
 
     def facts(self) -> list[dict[str, Any]]:
         """Return the properties of all scopes."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from pathlib import Path
 
@@ -12,15 +13,23 @@ from quadvis.diagram.diagram import Diagram
 from quadvis.engine.taps import Tap
 from quadvis.errors import QuadvisError
 from quadvis.machine.failures import surroundings
+from quadvis.output.recording import RecordedBlock
+from quadvis.output.stretch import NANOSECONDS
+from quadvis.output.wrapped_log import WrappedLog
 from quadvis.realtime.helm import READY, Helm
 from quadvis.realtime.options import RealTime
 from quadvis.run.loops import Paced
 from quadvis.run.result import Result
 from quadvis.run.session import recorded
+from quadvis.target.profiler import Profiler
 
 
 class Session:
     """One run. ``ready`` is done when it can begin, ``over`` when all has ended.
+
+    ``samples`` is how many of the fastest task the log is to have, infinite for all; ``wraps`` counts how
+    often it has begun anew. The log of a run that never began is removed. ``profiler`` gets the times of
+    tasks, and those of blocks if it is on when the run begins to be made.
 
     ``result`` is there if it has come to an end in order, ``problem`` says why if not. ``announce`` takes
     sentences, ``settle`` the first tick of which rows may still come, and ``ended`` is called when all is
@@ -32,6 +41,8 @@ class Session:
         diagram: Diagram,
         engine: str,
         log: Path,
+        samples: float,
+        profiler: Profiler,
         taps: Sequence[Tap],
         stop_time: float | None,
         announce: Callable[[str], None],
@@ -44,7 +55,9 @@ class Session:
         self.over: Future[None] = Future()
         self.result: Result | None = None
         self.problem = ""
-        self._engine, self._taps = engine, taps
+        self._engine, self._taps, self._samples = engine, taps, samples
+        self._wrapped: WrappedLog | None = None
+        self._profiler, self.is_profiled = profiler, profiler.is_on
         self._announce, self._settle, self._ended = announce, settle, ended
         self._thread = threading.Thread(target=self._perform, name="session", daemon=True)
         self._thread.start()
@@ -68,20 +81,45 @@ class Session:
         """True until all is over."""
         return self._thread.is_alive()
 
+    @property
+    def wraps(self) -> int:
+        """How often the log has begun anew, since it was full."""
+        return self._wrapped.wraps if self._wrapped is not None else 0
+
     def join(self, timeout: float | None = None) -> None:
         """Wait for the end."""
         self._thread.join(timeout)
 
     def _perform(self) -> None:
         try:
-            loop = Paced(self.diagram, self._engine, self._announce, RealTime(), self.helm)
-            self.result = recorded(self.diagram, loop, log=self.log, keep=(), taps=self._taps)
+            wishes = RealTime(profile=self.is_profiled)
+            loop = Paced(self.diagram, self._engine, self._announce, wishes, self.helm)
+            opened = self._open if math.isfinite(self._samples) else None
+            self.result = recorded(
+                self.diagram,
+                loop,
+                log=self.log,
+                keep=(),
+                taps=self._taps,
+                open_log=opened,
+                timed=self._profiler.take,
+            )
+            self._profiler.end(self.result.flight)
         except QuadvisError as error:
             self.problem = "; ".join([str(error), *getattr(error, "__notes__", ())])
         except Exception as error:
             self.problem = surroundings(error) or traceback.format_exc()
         finally:
+            if not self.helm.is_begun:
+                self.log.unlink(missing_ok=True)
             if not self.ready.done():
                 self.ready.set_exception(QuadvisError(self.problem or "it was stopped before it was ready"))
             self._ended()
             self.over.set_result(None)
+
+    def _open(
+        self, path: str | Path, blocks: Sequence[RecordedBlock], facts: Mapping[str, str]
+    ) -> WrappedLog:
+        span = int(self._samples * self.diagram.graph.tick * NANOSECONDS)
+        self._wrapped = WrappedLog(path, blocks, facts, span)
+        return self._wrapped

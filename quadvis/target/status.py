@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from quadvis.target.application import Application
 
 NONE, DETECTED = "none", "detected"  # CPUOverload
+NORMAL, WRAPPED = "Normal", "Wrapped"  # LogMode
 MODES = {True: "Real-Time Multi-Tasking", False: "Real-Time Single-Tasking"}
 
 
@@ -27,6 +29,7 @@ def status(name: str, application: Application | None, session_time: float) -> d
     if application is None:
         return found
     diagram, session = application.diagram, application.session
+    bounded = math.isfinite(application.log_samples)
     times = session.helm.times() if session is not None else {}
     tasks = [(computer, each) for computer, several in times.items() for each in several]
     found |= {
@@ -35,13 +38,17 @@ def status(name: str, application: Application | None, session_time: float) -> d
         "Mode": MODES[diagram.graph.tasking == MULTI],
         "Variant": diagram.variant or "",
         "Hash": diagram.hash,
-        "ExecTime": session.helm.time if session is not None else 0.0,
+        "ExecTime": application.time,
         "StopTime": application.stop_time,
         "SampleTime": float(diagram.graph.tick),
         "CPUOverload": DETECTED if any(each.overruns for _, each in tasks) else NONE,
         "NumSignals": len(application.newest.names),
         "NumParameters": len(application.parameters.names),
         "Tasks": [{"computer": computer, "task": each.task, **each.facts()} for computer, each in tasks],
+        "MaxLogSamples": application.log_samples if bounded else None,  # JSON has no infinity
+        "LogMode": WRAPPED if bounded else NORMAL,
+        "NumLogWraps": session.wraps if session is not None else 0,
+        "DefaultParamSet": application.default_set,
         "Log": session.log.stem if session is not None else "",
         "Problem": application.problem,
         "Said": application.said[-20:],
@@ -50,8 +57,7 @@ def status(name: str, application: Application | None, session_time: float) -> d
     result = application.result
     if result is not None and result.flight is not None and not (result.flight.early or diagram.here):
         found["Passed"] = result.passed
-        found["Verdicts"] = [str(verdict) for verdict in result.outcome.verdicts]
-        found["NotMet"] = [str(verdict) for verdict in result.outcome.verdicts if not verdict.met]
+        found["Verdicts"] = [verdict.facts() for verdict in result.outcome.verdicts]
     return found
 
 

@@ -3,9 +3,10 @@
 folder/files/<SHA-256>              contents of files, each once
 folder/applications/<name>/         bundle.json, and the folder `tree` as the diagram's blocks see it
 folder/sets/<name>/<set>.yaml       parameter sets of an application
+folder/sets/<name>/default          the name of the one that it has when it is loaded
 folder/drawings/<hash>.svg          drawings of diagrams
 folder/scopes/<name>/               files of file scopes
-folder/logs/<name>-<number>.mcap    the logs of its runs
+folder/logs/<name>-<number>.mcap    the logs of its runs; of a bounded one <name>-<number>.before.mcap, too
 """
 
 from __future__ import annotations
@@ -18,12 +19,15 @@ from io import BufferedRandom
 from pathlib import Path
 
 from quadvis.errors import QuadvisError, quoted, sentence, suggestion
+from quadvis.machine.files import Kind, write_output
+from quadvis.output.wrapped_log import BEFORE
 from quadvis.target.bundle import DIGEST, NAME, ApplicationBundle, inner_path
 
 MOST_BYTES = 256_000_000  # of a file
 MOST_BUNDLE = 4_000_000
 PARTLY = 8  # files that may be on their way at the same time
 DRAWINGS = 20  # that are kept
+DEFAULT = Kind("the name of the default parameter set")
 LOGS = 100  # of one application; older ones are removed
 
 
@@ -163,6 +167,28 @@ class Store:
         """Return the path of a parameter set; QuadvisError if there is none of this name."""
         return _known(chosen, {each: self.set_path(name, each) for each in self.sets(name)}, "parameter set")
 
+    def drop_set(self, name: str, chosen: str) -> None:
+        """Remove a parameter set; if it was the default one, there is none any more."""
+        self.known_set(name, chosen).unlink()
+        if self.default_set(name) == chosen:
+            self.keep_default(name, "")
+
+    def default_set(self, name: str) -> str:
+        """Return the name of the set that an application has when it is loaded; "" if there is none."""
+        path = self._default(name)
+        return path.read_text() if path.exists() else ""
+
+    def keep_default(self, name: str, chosen: str) -> None:
+        """Note which set an application has when it is loaded, from now on; "" for none."""
+        if chosen:
+            self.known_set(name, chosen)
+            write_output(self._default(name), DEFAULT, chosen)
+        else:
+            self._default(name).unlink(missing_ok=True)
+
+    def _default(self, name: str) -> Path:
+        return self.folder / "sets" / _checked(name) / "default"
+
     def scope_folder(self, name: str) -> Path:
         """Return the folder for the files of an application's scopes."""
         folder = self.folder / "scopes" / _checked(name)
@@ -181,7 +207,7 @@ class Store:
     def logs(self, name: str | None = None) -> list[Path]:
         """Return the logs of an application, or all, the oldest first."""
         found = (self.folder / "logs").glob("*.mcap")
-        mine = [path for path in found if name is None or path.stem.rpartition("-")[0] == name]
+        mine = [path for path in found if name is None or _whole(path).rpartition("-")[0] == name]
         return sorted(mine, key=_age)
 
     def next_log(self, name: str) -> Path:
@@ -209,8 +235,13 @@ def _known(name: str, paths: Mapping[str, Path], what: str) -> Path:
     return paths[name]
 
 
+def _whole(path: Path) -> str:
+    """Return the name of a log, also for its part that came before the newest."""
+    return path.stem.removesuffix(BEFORE)
+
+
 def _number(path: Path) -> int:
-    number = path.stem.rpartition("-")[2]
+    number = _whole(path).rpartition("-")[2]
     return int(number) if number.isascii() and number.isdigit() else 0
 
 

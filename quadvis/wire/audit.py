@@ -129,13 +129,19 @@ class Audit:
 
 def _short(value: Any) -> Any:
     """Return a value for a line: bytes and long values by their length and SHA-256."""
+    if value is None or isinstance(value, bool | int | float):
+        return value
     if isinstance(value, bytes):
         return f"{len(value)} bytes, SHA-256 {hashlib.sha256(value).hexdigest()}"
     if isinstance(value, Mapping) and len(value) <= 1000:
         value = {str(key): _short(each) for key, each in value.items()}
     elif hasattr(value, "tolist"):
         value = value.tolist()
-    text = json.dumps(value, default=str)
+    try:
+        text = json.dumps(value)
+    except TypeError:
+        text = json.dumps(value, default=str)
+        value = json.loads(text)
     if len(text) > LONGEST_TEXT:
         return f"{text[:80]}... {len(text)} characters, SHA-256 {hashlib.sha256(text.encode()).hexdigest()}"
-    return json.loads(text)
+    return value

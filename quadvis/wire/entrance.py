@@ -27,13 +27,13 @@ from quadvis.wire.limits import (
     HANDSHAKE,
     HANDSHAKES,
     HEARTBEAT,
-    MESSAGE,
     QUEUED,
+    REQUEST,
 )  # fmt: skip
 from quadvis.wire.outbox import Outbox
 
 _EVENTS = zmq.Event.ACCEPTED | zmq.Event.DISCONNECTED
-_RECEIVED = 8  # messages of one connection that libzmq holds for us
+_RECEIVED = 2  # messages of one connection that libzmq holds for us
 _OURS = 5  # bytes of an identity that libzmq made, which begins with a zero
 
 
@@ -64,7 +64,7 @@ class Entrance:
         made.linger = 0
         made.router_mandatory = True
         made.rcvhwm, made.sndhwm = _RECEIVED, QUEUED
-        made.maxmsgsize = MESSAGE
+        made.maxmsgsize = REQUEST  # whoever announces more is cut off before it takes memory
         made.handshake_ivl = int(HANDSHAKE * 1000)
         made.heartbeat_ivl, made.heartbeat_timeout = int(HEARTBEAT * 1000), int(DEAD_AFTER * 1000)
         made.zap_domain = self.domain.encode()

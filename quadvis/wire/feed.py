@@ -44,6 +44,10 @@ class Feed:
         self._outgoing: deque[tuple[str, list[bytes], int]] = deque()
         self._size = 0
 
+    def wants(self, topic: str) -> bool:
+        """Return whether anybody has subscribed to a topic; any thread may ask."""
+        return topic in self._wanted
+
     def publish(self, topic: str, header: Mapping[str, Any], array: Any = None) -> None:
         """Publish data of a topic; it is dropped and counted if too much waits already.
 

@@ -2,8 +2,9 @@
 
 VERSION = 1
 
-MESSAGE = 4 << 20  # bytes of one message
-PIECE = 1 << 20  # bytes of a file in one message
+MESSAGE = 4 << 20  # bytes of one message to a host
+REQUEST = 1 << 19  # bytes of one message to a target, which has to hold what strangers send
+PIECE = 1 << 18  # bytes of a file in one message
 ITEMS = 1 << 16  # values in one message, those in lists and maps included
 DEPTH = 12  # lists and maps inside one another
 TEXT = 1 << 16  # bytes of one text, except a drawing in a reply

@@ -11,7 +11,7 @@ import msgpack
 
 from quadvis.errors import quoted
 from quadvis.wire.argument import is_number, is_whole
-from quadvis.wire.limits import LONGEST_DEADLINE, MESSAGE, NAME, VERSION
+from quadvis.wire.limits import ITEMS, LONGEST_DEADLINE, MESSAGE, NAME, REQUEST, VERSION
 from quadvis.wire.refusals import BadError, WireError, wire_error
 from quadvis.wire.scan import scan
 
@@ -82,18 +82,39 @@ def _plain(value: Any) -> Any:
 def unpack(data: bytes, **limits: int) -> tuple[Any, int]:
     """Return the value of a message, and how many values are in it; BadError beyond the limits."""
     count = scan(data, **limits)
+    return _unpacked(data), count
+
+
+def _unpacked(data: bytes) -> Any:
     try:
-        return msgpack.unpackb(data, raw=False, strict_map_key=True), count
-    except ValueError as error:  # a UnicodeDecodeError is one
-        raise BadError("the message has a text that is not UTF-8") from error
+        return msgpack.unpackb(data, raw=False, strict_map_key=True, ext_hook=_no_extension)
+    except (ValueError, RecursionError) as error:  # a UnicodeDecodeError is one
+        raise BadError("the message has a text that is not UTF-8, or is no whole value") from error
+
+
+def _no_extension(kind: int, data: bytes) -> Any:
+    raise ValueError(f"an extension of type {kind}")
+
+
+def _unpack_answer(data: bytes) -> Any:
+    """Return the value of a message of a target.
+
+    A short one cannot have many values, and is not looked through: hosts get many of these.
+    """
+    if len(data) <= ITEMS:
+        return _unpacked(data)
+    return unpack(data, most=MESSAGE, text=MESSAGE, items=1 << 20)[0]
 
 
 def pack_request(request: Request) -> bytes:
-    """Return the bytes of a request."""
-    return pack(
+    """Return the bytes of a request; BadError if it is too long."""
+    data = pack(
         {"v": VERSION, "id": request.id, "cmd": request.cmd, "args": dict(request.args),
          "deadline": request.deadline}
     )  # fmt: skip
+    if len(data) > REQUEST:
+        raise BadError(f"the request has {len(data)} bytes, more than {REQUEST}; send less at once")
+    return data
 
 
 def read_request(data: bytes) -> Request:
@@ -142,7 +163,7 @@ def pack_reply(reply: Reply) -> bytes:
 
 def read_reply(data: bytes) -> Reply:
     """Return the reply in a message; BadError if there is none."""
-    found, _ = unpack(data, text=MESSAGE, items=1 << 20)
+    found = _unpack_answer(data)
     if not isinstance(found, dict) or not is_whole(found.get("id"), 0, _MOST_ID):
         raise BadError("the answer is no reply")
     tick = found.get("tick") if is_whole(found.get("tick"), 0, 2**63) else None
@@ -174,7 +195,7 @@ def read_stream(frames: Sequence[bytes]) -> StreamData:
     """Return the stream data of three frames; BadError if they are none."""
     if len(frames) != 3:
         raise BadError(f"stream data has 3 frames, not {len(frames)}")
-    facts, _ = unpack(frames[1])
+    facts = _unpack_answer(frames[1])
     if not isinstance(facts, dict) or not is_whole(facts.get("number"), 0, 2**63):
         raise BadError("stream data has no number")
     topic = frames[0].decode("utf-8", "replace")

@@ -107,7 +107,8 @@ def _lines() -> Iterator[str]:
 
 def _limits() -> list[tuple[str, str]]:
     return [
-        ("bytes of a message", f"{limits.MESSAGE}"),
+        ("bytes of a message to a target; who sends more is cut off", f"{limits.REQUEST}"),
+        ("bytes of a message to a host", f"{limits.MESSAGE}"),
         ("values in a request, those in lists and maps included", f"{limits.ITEMS}"),
         ("lists and maps inside one another", f"{limits.DEPTH}"),
         ("bytes of a text in a request", f"{limits.TEXT}"),

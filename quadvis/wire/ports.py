@@ -51,19 +51,46 @@ def local_folder(path: str) -> Path:
     return private_folder(Path(path).parent)
 
 
-def held(path: str, target: str) -> int:
-    """Return a lock on a path, as an open file; QuadvisError if another process has it.
+class HeldPath:
+    """A path at which this process alone may listen, with its two sockets, until `release`.
 
-    ZeroMQ would take the path away from whoever listens there.
+    ZeroMQ would take the path away from whoever listens there, and leaves its files behind. QuadvisError if
+    another process has it.
     """
-    import fcntl
 
-    try:
-        descriptor = os.open(f"{path}.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
-    except OSError as error:
-        raise QuadvisError(f"cannot listen at '{path}': {reason(error)}") from None
-    with suppress(BlockingIOError):
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    def __init__(self, path: str, target: str) -> None:
+        self.sockets = path, f"{path}.stream"
+        self._lock = f"{path}.lock"
+        try:
+            while not self._is_ours(descriptor := self._locked()):
+                os.close(descriptor)
+        except BlockingIOError:
+            raise QuadvisError(f"a target '{target}' runs already: it listens at '{path}'") from None
+        except OSError as error:
+            raise QuadvisError(f"cannot listen at '{path}': {reason(error)}") from None
+        self._descriptor = descriptor
+
+    def _locked(self) -> int:
+        """Return a lock, as an open file."""
+        import fcntl
+
+        descriptor = os.open(self._lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(descriptor)
+            raise
         return descriptor
-    os.close(descriptor)
-    raise QuadvisError(f"a target '{target}' runs already: it listens at '{path}'")
+
+    def _is_ours(self, descriptor: int) -> bool:
+        """Return whether the file of a lock is still there: whoever had it before may have removed it."""
+        with suppress(FileNotFoundError):
+            return os.path.samestat(os.fstat(descriptor), os.stat(self._lock))
+        return False
+
+    def release(self) -> None:
+        """Remove the files, those of the sockets first: they are closed."""
+        for path in (*self.sockets, self._lock):
+            with suppress(OSError):
+                os.unlink(path)
+        os.close(self._descriptor)

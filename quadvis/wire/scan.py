@@ -1,4 +1,4 @@
-"""Look through a msgpack message before it is unpacked: a message of 4 MB can hold four million empty maps.
+"""Look through a msgpack message before it is unpacked: one of 0.5 MB can hold half a million empty maps.
 
 The costs are bounded by the number of values, not of bytes. Accepted is what JSON could say, and byte
 strings: no extension types, no times, no keys that are not text.
@@ -6,7 +6,7 @@ strings: no extension types, no times, no keys that are not text.
 
 from __future__ import annotations
 
-from quadvis.wire.limits import DEPTH, ITEMS, MESSAGE, TEXT
+from quadvis.wire.limits import DEPTH, ITEMS, REQUEST, TEXT
 from quadvis.wire.refusals import BadError
 
 _VALUE, _TEXT, _BYTES, _LIST, _MAP = range(5)
@@ -35,11 +35,13 @@ def _forms() -> list[tuple[int, int, int] | None]:
 _FORMS = _forms()
 
 
-def scan(data: bytes, *, items: int = ITEMS, depth: int = DEPTH, text: int = TEXT) -> int:
+def scan(
+    data: bytes, *, most: int = REQUEST, items: int = ITEMS, depth: int = DEPTH, text: int = TEXT
+) -> int:
     """Return the number of values in a message; BadError if it is not one whole value within the limits."""
     size = len(data)
-    if size > MESSAGE:
-        raise BadError(f"the message has {size} bytes, more than {MESSAGE}")
+    if size > most:
+        raise BadError(f"the message has {size} bytes, more than {most}")
     position = count = 0
     open_lists: list[list[int]] = [[1, 0]]  # values that are still to come, and whether each second is a key
     while open_lists:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import socket
 import threading
 import time
@@ -27,7 +26,7 @@ from quadvis.wire.hosts import AuthorizedHosts
 from quadvis.wire.introduction import introduce
 from quadvis.wire.keys import KeyPair, checked_name
 from quadvis.wire.lease import Lease
-from quadvis.wire.ports import held, listeners, local_folder
+from quadvis.wire.ports import HeldPath, listeners, local_folder
 from quadvis.wire.verbs import CONTROL, STREAM
 from quadvis.wire.waker import Waker
 from quadvis.wire.who import Who
@@ -77,7 +76,7 @@ class Server:
         self._doorkeeper = Doorkeeper(self._context, hosts, self.counts, self._say)
         self._entrances: list[Entrance] = []
         self._introductions: list[socket.socket] = []
-        self._locks: list[int] = []
+        self._held: list[HeldPath] = []
         self._calls: deque[Callable[[], object]] = deque()
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
@@ -88,10 +87,10 @@ class Server:
         """Listen at a path that only this user can open, and return it; QuadvisError if it is taken."""
         path = checked_path(path or str(local_path(self.name)))
         local_folder(path)
-        self._locks.append(held(path, self.name))
-        for entrance, end in zip(self._two_entrances(None), ("", ".stream"), strict=True):
+        self._held.append(HeldPath(path, self.name))
+        for entrance, place in zip(self._two_entrances(None), self._held[-1].sockets, strict=True):
             try:
-                entrance.open_path(path + end)
+                entrance.open_path(place)
             except zmq.ZMQError as error:
                 raise QuadvisError(f"cannot listen at '{path}': {error.strerror.lower()}") from None
         return path
@@ -140,6 +139,10 @@ class Server:
     def publish(self, topic: str, header: Mapping[str, Any], array: Any = None) -> None:
         """Send data of a topic to all who have subscribed and may see it; it never waits, see `feed.Feed`."""
         self._feed.publish(topic, header, array)
+
+    def wants(self, topic: str) -> bool:
+        """Return whether anybody has subscribed to a topic, so that its data is worth being made."""
+        return self._feed.wants(topic)
 
     def close(self) -> None:
         """Answer what is under way, close all sockets and wait for the end of the thread."""
@@ -291,8 +294,8 @@ class Server:
             listener.close()
         self._doorkeeper.close()
         self._context.term()
-        for descriptor in self._locks:
-            os.close(descriptor)
+        for path in self._held:
+            path.release()
         self._waker.close()
         if self._audit is not None:
             self._audit.close()

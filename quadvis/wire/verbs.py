@@ -52,6 +52,7 @@ _TOPIC = argument.text(40, "[a-z]+(/[0-9]{1,4})?", "a topic such as 'state' or '
 _ID = argument.whole(1, 9999)
 _COUNT = argument.whole(0, 2**53)
 _TIME = argument.number(0, math.inf, "a time of at least 0 s, which may be infinite")
+_SAMPLES = argument.number(1, math.inf, "a number of at least 1, which may be infinite")
 _INSTANT = argument.whole(0, 2**62)
 _SHIFT = argument.whole(-(10**10), 10**10)
 _PERIOD = argument.number(1e-6, 1e6, "a time from 1e-6 to 1e6 s")
@@ -94,6 +95,15 @@ _DECLARED = (
     Verb("align", 0, "move the ticks of the run, slowly, to where they are due by the host's clock", "nil",
          (Argument("shift", _SHIFT, "by how much in all since the start (ns)"),), LEASED),
     Verb("stop", 1, "stop the application, which stays loaded", "nil", (), LEASED, CHANGES),
+    Verb("startprofiler", 1, "take the times of tasks, and of blocks from the next run on",
+         "a map: blocks (whether the run that goes on or waits gives those of blocks)", (), LEASED, CHANGES),
+    Verb("stopprofiler", 1, "take no more times; what was found stays", "nil", (), LEASED, CHANGES),
+    Verb("getprofilerdata", 3, "what the profiler has found in the newest run",
+         "a map: on, tick (s), tasks, blocks; of a task a list of tick, lateness, execution time (ns), "
+         "overruns; of a computer a list of a method's place, begin, time taken (ns)",
+         (Argument("task", argument.or_none(_COUNT), "the place of the task whose steps are wanted", None),
+          Argument("computer", argument.or_none(_COUNT), "that of the computer whose calls are wanted", None),
+          _FIRST, _some(10_000))),
     Verb("signals", 3, "the signals of the application", "a list of maps", (_FIRST, _some(4000))),
     Verb("getsignal", 3, "present values of signals", "a map of name to value", (_NAMES,)),
     Verb("parameters", 2, "the parameters of the application", "a list of maps", (_FIRST, _some(4000))),
@@ -104,6 +114,10 @@ _DECLARED = (
          (Argument("StopTime", argument.or_none(_TIME), "the stop time (s)", None),
           Argument("SampleTime", argument.or_none(_PERIOD), "the period of the base rate (s)", None)),
          LEASED, CHANGES),
+    Verb("setlog", 0, "bound the log of a run", "nil",
+         (Argument("MaxLogSamples", _SAMPLES,
+                   "how many samples of the fastest task it has at least, of a long run the newest"),),
+         LEASED, CHANGES),
     Verb("addscope", 2, "add a scope", "its number",
          (Argument("id", argument.or_none(_ID), "its number; else the first free one", None),
           Argument("type", _KIND_OF_SCOPE, "where its data goes", "host")), changes=True),
@@ -113,6 +127,8 @@ _DECLARED = (
     Verb("startscope", 3, "let scopes acquire", "nil", (_IDS,), changes=True),
     Verb("stopscope", 3, "interrupt scopes", "nil", (_IDS,), changes=True),
     Verb("trigger", 3, "trigger scopes by software", "nil", (_IDS,), changes=True),
+    Verb("setview", 3, "show one target scope alone on the target's own terminal", "nil",
+         (Argument("id", argument.or_none(_ID), "its number; nil for all of them"),), changes=True),
     Verb("scopes", 3, "all scopes with their properties", "a list of maps"),
     Verb("getscope", 3, "the newest whole acquisition of a scope", "a map with the samples",
          (_ID_OF_SCOPE, _FIRST, _some(10_000))),
@@ -121,7 +137,11 @@ _DECLARED = (
     Verb("listparamsets", 2, "the sets of this application", "a list of names"),
     Verb("getparamset", 2, "the values of a set", "a map of name to value", (_SET,)),
     Verb("deleteparamset", 0, "remove a set", "nil", (_SET,), LEASED, CHANGES),
-    Verb("logs", 1, "the logs on the target", "a list of maps: name, size, sha256"),
+    Verb("setdefaultparamset", 0, "let an application have a set whenever it is loaded", "nil",
+         (Argument("name", argument.or_none(_SET_NAME), "the name of the set; nil for none"),
+          Argument("application", argument.or_none(_NAME), "its name; nil for the one that is loaded", None)),
+         LEASED, CHANGES),
+    Verb("logs", 1, "the logs on the target", "a list of maps: name, size, changed (when, s since 1970)"),
     Verb("getlog", 1, "a piece of a log", "a map: data, size (of the whole log)",
          (Argument("name", _NAME, "the name of the log"),
           Argument("offset", _COUNT, "where the piece begins, from 0", 0), _some(PIECE))),

@@ -125,7 +125,7 @@ def test_the_facts_are_plain_json_with_null_for_what_is_not_there() -> None:
     assert facts["expect"][1] == {
         "expectation": "ramp.y always above 0.6 m after 1 s", "signal": "ramp.y", "kind": "above",
         "unit": "m",
-        "limit": 0.6, "found": pytest.approx(0.5), "met": False, "lack": None,
+        "limit": 0.6, "found": pytest.approx(0.5), "met": False, "lack": None, "shown": "0.5 m",
     }  # fmt: skip
     for key in facts:
         assert key in (type(result).facts.__doc__ or "")

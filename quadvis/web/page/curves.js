@@ -4,7 +4,7 @@ import uPlot from "./uplot/uPlot.esm.js";
 import { colour, colours } from "./colours.js";
 import { number, unit } from "./format.js";
 
-const FRAME = 40; // ms between two drawings
+const FRAME = 30; // ms between two drawings
 const SHARE = 5; // at most one part in so many of the time goes into drawing
 
 export class Curves {

@@ -54,13 +54,12 @@ export class Status {
     show(this.problem, Boolean(status.Problem));
     say(find("p", this.problem), status.Problem ?? "");
     this.#tasks(status.Tasks ?? []);
-    const verdicts = status.Verdicts ?? [];
+    const verdicts = (status.Verdicts ?? []).map((each) => [each.met, `${each.met ? "met" : "NOT MET"}: ${each.expectation}: ${each.shown}`]);
     show(this.verdicts, verdicts.length > 0);
     const text = verdicts.join("\n");
     if (text !== this.verdictsShown) {
       this.verdictsShown = text;
-      const missed = new Set(status.NotMet ?? []);
-      find("ul", this.verdicts).replaceChildren(...verdicts.map((each) => make("li", { className: missed.has(each) ? "missed" : "met", textContent: each })));
+      find("ul", this.verdicts).replaceChildren(...verdicts.map(([met, each]) => make("li", { className: met ? "met" : "missed", textContent: each })));
     }
   }
 

@@ -49,9 +49,16 @@ class Running(NamedTuple):
 
 @contextmanager
 def running_target(
-    *arguments: str, name: str = "lab", home: Path | None = None, before: Sequence[str] = ()
+    *arguments: str,
+    name: str = "lab",
+    home: Path | None = None,
+    before: Sequence[str] = (),
+    screen: int | None = None,
 ) -> Iterator[Running]:
-    """Start a target; end it at the end, whatever happened. ``before`` is what starts its command."""
+    """Start a target; end it at the end, whatever happened.
+
+    ``before`` is what starts its command, ``screen`` a terminal for its standard output.
+    """
     folder = Path(tempfile.mkdtemp(prefix="q"))  # short: the path of a socket has an end
     environment = os.environ | {
         "QUADVIS_HOME": str(home or folder / "home"), "XDG_RUNTIME_DIR": str(folder),
@@ -61,7 +68,8 @@ def running_target(
     with (folder / "output.txt").open("w") as output:
         process = subprocess.Popen(
             [*before, sys.executable, "-m", "quadvis", "target", "--name", name, *arguments], env=environment,
-            text=True, stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True,
+            text=True, stdin=subprocess.DEVNULL, stdout=output if screen is None else screen, stderr=output,
+            start_new_session=True,
         )  # fmt: skip
     try:
         last = "hosts with keys" if "--listen" in arguments else "this machine's user"

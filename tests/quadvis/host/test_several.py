@@ -6,6 +6,7 @@ import subprocess
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -97,11 +98,15 @@ def ip(*words: str) -> None:
     subprocess.run(["ip", *words], check=True, capture_output=True)
 
 
+class NotGrantedError(Exception):
+    """The system grants no namespaces."""
+
+
 @contextmanager
 def machines() -> Iterator[Mapping[str, str]]:
-    """Make two machines on one network, as namespaces; skip the test where this is not granted."""
+    """Make two machines on one network, as namespaces; NotGrantedError says why there are none."""
     if shutil.which("ip") is None or os.geteuid() != 0:
-        pytest.skip("namespaces need iproute2 and root")
+        raise NotGrantedError("namespaces need iproute2 and root")
     names = {name: f"quadvis-{os.getpid()}-{name}" for name in ("a", "b")}
     bridge = f"qv{os.getpid() % 10**6}"
     try:
@@ -117,7 +122,7 @@ def machines() -> Iterator[Mapping[str, str]]:
                 for device in ("eth0", "lo"):
                     ip("-n", space, "link", "set", device, "up")
         except subprocess.CalledProcessError as error:
-            pytest.skip(f"namespaces are not granted: {error.stderr.decode().strip()}")
+            raise NotGrantedError(f"namespaces are not granted: {error.stderr.decode().strip()}") from None
         yield names
     finally:
         for space in names.values():
@@ -132,7 +137,11 @@ def test_two_machines_with_clocks_of_their_own_fly_one_diagram(
     """Each is in a network namespace; the monotonic clock of the second one is 5000 s ahead."""
     monkeypatch.setenv("QUADVIS_HOME", str(tmp_path / "bench"))
     bench, _ = new_key("bench")
-    with machines() as spaces, ExitStack() as stack:
+    with ExitStack() as stack:
+        try:
+            spaces = stack.enter_context(machines())
+        except NotGrantedError as error:
+            pytest.skip(str(error))
         targets = {}
         for name, space in spaces.items():
             home = tmp_path / name
@@ -152,6 +161,116 @@ def test_two_machines_with_clocks_of_their_own_fly_one_diagram(
         assert abs(offsets["b"].offset - offsets["a"].offset - AHEAD * 10**9) < 10**9
 
 
+BENCH = """\
+quadvis: 1
+name: bench
+base: {file: FLIGHT, variant: hil}
+overload: {max: 1000000, consecutive: 1000000, action: warn}
+expect:
+  - {signal: "craft.position[0:2]", after: 5 s, within: 60 cm}
+  - {signal: "craft.position[2]", of: "$target[2]", after: 5 s, within: 40 cm}
+  - {signal: detector.lost, count: 0}
+"""
+FLIGHT = Path(__file__).resolve().parents[3] / "diagrams" / "flight.yaml"
+LASTING = 20.0  # s of the flight
+LATE, MISSED = 0.05, 0.03  # s, and a share of the ticks: with more of it nobody can fly
+
+
+@contextmanager
+def two_labs(folder: Path) -> Iterator[Mapping[str, str]]:
+    """Have two targets that listen, each on a machine of its own if that is granted; give their addresses."""
+    bench, _ = new_key("bench", folder / "bench")
+    with ExitStack() as stack:
+        try:
+            spaces = dict(zip(("lab1", "lab2"), stack.enter_context(machines()).items(), strict=True))
+        except NotGrantedError:
+            spaces = {}
+        found = {}
+        for name in ("lab1", "lab2"):
+            new_key(name, folder / name)
+            allow("bench", bench.public.hex(), 0, folder=folder / name)
+            place, space = spaces.get(name, ("", ""))
+            found[name] = ADDRESSES[place] if place else f"127.0.0.1:{free_ports(3)}"
+            before = ["ip", "netns", "exec", space] if place else []
+            stack.enter_context(
+                running_target("--listen", found[name], name=name, home=folder / name, before=before)
+            )
+        yield found
+
+
+def free_ports(count: int) -> int:
+    """Return the first of neighbouring ports of the loopback that are free."""
+    from quadvis.wire.ports import listeners
+
+    ports = listeners("127.0.0.1", 0)
+    assert len(ports) == count
+    first = int(ports[0].getsockname()[1])
+    for port in ports:
+        port.close()
+    return first
+
+
+@contextmanager
+def wires() -> Iterator[Mapping[str, str]]:
+    """Lay the serial lines of the bench between the two machines; give the parameters with their ports."""
+    from multiprocessing import get_context
+
+    from quadvis.machine.serial_port import Line
+    from quadvis.realtime.cables import Cable, Cables
+    from quadvis_blocks.hardware._sbus import LINE
+
+    lines = {"rc": LINE, "circles": Line(115_200), "imu": Line(230_400)}
+    cables = Cables(get_context("spawn"), [Cable(name, line) for name, line in lines.items()], 0)
+    cables.start()
+    try:
+        cables.make()
+        ends = cables.ends
+        yield {
+            "rc": ends["rc"].a, "rc_in": ends["rc"].b, "circles_out": ends["circles"].a,
+            "circles_in": ends["circles"].b, "imu_out": ends["imu"].a, "imu_in": ends["imu"].b,
+        }  # fmt: skip
+    finally:
+        cables.close()
+
+
+@pytest.mark.slow
+def test_the_bench_flies_with_world_and_vision_on_one_machine_and_control_on_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    from quadvis.cli import main
+
+    monkeypatch.setenv("QUADVIS_HOME", str(tmp_path / "bench"))
+    diagram = tmp_path / "bench.yaml"
+    diagram.write_text(BENCH.replace("FLIGHT", os.path.relpath(FLIGHT, tmp_path)))
+    with two_labs(tmp_path) as labs, wires() as ports:
+        words = ["run", str(diagram), "--stop-time", f"{LASTING} s", "--log", str(tmp_path / "home.mcap")]
+        for computer, lab in (("world", "lab1"), ("vision_pc", "lab1"), ("target", "lab2")):
+            words += ["--on", f"{computer}={labs[lab]}"]
+        for name, port in ports.items():
+            words += ["--set", f"{name}={port}"]
+        code = main(words)
+    said = capfd.readouterr()
+    assert code in (0, 1), said.err
+    places = [tmp_path / "home" / name for name in ("vision_pc+world.mcap", "target.mcap")]
+    assert sorted(places) == sorted((tmp_path / "home").iterdir())
+    lab1, lab2 = map(quadvis.read_log, places)
+    assert "detector.centres" in lab1 and "detector.centres" not in lab2 and "outputs.sent" in lab2
+    times = [log.times(f"_times/{name}.tet") for log, name in ((lab1, "world/imu"), (lab2, "target/imu"))]
+    assert all(each[-1] > LASTING - 1 for each in times)
+    lateness = max(
+        log[f"_times/{name}.lateness"].max() for log, name in ((lab1, "world/imu"), (lab2, "target/imu"))
+    )
+    missed = 1 - min(map(len, times)) / (LASTING / 0.01)
+    print(f"late by {lateness:.3f} s at most, {missed:.1%} of ticks missed")
+    print(said.out)
+    assert lab1["detector.found"].sum() > LASTING * 5
+    assert lab2["circle_line.age"][200:].min() > 0
+    if lateness < LATE and missed < MISSED:
+        assert code == 0, said.out
+    for place in places:
+        assert quadvis.replay(place).same
+
+
 def test_a_link_that_cannot_leave_a_machine_is_reported(tmp_path: Path) -> None:
     from dataclasses import replace
 
@@ -169,6 +288,28 @@ def test_a_link_that_cannot_leave_a_machine_is_reported(tmp_path: Path) -> None:
         with pytest.raises(QuadvisError, match=f"link 'there' joins 'a' and 'b'.*{words}"):
             check_reach(diagram.links_here, diagram.computers)
         check_reach(diagram.links, diagram.graph.computers)
+
+
+def test_a_cable_that_cannot_leave_a_machine_is_reported() -> None:
+    from quadvis.realtime.lines import check_cables
+
+    graph = quadvis.load(FLIGHT, variant="hil").graph
+    check_cables(graph, graph.computers)
+    check_cables(graph, ("vision_pc",))
+    words = "the cable 'pty:rc' joins .outputs. and .receiver/receiver., which are on two machines; give each"
+    with pytest.raises(QuadvisError, match=words):
+        check_cables(graph, ("target",))
+    ports = {"rc": "/dev/ttyUSB0", "rc_in": "/dev/ttyUSB1"}
+    check_cables(quadvis.load(FLIGHT, variant="hil", settings=ports).graph, ("target",))
+
+
+def test_a_target_may_be_several_computers(tmp_path: Path) -> None:
+    diagram = quadvis.load(written(tmp_path))
+    lab1, lab2 = (cast(Target, object()) for _ in range(2))
+    one = Several(diagram, {"a": lab1, "b": lab1})
+    assert (one.computers, list(one.targets.values())) == ({"a+b": ("a", "b")}, [lab1])
+    two = Several(diagram, {"b": lab1, "a": lab2})
+    assert two.computers == {"b": ("b",), "a": ("a",)}
 
 
 def test_each_computer_needs_one_target(tmp_path: Path) -> None:

@@ -91,7 +91,7 @@ def test_the_list_of_properties_reads_as_in_xpc_target(tg: Target, diagram: Path
             assert getattr(tg, name) == getattr(tg, alias)
     with pytest.raises(AttributeError, match="a target has no 'Sttus'; did you mean 'Status'"):
         _ = tg.Sttus
-    with pytest.raises(AttributeError, match="StopTime and SampleTime can"):
+    with pytest.raises(AttributeError, match="MaxLogSamples and ViewMode can"):
         tg.Status = "running"
 
 
@@ -103,7 +103,9 @@ def test_times_can_be_set_while_it_is_stopped(tg: Target, diagram: Path) -> None
     tg.start()
     wait_for(lambda: tg.Status == "stopped")
     assert tg.Passed
-    assert tg.Verdicts == ["met: law.y within 100 m: 1.902 m"]
+    (verdict,) = tg.Verdicts
+    assert (verdict["met"], verdict["expectation"], verdict["limit"]) == (True, "law.y within 100 m", 100.0)
+    assert "met: law.y within 100 m: 1.902 m" in str(tg)
     times = tg.getlog("TimeLog")
     np.testing.assert_allclose(times, 0.02 * np.arange(26))
     tg.start()
@@ -192,6 +194,158 @@ def test_sets_are_kept_compared_and_used(tg: Target, diagram: Path, lab: Running
     assert "first" not in tg.listparamsets()
     tg.stop()
     assert tg.compare("autosave") == []  # what was tuned is kept at the end of a run
+
+
+def test_an_application_has_its_default_set_when_it_is_loaded(
+    tg: Target, diagram: Path, tmp_path: Path
+) -> None:
+    tg.load(diagram, name="kept")
+    tg.setparam({"law.factor": 3.0, "other.factor": 4.0})
+    tg.saveparamset("mine")
+    assert tg.DefaultParamSet == ""
+    with pytest.raises(QuadvisError, match="there is no parameter set 'mne'; did you mean 'mine'"):
+        tg.setdefaultparamset("mne")
+    tg.setdefaultparamset("mine")
+    tg.unload()
+    tg.load("kept")
+    assert (tg.DefaultParamSet, tg.getparam("law.factor")) == ("mine", 3.0)
+    tg.start()
+    wait_for(lambda: tg.ExecTime > 0.3)
+    tg.stop()
+    log = tg.getlog()
+    sampled = np.interp(log.times("other.y"), log.times("wave.y"), log["wave.y"])
+    np.testing.assert_allclose(log["other.y"], 4.0 * sampled, atol=1e-12)
+    # A diagram for which it was not made is not flown with half of it.
+    changed = tmp_path / "changed.yaml"
+    changed.write_text(LOOP.replace("other:", "second:"))
+    with pytest.raises(QuadvisError, match=r"kept cannot have its default parameter set 'mine': .*other"):
+        tg.load(changed, name="kept")
+    assert tg.Application == ""
+    tg.setdefaultparamset("", "kept")
+    tg.load(changed, name="kept")
+    assert tg.getparam("law.factor") == 2.0
+    tg.setdefaultparamset("mine")
+    tg.deleteparamset("mine")
+    assert tg.DefaultParamSet == ""
+
+
+SUM = "  sum: {block: signal.integrator, in: {u: {from: wave.y, across: hold}}}\n"
+PAIR = "  pair: {block: sources.constant, rate: fast, with: {value: [2, 3]}}\n"
+
+
+def flown(tg: Target, path: Path, text: str) -> Log:
+    """Fly a diagram to its end, and return the log."""
+    path.write_text(text)
+    tg.load(path)
+    tg.start()
+    wait_for(lambda: tg.Status == "stopped")
+    log = tg.getlog()
+    assert isinstance(log, Log)
+    return log
+
+
+def test_parts_of_a_log_have_the_names_of_xpc_target(tg: Target, tmp_path: Path) -> None:
+    text = LOOP.replace("stop_time: 600 s", "stop_time: 0.5 s").replace("expect:", PAIR + "expect:")
+    log = flown(tg, tmp_path / "loop.yaml", text)
+    time = tg.TimeLog
+    np.testing.assert_array_equal(time, log.times("wave.y"))
+    columns = np.column_stack([log["wave.y"], log["pair.y"]])
+    found = tg.OutputLog
+    assert found.shape == (len(time), 3)
+    assert {tuple(row) for row in found.T} == {tuple(row) for row in columns.T}
+    tet = tg.TETLog
+    fast = next(each for each in tg.Tasks if each["task"] == "fast")
+    assert len(tet) == fast["steps"]
+    np.testing.assert_allclose([tet.min(), tet.mean(), tet.max()], [tg.MinTET, tg.AvgTET, tg.MaxTET])
+    np.testing.assert_array_equal(tg.getlog("TimeLog", 3, 4, 2), time[2:10:2])
+    np.testing.assert_array_equal(tg.getlog("wave.y", 2, 3), log["wave.y"][1:4])
+    with pytest.raises(QuadvisError, match="counted from 1"):
+        tg.getlog("TimeLog", 0)
+    with pytest.raises(QuadvisError, match="has no signal of a block with continuous states"):
+        _ = tg.state_log
+    log = flown(
+        tg,
+        tmp_path / "sum.yaml",
+        text.replace("expect:", SUM + "solver: {method: ode4, step: 5 ms}\nexpect:"),
+    )
+    np.testing.assert_array_equal(tg.StateLog[:, 0], log["sum.y"])
+    np.testing.assert_array_equal(tg.TimeLog, log.times("sum.y"))
+
+
+def test_a_bounded_log_has_the_newest_samples(tg: Target, diagram: Path) -> None:
+    tg.load(diagram)
+    assert (tg.MaxLogSamples, tg.LogMode, tg.NumLogWraps) == (float("inf"), "Normal", 0)
+    before = [each["name"] for each in tg.logs()]
+    tg.MaxLogSamples = 30
+    assert (tg.MaxLogSamples, tg.LogMode, tg.Status) == (30, "Wrapped", "ready")
+    assert [each["name"] for each in tg.logs()] == before  # nothing has been flown
+    tg.start()
+    wait_for(lambda: tg.NumLogWraps >= 3)
+    tick = tg.setparam("law.factor", 5.0)
+    wait_for(lambda: tg.ExecTime > 0.01 * tick + 0.1)
+    with pytest.raises(QuadvisError, match="the log cannot change in a run: stop it first"):
+        tg.MaxLogSamples = 50
+    tg.stop()
+    wraps = tg.NumLogWraps
+    names = [each["name"] for each in tg.logs() if each["name"] not in before]
+    assert names == [f"{tg.Log}.before", tg.Log]
+    time, wave = tg.TimeLog, tg.getlog("wave.y")
+    assert len(time) >= 30 and time[0] > 0.2
+    assert time[-1] == pytest.approx(tg.ExecTime, abs=0.011)
+    np.testing.assert_allclose(wave, np.sin(2 * np.pi * time), atol=1e-9)
+    steps = np.round(np.diff(time) / 0.01)
+    assert (steps == 1).all() or tg.CPUOverload == "detected"
+    log = tg.getlog()
+    assert log.metadata["wraps"] == str(wraps) and log.summary["stopped"].startswith("it was stopped")
+    with pytest.raises(QuadvisError, match="has the end of its run alone, which a replay cannot begin with"):
+        quadvis.replay(log)
+    tg.MaxLogSamples = float("inf")
+    assert tg.LogMode == "Normal"
+
+
+def test_the_profiler_times_tasks_at_once_and_blocks_from_the_next_run_on(
+    tg: Target, diagram: Path, tmp_path: Path
+) -> None:
+    tg.load(diagram)
+    tg.start()
+    wait_for(lambda: tg.ExecTime > 0.2)
+    assert tg.startProfiler() is False  # blocks come with the next run
+    wait_for(lambda: sum(len(each.ticks) for each in tg.getProfilerData().tasks) > 30)
+    tg.stop()
+    found = tg.getProfilerData()
+    assert found.profiles == {}
+    log = tg.getlog()
+    assert isinstance(log, Log)
+    assert {each.task for each in found.tasks} == {"fast", "slow"}
+    for each in found.tasks:
+        times = log.times(f"_times/{each.task}.tet")
+        assert 0 < len(each.ticks) < len(times)  # not from the beginning on
+        place = np.searchsorted(times, each.due[0] - 1e-9)
+        for name, values in (("tet", each.execution), ("lateness", each.lateness)):
+            logged = log[f"_times/{each.task}.{name}"][place : place + len(values)]
+            np.testing.assert_allclose(values, logged, atol=1e-12)
+    tg.start()
+    wait_for(lambda: tg.ExecTime > 0.3)
+    assert "profile" not in str(tg.getProfilerData())
+    tg.stop()
+    found = tg.get_profiler_data()
+    steps = {each.task: each for each in found.tasks}
+    methods = {(each.block, each.method): each for each in found.profiles[""].methods}
+    # The calls of the warm ticks before the start are among them.
+    assert len(steps["fast"].ticks) <= methods["wave", "output"].calls <= len(steps["fast"].ticks) + 10
+    assert methods["law", "output"].total > 0
+    assert "wave" in found.report() and "fast" in found.report()
+    trace = json.loads(found.write(tmp_path / "trace.json").read_text())["traceEvents"]
+    calls = [each for each in trace if each["name"] == "wave.output"][-len(steps["fast"].ticks) :]
+    drawn = [each for each in trace if each.get("cat") == "step" and each["tid"] == calls[0]["tid"]]
+    for call, step in zip(calls, drawn, strict=True):  # they are on one clock
+        assert step["ts"] - 1 <= call["ts"] <= step["ts"] + step["dur"] + 1
+    tg.stopProfiler()
+    tg.start()
+    wait_for(lambda: tg.ExecTime > 0.1)
+    tg.stop()
+    assert tg.getProfilerData().tasks == []
+    assert tg.startProfiler() is True
 
 
 def test_two_scopes_that_trigger_each_other_lose_nothing(tg: Target, diagram: Path) -> None:

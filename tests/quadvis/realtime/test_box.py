@@ -12,9 +12,11 @@ from hypothesis import strategies as st
 
 from quadvis.engine.memory import SLOT
 from quadvis.realtime import box as boxes
-from quadvis.realtime import control
+from quadvis.realtime import control, dispatch, pacing, plan
 from quadvis.realtime.box import NUMBER, ParameterBox
+from quadvis.realtime.notes import Notes
 from quadvis.realtime.pacer import Ended
+from quadvis.realtime.words import whole_words
 from tests.quadvis.realtime.fakes import CrewClock, FakeClock, Paced
 from tests.quadvis.realtime.test_crew import MS, busy
 from tests.quadvis.realtime.test_crew import diagram as crew_diagram
@@ -73,6 +75,19 @@ def test_a_group_that_is_not_whole_waits() -> None:
     paced.engine.observe("fast", spoil)
     paced.run(20)
     assert noted(paced) == [[1, 9]]
+
+
+@given(st.integers(1, 2**40), st.integers(0, 2**53 - 1), st.integers(1, boxes.ANSWERS - 1))
+def test_the_answer_is_that_to_the_newest_group(number: int, tick: int, before: int) -> None:
+    made = ParameterBox(memoryview(bytearray(SLOT * ParameterBox.size(8))).cast("q"), 8)
+    made.words[NUMBER] = number - 1
+    assert made.put([(0, [1])], 0) == number
+    if number % boxes.ANSWERS:
+        assert made.taken(number) is None
+    notes, memory = whole_words(Notes.size([])), whole_words(1)
+    pacing._take(whole_words(plan.HEAD), made.words, notes, whole_words(dispatch.HEAD), memory, tick)
+    assert made.taken(number) == tick
+    assert made.taken(number + before) is None
 
 
 @given(st.lists(st.integers(-(2**63), 2**63 - 1), min_size=1, max_size=8), st.data())

@@ -13,13 +13,20 @@ from quadvis.realtime.ring import RecordRing
 
 
 @given(
+    st.booleans(),
     st.integers(1, 9),
     st.lists(st.integers(0, 3), min_size=1, max_size=3),
     st.lists(st.one_of(st.integers(1, 12), st.just("take")), max_size=30),
 )
 def test_what_is_put_is_taken_in_its_order_and_what_finds_no_room_is_counted(
-    room: int, sizes: list[int], actions: list[int | str]
+    in_order: bool, room: int, sizes: list[int], actions: list[int | str]
 ) -> None:
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("quadvis.realtime.ring.IN_ORDER", in_order)
+        check_ring(in_order, room, sizes, actions)
+
+
+def check_ring(in_order: bool, room: int, sizes: list[int], actions: list[int | str]) -> None:
     width = 1 + sum(sizes)
     words = memoryview(np.zeros(RecordRing.size(room, width), np.int64))
     producer, consumer = RecordRing(words, room, width), RecordRing(words, room, width)
@@ -38,6 +45,8 @@ def test_what_is_put_is_taken_in_its_order_and_what_finds_no_room_is_counted(
         if action == "take":
             count, seen = seen, len(waiting)  # those that were there at the last call
             seen -= count
+            if in_order:
+                count, seen = count + seen, 0
             check(consumer.take(), count)
             continue
         for _ in range(int(action)):

@@ -68,21 +68,22 @@ class Rig:
         self.tuner.offer(wanted, self.tick)
         return wanted.future
 
-    def look(self) -> None:
-        for name, loop in self.loops.items():
+    def look(self, *, notes: bool = True) -> None:
+        self.tuner.answer()
+        for name, loop in self.loops.items() if notes else ():
             self.tuner.noted(name, np.array(loop.notes.groups.take(last=True)))
         self.tuner.send(self.tick)
 
-    def step(self, *computers: str) -> None:
+    def step(self, *computers: str, notes: bool = True) -> None:
         self.tick += 1
         for name in computers:
             self.loops[name].step(self.tick)
-        self.look()
+        self.look(notes=notes)
 
 
 values = st.tuples(st.sampled_from(["one", "two"]), st.sampled_from(["lower", "upper"]), st.floats(-2.0, 2.0))
 groups = st.lists(values, min_size=1, max_size=3)
-steps = st.sampled_from([("near",), ("far",), ("near", "far")])
+steps = st.tuples(st.sampled_from([("near",), ("far",), ("near", "far")]), st.booleans())
 
 
 @given(st.lists(st.one_of(groups, steps), max_size=25))
@@ -94,7 +95,7 @@ def test_every_accepted_group_holds_in_its_order_and_no_other_does(plan: list[An
     }
     for each in plan:
         if isinstance(each, tuple):
-            rig.step(*each)
+            rig.step(*each[0], notes=each[1])
             continue
         new = model | {(block, name): value for block, name, value in each}
         future = rig.offer(*each)
@@ -104,10 +105,10 @@ def test_every_accepted_group_holds_in_its_order_and_no_other_does(plan: list[An
         else:
             with pytest.raises(ParameterError, match="lower must be at most upper"):
                 future.result(0)
-        rig.look()
+        rig.look(notes=False)
     for _ in range(60):
         rig.step("near", "far")
-    assert not rig.tuner.waits
+    assert not rig.tuner.waits_for
     ticks = [future.result(0) for _, future in offered]
     for (group, _), tick in zip(offered, ticks, strict=True):
         for block, name, value in dict.fromkeys(group):
@@ -117,6 +118,20 @@ def test_every_accepted_group_holds_in_its_order_and_no_other_does(plan: list[An
             )
     for (block, name), value in model.items():
         assert rig.loops["near" if block == "one" else "far"].engine.read(block, name) == value
+
+
+def test_who_waits_for_a_tick_has_it_before_the_notes_come_with_the_rows() -> None:
+    rig = Rig()
+    for number in range(600):  # more than there are different answers
+        future = rig.offer(("one", "upper", 2.0 + number), ("one", "lower", 1.0))
+        rig.look(notes=False)
+        assert not future.done()
+        rig.step("near", notes=False)
+        assert future.result(0) == rig.tick == number + 1
+    assert rig.changes == []
+    rig.look()
+    assert [change.tick for change in rig.changes] == [tick for tick in range(1, 601) for _ in range(2)]
+    assert [change.value for change in rig.changes[::2]] == [2.0 + number for number in range(600)]
 
 
 def test_what_waits_goes_together_and_other_computers_do_not_wait() -> None:

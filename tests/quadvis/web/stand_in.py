@@ -122,8 +122,7 @@ class StandIn:
         found["CPUOverload"] = "detected" if any(task["overruns"] for task in found["Tasks"]) else "none"
         if self.verdicts is not None:
             found["Passed"] = all(verdict.met for verdict in self.verdicts)
-            found["Verdicts"] = [str(verdict) for verdict in self.verdicts]
-            found["NotMet"] = [str(verdict) for verdict in self.verdicts if not verdict.met]
+            found["Verdicts"] = [verdict.facts() for verdict in self.verdicts]
         return found
 
     def do_applications(self) -> list[dict[str, Any]]:

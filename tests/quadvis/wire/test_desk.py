@@ -18,7 +18,7 @@ from quadvis.wire.budget import Tally
 from quadvis.wire.desk import Desk
 from quadvis.wire.lease import Lease
 from quadvis.wire.levels import LEVELS
-from quadvis.wire.limits import BURST, PENDING, RATE
+from quadvis.wire.limits import BURST, PENDING, PIECE, RATE
 from quadvis.wire.messages import Reply, read_reply
 from quadvis.wire.verbs import STREAM, VERBS, Verb
 from quadvis.wire.who import Who
@@ -72,12 +72,13 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
 
 # The levels of xPC Target's web interface, said once more and independently: what each level may not do.
 NOT_FROM_LEVEL = {
-    1: {"load", "unload", "setparam", "saveparamset", "loadparamset", "deleteparamset", "settime", "have",
-        "put", "align"},
-    2: {"start", "stop", "logs", "getlog", "lease", "renew", "release"},
+    1: {"load", "unload", "setparam", "saveparamset", "loadparamset", "deleteparamset", "setdefaultparamset",
+        "settime", "setlog", "have", "put", "align"},
+    2: {"start", "stop", "startprofiler", "stopprofiler", "logs", "getlog", "lease", "renew", "release"},
     3: {"parameters", "getparam", "listparamsets", "getparamset", "addscope", "remscope"},
-    4: {"signals", "getsignal", "setscope", "startscope", "stopscope", "trigger", "scopes", "getscope",
-        "picture", "drawing", "applications", "clock"},
+    4: {"signals", "getsignal", "setscope", "startscope", "stopscope", "trigger", "setview", "scopes",
+        "getscope",
+        "picture", "drawing", "applications", "clock", "getprofilerdata"},
 }  # fmt: skip
 ALWAYS = {"hello", "status", "subscribe", "unsubscribe"}
 
@@ -171,7 +172,7 @@ def test_odd_arguments_are_answered_with_a_sentence_and_never_reach_the_target_u
         ("put", RIGHT["put"] | {"offset": -1}), ("put", RIGHT["put"] | {"file": "A" * 64}),
         ("remscope", {"ids": [0]}), ("remscope", {"ids": [True]}),
         ("getsignal", {"names": "a"}), ("getsignal", {"names": [3]}), ("stop", {"now": True}),
-        ("put", RIGHT["put"] | {"data": b"x" * ((1 << 20) + 1)}),
+        ("put", RIGHT["put"] | {"data": b"x" * (PIECE + 1)}),
     ],
     ids=str,
 )  # fmt: skip

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from quadvis.wire.limits import REQUEST
 from quadvis.wire.messages import (
     Reply,
     Request,
@@ -32,6 +33,13 @@ def test_a_request_and_a_reply_come_back_as_they_were_sent() -> None:
     )
     error = read_reply(pack_reply(Reply(8, error=BusyError("later")))).error
     assert isinstance(error, BusyError) and str(error) == "later"
+
+
+def test_a_request_that_no_target_takes_is_not_sent() -> None:
+    data = bytes(REQUEST - 100)
+    assert read_request(pack_request(Request(1, "put", {"data": data}))).args["data"] == data
+    with pytest.raises(BadError, match=f"the request has 524... bytes, more than {REQUEST}; send less"):
+        pack_request(Request(1, "put", {"data": bytes(REQUEST - 20)}))
 
 
 def test_a_deadline_may_be_left_out() -> None:
@@ -69,6 +77,16 @@ def test_random_bytes_are_no_request_and_no_reply(data: bytes) -> None:
     for read in (read_request, read_reply):
         with pytest.raises(BadError):
             read(data)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [b"\x91" * 60_000, b"\x81\xa1a" * 20_000, b"\xc7\x02\x05ab", msgpack.packb({1: 2}),
+     msgpack.packb({"id": 1, "ok": True, "result": msgpack.ExtType(5, b"x")})],
+)  # fmt: skip
+def test_an_odd_answer_of_a_target_is_refused(data: bytes) -> None:
+    with pytest.raises(BadError):
+        read_reply(data)
 
 
 @given(st.data())

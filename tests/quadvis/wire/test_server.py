@@ -17,6 +17,7 @@ from quadvis.wire.courier import CONNECTED
 from quadvis.wire.hosts import allow, revoke
 from quadvis.wire.limits import CONNECTIONS
 from quadvis.wire.messages import read_reply
+from quadvis.wire.ports import HeldPath
 from quadvis.wire.refusals import (
     BadError,
     BusyError,
@@ -88,7 +89,9 @@ def test_streams_reach_those_who_may_see_them(rig: Rig) -> None:
     rig.key("anna", 3)
     rig.key("eve", 4)
     anna, eve = rig.client("anna"), rig.client("eve")
+    assert not rig.server.wants("state")
     everything = anna.subscribe("state", "scope/1")
+    assert rig.server.wants("state") and rig.server.wants("scope/1") and not rig.server.wants("scope/2")
     with pytest.raises(
         RefusedError, match=r"may see the status alone \(level 4\); the stream 'scope/1' needs"
     ):
@@ -108,6 +111,8 @@ def test_streams_reach_those_who_may_see_them(rig: Rig) -> None:
     anna.unsubscribe(everything)
     with pytest.raises(GoneError):
         everything.take(1)
+    until(lambda: not rig.server.wants("scope/1"))
+    assert rig.server.wants("state")  # by eve
 
 
 def test_a_key_that_is_lowered_or_revoked_sees_and_does_nothing_more(rig: Rig) -> None:
@@ -289,8 +294,30 @@ def test_a_target_of_this_computer_is_reached_by_its_path(
             assert state.take(20).number == 1
         with Server("lab1", Echo()) as second, pytest.raises(QuadvisError, match="'lab1' runs already"):
             second.listen_here()
+        assert Path(path).exists()
+    assert list(Path(path).parent.iterdir()) == []
     with Server("lab1", Echo()) as third:
         third.listen_here()
+
+
+def test_a_path_is_held_by_one_process_whoever_removes_it_meanwhile(tmp_path: Path) -> None:
+    import fcntl
+
+    path = str(tmp_path / "lab1")
+    first = HeldPath(path, "lab1")
+    with pytest.raises(QuadvisError, match="'lab1' runs already: it listens at"):
+        HeldPath(path, "lab1")
+    with open(f"{path}.lock") as late:  # by who has opened the file, and takes the lock when it is gone
+        first.release()
+        fcntl.flock(late, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        assert not first._is_ours(late.fileno())
+        second = HeldPath(path, "lab1")
+        with pytest.raises(QuadvisError, match="runs already"):
+            HeldPath(path, "lab1")
+    for socket in second.sockets:
+        Path(socket).touch()
+    second.release()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_open_folder_is_refused(tmp_path: Path) -> None:
