@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from quadvis.block import Block, ParameterError
@@ -235,6 +236,12 @@ class Expansion:
             given[name] = read[0]
         try:
             return kind.with_ports(given)
+        except DiagramError as error:  # the faults of a file, each at its place
+            for fault in error.faults:
+                if fault not in self.faults:
+                    self.faults.append(
+                        fault if fault.subject else replace(fault, subject=self.faults.subject)
+                    )
         except QuadvisError as error:
             node = values.get(error.parameter) if isinstance(error, ParameterError) else None
             place = node.place if node is not None and known(node) else block.place

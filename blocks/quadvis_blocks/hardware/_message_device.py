@@ -1,0 +1,163 @@
+"""What the blocks hardware.message_... share: which message they mean, its ports and its line."""
+
+from __future__ import annotations
+
+import keyword
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
+
+from quadvis.block import Line, Param, ParameterError
+from quadvis.block.block import RESERVED
+from quadvis.errors import DiagramError, Fault, quoted, sentence, suggestion
+from quadvis.machine.inputs import read_once
+from quadvis_blocks.hardware._protocol.description import (
+    DeviceProtocol,
+    NamedValue,
+    ProtocolMessage,
+)
+from quadvis_blocks.hardware._protocol.formats import Written, message_of
+from quadvis_blocks.hardware._protocol.leaks import wrong_per_million
+from quadvis_blocks.hardware._protocol.reading import read_protocol
+
+Read = Callable[[], DeviceProtocol]
+LEAKY = 1.0  # of a million messages that may give wrong values; a checksum of which more do is a doubt
+
+
+class DescribedMessage:
+    """Which message a block takes or sends: a base class beside that of the device."""
+
+    protocol = Param("", type="file", doc="file that describes the protocol (YAML); or give a format")
+    message = Param("", type="str", doc="name of the message; none if the protocol has one only")
+    format = Param(
+        "",
+        type="str",
+        doc="in place of a protocol: text as %f,%f of printf, or bytes as <3hB of Python's struct",
+    )
+    names = Param("", type="str", doc="names of the format's numbers, with blanks between them")
+    units = Param("", type="str", doc="their units, or one for all; none for plain numbers")
+    ranges = Param("", type="str", doc="their ranges, such as -180..180, or one for all")
+    header = Param(
+        "", type="str", doc="bytes by which each message of the format begins, such as $ or \\xAA\\x55"
+    )
+    terminator = Param("", type="str", doc="bytes by which it ends, such as \\r\\n")
+    checksum = Param("", type="str", doc="checksum of the format, such as xor or crc16_modbus, or none")
+
+    @cached_property
+    def described(self) -> Chosen:
+        """The message, and the protocol that it belongs to."""
+        texts = self.format, self.names, self.units, self.ranges, self.header, self.terminator, self.checksum
+        read: Any = getattr(self, "read_file")  # noqa: B009  # of the block that this class is a base of
+        written = Written(*map(str, texts))
+        return chosen(str(self.protocol), str(self.message), written, lambda: read("protocol", read_protocol))
+
+    @property
+    def described_by(self) -> str:
+        """The name of the parameter that describes it."""
+        return "protocol" if self.protocol else "format"
+
+
+class DescribedLine(DescribedMessage):
+    """The same of a device at a port, whose line the protocol may describe."""
+
+    baud = Param(
+        0, type="int64", min=0, max=10**7, doc="speed of a serial line (1/s); 0 is that of the protocol"
+    )
+    dtr = Param(
+        False, type="bool", doc="the line DTR is high, which restarts some boards when the port is opened"
+    )
+    rts = Param(False, type="bool", doc="the line RTS is high")
+    settle = Param(
+        0.0,
+        unit="s",
+        min=0.0,
+        max=60.0,
+        doc="time that the device needs to start after the port was opened; 0 is that of the protocol",
+    )
+
+    def line_settings(self) -> Line:
+        """Return the settings of the line: those of the protocol, but for what the block itself says."""
+        told = self.described.protocol.line or Line(0)
+        baud = int(self.baud) or int(told.baud)
+        if not baud:
+            remedy = "give it, or let the protocol's file say it: 'line: {baud: 115200}'"
+            raise ParameterError("baud", sentence("baud is missing", remedy))
+        return told._replace(
+            baud=baud,
+            dtr=bool(self.dtr) or told.dtr,
+            rts=bool(self.rts) or told.rts,
+            settle=float(self.settle) or told.settle,
+        )
+
+
+class Chosen(NamedTuple):
+    """A message, and the protocol that it belongs to."""
+
+    protocol: DeviceProtocol
+    message: ProtocolMessage
+
+
+def chosen(protocol: str, message: str, written: Written, read: Read | None = None) -> Chosen:
+    """Return the message that a block's parameters describe; ParameterError or DiagramError if they do not.
+
+    ``read`` reads the file of a protocol.
+    """
+    if bool(protocol) == bool(written.format):
+        problem = "a block has a protocol, which is a file, or a format, such as %f,%f or <3h"
+        raise ParameterError("protocol" if protocol else "format", sentence(problem, "give one of the two"))
+    if not protocol:
+        made = message_of(written)
+        return Chosen(DeviceProtocol(made.name, {made.name: made}), made)
+    for name, value in written._asdict().items():
+        if value:
+            raise ParameterError(name, f"{name} goes with a format, and the protocol says it; leave it out")
+    found = read() if read is not None else read_once(read_protocol, protocol)
+    if not message and len(found.messages) == 1:
+        return Chosen(found, next(iter(found.messages.values())))
+    if message not in found.messages:
+        names = list(found.messages)
+        problem = f"there is no message '{message}' in the protocol" if message else "message is missing"
+        remedy = suggestion(message, names) or f"choose from {', '.join(names)}"
+        raise ParameterError("message", sentence(problem, remedy))
+    return Chosen(found, found.messages[message])
+
+
+def check_names(values: Sequence[NamedValue], taken: Any, made: Sequence[str]) -> None:
+    """Refuse names of values that are something else in a block's class; ``made`` are those that follow.
+
+    ``taken`` is the class.
+    """
+    if not values:
+        raise ParameterError("message", "the message has no value; choose one that has")
+    faults = []
+    for value in values:
+        names = [pattern.format(value.name) for pattern in ("{}", *made)]
+        is_taken = any(hasattr(taken, name) for name in names) or value.name.startswith("_")
+        if is_taken or keyword.iskeyword(value.name) or value.name in RESERVED:
+            problem = f"{quoted(value.name)} has another meaning in a block"
+            faults.append(Fault(value.place, "", problem, "choose another name"))
+    if faults and not faults[0].place.file:
+        raise ParameterError("names", sentence(faults[0].problem, faults[0].remedy))
+    if faults:
+        raise DiagramError(faults)
+
+
+def doubt_about(message: ProtocolMessage, parameter: str) -> list[ParameterError]:
+    """Return the warning that a checksum lets damaged messages through, if it does."""
+    wrong = wrong_per_million(message)
+    if wrong < LEAKY:
+        return []
+    kind = message.check.algorithm.name if message.check is not None else "no checksum"
+    named = f"'{message.name}' has {kind if message.check is None else f'the checksum {kind}'}"
+    problem = (
+        f"message {named}: with 1 % of the bytes damaged, some {_round(wrong)} of a million messages "
+        "would give wrong values"
+    )
+    remedy = "choose a CRC of 16 bits or more, such as crc16_ccitt_false, if the device can"
+    return [ParameterError(parameter, sentence(problem, remedy))]
+
+
+def _round(number: float) -> str:
+    """Return a number with one digit that counts, or two above 10."""
+    digits = 1 if number < 10 else 2
+    return f"{float(f'{number:.{digits - 1}e}'):,.0f}"

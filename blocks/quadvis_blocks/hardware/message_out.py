@@ -1,0 +1,125 @@
+"""Commands as messages of a protocol that a file, or a format, describes."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from quadvis.block import Declared, In, Initial, Line, Out, Output, Param, ParameterError, Safe, Sealer
+from quadvis.errors import DiagramError, Fault
+from quadvis.machine.ports import PortSettings
+from quadvis_blocks.hardware._message_device import DescribedLine, check_names, chosen
+from quadvis_blocks.hardware._protocol.counting import MessageCounter
+from quadvis_blocks.hardware._protocol.decode import Decoded, Decoding, decoding
+from quadvis_blocks.hardware._protocol.encode import encode
+from quadvis_blocks.hardware._protocol.formats import Written
+
+
+class MessageOut(DescribedLine, Output):
+    """Commands to other people's devices, over a serial line or as datagrams: lines of text, or bytes.
+
+    A file describes the protocol (see blocks/README.md), or a format in the diagram, as xPC Target's blocks
+    for RS-232 and Pack have it. Each value of the message is an input, with an initial and a safe value:
+    ``initial`` and ``safe``, or ``initial_NAME`` and ``safe_NAME`` if there are several. What goes beyond the
+    range of a value stays at its end.
+
+    What the protocol says under ``initialise`` is sent before the first message, and what it says under
+    ``terminate`` after the last one: after the safe messages of the time ``hold``, if that is not 0.
+    """
+
+    line = Line("baud")
+    rate = "spacing"
+    hold = "hold_time"
+
+    port = Param(type="port", doc="serial port, udp:HOST:PORT, or a cable such as pty:servos")
+    spacing = Param(20e-3, unit="s", min=1e-3, max=1.0, doc="from one message to the next")
+    hold_time = Param(
+        0.0,
+        unit="s",
+        min=0.0,
+        max=60.0,
+        doc="time of safe messages at the end, and nothing after it; 0: as long as anybody lives",
+    )
+
+    @classmethod
+    def ports(
+        cls,
+        protocol: str,
+        message: str,
+        format: str,
+        names: str,
+        units: str,
+        ranges: str,
+        header: str,
+        terminator: str,
+        checksum: str,
+    ) -> dict[str, Declared]:
+        """Return an input for each value of the message, with its two values, and what is sent of it."""
+        written = Written(format, names, units, ranges, header, terminator, checksum)
+        values = chosen(protocol, message, written).message.values
+        made = ("initial_{}", "safe_{}", "sent_{}") if len(values) > 1 else ()
+        check_names(values, cls, made)
+        found: dict[str, Declared] = {}
+        for value in values:
+            name, unit = value.name, str(value.unit)
+            words = value.doc or f"'{name}' of the message"
+            behind = f"_{name}" if len(values) > 1 else ""
+            found[name] = In(value.type, unit=unit, doc=words)
+            found[f"initial{behind}"] = Initial(name, doc=f"{name} before the first command")
+            found[f"safe{behind}"] = Safe(name, doc=f"{name} at every end of a run")
+            found[f"sent{behind}"] = Out(value.type, unit=unit, doc=f"{name} as it is on the wire")
+        return found
+
+    @property
+    def settings(self) -> PortSettings:
+        """The settings of the port."""
+        found = super().settings
+        return self.line_settings() if isinstance(found, Line) else found
+
+    def check(self) -> None:
+        """Refuse values without a range, and initial and safe values beyond it."""
+        message = self.described.message
+        bare = [value for value in message.values if not message.is_bounded(value)]
+        if bare and self.format:
+            raise ParameterError(
+                "ranges", f"'{bare[0].name}' is sent, so it needs a range; write such as -1..1"
+            )
+        if bare:
+            problem, remedy = "'{}' is sent, so it needs a range", "add such as 'range: [-1, 1]'"
+            raise DiagramError([Fault(each.place, "", problem.format(each.name), remedy) for each in bare])
+        names = {value.name: value for value in message.values}
+        for fixed in (*self.initial_values.values(), *self.interface.safe.values()):
+            given, value = np.asarray(getattr(self, fixed.name)), names[fixed.input]
+            low, high = value.bounds
+            if ((given < low) | (given > high)).any():
+                problem = f"{fixed.name} must lie between {low:g} and {high:g}, the range of {value.name}"
+                raise ParameterError(fixed.name, problem)
+
+    @cached_property
+    def _decode(self) -> Decoding:
+        return decoding(self.described.message)
+
+    def output(self, *inputs: Any) -> Any:
+        """Return what is sent."""
+        found = self._decode(encode(self.described.message, inputs))
+        assert isinstance(found, Decoded)
+        return found.values if len(found.values) > 1 else found.values[0]
+
+    def frame(self, *inputs: Any) -> bytes:
+        """Return the message of some commands."""
+        return encode(self.described.message, inputs)
+
+    def sealer(self) -> Sealer | None:
+        """Return what numbers the messages, if they have a number."""
+        message = self.described.message
+        return MessageCounter(message) if message.modulus else None
+
+    def beginning(self) -> bytes:
+        """Return what is sent before the first message."""
+        return b"".join(self.described.protocol.initialise)
+
+    def ending(self) -> bytes:
+        """Return what is sent after the last message."""
+        return b"".join(self.described.protocol.terminate)
