@@ -20,6 +20,7 @@ from quadvis.block.device import CABLE, Device, LineDevice
 from quadvis.block.elements import all_finite, clip, copied, inward, saturated, zeros_like
 from quadvis.block.input import Counted, Input
 from quadvis.block.instants import INSTANT, passed, reached
+from quadvis.block.news import NewsDevice, NewsOutput
 from quadvis.block.output import Output, Sealer
 from quadvis.block.random import fill_normal, fill_uniform, normal, normal_like, random_signs, uniform
 from quadvis.block.signals import NO_FRAME, SCALARS, Frame, Shape, SignalType, Sizes
@@ -31,9 +32,10 @@ from quadvis.machine.serial_port import Line
 __all__ = [
     "CABLE", "INSTANT", "METHODS", "NO_FRAME", "OUTSIDE", "OWN_MODULES", "SCALARS", "TAGS", "Block",
     "CaptureRequest", "CapturedInput", "Card", "ChannelError", "Counted", "Declared", "Derived", "Device",
-    "FixedInput", "Frame", "In", "Initial", "Input", "Interface", "Line", "LineDevice", "OpenPort", "Out",
-    "Output", "Param", "ParameterError", "PortError", "PortSettings", "Random", "Safe", "Sealer", "Shape",
-    "SignalType", "Sizes", "SourceRecord", "State", "Waiting", "Work", "all_finite", "clip", "copied",
-    "fill_normal", "fill_uniform", "inward", "normal", "normal_like", "parameter_sizes", "passed",
-    "random_signs", "reached", "saturated", "uniform", "units_of", "zeros_like",
+    "FixedInput", "Frame", "In", "Initial", "Input", "Interface", "Line", "LineDevice", "NewsDevice",
+    "NewsOutput", "OpenPort", "Out", "Output", "Param", "ParameterError", "PortError", "PortSettings",
+    "Random", "Safe", "Sealer", "Shape", "SignalType", "Sizes", "SourceRecord", "State", "Waiting",
+    "Work", "all_finite", "clip", "copied", "fill_normal", "fill_uniform", "inward", "normal",
+    "normal_like", "parameter_sizes", "passed", "random_signs", "reached", "saturated", "uniform",
+    "units_of", "zeros_like",
 ]  # fmt: skip

@@ -20,10 +20,15 @@ CABLE = "pty:"  # begins a port that is one end of a cable of ptys
 
 
 class Device(Block, numeric=False):
-    """A block with one port: a parameter of type ``port``."""
+    """A block with one port: a parameter of type ``port``.
+
+    A port has one device, unless all its devices are ``shared`` by the same word: then any number of them
+    send there, and one may take what comes.
+    """
 
     port_parameter: ClassVar[str] = ""
     port_example: ClassVar[str] = f"{CABLE}name"
+    shared: ClassVar[str] = ""
 
     def __init_subclass__(cls, *, numeric: bool | None = None, bound: bool = False) -> None:
         super().__init_subclass__(numeric=numeric, bound=bound)
@@ -51,6 +56,10 @@ class Device(Block, numeric=False):
     def missing(self) -> str:
         """Return a sentence if the port is surely not there, else ""."""
         return "" if self.port_given.startswith(CABLE) else missing_port(self.port_given)
+
+    @staticmethod
+    def report(sentence: str) -> None:
+        """Report what people should know during a run: a real-time run gives each block its own way."""
 
 
 class LineDevice(Device):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from enum import Enum
 from typing import Any, ClassVar
 
@@ -13,7 +13,7 @@ from quadvis.block.declare import Out
 from quadvis.block.device import CABLE, LineDevice
 from quadvis.block.instants import reached
 from quadvis.block.sizes import parameter_sizes
-from quadvis.machine.ports import PortError, Waiting
+from quadvis.machine.ports import OpenPort, PortError, Waiting
 
 KEPT = 4096  # bytes at most that wait for the rest of their message
 
@@ -50,6 +50,7 @@ class Input(LineDevice):
 
     besides: ClassVar[tuple[str, ...]] = ()
     actual_port = ""  # what a real-time run puts in the place of `pty:NAME`
+    lent: Callable[[], OpenPort] | None = None  # gives a port that is open, in a real-time run that shares it
 
     def decode(self, received: bytearray) -> Iterator[Any]:
         """Take all whole messages off the beginning of ``received``, and leave the rest there.
@@ -83,7 +84,7 @@ class Input(LineDevice):
         if path.startswith(CABLE):
             raise PortError(f"{path} is a cable, and only a real-time run makes cables")
         self._starts = self.settings.settle > 0.0
-        self._port = self.settings.open(path)
+        self._port = self.settings.open(path) if self.lent is None else self.lent()
 
     def read(self, time: float) -> None:
         """Take all messages that have come, once the device has started."""

@@ -87,6 +87,10 @@ class OpenLine(OpenPort):
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
 
+    def fileno(self) -> int:
+        """Return its descriptor."""
+        return self._descriptor
+
     def write(self, piece: bytes) -> int:
         """Write as many bytes as there is room for; return their number."""
         return write_some(self._descriptor, piece)
@@ -103,6 +107,15 @@ class OpenLine(OpenPort):
     def close(self) -> None:
         """Let others open the port again, and close it."""
         close_port(self._descriptor)
+
+
+class LentLine(OpenLine):
+    """A serial port that another process has opened, and keeps."""
+
+    def close(self) -> None:
+        """Give the descriptor back; the port stays that of the other process."""
+        with suppress(OSError):
+            os.close(self._descriptor)
 
 
 def open_port(path: str, line: Line) -> int:

@@ -47,6 +47,7 @@ from quadvis.realtime.lifeline import Lifeline
 from quadvis.realtime.options import RealTime
 from quadvis.realtime.pacer import Ended, Pacer
 from quadvis.realtime.pictures import PictureBox, picture_signals
+from quadvis.realtime.reports import Reports
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
 from quadvis.realtime.streams import RowStream
 from quadvis.realtime.system import SHARE, Grants, ask_all, raise_thread, wake_up_time
@@ -197,7 +198,7 @@ class _Application:
             stack.callback(close_all, carriers.values())
             engine = self._engine = Engine(live(part, carriers), diagram.seed, pacer)
             pacer.write_into(engine.memory)
-            setup.devices.bind(engine, supply.ports)
+            setup.devices.bind(engine, supply.ports, Reports(setup.link, clock).take)
             captures = stack.enter_context(Captures(engine, clock))
             captures.start()
             if setup.wishes.profile:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
 from typing import Any
 
-from quadvis.block import CABLE, Block, Device, Input, LineDevice, Output
+from quadvis.block import CABLE, Block, Card, Device, Input, LineDevice, NewsDevice, Output
 from quadvis.engine.engine import Engine
 from quadvis.errors import RunError
 from quadvis.graph.devices import devices
@@ -20,27 +21,44 @@ from quadvis.realtime.guard import Guard
 from quadvis.realtime.guardian import Alarm, Standing, outboxes, words_for
 from quadvis.realtime.heartbeat import Patience
 from quadvis.realtime.outlet import OutputPort
+from quadvis.realtime.shared_ports import lent_port
+
+Report = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class PortBindings:
-    """What the devices of an application need: the guardian's words, the outbox of each output, by path."""
+    """What the devices of an application need, by path.
+
+    These are the guardian's words with the number of each outbox, and what gives inputs at shared ports the
+    descriptors of these.
+    """
 
     words: Any = None
     boxes: Mapping[str, int] = field(default_factory=dict)
+    lenders: Mapping[str, Connection] = field(default_factory=dict)
 
-    def bind(self, engine: Engine, ports: Mapping[str, str]) -> None:
+    def bind(self, engine: Engine, ports: Mapping[str, str], report: Report) -> None:
         """Bind the devices of an engine, before it opens them.
 
-        ``ports`` are the paths of the ptys of those inputs that are at the end of a cable.
+        ``ports`` are the paths of the ptys of those inputs that are at the end of a cable; ``report`` takes
+        what a device has to say during the run.
         """
         boxes = outboxes(self.words) if self.boxes else []
         for path, device in devices(engine.graph):
             block = engine.bound(path)
-            if isinstance(device, Output):
+            block.report = partial(_report, report, path)
+            if path in self.boxes:
                 block.deliver = boxes[self.boxes[path]].put
-            elif path in ports:
+            if path in self.lenders:
+                assert isinstance(device, LineDevice)
+                block.lent = partial(lent_port, device.settings, self.lenders[path])
+            if path in ports:
                 block.actual_port = ports[path]
+
+
+def _report(report: Report, path: str, sentence: str) -> None:
+    report(f"block '{path}': {sentence}")
 
 
 class Devices:
@@ -49,12 +67,19 @@ class Devices:
     def __init__(self, context: SpawnContext, graph: Graph, on_host_loss: str, standing: Standing) -> None:
         self._context, self._on_host_loss, self._standing = context, on_host_loss, standing
         self._devices = list(devices(graph))
-        self._outputs = {path: device for path, device in self._devices if isinstance(device, Output)}
+        self._outputs = {
+            path: device for path, device in self._devices if isinstance(device, Output | NewsDevice)
+        }
         self._inputs = {path: device for path, device in self._devices if isinstance(device, Input)}
         words = context.RawArray("q", words_for(len(self._outputs))) if self._outputs else None
         boxes = {path: number for number, path in enumerate(self._outputs)}
         self.ports: dict[str, str] = {}  # of inputs at the end of a cable, by path, from `open` on
-        self.bindings = PortBindings(words, boxes)
+        self._shared = _shared(self._outputs, self._inputs)
+        pipes = {
+            path: context.Pipe() for path, device in self._inputs.items() if device.port_given in self._shared
+        }
+        self._readers = {self._inputs[path].port_given: pipe[0] for path, pipe in pipes.items()}
+        self.bindings = PortBindings(words, boxes, {path: pipe[1] for path, pipe in pipes.items()})
         lines = {device.port_given: device.settings for device in self._all() if _on_cable(device)}
         self.cables = [Cable(port, line) for port, line in lines.items() if isinstance(line, Line)]
         self._guard: Guard | None = None
@@ -63,7 +88,14 @@ class Devices:
         """Start the guardian, and return its process; None if nothing needs one."""
         if not self._outputs:
             return None
-        self._guard = Guard(self._context, self.bindings.words, patiences, self._on_host_loss, self._standing)
+        self._guard = Guard(
+            self._context,
+            self.bindings.words,
+            patiences,
+            self._on_host_loss,
+            self._standing,
+            self._readers,
+        )
         self._guard.start()
         return self._guard.process.pid
 
@@ -112,9 +144,9 @@ class Devices:
         yield from self._outputs.values()
         yield from self._inputs.values()
 
-    def _output_port(self, path: str, device: Output, ends: Mapping[str, Ends]) -> OutputPort:
+    def _output_port(self, path: str, device: Output | NewsDevice, ends: Mapping[str, Ends]) -> OutputPort:
         port = ends[device.port_given].a if _on_cable(device) else device.port_given
-        return OutputPort.of(device, path, port)
+        return OutputPort.of(device, path, port, shared=device.port_given in self._shared)
 
 
 def guards_all(part: Graph) -> bool:
@@ -125,6 +157,17 @@ def guards_all(part: Graph) -> bool:
         if "write" in node.block.interface.arguments or type(node.block).write_safe is not Block.write_safe
     ]
     return bool(writers) and all(isinstance(block, Output) or block.harmless for block in writers)
+
+
+def _shared(outputs: Mapping[str, LineDevice], inputs: Mapping[str, LineDevice]) -> set[str]:
+    """Return the ports that several devices have together."""
+    found, seen = set(), set()
+    for path, device in {**outputs, **inputs}.items():
+        port = device.port_given
+        if port in seen or (path in outputs and path in inputs):
+            found.add(port)
+        seen |= set() if _on_cable(device) or isinstance(device.settings, Card) else {port}
+    return found
 
 
 def _on_cable(device: Device) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
@@ -28,6 +28,7 @@ from quadvis.realtime.guardian import (
 from quadvis.realtime.heartbeat import Patience
 from quadvis.realtime.outlet import Outlet, OutputPort
 from quadvis.realtime.schedule import NANOSECONDS
+from quadvis.realtime.shared_ports import SharedPorts
 
 START = 30.0  # s that the guardian has to open its ports
 SILENT = 3.0  # s without a look at the loops, after which it counts as hanging
@@ -39,7 +40,8 @@ class Guard:
     """Starts the guardian, tells it whom to watch and what to send, and hears its alarms.
 
     ``words`` (a RawArray of `words_for` words) hold the outboxes of `quadvis.realtime.guardian.outboxes`,
-    in the order of the ports: whoever gives commands puts frames there.
+    in the order of the ports: whoever gives commands puts frames there. ``readers`` get the descriptors of
+    shared ports, by path.
     """
 
     def __init__(
@@ -49,11 +51,21 @@ class Guard:
         patiences: Sequence[Patience],
         on_host_loss: str,
         standing: Standing,
+        readers: Mapping[str, Connection] | None = None,
     ) -> None:
         self._ports: tuple[OutputPort, ...] = ()
         self._looked = looked(words)
         self._link, self._theirs = context.Pipe()
-        setup = GuardianSetup((), words, tuple(patiences), self._theirs, os.getpid(), on_host_loss, standing)
+        setup = GuardianSetup(
+            (),
+            words,
+            tuple(patiences),
+            self._theirs,
+            os.getpid(),
+            on_host_loss,
+            standing,
+            readers or {},
+        )
         self.process: BaseProcess = context.Process(target=guard, args=(setup,), name="guardian")
         self._started = self._lost = False
 
@@ -115,7 +127,9 @@ class Guard:
             return []
         self.process.kill()
         self.process.join()
-        return [sentence for port in self._ports for sentence in _in_its_place(port)]
+        shared = SharedPorts()
+        commands = [port for port in self._ports if not port.news]
+        return [sentence for port in commands for sentence in _in_its_place(port, shared)]
 
     def _receive(self) -> Any:
         try:
@@ -129,9 +143,10 @@ class Guard:
             self._link.send(what)
 
 
-def _in_its_place(port: OutputPort) -> list[str]:
+def _in_its_place(port: OutputPort, shared: SharedPorts) -> list[str]:
     """Send a safe frame in the guardian's place; return what went wrong."""
-    outlet = Outlet(port, lambda: None)
+    taken, open_port = shared.taken(port)
+    outlet = Outlet(taken, lambda: None, open_port)
     try:
         outlet.open()
         outlet.serve(time.monotonic_ns(), safe=True)

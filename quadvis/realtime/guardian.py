@@ -12,9 +12,9 @@ import os
 import select
 import signal
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import partial
 from multiprocessing.connection import Connection
@@ -27,9 +27,11 @@ from quadvis.machine.mailbox import Mailbox
 from quadvis.machine.ports import ChannelError, PortError
 from quadvis.realtime.heartbeat import Heartbeat, Patience, Sign
 from quadvis.realtime.lives import Lives
+from quadvis.realtime.news import NewsOutlet, news_of
 from quadvis.realtime.options import HIGHEST, RealTime
 from quadvis.realtime.outlet import Outlet, OutputPort
 from quadvis.realtime.schedule import NANOSECONDS
+from quadvis.realtime.shared_ports import SharedPorts
 from quadvis.realtime.system import Grants, ask_all
 
 LONGEST_LOOK, SHORTEST_LOOK = 10_000_000, 1_000_000  # ns between two looks at the loops
@@ -63,7 +65,8 @@ class GuardianSetup:
     """What the guardian needs: ``words`` has an outbox for each of the ``ports``, in their order.
 
     Its process starts without ports, and takes them from the ``link``. ``supervisor`` is the process that
-    started it, ``on_host_loss`` what its death means.
+    started it, ``on_host_loss`` what its death means. ``readers`` get the descriptors of shared ports, by
+    path.
     """
 
     ports: tuple[OutputPort, ...]
@@ -73,6 +76,7 @@ class GuardianSetup:
     supervisor: int
     on_host_loss: str
     standing: Standing
+    readers: Mapping[str, Connection] = field(default_factory=dict)
 
 
 class Order(Enum):
@@ -131,10 +135,9 @@ class Guardian:
 
     def __init__(self, setup: GuardianSetup) -> None:
         self._setup, self._link = setup, setup.link
-        boxes = outboxes(setup.words)
-        self._outlets = [
-            Outlet(port, partial(_newest_frame, box)) for port, box in zip(setup.ports, boxes, strict=True)
-        ]
+        self._shared = SharedPorts()
+        boxes = zip(setup.ports, outboxes(setup.words), strict=True)
+        self._outlets = [self._outlet(port, box) for port, box in boxes]
         self._looked = looked(setup.words)
         self._hearts = [Heartbeat(patience, time.monotonic_ns) for patience in setup.patiences]
         self._supervisor, self._applications = Lives(), Lives()
@@ -148,6 +151,12 @@ class Guardian:
         self._listening = True
         self.told_to_end = False
 
+    def _outlet(self, port: OutputPort, box: Mailbox) -> Outlet:
+        taken, open_port = self._shared.taken(port)
+        if port.news:
+            return NewsOutlet(taken, news_of(box), open_port)
+        return Outlet(taken, partial(_newest_frame, box), open_port)
+
     def open(self) -> bool:
         """Open all ports; if one refuses, the others have their safe frames before this is reported."""
         refused = []
@@ -158,6 +167,7 @@ class Guardian:
                 refused.append((outlet, error))
         for outlet, refusal in refused:
             self._fail(outlet, refusal)
+        self._shared.lend(self._setup.readers)
         return not refused
 
     def run(self) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 
-from quadvis.block import Output, Sealer
+from quadvis.block import NewsDevice, Output, Sealer
 from quadvis.machine.ports import ChannelError, OpenPort, PortError, PortSettings
 from quadvis.realtime.schedule import NANOSECONDS
 
@@ -19,7 +19,8 @@ class OutputPort:
 
     ``path`` is the port, ``interval`` the time from one frame to the next (ns); ``initial`` and ``safe`` are
     whole frames. ``beginning`` and ``ending`` are sent once, before and after all frames. After safe frames
-    for the time ``held`` (ns) none follow; 0 means that there is no such time.
+    for the time ``held`` (ns) none follow; 0 means that there is no such time. ``news`` are sent once each,
+    and have none of these. A ``shared`` port has other outlets, too.
     """
 
     block: str
@@ -32,32 +33,45 @@ class OutputPort:
     beginning: bytes = b""
     ending: bytes = b""
     held: int = 0
+    news: bool = False
+    shared: bool = False
 
     @staticmethod
-    def of(device: Output, block: str, path: str) -> OutputPort:
+    def of(device: Output | NewsDevice, block: str, path: str, shared: bool = False) -> OutputPort:
         """Return the port of a device."""
+        settings, interval = device.settings, round(device.interval * NANOSECONDS)
+        if isinstance(device, NewsDevice):
+            sealer = device.sealer()
+            return OutputPort(block, path, settings, interval, b"", b"", sealer, news=True, shared=shared)
         return OutputPort(
             block,
             path,
-            device.settings,
-            round(device.interval * NANOSECONDS),
+            settings,
+            interval,
             device.initial_frame(),
             device.safe_frame(),
             device.sealer(),
             device.beginning(),
             device.ending(),
             round(device.held * NANOSECONDS),
+            shared=shared,
         )
 
 
 class Outlet:
     """Sends frames to a port, one every interval on a grid of its own; PortError if the port is lost.
 
-    ``newest`` returns the newest frame; None before the first one, or if it cannot be read now.
+    ``newest`` returns the newest frame; None before the first one, or if it cannot be read now. ``open_port``
+    opens the port if its settings do not.
     """
 
-    def __init__(self, port: OutputPort, newest: Callable[[], bytes | None]) -> None:
-        self.port, self._newest = port, newest
+    def __init__(
+        self,
+        port: OutputPort,
+        newest: Callable[[], bytes | None],
+        open_port: Callable[[], OpenPort] | None = None,
+    ) -> None:
+        self.port, self._newest, self._open_port = port, newest, open_port
         self._frame = port.initial
         self._opened: OpenPort | None = None
         self._beginning = port.beginning
@@ -77,7 +91,8 @@ class Outlet:
 
     def open(self) -> None:
         """Open the port."""
-        self._opened = self.port.settings.open(self.port.path)
+        opens = self._open_port
+        self._opened = self.port.settings.open(self.port.path) if opens is None else opens()
 
     def close(self) -> None:
         """Close the port."""
@@ -148,7 +163,8 @@ class Outlet:
         """Send what comes after all frames, once."""
         if self._opened is not None and not self._released:
             self._released = True
-            self._write(self._rest + self.port.ending, now)
+            ending = self._sealed(self.port.ending, now) if self.port.ending else b""
+            self._write(self._rest + ending, now)
 
     def _sealed(self, frame: bytes, now: int) -> bytes:
         sealer = self.port.sealer

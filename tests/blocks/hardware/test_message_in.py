@@ -201,7 +201,7 @@ def test_a_format_in_the_diagram_does_the_same() -> None:
         ({"protocol": LAB, "format": "<h"}, "protocol", "give one"),
         ({"protocol": LAB, "names": "a"}, "names", "names goes with a format, and the protocol says it"),
         ({"protocol": LAB, "message": "im"}, "message", "there is no message 'im' in the"),
-        ({"format": "<h", "names": "a", "checksum": "none"}, "format", "'format' cannot be found in a stream"),
+        ({"format": "<h", "names": "a", "checksum": "none"}, "format", "'format' cannot be found in"),
         ({"format": "<h", "names": "a", "checksum": "xor"}, "baud", "baud is missing; give it, or let the"),
         ({"format": "<h", "names": "age", "checksum": "xor"}, "names", "'age' has another meaning"),
         ({"format": "<h", "names": "read", "checksum": "xor"}, "names", "'read' has another meaning"),
