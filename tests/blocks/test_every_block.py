@@ -19,6 +19,8 @@ from quadvis_blocks.vision.rendered_camera import RenderedCamera
 from quadvis_vision.camera.calibration import CameraCalibration
 
 ROOT = Path(__file__).parents[2]
+PROTOCOL = str(ROOT / "diagrams" / "protocols" / "lab_imu.yaml")
+SENT = (("roll", 0), ("pitch", 0), ("rates", 3))  # values of its message, and their elements
 CALIB = ROOT / "diagrams" / "calib"
 CAMERA, COLOURS, PLANES = (str(CALIB / f"{name}.yaml") for name in ("camera", "colours", "two_planes"))
 
@@ -71,13 +73,18 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
         "safe": [0.0, 0.0, 0.0],
         "model": str(ROOT / "diagrams" / "models" / "rotorcraft.xml"),
     }
+    values |= {
+        f"{kind}_{key}": [0.0] * size if size else 0.0 for kind in ("initial", "safe") for key, size in SENT
+    }
+    told = {"protocol": PROTOCOL} if "protocol" in block.interface.params else {}
+    block = block.with_ports(told) if told else block
     required = [key for key, param in block.interface.params.items() if param.required]
     if {"file", "folder"} & {*required}:  # few blocks read or write files, and all tests come by here
         folder = request.getfixturevalue("tmp_path")
         values |= {"folder": str(_pictures(folder)), "file": str(_video(folder / "video.avi"))}
     if name == "sources.recording":
         values |= {"file": str(_log(folder / "run.mcap")), "signal": "eyes.centres"}
-    given = {key: values[key] for key in required}
+    given = {key: values[key] for key in required} | told
     if "latency" in block.interface.params:
         given["latency"] = 0.15
     inputs: dict[str, list[Any]] = {}

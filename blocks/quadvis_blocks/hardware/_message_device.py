@@ -11,11 +11,13 @@ from quadvis.block import Line, Param, ParameterError
 from quadvis.block.block import RESERVED
 from quadvis.errors import DiagramError, Fault, quoted, sentence, suggestion
 from quadvis.machine.inputs import read_once
+from quadvis_blocks.hardware._protocol.decode import Decoded, Decoding, decoding
 from quadvis_blocks.hardware._protocol.description import (
     DeviceProtocol,
     NamedValue,
     ProtocolMessage,
 )
+from quadvis_blocks.hardware._protocol.encode import encode
 from quadvis_blocks.hardware._protocol.formats import Written, message_of
 from quadvis_blocks.hardware._protocol.leaks import wrong_per_million
 from quadvis_blocks.hardware._protocol.reading import read_protocol
@@ -50,6 +52,16 @@ class DescribedMessage:
         read: Any = getattr(self, "read_file")  # noqa: B009  # of the block that this class is a base of
         written = Written(*map(str, texts))
         return chosen(str(self.protocol), str(self.message), written, lambda: read("protocol", read_protocol))
+
+    @cached_property
+    def _decode(self) -> Decoding:
+        return decoding(self.described.message)
+
+    def on_wire(self, values: Sequence[Any]) -> tuple[Any, ...]:
+        """Return values as who receives their message has them."""
+        found = self._decode(encode(self.described.message, values))
+        assert isinstance(found, Decoded)
+        return found.values
 
     @property
     def described_by(self) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,6 @@ from quadvis.errors import DiagramError, Fault
 from quadvis.machine.ports import PortSettings
 from quadvis_blocks.hardware._message_device import DescribedLine, check_names, chosen
 from quadvis_blocks.hardware._protocol.counting import MessageCounter
-from quadvis_blocks.hardware._protocol.decode import Decoded, Decoding, decoding
 from quadvis_blocks.hardware._protocol.encode import encode
 from quadvis_blocks.hardware._protocol.formats import Written
 
@@ -97,15 +95,10 @@ class MessageOut(DescribedLine, Output):
                 problem = f"{fixed.name} must lie between {low:g} and {high:g}, the range of {value.name}"
                 raise ParameterError(fixed.name, problem)
 
-    @cached_property
-    def _decode(self) -> Decoding:
-        return decoding(self.described.message)
-
     def output(self, *inputs: Any) -> Any:
         """Return what is sent."""
-        found = self._decode(encode(self.described.message, inputs))
-        assert isinstance(found, Decoded)
-        return found.values if len(found.values) > 1 else found.values[0]
+        sent = self.on_wire(inputs)
+        return sent if len(sent) > 1 else sent[0]
 
     def frame(self, *inputs: Any) -> bytes:
         """Return the message of some commands."""
