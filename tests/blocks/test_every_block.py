@@ -71,6 +71,8 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
         "highest": [1.0, 1.0, -1.0],
         "initial": [0.0, 0.0, 0.5],
         "safe": [0.0, 0.0, 0.0],
+        "ranges": [3, 3, 3],
+        "scale": [1.0, 2.0, -0.5],
         "model": str(ROOT / "diagrams" / "models" / "rotorcraft.xml"),
     }
     values |= {
@@ -78,6 +80,8 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
     }
     told = {"protocol": PROTOCOL} if "protocol" in block.interface.params else {}
     block = block.with_ports(told) if told else block
+    if name == "hardware.digital_out":
+        values["initial"] = [0, 1, 0]
     required = [key for key, param in block.interface.params.items() if param.required]
     if {"file", "folder"} & {*required}:  # few blocks read or write files, and all tests come by here
         folder = request.getfixturevalue("tmp_path")
