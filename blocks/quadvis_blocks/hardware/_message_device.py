@@ -26,8 +26,24 @@ Read = Callable[[], DeviceProtocol]
 LEAKY = 1.0  # of a million messages that may give wrong values; a checksum of which more do is a doubt
 
 
-class DescribedMessage:
-    """Which message a block takes or sends: a base class beside that of the device."""
+class BlockMessage:
+    """What the blocks that take or send a message have in common: a base class beside that of the device."""
+
+    described: Any  # Chosen, from the block's parameters
+
+    @cached_property
+    def _decode(self) -> Decoding:
+        return decoding(self.described.message)
+
+    def on_wire(self, values: Sequence[Any]) -> tuple[Any, ...]:
+        """Return values as who receives their message has them."""
+        found = self._decode(encode(self.described.message, values))
+        assert isinstance(found, Decoded)
+        return found.values
+
+
+class DescribedMessage(BlockMessage):
+    """Which message a block takes or sends, by a file or by a format."""
 
     protocol = Param("", type="file", doc="file that describes the protocol (YAML); or give a format")
     message = Param("", type="str", doc="name of the message; none if the protocol has one only")
@@ -52,16 +68,6 @@ class DescribedMessage:
         read: Any = getattr(self, "read_file")  # noqa: B009  # of the block that this class is a base of
         written = Written(*map(str, texts))
         return chosen(str(self.protocol), str(self.message), written, lambda: read("protocol", read_protocol))
-
-    @cached_property
-    def _decode(self) -> Decoding:
-        return decoding(self.described.message)
-
-    def on_wire(self, values: Sequence[Any]) -> tuple[Any, ...]:
-        """Return values as who receives their message has them."""
-        found = self._decode(encode(self.described.message, values))
-        assert isinstance(found, Decoded)
-        return found.values
 
     @property
     def described_by(self) -> str:

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
-from quadvis.block import Declared, In, Initial, Line, Out, Output, Param, ParameterError, Safe, Sealer
-from quadvis.errors import DiagramError, Fault
-from quadvis.machine.ports import PortSettings
-from quadvis_blocks.hardware._message_device import DescribedLine, check_names, chosen
+from quadvis.block import Declared, Line, Output, Param, PortSettings, Sealer
+from quadvis_blocks.hardware._message_device import DescribedLine, chosen
 from quadvis_blocks.hardware._protocol.counting import MessageCounter
 from quadvis_blocks.hardware._protocol.encode import encode
 from quadvis_blocks.hardware._protocol.formats import Written
+from quadvis_blocks.hardware._sent_message import SentMessage, sent_ports
 
 
-class MessageOut(DescribedLine, Output):
+class MessageOut(SentMessage, DescribedLine, Output):
     """Commands to other people's devices, over a serial line or as datagrams: lines of text, or bytes.
 
     A file describes the protocol (see blocks/README.md), or a format in the diagram, as xPC Target's blocks
@@ -24,7 +21,7 @@ class MessageOut(DescribedLine, Output):
     range of a value stays at its end.
 
     What the protocol says under ``initialise`` is sent before the first message, and what it says under
-    ``terminate`` after the last one: after the safe messages of the time ``hold``, if that is not 0.
+    ``terminate`` after the last one: after the safe messages of the ``hold_time``, if that is not 0.
     """
 
     line = Line("baud")
@@ -57,48 +54,13 @@ class MessageOut(DescribedLine, Output):
         """Return an input for each value of the message, with its two values, and what is sent of it."""
         written = Written(format, names, units, ranges, header, terminator, checksum)
         values = chosen(protocol, message, written).message.values
-        made = ("initial_{}", "safe_{}", "sent_{}") if len(values) > 1 else ()
-        check_names(values, cls, made)
-        found: dict[str, Declared] = {}
-        for value in values:
-            name, unit = value.name, str(value.unit)
-            words = value.doc or f"'{name}' of the message"
-            behind = f"_{name}" if len(values) > 1 else ""
-            found[name] = In(value.type, unit=unit, doc=words)
-            found[f"initial{behind}"] = Initial(name, doc=f"{name} before the first command")
-            found[f"safe{behind}"] = Safe(name, doc=f"{name} at every end of a run")
-            found[f"sent{behind}"] = Out(value.type, unit=unit, doc=f"{name} as it is on the wire")
-        return found
+        return sent_ports(cls, values)
 
     @property
     def settings(self) -> PortSettings:
         """The settings of the port."""
         found = super().settings
         return self.line_settings() if isinstance(found, Line) else found
-
-    def check(self) -> None:
-        """Refuse values without a range, and initial and safe values beyond it."""
-        message = self.described.message
-        bare = [value for value in message.values if not message.is_bounded(value)]
-        if bare and self.format:
-            raise ParameterError(
-                "ranges", f"'{bare[0].name}' is sent, so it needs a range; write such as -1..1"
-            )
-        if bare:
-            problem, remedy = "'{}' is sent, so it needs a range", "add such as 'range: [-1, 1]'"
-            raise DiagramError([Fault(each.place, "", problem.format(each.name), remedy) for each in bare])
-        names = {value.name: value for value in message.values}
-        for fixed in (*self.initial_values.values(), *self.interface.safe.values()):
-            given, value = np.asarray(getattr(self, fixed.name)), names[fixed.input]
-            low, high = value.bounds
-            if ((given < low) | (given > high)).any():
-                problem = f"{fixed.name} must lie between {low:g} and {high:g}, the range of {value.name}"
-                raise ParameterError(fixed.name, problem)
-
-    def output(self, *inputs: Any) -> Any:
-        """Return what is sent."""
-        sent = self.on_wire(inputs)
-        return sent if len(sent) > 1 else sent[0]
 
     def frame(self, *inputs: Any) -> bytes:
         """Return the message of some commands."""

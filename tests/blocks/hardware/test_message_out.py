@@ -112,9 +112,9 @@ def test_what_is_sent_needs_a_range(tmp_path: Path) -> None:
         (
             {"safe_thrust": [0.2, 0.2, 0.2, 2.1]},
             "safe_thrust",
-            "safe_thrust must lie between 0 and 2, the range",
+            "safe_thrust must lie between 0 and 2, as thrust",
         ),
-        ({"initial_lamp": 2}, "initial_lamp", "initial_lamp must lie between 0 and 1, the range of lamp"),
+        ({"initial_lamp": 2}, "initial_lamp", "initial_lamp must lie between 0 and 1, as lamp does"),
         ({"initial_thrust": [1.0]}, "initial_thrust", "initial_thrust must be 4 values"),
         ({"baud": 300, "spacing": 0.1}, "spacing", "a frame of 12 bytes takes 400 ms at 300 baud 8N1"),
         ({"safe": 0}, "safe", "MessageOut has no parameter 'safe'"),

@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, TypeGuard
 
 from quadvis.block import Line
 from quadvis.errors import Place
@@ -212,12 +212,26 @@ class ProtocolMessage:
             checked = len(self.check.mark) + self.check.algorithm.size * (2 if self.is_text else 1)
         return len(self.header) + sum(each.size for each in self.fields) + checked + len(self.terminator)
 
-    def is_bounded(self, value: NamedValue) -> bool:
-        """Return whether a value has a least and a greatest number, by its range, its words or its form."""
-        if value.lowest is not None or value.words:
-            return True
-        whole = [each for each in self.fields if isinstance(each, BitField) or is_whole_binary(each)]
-        return any(value in values_of(each) for each in whole)
+    def limits(self, value: NamedValue) -> tuple[float, float]:
+        """Return the least and the greatest SI value that can be sent; infinite if nothing limits it."""
+        low, high = self._form_limits(value)
+        ends = sorted(end * value.factor + value.shift for end in (low, high))
+        lowest = -math.inf if value.lowest is None else value.lowest
+        highest = math.inf if value.highest is None else value.highest
+        return max(lowest, ends[0]), min(highest, ends[1])
+
+    def _form_limits(self, value: NamedValue) -> tuple[float, float]:
+        """Return the least and the greatest number on the wire, of a whole one, or one that words mean."""
+        if value.words:
+            return min(value.words.values()), max(value.words.values())
+        for each in self.fields:
+            if isinstance(each, BitField):
+                found = [run.limits for run in each.runs if run.value == value]
+            else:
+                found = [each.form.limits] if is_whole_binary(each) and value in values_of(each) else []
+            if found:
+                return found[0]
+        return -math.inf, math.inf
 
     @property
     def is_marked(self) -> bool:
@@ -232,7 +246,7 @@ def values_of(each: WireField) -> list[NamedValue]:
     return [each.value] if isinstance(each, ValueField) else []
 
 
-def is_whole_binary(each: WireField) -> bool:
+def is_whole_binary(each: WireField) -> TypeGuard[ValueField]:
     """Return whether a field is a whole number in bytes."""
     return isinstance(each, ValueField) and isinstance(each.form, Binary) and each.form.is_whole
 

@@ -108,9 +108,6 @@ def _text(each: ValueField, value: float) -> bytes:
         return b""
     number = wire_number(each, value)
     if named.words:
-        word = next((word for word, meant in named.words.items() if meant == number), None)
-        if word is None:
-            raise ValueError(f"{named.name} has no word for {number:g}")
-        return word
+        return min(named.words, key=lambda word: abs(named.words[word] - number))
     assert isinstance(each.form, Printed)
     return each.form.print(number)
