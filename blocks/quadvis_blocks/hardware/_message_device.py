@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
-from quadvis.block import Line, Param, ParameterError
+from quadvis.block import Line, Out, Param, ParameterError
 from quadvis.block.block import RESERVED
 from quadvis.errors import DiagramError, Fault, quoted, sentence, suggestion
 from quadvis.machine.inputs import read_once
@@ -129,15 +129,35 @@ def chosen(protocol: str, message: str, written: Written, read: Read | None = No
     for name, value in written._asdict().items():
         if value:
             raise ParameterError(name, f"{name} goes with a format, and the protocol says it; leave it out")
-    found = read() if read is not None else read_once(read_protocol, protocol)
-    if not message and len(found.messages) == 1:
-        return Chosen(found, next(iter(found.messages.values())))
-    if message not in found.messages:
-        names = list(found.messages)
-        problem = f"there is no message '{message}' in the protocol" if message else "message is missing"
-        remedy = suggestion(message, names) or f"choose from {', '.join(names)}"
-        raise ParameterError("message", sentence(problem, remedy))
-    return Chosen(found, found.messages[message])
+    found = named(read() if read is not None else read_once(read_protocol, protocol), message)
+    if found.message.frame_id is not None:
+        problem = f"message '{found.message.name}' has an id, so it is a frame on a CAN bus"
+        raise ParameterError("message", sentence(problem, "use hardware.can_in or hardware.can_out"))
+    return found
+
+
+def named(protocol: DeviceProtocol, name: str) -> Chosen:
+    """Return the message of a name, or the only one; ParameterError if there is none."""
+    if not name and len(protocol.messages) == 1:
+        return Chosen(protocol, next(iter(protocol.messages.values())))
+    if name not in protocol.messages:
+        problem = f"there is no message '{name}' in the protocol" if name else "message is missing"
+        raise ParameterError("message", sentence(problem, suggestion(name, protocol.messages)))
+    return Chosen(protocol, protocol.messages[name])
+
+
+def received_ports(kind: Any, values: Sequence[NamedValue]) -> dict[str, Out]:
+    """Return an output for each value of a message that comes; ``kind`` is the class of the block."""
+    check_names(values, kind, ())
+    return {
+        value.name: Out(
+            value.type,
+            unit=str(value.unit),
+            nan=value.optional,
+            doc=value.doc or f"'{value.name}' of the message",
+        )
+        for value in values
+    }
 
 
 def check_names(values: Sequence[NamedValue], taken: Any, made: Sequence[str]) -> None:

@@ -9,9 +9,9 @@ from quadvis.block import Counted, Input, Line, Out, Param, ParameterError
 from quadvis.machine.ports import PortSettings
 from quadvis_blocks.hardware._message_device import (
     DescribedLine,
-    check_names,
     chosen,
     doubt_about,
+    received_ports,
 )
 from quadvis_blocks.hardware._protocol.finder import Finder
 from quadvis_blocks.hardware._protocol.formats import Written
@@ -51,17 +51,7 @@ class MessageIn(DescribedLine, Input):
     ) -> dict[str, Out]:
         """Return an output for each value of the message."""
         written = Written(format, names, units, ranges, header, terminator, checksum)
-        values = chosen(protocol, message, written).message.values
-        check_names(values, cls, ())
-        return {
-            value.name: Out(
-                value.type,
-                unit=str(value.unit),
-                nan=value.optional,
-                doc=value.doc or f"'{value.name}' of the message",
-            )
-            for value in values
-        }
+        return received_ports(cls, chosen(protocol, message, written).message.values)
 
     @property
     def settings(self) -> PortSettings:

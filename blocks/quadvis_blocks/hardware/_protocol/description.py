@@ -167,11 +167,19 @@ class Check(NamedTuple):
     mark: bytes = b""
 
 
+class FrameId(NamedTuple):
+    """The identifier of a frame on a CAN bus: of 11 bits, or of 29 if it is ``extended``."""
+
+    number: int
+    extended: bool = False
+
+
 @dataclass(frozen=True)
 class ProtocolMessage:
     """A message: its header, its fields in the order of the wire, its checksum if it has one, its terminator.
 
-    In text, what stands between fields is a `FixedBytes` among them.
+    In text, what stands between fields is a `FixedBytes` among them. A message with a ``frame_id`` is a frame
+    on a CAN bus, which has neither header nor terminator.
     """
 
     name: str
@@ -182,6 +190,7 @@ class ProtocolMessage:
     terminator: bytes
     doc: str = ""
     request: bytes = b""  # sent at each step of the block that reads it
+    frame_id: FrameId | None = None
     place: Place = field(default=NOWHERE, compare=False)
 
     @cached_property

@@ -42,7 +42,7 @@ class Finder:
         starts |= {wanted.header} if _is_sealed_line(wanted) else set()
         self._next = re.compile(b"|".join(map(re.escape, sorted(starts, key=len)))).search
         self._longest_start = max(map(len, starts))
-        self._counter, self._modulus = -1, wanted.modulus
+        self._gap = Gap(wanted.modulus)
         self._tally: Tally = tally(wanted)
 
     def take(self, received: bytearray, *, is_whole: bool = False) -> Iterator[Values | Counted]:
@@ -95,16 +95,26 @@ class Finder:
         elif found is Counted.OTHER:
             yield found
         else:
-            yield from [Counted.LOST] * self._gap(found.counter)
+            yield from [Counted.LOST] * self._gap.before(found.counter)
             yield found.values
 
-    def _gap(self, counter: int) -> int:
-        """Return how many messages are missing before this one; a sender that began anew has missed none."""
-        if counter < 0:
+
+class Gap:
+    """Counts the messages that are missing, by the numbers that the others have: 0 to ``modulus`` - 1."""
+
+    def __init__(self, modulus: int) -> None:
+        self._modulus, self._last = modulus, -1
+
+    def before(self, number: int) -> int:
+        """Return how many are missing before a message; a sender that began anew has missed none.
+
+        -1 is a message without a number.
+        """
+        if number < 0:
             return 0
-        ahead = (counter - self._counter) % self._modulus
-        missing = ahead - 1 if self._counter >= 0 and 0 < ahead <= self._modulus // 2 else 0
-        self._counter = counter
+        ahead = (number - self._last) % self._modulus
+        missing = ahead - 1 if self._last >= 0 and 0 < ahead <= self._modulus // 2 else 0
+        self._last = number
         return missing
 
 

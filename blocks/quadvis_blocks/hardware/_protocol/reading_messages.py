@@ -21,6 +21,7 @@ from quadvis_blocks.hardware._protocol.description import (
     Check,
     CounterField,
     FixedBytes,
+    FrameId,
     ProtocolMessage,
     ValueField,
     WireField,
@@ -29,11 +30,12 @@ from quadvis_blocks.hardware._protocol.forms import BITS, ORDERS
 from quadvis_blocks.hardware._protocol.reading_fields import LengthField, ReadField, is_text_field
 
 REQUIRED = ("fields", "checksum")
-OPTIONAL = ("doc", "header", "terminator", "separator", "order", "request")
+OPTIONAL = ("doc", "header", "terminator", "separator", "order", "request", "id", "extended")
 CHECK_KEYS = ("over", "order", "mark", "width", "polynomial", "initial", "reflected", "final")
 CRC = "crc"
 MARK = b"*"
 MOST_FIELDS = 200
+CAN_BYTES = 8  # of a frame
 PRINTABLE = range(0x20, 0x7F)
 
 
@@ -79,9 +81,31 @@ class _Reader:
         if len(self.faults) > self.before:
             return None
         made = ProtocolMessage(
-            self.name, self.is_text, header, (), check, terminator, text, request, self.given.place
+            self.name, self.is_text, header, (), check, terminator, text, request, place=given.place
         )
-        return self._checked(replace(made, fields=self._laid_out(fields, separator, made)))
+        whole = replace(made, fields=self._laid_out(fields, separator, made))
+        return self._checked(replace(whole, frame_id=self._frame_id(whole)))
+
+    def _frame_id(self, message: ProtocolMessage) -> FrameId | None:
+        """Return the identifier of a frame on a CAN bus; None if the message has none."""
+        given = self.given
+        if "id" not in given:
+            if "extended" in given:
+                self.faults.add(given.keys["extended"].place, "'extended' belongs to an 'id'", "give it")
+            return None
+        for key in ("header", "terminator", "separator", "request"):
+            if key in given:
+                self.faults.add(given.keys[key].place, f"a frame with an id has no '{key}'", "leave it out")
+        extended = self.faults.collect(given["extended"].boolean) if "extended" in given else False
+        number = self.faults.collect(whole_number, given["id"])
+        bits = 29 if extended else 11
+        if number is not None and not 0 <= number < 1 << bits:
+            remedy = "" if extended or number < 0 else "write 'extended: true' for one of 29 bits"
+            self.faults.append(given["id"].wrong(f"a whole number of {bits} bits", remedy).faults[0])
+        if message.is_text or message.size > CAN_BYTES:
+            problem = f"a frame with an id has {CAN_BYTES} bytes at most, and no text"
+            self.faults.add(given["fields"].place, problem, f"these are {message.size} bytes")
+        return FrameId(number or 0, bool(extended))
 
     def _bytes(self, key: str) -> bytes:
         node = self.given.get(key)
