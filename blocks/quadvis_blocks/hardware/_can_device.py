@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
 
 from quadvis.block import Param, ParameterError
 from quadvis.errors import sentence
@@ -27,8 +26,7 @@ class CanFrame(BlockMessage):
     @cached_property
     def described(self) -> Chosen:
         """The frame, and the protocol that it belongs to."""
-        read: Any = getattr(self, "read_file")  # noqa: B009  # of the block that this class is a base of
-        return frame_of(read("protocol", read_protocol), str(self.message))
+        return frame_of(self.read_file("protocol", read_protocol), str(self.message))
 
     @property
     def frame_id(self) -> FrameId:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import keyword
 from collections.abc import Callable, Sequence
-from functools import cached_property
-from typing import Any, NamedTuple
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from quadvis.block import Line, Out, Param, ParameterError
 from quadvis.block.block import RESERVED
@@ -22,11 +22,16 @@ from quadvis_blocks.hardware._protocol.formats import Written, message_of
 from quadvis_blocks.hardware._protocol.leaks import wrong_per_million
 from quadvis_blocks.hardware._protocol.reading import read_protocol
 
+if TYPE_CHECKING:
+    from quadvis.block import Block as _Base
+else:
+    _Base = object  # a block has its base class from its device
+
 Read = Callable[[], DeviceProtocol]
 LEAKY = 1.0  # of a million messages that may give wrong values; a checksum of which more do is a doubt
 
 
-class BlockMessage:
+class BlockMessage(_Base):
     """What the blocks that take or send a message have in common: a base class beside that of the device."""
 
     described: Any  # Chosen, from the block's parameters
@@ -65,9 +70,8 @@ class DescribedMessage(BlockMessage):
     def described(self) -> Chosen:
         """The message, and the protocol that it belongs to."""
         texts = self.format, self.names, self.units, self.ranges, self.header, self.terminator, self.checksum
-        read: Any = getattr(self, "read_file")  # noqa: B009  # of the block that this class is a base of
-        written = Written(*map(str, texts))
-        return chosen(str(self.protocol), str(self.message), written, lambda: read("protocol", read_protocol))
+        read = partial(self.read_file, "protocol", read_protocol)
+        return chosen(str(self.protocol), str(self.message), Written(*map(str, texts)), read)
 
     @property
     def described_by(self) -> str:
