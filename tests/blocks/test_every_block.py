@@ -78,6 +78,11 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
         "highest": [1.0, 1.0, -1.0],
         "initial": [0.0, 0.0, 0.5],
         "safe": [0.0, 0.0, 0.0],
+        "roles": "stick throttle switch",
+        "codes": "ABS_X ABS_Y BTN_TR",
+        "dead_man": "BTN_TL",
+        "shortest": [1000.0, 1000.0, 900.0],
+        "longest": [2000.0, 2000.0, 2100.0],
         "ranges": [3, 3, 3],
         "scale": [1.0, 2.0, -0.5],
         "model": str(ROOT / "diagrams" / "models" / "rotorcraft.xml"),
@@ -85,7 +90,7 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
     values |= {
         f"{kind}_{key}": [0.0] * size if size else 0.0 for kind in ("initial", "safe") for key, size in SENT
     }
-    told = {"protocol": PROTOCOL} if "protocol" in block.interface.params else {}
+    told = {"protocol": PROTOCOL} if name.startswith("hardware.message_") else {}
     if name.startswith("hardware.can_"):
         told = {"protocol": written(request.getfixturevalue("tmp_path")), "message": "actuator"}
         values["port"] = "can:virtual:conformance"

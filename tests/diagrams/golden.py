@@ -15,7 +15,7 @@ import json
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -44,8 +44,19 @@ def every_case() -> Iterator[tuple[str, str | None, bool]]:
             lineage = [variant]
             while base := lineage[-1].get("base"):
                 lineage.append(variants[base])
-            kinds = [block.get("block") for each in lineage for block in each.get("slots", {}).values()]
-            yield path.name, name, any(issubclass(catalogue.find(kind), Device) for kind in kinds if kind)
+            slots = [block for each in lineage for block in each.get("slots", {}).values()]
+            yield path.name, name, any(issubclass(catalogue.find(kind), Device) for kind in kinds(slots))
+
+
+def kinds(blocks: Iterable[dict[str, Any]], folder: Path = DIAGRAMS) -> Iterator[str]:
+    """Yield the names of the classes of blocks, those in parts included."""
+    for block in blocks:
+        if "part" in block:
+            part = folder / block["part"]
+            inside = yaml.load(part.read_text(), yaml.CSafeLoader)["blocks"]
+            yield from kinds(inside.values(), part.parent)
+        else:
+            yield block["block"]
 
 
 @cache

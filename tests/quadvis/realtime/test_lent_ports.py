@@ -37,7 +37,7 @@ blocks:
     block: hardware.sbus_in
     rate: slow
     at: hearer
-    with: {port: "BACK", channels: [1], lowest: [0], highest: [1]}
+    with: {port: "BACK", channels: [1], lowest: [0], highest: [1], roles: throttle}
 """
 
 

@@ -248,7 +248,7 @@ def test_a_cable_brings_the_commands_to_an_input() -> None:
     write("pty:rc")
     more = (
         '  back: {block: hardware.sbus_in, rate: fast, with: {port: "pty:rc", channels: [1], lowest: [0], '
-        "highest: [1]}}\n"
+        "highest: [1], roles: stick}}\n"
     )
     Path("flight.yaml").write_text(Path("flight.yaml").read_text() + more)
     result = quadvis.load("flight.yaml", stop_time="1 s").run(
@@ -281,7 +281,7 @@ blocks:
     block: hardware.sbus_in
     rate: fast
     at: target
-    with: {port: "pty:rc", channels: [1], lowest: [0], highest: [1]}
+    with: {port: "pty:rc", channels: [1], lowest: [0], highest: [1], roles: stick}
 """
 
 

@@ -28,7 +28,7 @@ class comedi_range:  # the library's name
     """A range."""
 
     def __init__(self, least: float = 0.0, most: float = 0.0, unit: int = UNIT_volt) -> None:
-        self.min, self.max, self.unit = least, most, unit
+        self.min, self.max, self.unit = float(least), float(most), unit
 
 
 OUTPUTS = [

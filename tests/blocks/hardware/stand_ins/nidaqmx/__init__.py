@@ -84,7 +84,7 @@ class Task:
         if kind == "ao":
             if not settings[0] <= data <= settings[1]:
                 raise errors.DaqError("Requested value is not supported for this property value.", -200077)
-            card.wrote("analog", place, data)
+            card.wrote("analog_ni", place, data)
         else:
             assert type(data) is bool
             card.wrote("digital", place, data)
