@@ -7,9 +7,10 @@ from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from quadvis.block import Line, Out, Param, ParameterError
+from quadvis.block import Line, Out, Param, ParameterError, PortSettings
 from quadvis.block.block import RESERVED
 from quadvis.errors import DiagramError, Fault, quoted, sentence, suggestion
+from quadvis.machine.datagrams import Datagrams
 from quadvis.machine.inputs import read_once
 from quadvis_blocks.hardware._protocol.decode import Decoded, Decoding, decoding
 from quadvis_blocks.hardware._protocol.description import (
@@ -18,7 +19,7 @@ from quadvis_blocks.hardware._protocol.description import (
     ProtocolMessage,
 )
 from quadvis_blocks.hardware._protocol.encode import encode
-from quadvis_blocks.hardware._protocol.formats import Written, message_of
+from quadvis_blocks.hardware._protocol.formats import WrittenMessage, message_of
 from quadvis_blocks.hardware._protocol.leaks import wrong_per_million
 from quadvis_blocks.hardware._protocol.reading import read_protocol
 
@@ -71,7 +72,7 @@ class DescribedMessage(BlockMessage):
         """The message, and the protocol that it belongs to."""
         texts = self.format, self.names, self.units, self.ranges, self.header, self.terminator, self.checksum
         read = partial(self.read_file, "protocol", read_protocol)
-        return chosen(str(self.protocol), str(self.message), Written(*map(str, texts)), read)
+        return chosen(str(self.protocol), str(self.message), WrittenMessage(*map(str, texts)), read)
 
     @property
     def described_by(self) -> str:
@@ -97,8 +98,10 @@ class DescribedLine(DescribedMessage):
         doc="time that the device needs to start after the port was opened; 0 is that of the protocol",
     )
 
-    def line_settings(self) -> Line:
-        """Return the settings of the line: those of the protocol, but for what the block itself says."""
+    def port_settings(self, found: PortSettings) -> PortSettings:
+        """Return the settings of the port: those of the protocol, but for what the block itself says."""
+        if not isinstance(found, Line):
+            return found._replace(settle=float(self.settle)) if isinstance(found, Datagrams) else found
         told = self.described.protocol.line or Line(0)
         baud = int(self.baud) or int(told.baud)
         if not baud:
@@ -119,7 +122,7 @@ class Chosen(NamedTuple):
     message: ProtocolMessage
 
 
-def chosen(protocol: str, message: str, written: Written, read: Read | None = None) -> Chosen:
+def chosen(protocol: str, message: str, written: WrittenMessage, read: Read | None = None) -> Chosen:
     """Return the message that a block's parameters describe; ParameterError or DiagramError if they do not.
 
     ``read`` reads the file of a protocol.

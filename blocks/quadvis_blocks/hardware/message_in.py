@@ -14,7 +14,7 @@ from quadvis_blocks.hardware._message_device import (
     received_ports,
 )
 from quadvis_blocks.hardware._protocol.finder import Finder
-from quadvis_blocks.hardware._protocol.formats import Written
+from quadvis_blocks.hardware._protocol.formats import WrittenMessage
 
 
 class MessageIn(DescribedLine, Input):
@@ -50,14 +50,13 @@ class MessageIn(DescribedLine, Input):
         checksum: str,
     ) -> dict[str, Out]:
         """Return an output for each value of the message."""
-        written = Written(format, names, units, ranges, header, terminator, checksum)
+        written = WrittenMessage(format, names, units, ranges, header, terminator, checksum)
         return received_ports(cls, chosen(protocol, message, written).message.values)
 
     @property
     def settings(self) -> PortSettings:
         """The settings of the port."""
-        found = super().settings
-        return self.line_settings() if isinstance(found, Line) else found
+        return self.port_settings(super().settings)
 
     def check(self) -> None:
         """Refuse a message that could not be found in a stream of bytes."""

@@ -8,7 +8,7 @@ from quadvis.block import Declared, Line, Output, Param, PortSettings, Sealer
 from quadvis_blocks.hardware._message_device import DescribedLine, chosen
 from quadvis_blocks.hardware._protocol.counting import MessageCounter
 from quadvis_blocks.hardware._protocol.encode import encode
-from quadvis_blocks.hardware._protocol.formats import Written
+from quadvis_blocks.hardware._protocol.formats import WrittenMessage
 from quadvis_blocks.hardware._sent_message import SentMessage, sent_ports
 
 
@@ -52,15 +52,14 @@ class MessageOut(SentMessage, DescribedLine, Output):
         checksum: str,
     ) -> dict[str, Declared]:
         """Return an input for each value of the message, with its two values, and what is sent of it."""
-        written = Written(format, names, units, ranges, header, terminator, checksum)
+        written = WrittenMessage(format, names, units, ranges, header, terminator, checksum)
         values = chosen(protocol, message, written).message.values
         return sent_ports(cls, values)
 
     @property
     def settings(self) -> PortSettings:
         """The settings of the port."""
-        found = super().settings
-        return self.line_settings() if isinstance(found, Line) else found
+        return self.port_settings(super().settings)
 
     def frame(self, *inputs: Any) -> bytes:
         """Return the message of some commands."""

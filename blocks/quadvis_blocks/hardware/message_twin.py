@@ -6,7 +6,7 @@ from typing import Any
 
 from quadvis.block import Block, Declared, In, Out
 from quadvis_blocks.hardware._message_device import DescribedMessage, check_names, chosen
-from quadvis_blocks.hardware._protocol.formats import Written
+from quadvis_blocks.hardware._protocol.formats import WrittenMessage
 
 
 class MessageTwin(DescribedMessage, Block, numeric=False):
@@ -37,7 +37,7 @@ class MessageTwin(DescribedMessage, Block, numeric=False):
         checksum: str,
     ) -> dict[str, Declared]:
         """Return an input and an output for each value of the message."""
-        written = Written(format, names, units, ranges, header, terminator, checksum)
+        written = WrittenMessage(format, names, units, ranges, header, terminator, checksum)
         values = chosen(protocol, message, written).message.values
         check_names(values, cls, ("true_{}",))
         found: dict[str, Declared] = {}

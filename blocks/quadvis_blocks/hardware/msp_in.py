@@ -56,7 +56,7 @@ class MspIn(Input):
 
     Signs are those of this library: Betaflight's pitch and its rates of pitch and yaw have the other sign.
     Attitudes come in tenths of a degree, yaw and rates in whole degrees, which is coarse for a control law.
-    With 1 % of the bytes damaged some 20 of a million attitudes would be wrong in spite of the checksum of v2.
+    With 1 % of the bytes damaged some 20 of a million attitudes would be wrong in spite of v2's checksum.
     An input may have the port of an ``hardware.msp_rc_out``, written alike.
     """
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import quadvis
 from quadvis.block import Line, ParameterError
 from quadvis.errors import DiagramError
 from quadvis.machine.datagrams import Datagrams
@@ -69,6 +70,7 @@ def test_outputs_follow_from_the_protocol() -> None:
     assert block.settings == Line(230400)
     assert MessageIn(port="pty:imu", protocol=LAB, baud=9600, rts=True).settings == Line(9600, rts=True)
     assert MessageIn(port="udp::4000", protocol=LAB).settings == Datagrams(False)
+    assert MessageIn(port="udp::4000", protocol=LAB, settle=2.0).settings.settle == 2.0
 
 
 def test_the_newest_message_counts_and_ages() -> None:
@@ -233,3 +235,21 @@ def test_a_weak_checksum_is_a_warning_that_says_what_to_expect(tmp_path: Path) -
         (doubt,) = MessageIn(port="pty:imu", protocol=str(path)).doubts()
         assert words in str(doubt) and doubt.parameter == "protocol"
     assert MessageIn(port="pty:imu", protocol=LAB).doubts() == []
+
+
+def test_check_reports_all_faults_of_the_file_at_their_places(tmp_path: Path) -> None:
+    text = Path(LAB).read_text().replace("%.6f", "%s").replace("crc16_ccitt_false", "crc16")
+    (tmp_path / "imu.yaml").write_text(text)
+    head = "quadvis: 1\nname: x\nrates: {fast: 100 Hz}\nstop_time: 1 s\nblocks:\n"
+    entry = "  imu: {block: hardware.message_in, rate: fast, with: {port: pty:imu, protocol: imu.yaml}}\n"
+    (tmp_path / "x.yaml").write_text(head + entry)
+    with pytest.raises(DiagramError) as caught:
+        quadvis.load(tmp_path / "x.yaml")
+    places = [(Path(fault.place.file).name, fault.place.line) for fault in caught.value.faults]
+    assert places == [("imu.yaml", line) for line in (13, 14, 15, 17)]
+    assert all(fault.subject == "block 'imu', protocol 'lab_imu'" for fault in caught.value.faults)
+    (tmp_path / "x.yaml").write_text(head + entry.replace("imu.yaml", "imv.yaml"))
+    with pytest.raises(DiagramError) as caught:
+        quadvis.load(tmp_path / "x.yaml")
+    (fault,) = caught.value.faults
+    assert (Path(fault.place.file).name, fault.problem) == ("x.yaml", "'imv.yaml': there is no such file")

@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 from quadvis.block import Counted
+from quadvis_blocks.hardware._protocol.damage import DamageCount, damage_count
 from quadvis_blocks.hardware._protocol.decode import Damage, decoding
 from quadvis_blocks.hardware._protocol.description import LONGEST_TEXT, ProtocolMessage
 from quadvis_blocks.hardware._protocol.encode import DIGITS
-from quadvis_blocks.hardware._protocol.tally import Tally, tally
 
 Values = tuple[Any, ...]
 
@@ -43,7 +43,7 @@ class Finder:
         self._next = re.compile(b"|".join(map(re.escape, sorted(starts, key=len)))).search
         self._longest_start = max(map(len, starts))
         self._gap = Gap(wanted.modulus)
-        self._tally: Tally = tally(wanted)
+        self._damage: DamageCount = damage_count(wanted)
 
     def take(self, received: bytearray, *, is_whole: bool = False) -> Iterator[Values | Counted]:
         """Take whole messages off the beginning of ``received``; leave there what may become one.
@@ -59,7 +59,7 @@ class Finder:
             waits = seen is WAIT and not is_whole
             good = begin if seen.length > 0 or waits else min(begin + 1, end)
             if good > at and not is_whole:
-                yield from [Counted.REFUSED] * self._tally.reject(received, at, good)
+                yield from [Counted.REFUSED] * self._damage.reject(received, at, good)
             is_spoilt |= good > at and is_whole
             if waits:
                 at = good
@@ -89,7 +89,7 @@ class Finder:
         return WAIT if waits else NOT_HERE
 
     def _found(self, found: Any) -> Iterator[Values | Counted]:
-        yield from [Counted.REFUSED] * self._tally.close()
+        yield from [Counted.REFUSED] * self._damage.close()
         if found is Damage.VALUE:
             yield Counted.REFUSED
         elif found is Counted.OTHER:

@@ -38,7 +38,7 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
 _PIECE = re.compile(r"%[^%a-zA-Z]*[a-zA-Z]|%%|[^%]+|%")
 
 
-class Written(NamedTuple):
+class WrittenMessage(NamedTuple):
     """A message as a diagram writes it; ``names``, ``units`` and ``ranges`` have blanks between them."""
 
     format: str
@@ -50,7 +50,7 @@ class Written(NamedTuple):
     checksum: str
 
 
-def message_of(written: Written) -> ProtocolMessage:
+def message_of(written: WrittenMessage) -> ProtocolMessage:
     """Return the message; ParameterError names the parameter that is wrong."""
     is_text = "%" in written.format
     header, terminator = (_bytes(name, getattr(written, name)) for name in ("header", "terminator"))
@@ -131,7 +131,7 @@ def _struct_fields(text: str) -> Iterator[WireField]:
         yield ValueField(form, NamedValue("", elements=count if match["count"] else 0, whole=whole))
 
 
-def _values(written: Written, count: int) -> list[NamedValue]:
+def _values(written: WrittenMessage, count: int) -> list[NamedValue]:
     """Return the values that the names, the units and the ranges describe."""
     names = written.names.split()
     if len(names) != count or not count:
@@ -145,7 +145,7 @@ def _values(written: Written, count: int) -> list[NamedValue]:
     return [_value(*each) for each in zip(names, units, ranges, strict=True)]
 
 
-def _each(written: Written, what: str, count: int) -> Sequence[str]:
+def _each(written: WrittenMessage, what: str, count: int) -> Sequence[str]:
     found = str(getattr(written, what)).split() or [""]
     if len(found) not in (1, count):
         raise ParameterError(what, f"{what} must be one for all names, or {count}, got {len(found)}")

@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from quadvis.block import ParameterError
 from quadvis_blocks.hardware._protocol.decode import Decoded, decoding
 from quadvis_blocks.hardware._protocol.encode import encode
-from quadvis_blocks.hardware._protocol.formats import Written, message_of
+from quadvis_blocks.hardware._protocol.formats import WrittenMessage, message_of
 
 
-def written(format: str, names: str, **others: str) -> Written:
+def written(format: str, names: str, **others: str) -> WrittenMessage:
     given = {"units": "", "ranges": "", "header": "", "terminator": "", "checksum": "none", **others}
-    return Written(format, names, **given)
+    return WrittenMessage(format, names, **given)
 
 
 @given(

@@ -9,7 +9,7 @@ from __future__ import annotations
 from quadvis_blocks.hardware._protocol.description import ProtocolMessage
 
 
-class Tally:
+class DamageCount:
     """Counts the damaged messages in rejected bytes."""
 
     def reject(self, received: bytearray, begin: int, end: int) -> int:
@@ -21,7 +21,7 @@ class Tally:
         raise NotImplementedError
 
 
-class _LineTally(Tally):
+class _LineCount(DamageCount):
     """Counts the ends of lines, and a line that lost its end."""
 
     def __init__(self, end: bytes) -> None:
@@ -49,7 +49,7 @@ class _LineTally(Tally):
         return count
 
 
-class _StretchTally(Tally):
+class _StretchCount(DamageCount):
     """Counts as many messages as the rejected bytes are long, and one at least."""
 
     def __init__(self, size: int) -> None:
@@ -69,6 +69,6 @@ class _StretchTally(Tally):
         return max(1, (2 * self._rejected + self._size) // (2 * self._size)) if self._rejected > 0 else 0
 
 
-def tally(message: ProtocolMessage) -> Tally:
+def damage_count(message: ProtocolMessage) -> DamageCount:
     """Return what counts the damaged ones among the messages of a kind."""
-    return _LineTally(message.terminator) if message.is_text else _StretchTally(message.size)
+    return _LineCount(message.terminator) if message.is_text else _StretchCount(message.size)
