@@ -18,13 +18,12 @@ from quadvis.diagram.sections.rates import RATES
 from quadvis.diagram.sections.solver import SOLVER
 from quadvis.diagram.spec import FileSpec
 from quadvis.diagram.times import time_text
-from quadvis.diagram.values import OpenUnits, read_parameter, read_value
+from quadvis.diagram.values import OpenUnits, file_fault, read_parameter, read_value
 from quadvis.diagram.wiring import OpenInput, Wiring
 from quadvis.document import YamlNode, YamlScalar
 from quadvis.errors import (
     UNKNOWN,
     DiagramError,
-    Fault,
     Faults,
     Place,
     QuadvisError,
@@ -237,7 +236,7 @@ class Builder:
             self.faults.add(self._place(flat, error), str(error))
         except DiagramError as error:
             for fault in error.faults:
-                self.faults.append(self._from_file(fault, flat, values))
+                self.faults.append(file_fault(fault, flat.parameters, values, self.faults.subject))
         except QuadvisError as error:
             self.faults.add(flat.spec.place, str(error))
         return UNKNOWN
@@ -246,16 +245,6 @@ class Builder:
     def _place(flat: FlatBlock, error: ParameterError) -> Place:
         node = flat.parameters.get(error.parameter, UNKNOWN)
         return node.place if known(node) else flat.spec.place
-
-    def _from_file(self, fault: Fault, flat: FlatBlock, values: Mapping[str, Any]) -> Fault:
-        """Return a fault of a file that a parameter names; one of the whole file is put where it is named."""
-        nodes = (flat.parameters[name] for name, value in values.items() if value == fault.place.file)
-        named = [node for node in nodes if known(node)]
-        if named and not fault.place.line:
-            problem = f"'{named[0].text()}': {fault.problem}"
-            return Fault(named[0].place, self.faults.subject, problem, fault.remedy)
-        subject = f"{self.faults.subject}, {fault.subject}" if fault.subject else self.faults.subject
-        return Fault(fault.place, subject, fault.problem, fault.remedy)
 
     def _connections(self, flat: FlatBlock, kind: type[Block]) -> Iterator[tuple[str, Connection]]:
         if flat.spec.inputs is UNKNOWN:

@@ -19,7 +19,7 @@ from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.ports import PORTS
 from quadvis.diagram.settings import Settings
 from quadvis.diagram.spec import FileSpec
-from quadvis.diagram.values import read_parameter, substitute
+from quadvis.diagram.values import file_fault, read_parameter, substitute
 from quadvis.document import YamlNode
 from quadvis.errors import (
     UNKNOWN,
@@ -235,6 +235,9 @@ class Expansion:
             given[name] = read[0]
         try:
             return kind.with_ports(given)
+        except DiagramError as error:  # the faults of a file, each at its place
+            for fault in error.faults:
+                self.faults.append(file_fault(fault, values, given, self.faults.subject))
         except QuadvisError as error:
             node = values.get(error.parameter) if isinstance(error, ParameterError) else None
             place = node.place if node is not None and known(node) else block.place

@@ -13,7 +13,7 @@ from quadvis.block import Param, SignalType
 from quadvis.diagram.group import Group
 from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar
 from quadvis.document.number_lists import Numbers
-from quadvis.errors import UNKNOWN, Faults, Unknown, known, quoted, suggestion
+from quadvis.errors import UNKNOWN, Fault, Faults, Unknown, known, quoted, suggestion
 from quadvis.machine.shipped import named_file, named_output
 from quadvis.units import Unit, parse_quantity, split_quantity
 
@@ -159,6 +159,22 @@ def read_parameter(param: Param, node: YamlNode, diagram: Path | None = None) ->
     if param.choices:
         return node.choice(param.choices), ()
     return read_value(param.signal, param.units, node)
+
+
+def file_fault(
+    fault: Fault, nodes: Mapping[str, YamlNode | Unknown], values: Mapping[str, Any], subject: str
+) -> Fault:
+    """Return a fault of a file that a parameter of a block names, with the block as its subject.
+
+    ``nodes`` are the parameters as they are written, ``values`` what was read of them. A fault of the whole
+    file is put where it is named.
+    """
+    named = [nodes[name] for name, value in values.items() if value == fault.place.file]
+    found = next((node for node in named if known(node)), None)
+    if found is not None and not fault.place.line:
+        return Fault(found.place, subject, f"'{found.text()}': {fault.problem}", fault.remedy)
+    subject = f"{subject}, {fault.subject}" if fault.subject else subject
+    return Fault(fault.place, subject, fault.problem, fault.remedy)
 
 
 def read_value(signal: SignalType, units: Sequence[Unit], node: YamlNode) -> tuple[Any, OpenUnits]:

@@ -1,5 +1,6 @@
 """Read YAML files that may be wrong or hostile, within limits, as untyped nodes with their places."""
 
+from quadvis.document.fields_file import read_fields
 from quadvis.document.node import YamlNode
 from quadvis.document.reader import MAX_BYTES, dump_yaml, parse_yaml, read_yaml
 from quadvis.document.tree import YamlList, YamlMap, YamlScalar
@@ -12,5 +13,6 @@ __all__ = [
     "YamlScalar",
     "dump_yaml",
     "parse_yaml",
+    "read_fields",
     "read_yaml",
 ]  # fmt: skip

@@ -115,7 +115,8 @@ def example(name: str, block: type[Block]) -> list[str]:
     interface = block.interface
     lines = [f"{name.rpartition('.')[2].rpartition(':')[2]}:", f"  block: {name}"]
     lines += [] if interface.continuous else ["  rate: ..."]
-    required = {param.name: _sample(param, block) for param in interface.params.values() if param.required}
+    needed = [param for param in interface.params.values() if param.required or _gives_ports(param, block)]
+    required = {param.name: _sample(param, block) for param in needed}
     wired = {port.name: "block.port" for port in interface.inputs.values() if port.default is None}
     for key, values in (("with", required), ("in", wired)):
         entries = [f"{item}: {text}" for item, text in values.items()]
@@ -123,6 +124,11 @@ def example(name: str, block: type[Block]) -> list[str]:
         if entries:
             lines += [line] if len(line) <= LINE else [f"  {key}:", *(f"    {entry}" for entry in entries)]
     return lines
+
+
+def _gives_ports(param: Param, block: type[Block]) -> bool:
+    """Return whether a parameter names a file from which the ports of a block follow."""
+    return param.is_file and param.name in block.ports_from()
 
 
 def _sample(param: Param, block: type[Block]) -> str:

@@ -8,7 +8,8 @@ from quadvis.errors import QuadvisError, suggestion
 from quadvis.machine.columns import table
 from quadvis.machine.shipped import PREFIX, named_file, shipped_folder
 
-KINDS = ("*.yaml", "parts/*.yaml", "crafts/*.yaml", "calib/*.yaml", "sets/*.yaml", "models/*.xml")
+FOLDERS = ("parts", "crafts", "calib", "protocols", "sets")
+KINDS = ("*.yaml", *(f"{folder}/*.yaml" for folder in FOLDERS), "models/*.xml")
 
 
 def shipped_names() -> list[str]:

@@ -47,6 +47,7 @@ class Datagrams(NamedTuple):
 
     sends: bool
     gap: float = 0.0
+    settle: float = 0.0
 
     def time(self, count: int) -> float:
         """Return 0: the system takes a datagram at once."""

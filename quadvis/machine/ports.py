@@ -65,6 +65,10 @@ class PortSettings(Protocol):
     def gap(self) -> float:
         """The silence (s) that a receiver needs after a frame."""
 
+    @property
+    def settle(self) -> float:
+        """The time (s) in which a device starts: it hears nothing, and says nothing that counts."""
+
     def time(self, count: int) -> float:
         """Return how long so many bytes take (s)."""
 
@@ -87,6 +91,7 @@ class Card:
     """
 
     gap = 0.0
+    settle = 0.0
 
     def time(self, count: int) -> float:
         """Return 0: a driver takes a frame at once."""

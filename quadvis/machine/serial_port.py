@@ -42,7 +42,8 @@ class Line(NamedTuple):
 
     ``baud`` may be the name of the parameter of a block that gives it. ``gap`` is the silence (s) that a
     receiver needs after a frame. The lines DTR and RTS are low, which does not restart a board, unless
-    ``dtr`` or ``rts`` is true.
+    ``dtr`` or ``rts`` is true. For the time ``settle`` (s) after it was opened the device at its other end
+    starts, as a board does that opening restarts: nothing is sent, and what comes does not count.
     """
 
     baud: int | str
@@ -52,6 +53,7 @@ class Line(NamedTuple):
     gap: float = 0.0
     dtr: bool = False
     rts: bool = False
+    settle: float = 0.0
 
     @property
     def bits_of_byte(self) -> int:

@@ -33,7 +33,7 @@ class NewsOutlet(Outlet):
 
     def serve(self, now: int, *, safe: bool) -> None:
         """Send what is new."""
-        if self._opened is None or now < self.due:
+        if self._opened is None or now < self.due or not self._settles(now):
             return
         self.due = now + self.port.interval
         if safe:

@@ -75,6 +75,7 @@ class Outlet:
         self._frame = port.initial
         self._opened: OpenPort | None = None
         self._beginning = port.beginning
+        self._settled = False  # whether the device has had the time to start
         self._rest = b""  # of what the port has taken in part
         self._free = 0  # the instant from which the line can take a frame
         self.due = 0  # the instant of the next frame
@@ -117,7 +118,7 @@ class Outlet:
 
     def serve(self, now: int, *, safe: bool) -> None:
         """Send what is due: the safe frame, or the newest, or before the first one the initial frame."""
-        if self._opened is None or now < self.due:
+        if self._opened is None or now < self.due or not self._settles(now):
             return
         self._frame = self._newest() or self._frame
         interval = self.port.interval
@@ -137,6 +138,14 @@ class Outlet:
                 self._write(self._sealed(self._frame, now), now)
         except PortError as error:
             raise type(error)(f"{self.port.path}: {error}") from error
+
+    def _settles(self, now: int) -> bool:
+        """Return whether the device has had the time to start; else the first frame is due when it has."""
+        if not self._settled:
+            self._settled = True
+            self._free = now + round(NANOSECONDS * self.port.settings.settle)
+            self.hurry(now)
+        return now >= self.due
 
     def _send_safe(self, now: int) -> None:
         self._safe_since = self._safe_since or now

@@ -115,6 +115,11 @@ class Unit:
         """The same unit with fewer names, if a shorter product exists: s*N/kg/m is 1/s."""
         return _reduced(self.exponents, self.symbols)
 
+    @cached_property
+    def si(self) -> Unit:
+        """The SI unit of the same dimension: rad/s of deg/s, V of mV."""
+        return _in_bases(Unit(self.dimension)).reduced
+
     def substitute(self, bindings: Mapping[str, Unit]) -> Unit:
         """Return the unit with all bound variables replaced."""
         result = _unit(

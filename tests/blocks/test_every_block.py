@@ -17,8 +17,17 @@ from quadvis.testing import drive
 from quadvis.testing.conformance import CHECKS, Subject
 from quadvis_blocks.vision.rendered_camera import RenderedCamera
 from quadvis_vision.camera.calibration import CameraCalibration
+from tests.blocks.hardware.can_frames import written
 
 ROOT = Path(__file__).parents[2]
+PROTOCOL = str(ROOT / "diagrams" / "protocols" / "lab_imu.yaml")
+SENT = (
+    ("roll", 0),
+    ("pitch", 0),
+    ("rates", 3),
+    ("position", 0),
+    ("current", 0),
+)  # values of its message, and their elements
 CALIB = ROOT / "diagrams" / "calib"
 CAMERA, COLOURS, PLANES = (str(CALIB / f"{name}.yaml") for name in ("camera", "colours", "two_planes"))
 
@@ -78,6 +87,14 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
         "scale": [1.0, 2.0, -0.5],
         "model": str(ROOT / "diagrams" / "models" / "rotorcraft.xml"),
     }
+    values |= {
+        f"{kind}_{key}": [0.0] * size if size else 0.0 for kind in ("initial", "safe") for key, size in SENT
+    }
+    told = {"protocol": PROTOCOL} if name.startswith("hardware.message_") else {}
+    if name.startswith("hardware.can_"):
+        told = {"protocol": written(request.getfixturevalue("tmp_path")), "message": "actuator"}
+        values["port"] = "can:virtual:conformance"
+    block = block.with_ports(told) if told else block
     if name == "hardware.digital_out":
         values["initial"] = [0, 1, 0]
     required = [key for key, param in block.interface.params.items() if param.required]
@@ -86,7 +103,7 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
         values |= {"folder": str(_pictures(folder)), "file": str(_video(folder / "video.avi"))}
     if name == "sources.recording":
         values |= {"file": str(_log(folder / "run.mcap")), "signal": "eyes.centres"}
-    given = {key: values[key] for key in required}
+    given = {key: values[key] for key in required if key not in told} | told
     if "latency" in block.interface.params:
         given["latency"] = 0.15
     inputs: dict[str, list[Any]] = {}

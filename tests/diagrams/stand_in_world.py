@@ -1,8 +1,8 @@
 """A world for the variant that flies: a simulated craft behind real ports, and a camera of the network.
 
-It takes thrusts from an SBUS line, sends an inertial unit's frames over another line, and serves what the
-craft's camera sees. The craft is held until the commands would let it hover, since it takes a while until the
-first picture has been searched.
+It takes thrusts from an SBUS line, sends an inertial unit's frames or lines of text over another line, and
+serves what the craft's camera sees. The craft is held until the commands would let it hover, since it takes a
+while until the first picture has been searched.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ import numpy as np
 import quadvis
 from quadvis.links.frame import encode
 from quadvis_blocks.hardware._counts import HIGH, LOW
+from quadvis_blocks.hardware._protocol.encode import encode as encode_message
+from quadvis_blocks.hardware._protocol.reading import read_protocol
 from quadvis_blocks.hardware._sbus import LENGTH, START, decode
 from quadvis_blocks.hardware.imu_in import message_of
 from tests.camera_server import CameraServer, coded
@@ -35,8 +37,9 @@ quadvis: 1
 name: world
 base: {flight}
 without: {{blocks: [detector, pose, estimate, setpoint, supervision, control, gate, outputs, receiver],
-  variants: [sim, hil, flight], computers: [vision_pc, target], links: [pictures, circle_line, imu_line],
-  params: [target, idle, camera, imu, rc, circles_out, circles_in],
+  variants: [sim, hil, flight, text_imu], computers: [vision_pc, target],
+  links: [pictures, circle_line, imu_line],
+  params: [target, idle, camera, imu, rc, rc_in, circles_out, circles_in, imu_out, imu_in],
   summary: [xy, h, yaw, frames without target], rates: [sight, vision, control]}}
 overload: {{}}
 blocks:
@@ -61,7 +64,7 @@ class World:
     lateness of these ticks (s).
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, text: bool = False) -> None:
         path = folder / "world.yaml"
         path.write_text(WORLD.format(flight=DIAGRAMS / "flight.yaml", parts=DIAGRAMS / "parts"))
         self._diagram = quadvis.load(path)
@@ -72,6 +75,8 @@ class World:
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._pixels: Any = None
         self._shown = threading.Condition()
+        protocol = read_protocol(DIAGRAMS / "protocols" / "lab_imu.yaml")
+        self._text = protocol.messages["imu"] if text else None
         self.positions: list[Any] = []
         self.commands, self.latest = 0, 0.0
         self.error: BaseException | None = None
@@ -134,6 +139,9 @@ class World:
 
     def _send(self, run: Any, tick: int) -> None:
         values = run["craft.rates"], run["craft.pitch"], run["craft.roll"]
+        if self._text is not None:
+            _write(self._unit, encode_message(self._text, [values[2], values[1], values[0]]))
+            return
         message = message_of("craft/imu")
         _write(self._unit, encode(message, tick, round(tick * TICK * 1e9), message.pack(values)))
 

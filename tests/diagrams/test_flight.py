@@ -33,7 +33,7 @@ overload: {{action: warn}}
 AIRBORNE = """
 quadvis: 1
 name: airborne
-base: {{file: {}, variant: flight}}
+base: {{file: {}, variant: {}}}
 overload: {{max: 1000, consecutive: 100, action: warn}}
 params: {{circles_out: "", circles_in: ""}}
 """
@@ -45,7 +45,7 @@ COMPUTERS = {"world", "vision_pc", "target"}
 
 def test_devices_need_real_time_and_no_other_variant_does() -> None:
     assert on_devices() == (
-        *(("flight.yaml", variant) for variant in ("hil", "flight")),
+        *(("flight.yaml", variant) for variant in ("hil", "flight", "text_imu")),
         *(("takeover.yaml", variant) for variant in ("crsf", "sbus", "joystick")),
     )
     for name, variant in on_devices():
@@ -65,7 +65,7 @@ def test_desk_and_bench_differ_in_slots_and_links_alone() -> None:
 def test_check_says_what_desk_and_bench_share(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(FLIGHT)]) == 0
     assert (
-        "  sim, hil, flight differ in craft, eyes, outputs, receiver, computers, links, rates, solver; "
+        "  sim, hil, flight, text_imu differ in craft, eyes, outputs, receiver, computers, links, rates, solver; "
         "47 blocks are the same to the bit\n" in capsys.readouterr().out
     )
 
@@ -122,15 +122,16 @@ def test_the_bench_flies_as_the_desk_does_and_is_replayed_to_the_bit(tmp_path: P
 
 
 @pytest.mark.slow
-def test_the_flight_flies_with_stand_ins_for_its_devices(tmp_path: Path) -> None:
+@pytest.mark.parametrize("variant", ["flight", "text_imu"])
+def test_the_flight_flies_with_stand_ins_for_its_devices(tmp_path: Path, variant: str) -> None:
     """The camera is one of the network, radio and inertial unit are ptys, and a simulated world is behind.
 
     It flies until it has flown for a while, however late everybody is, and is ended by Ctrl-C. Whether it
     holds its place is judged if the machine has kept the times.
     """
     log, airborne = tmp_path / "flight.mcap", tmp_path / "airborne.yaml"
-    airborne.write_text(AIRBORNE.format(FLIGHT))
-    with World(tmp_path) as world:
+    airborne.write_text(AIRBORNE.format(FLIGHT, variant))
+    with World(tmp_path, text=variant == "text_imu") as world:
         ports = {"camera": world.camera, "imu": world.imu, "rc": world.rc, "eyes.exposure": "0 s"}
         settings = [text for name, value in ports.items() for text in ("--set", f"{name}={value}")]
         command = ["run", str(airborne), "--real-time", "--priority", "0", "--log", str(log), *settings]

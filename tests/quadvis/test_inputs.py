@@ -289,7 +289,7 @@ def test_a_file_that_changes_between_two_blocks_is_refused(
                 other_number(Path(path))
         return read(path, *others)
 
-    monkeypatch.setattr("quadvis_vision.camera.calibration_file.read_yaml", edited)
+    monkeypatch.setattr("quadvis.document.fields_file.read_yaml", edited)
     with pytest.raises(QuadvisError, match=r"camera\.yaml' was changed while it was being read; try again"):
         quadvis.load(project / "recorded.yaml")
     assert len(seen) >= 2

@@ -542,3 +542,12 @@ def test_a_ratio_is_shown_as_it_is_read(value: float) -> None:
     shown = format_ratio(value, "dB")
     assert read_ratio(shown) == pytest.approx(value, rel=0.02)
     assert format_ratio(0.0, "dB") == "-inf dB"
+
+
+@pytest.mark.parametrize(
+    ("text", "si"),
+    [("deg/s", "rad/s"), ("mV", "V"), ("1", "1"), ("%", "1"), ("km/h", "m/s"), ("uT", "T"), ("rpm", "rad/s")],
+)
+def test_a_unit_has_an_si_unit_of_its_dimension(text: str, si: str) -> None:
+    assert str(Unit.parse(text).si) == si
+    assert Unit.parse(text).si.scale == 1.0

@@ -13,11 +13,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from quadvis.document import YamlNode, dump_yaml
+from quadvis.document import YamlNode, dump_yaml, read_fields
 from quadvis.errors import DiagramError, Fault
 from quadvis.machine.files import Kind, write_output
 from quadvis_vision.camera import lens as lens_model
-from quadvis_vision.camera.calibration_file import read_fields
 from quadvis_vision.camera.picture_size import BOUND, is_too_large
 from quadvis_vision.camera.provenance import KEYS, CalibrationError, Evidence
 

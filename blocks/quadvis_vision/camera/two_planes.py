@@ -24,11 +24,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from quadvis.document import dump_yaml
+from quadvis.document import dump_yaml, read_fields
 from quadvis.errors import DiagramError, Fault, QuadvisError
 from quadvis.machine.files import Kind, write_output
 from quadvis.units import Unit, UnitError
-from quadvis_vision.camera.calibration_file import read_fields
 from quadvis_vision.camera.homogeneous import rq
 from quadvis_vision.camera.plane_maps import (
     PARALLEL,

@@ -16,10 +16,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.document import YamlNode, dump_yaml
+from quadvis.document import YamlNode, dump_yaml, read_fields
 from quadvis.errors import DiagramError, Fault, Faults, QuadvisError, sentence
 from quadvis.machine.files import Kind, write_output
-from quadvis_vision.camera.calibration_file import read_fields
 from quadvis_vision.camera.provenance import CalibrationError
 from quadvis_vision.detection.colour_provenance import KEYS, ColourEvidence
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -42,7 +43,7 @@ def outlives_hostile_bytes(subject: Subject) -> None:
     if not issubclass(subject.block, Input):
         return
     random = np.random.default_rng(zlib.crc32(subject.block.__name__.encode()))
-    own = [name for name in subject.block.interface.outputs if name not in Input.interface.outputs]
+    own = subject.block.message_outputs()
     for rig in rigs(subject):
         received = bytearray()
         with rig.engine:
@@ -53,7 +54,7 @@ def outlives_hostile_bytes(subject: Subject) -> None:
                 del received[:-KEPT]
 
 
-def _fits(rig: Any, names: list[str], message: Any) -> None:
+def _fits(rig: Any, names: Sequence[str], message: Any) -> None:
     if isinstance(message, Counted):
         return
     count = len(message) if isinstance(message, tuple) else 1

@@ -52,7 +52,8 @@ def all_declarations_used(subject: Subject) -> None:
     idle = [name for name in interface.inputs if name not in asked]
     assert not idle, f"no method asks for {', '.join(idle)}; take it away"
     classes = [kind for kind in subject.block.__mro__ if kind not in Block.__mro__]
-    functions = [value for kind in classes for value in vars(kind).values() if inspect.isfunction(value)]
+    values = [_plain(value) for kind in classes for value in vars(kind).values()]
+    functions = [value for value in values if inspect.isfunction(value)]
     names = {name for function in _reached(functions) for name in _named(function.__code__)}
     names |= {item.name for item in interface.safe.values()}  # `Block.write_safe` uses them
     if issubclass(subject.block, Device):
@@ -60,6 +61,13 @@ def all_declarations_used(subject: Subject) -> None:
     groups = (interface.params, interface.derived, interface.states, interface.work)
     idle = [name for group in groups for name in group if name not in names]
     assert not idle, f"no method uses {', '.join(idle)}; take it away"
+
+
+def _plain(value: Any) -> Any:
+    """Return the function of a property or a class method; any other value as it is."""
+    for name in ("fget", "func", "__func__"):
+        value = getattr(value, name, value)
+    return value
 
 
 def _reached(functions: Iterable[Any]) -> set[types.FunctionType]:

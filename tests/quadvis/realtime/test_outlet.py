@@ -28,7 +28,8 @@ class Rig:
     def __init__(self, pty: Pty, **given: Any) -> None:
         self.pty = pty
         self.newest: list[bytes] = []
-        port = OutputPort("out", pty.path, LINE, 10 * MS, b"first", b"safe!", **given)
+        given = {"settings": LINE, **given}
+        port = OutputPort("out", pty.path, interval=10 * MS, initial=b"first", safe=b"safe!", **given)
         self.outlet = Outlet(port, lambda: self.newest.pop() if self.newest else None)
 
     def serve(self, instant: float, *, safe: bool = False) -> bytes:
@@ -63,6 +64,23 @@ def test_the_initial_frame_comes_at_once_then_the_newest_is_repeated(rig: Rig) -
     assert [rig.serve(at) for at in (1, 9.9, 10.1, 19)] == [b"", b"", b"first", b""]
     rig.newest.append(b"one..")
     assert [rig.serve(at) for at in (20.1, 30.1)] == [b"one..", b"one.."]
+
+
+def test_a_board_that_starts_anew_when_it_is_opened_hears_nothing_for_its_time_and_then_whole_frames(
+    make: Any,
+) -> None:
+    rig = make(settings=LINE._replace(settle=2.0), beginning=b"hello")
+    rig.newest.append(b"one..")
+    assert [rig.serve(at) for at in (0, 10, 1000, 1999.9)] == [b""] * 4
+    assert [rig.serve(at) for at in (2000, 2004)] == [b"hello", b"one.."]
+    assert [rig.serve(at, safe=True) for at in (2014, 2024)] == [b"safe!", b"safe!"]
+
+
+def test_safe_frames_wait_for_such_a_board_too(make: Any) -> None:
+    rig = make(settings=LINE._replace(settle=2.0))
+    assert rig.serve(0) == b""
+    rig.outlet.hurry(BEGIN + MS)
+    assert [rig.serve(at, safe=True) for at in (1, 1000, 2000)] == [b"", b"", b"safe!"]
 
 
 def test_what_was_missed_is_left_out_and_the_grid_stays(rig: Rig) -> None:

@@ -1,7 +1,7 @@
-"""Read the YAML of calibration files; refuse any other file without quoting it.
+"""Read the YAML files that parameters of blocks name; refuse a file of another kind without quoting it.
 
-A diagram may come from anybody and may name any file as its calibration. A message that quotes the wrong line
-helps a person who edits a calibration. Of any other file a message must not show a line.
+A diagram may come from anybody and may name any file as a calibration, for example. A message that quotes the
+wrong line helps a person who edits a calibration. Of any other file a message must not show a line.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from quadvis.document import MAX_BYTES, read_yaml
+from quadvis.document.reader import MAX_BYTES, read_yaml
 from quadvis.errors import DiagramError, Fault, Place, QuadvisError
 from quadvis.machine.inputs import read_input
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from quadvis.document import YamlMap
+    from quadvis.document.tree import YamlMap
 
 
 def read_fields(path: str | Path, kind: str, required: Collection[str], optional: Collection[str]) -> YamlMap:
