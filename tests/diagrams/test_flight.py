@@ -65,8 +65,8 @@ def test_desk_and_bench_differ_in_slots_and_links_alone() -> None:
 def test_check_says_what_desk_and_bench_share(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(FLIGHT)]) == 0
     assert (
-        "  sim, hil, flight, text_imu differ in craft, eyes, outputs, receiver, computers, links, rates, solver; "
-        "47 blocks are the same to the bit\n" in capsys.readouterr().out
+        "  sim, hil, flight, text_imu differ in craft, eyes, outputs, receiver, computers, links, rates, "
+        "solver; 47 blocks are the same to the bit\n" in capsys.readouterr().out
     )
 
 
