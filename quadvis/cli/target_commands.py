@@ -272,6 +272,14 @@ def _delete_set(tg: Target, names: Sequence[str]) -> None:
     tg.deleteparamset(*_exactly(names, 1, "delete NAME"))
 
 
+def _export_set(tg: Target, names: Sequence[str]) -> None:
+    print(tg.exportparamset(*_exactly(names, 2, "export NAME FILE")))
+
+
+def _import_set(tg: Target, names: Sequence[str]) -> None:
+    print(tg.importparamset(*_exactly(names, 2 if len(names) == 2 else 1, "import FILE [NAME]")))
+
+
 def _default_set(tg: Target, names: Sequence[str]) -> None:
     if names:
         tg.setdefaultparamset(*_exactly(names, 2 if len(names) == 2 else 1, "default [NAME [APPLICATION]]"))
@@ -287,5 +295,5 @@ def _exactly(names: Sequence[str], count: int, right: str) -> Sequence[str]:
 
 _SETS: Mapping[str, Callable[[Target, Sequence[str]], None]] = {
     "list": _list_sets, "save": _save_set, "load": _load_set, "show": _show_set, "compare": _compare_sets,
-    "delete": _delete_set, "default": _default_set,
+    "delete": _delete_set, "default": _default_set, "export": _export_set, "import": _import_set,
 }  # fmt: skip

@@ -43,7 +43,7 @@ def add_target_commands(add: Add, diagram_settings: Callable[[Parser], None], en
     log.add_argument("--list", action="store_true", help="list the logs instead")
     log.add_argument("--output", "-o", metavar="PATH", help="default: NAME.mcap")
     sets = add("sets", commands.sets, "keep, show, compare and use parameter sets of the application")
-    actions = ("list", "save", "load", "show", "compare", "delete", "default")
+    actions = ("list", "save", "load", "show", "compare", "delete", "default", "export", "import")
     sets.add_argument("action", choices=actions, nargs="?", default="list")
     sets.add_argument("names", nargs="*", metavar="NAME", help="names of sets")
     profile = add("profile", commands.profile, "time the tasks and blocks of a target's application")

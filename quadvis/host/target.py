@@ -121,17 +121,14 @@ class Target:
             raise AttributeError(name)
         if name in _PARTS:
             return self.getlog(_PARTS[name])
-        known = _BY_ALIAS.get(name)
-        if known is None:
-            problem = f"a target has no '{name}'"
-            raise AttributeError(sentence(problem, suggestion(name, _BY_ALIAS)))
+        known = _known(name)
         if known == "Scopes":
             return [each["id"] for each in self.request("scopes")]
         found = self.status().get(known)
         return math.inf if known == "MaxLogSamples" and found is None else found
 
     def __setattr__(self, name: str, value: Any) -> None:
-        known = _BY_ALIAS.get(name, name)
+        known = _known(name)
         if known in ("StopTime", "SampleTime"):
             self._connection.operate("settime", deadline=LOADING, **{known: float(value)})
         elif known == "ViewMode":
@@ -213,6 +210,14 @@ class Target:
         self._connection.operate("stop", deadline=STOPPING)
         return self
 
+    def __pos__(self) -> Target:
+        """Start the application, as ``+tg`` does in xPC Target."""
+        return self.start()
+
+    def __neg__(self) -> Target:
+        """Stop the application, as ``-tg`` does in xPC Target."""
+        return self.stop()
+
     def unload(self) -> None:
         """Remove the application that is loaded from the target's memory; the target keeps its files."""
         self._connection.operate("unload", deadline=LOADING)
@@ -277,6 +282,22 @@ class Target:
     def deleteparamset(self, name: str) -> None:
         """Remove a parameter set from the target."""
         self._connection.operate("deleteparamset", name=name)
+
+    def exportparamset(self, name: str, path: str | Path) -> Path:
+        """Write a parameter set of the target to a file here, for `quadvis run --params`; return the path."""
+        from quadvis.target.parameters import write_set
+
+        about = f"the parameter set {name} of {self.Application} on {self.name}"
+        write_set(Path(path), self.getparamset(name), about)
+        return Path(path)
+
+    def importparamset(self, path: str | Path, name: str | None = None) -> str:
+        """Let the target keep the values of a parameter file as a set; return its name, that of the file."""
+        from quadvis.target.parameters import read_set
+
+        chosen = name or Path(path).stem
+        self._connection.operate("putparamset", name=chosen, values=read_set(Path(path)))
+        return chosen
 
     def setdefaultparamset(self, name: str, application: str = "") -> None:
         """Let the application that is loaded, or another one, have a set whenever it is loaded.
@@ -368,6 +389,18 @@ class Target:
         if signal is None:
             return self._logs.newest()[-1]
         return self._logs.samples(signal, first, count, decimation)
+
+
+def _known(name: str) -> str:
+    """Return the property that a name means, which may be the beginning of one, as in xPC Target."""
+    if name in _BY_ALIAS:
+        return _BY_ALIAS[name]
+    found = dict.fromkeys(full for each, full in _BY_ALIAS.items() if each.lower().startswith(name.lower()))
+    if len(found) == 1:
+        return next(iter(found))
+    problem = f"a target has no '{name}'"
+    remedy = f"write one of {', '.join(found)}" if found else suggestion(name, _BY_ALIAS)
+    raise AttributeError(sentence(problem, remedy))
 
 
 def _loaded(what: str | Path | Diagram, variant: str | None, settings: Given, params: Files) -> Diagram:

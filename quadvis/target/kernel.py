@@ -9,10 +9,11 @@ from typing import Any
 
 from quadvis.diagram.sections.on_host_loss import CONTINUE, SAFE
 from quadvis.errors import QuadvisError
+from quadvis.run.tuned import new_values
 from quadvis.target.admission import admit
 from quadvis.target.application import Application
 from quadvis.target.bundle import DIGEST, ApplicationBundle
-from quadvis.target.parameters import read_set
+from quadvis.target.parameters import as_written, read_set
 from quadvis.target.scopes import ShownScope
 from quadvis.target.status import status
 from quadvis.target.store import Store
@@ -222,6 +223,14 @@ class Kernel:
         """Keep the present values of all that can be tuned under a name."""
         application = self._loaded
         application.parameters.save(self.store.set_path(application.name, name))
+        return name
+
+    def putparamset(self, name: str, values: Mapping[str, Any]) -> str:
+        """Keep values of parameters under a name, if they may be tuned so; nothing changes."""
+        application = self._loaded
+        given = {each: as_written(value) for each, value in values.items()}
+        application.parameters.check(new_values(application.diagram, given))
+        application.parameters.keep(self.store.set_path(application.name, name), values)
         return name
 
     def loadparamset(self, name: str) -> Future[Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -117,9 +117,18 @@ class Parameters:
             for node, name, param in self._all()
             if param.tune
         }
+        self.keep(path, values)
+
+    def keep(self, path: Path, values: Mapping[str, Any]) -> None:
+        """Write values as a parameter file of this name."""
         about = f"{self._diagram.name}, as tuned on the target; diagram {self._diagram.hash[:12]}"
-        text = dump_yaml({"quadvis": 1, "name": path.stem, "doc": about, "set": values})
-        write_output(path, SET, text)
+        write_set(path, values, about)
+
+
+def write_set(path: Path, values: Mapping[str, Any], about: str) -> None:
+    """Write a parameter set, which is a parameter file for `quadvis run --params`, too."""
+    text = dump_yaml({"quadvis": 1, "name": path.stem, "doc": about, "set": dict(values)})
+    write_output(path, SET, text)
 
 
 def read_set(path: Path) -> dict[str, Any]:

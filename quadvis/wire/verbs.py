@@ -134,6 +134,7 @@ _DECLARED = (
          (_ID_OF_SCOPE, _FIRST, _some(10_000))),
     Verb("saveparamset", 0, "keep the present parameters as a set", "nil", (_SET,), LEASED, CHANGES),
     Verb("loadparamset", 0, "tune all parameters of a set", "nil, with the tick", (_SET,), LEASED, CHANGES),
+    Verb("putparamset", 0, "keep values as a set", "the name of the set", (_SET, _VALUES), LEASED, CHANGES),
     Verb("listparamsets", 2, "the sets of this application", "a list of names"),
     Verb("getparamset", 2, "the values of a set", "a map of name to value", (_SET,)),
     Verb("deleteparamset", 0, "remove a set", "nil", (_SET,), LEASED, CHANGES),

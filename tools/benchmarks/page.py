@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -67,7 +67,7 @@ class Ages:
 def gateway(target: str) -> Iterator[tuple[int, str]]:
     """Serve the page of a target; give the process and the address."""
     words = [sys.executable, "-m", "quadvis", "web", "--target", target, "--port", "0", "--no-browser"]
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     try:
         assert process.stdout is not None
         found = re.search(r"http://\S+", process.stdout.readline())
@@ -76,7 +76,7 @@ def gateway(target: str) -> Iterator[tuple[int, str]]:
         yield process.pid, found[0]
     finally:
         process.terminate()
-        process.wait(20)
+        process.communicate(timeout=20)
 
 
 class PageClient:
@@ -88,8 +88,9 @@ class PageClient:
 
         place, _, token = address.partition("#")
         host = place.removeprefix("http://").strip("/")
-        self._line = connect(
-            f"ws://{host}/live", origin=f"http://{host}", compression=None, max_size=None, proxy=None
+        self._stack = ExitStack()
+        self._line = self._stack.enter_context(
+            connect(f"ws://{host}/live", origin=f"http://{host}", compression=None, max_size=None, proxy=None)
         )
         self._line.send(json.dumps({"token": token}))
         self._number, self._start = 0, start
@@ -147,7 +148,7 @@ class PageClient:
 
     def close(self) -> None:
         """End the connection."""
-        self._line.close()
+        self._stack.close()
 
 
 def processor_time(process: int) -> float:

@@ -1,4 +1,5 @@
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -93,6 +94,9 @@ def test_the_list_of_properties_reads_as_in_xpc_target(tg: Target, diagram: Path
         _ = tg.Sttus
     with pytest.raises(AttributeError, match="MaxLogSamples and ViewMode can"):
         tg.Status = "running"
+    assert (tg.NumSig, tg.sampl, tg.Stat) == (tg.NumSignals, 0.01, "running")
+    with pytest.raises(AttributeError, match="no 'S'; write one of Status, SessionTime, StopTime"):
+        _ = tg.S
 
 
 def test_times_can_be_set_while_it_is_stopped(tg: Target, diagram: Path) -> None:
@@ -111,6 +115,30 @@ def test_times_can_be_set_while_it_is_stopped(tg: Target, diagram: Path) -> None
     tg.start()
     with pytest.raises(QuadvisError, match="times cannot change in a run"):
         tg.StopTime = 3.0
+
+
+def test_a_run_without_end_is_stopped_by_an_operator(tg: Target, diagram: Path) -> None:
+    tg.load(diagram)
+    tg.StopTime = float("inf")
+    assert tg.StopTime == float("inf") and "StopTime         inf s" in str(tg)
+    assert (+tg).Status == "running"
+    wait_for(lambda: tg.ExecTime > 0.1)
+    assert (-tg).Status == "stopped"
+
+
+def test_one_overrun_too_many_stops_a_run_and_the_target_says_so(tg: Target, tmp_path: Path) -> None:
+    path = tmp_path / "late.yaml"
+    path.write_text(
+        LOOP.replace("overload: {max: 1000000, consecutive: 1000000, action: warn}", "overload: {startup: 1}")
+        .replace("fast: 100 Hz", "fast: 20 kHz")  # which no interpreted loop can keep
+        .replace("expect:", "tasking: multi\nexpect:")
+    )
+    tg.load(path, engine="python")
+    assert (tg.Mode, tg.CPUOverload) == ("Real-Time Multi-Tasking", "none")
+    tg.start()
+    wait_for(lambda: tg.Status == "stopped")
+    assert tg.CPUOverload == "detected"
+    assert re.search(r"task 'fast': overload limit \(0\) exceeded with \d+ overruns?", tg.Problem)
 
 
 def test_values_are_tuned_together_at_a_tick_that_the_log_has(
@@ -194,6 +222,24 @@ def test_sets_are_kept_compared_and_used(tg: Target, diagram: Path, lab: Running
     assert "first" not in tg.listparamsets()
     tg.stop()
     assert tg.compare("autosave") == []  # what was tuned is kept at the end of a run
+
+
+def test_sets_travel_between_host_and_target(tg: Target, diagram: Path, tmp_path: Path) -> None:
+    tg.load(diagram)
+    tg.setparam("law.factor", 3.0)
+    tg.saveparamset("mine")
+    path = tg.exportparamset("mine", tmp_path / "flown.yaml")
+    assert quadvis.load(diagram, params=path).graph["law"].block.factor == 3.0  # type: ignore[attr-defined]
+    path.write_text(path.read_text().replace("3", "4"))
+    assert tg.importparamset(path) == "flown"
+    assert tg.getparam("law.factor") == 3.0  # nothing has changed
+    assert tg.compare("mine", "flown") == [("law.factor", 3.0, 4.0)]
+    tg.loadparamset("flown")
+    assert tg.getparam("law.factor") == 4.0
+    path.write_text("quadvis: 1\nname: wrong\nset: {law.factr: 3}\n")
+    with pytest.raises(QuadvisError, match=r"lab refuses: .*did you mean 'factor'"):
+        tg.importparamset(path, "wrong")
+    assert "wrong" not in tg.listparamsets()
 
 
 def test_an_application_has_its_default_set_when_it_is_loaded(
@@ -346,6 +392,21 @@ def test_the_profiler_times_tasks_at_once_and_blocks_from_the_next_run_on(
     tg.stop()
     assert tg.getProfilerData().tasks == []
     assert tg.startProfiler() is True
+
+
+def test_a_signal_is_seen_as_the_log_has_it(tg: Target, diagram: Path) -> None:
+    tg.load(diagram)
+    assert tg.getsignal("wave.y") is None  # before its first row
+    tg.start()
+    wait_for(lambda: tg.ExecTime > 0.1)
+    seen = [(tg.ExecTime, tg.getsignal("wave.y", "law.y")) for _ in range(5)]
+    tg.stop()
+    log = tg.getlog()
+    assert isinstance(log, Log)
+    for time, values in seen:
+        for name, value in values.items():
+            place = np.flatnonzero(log[name] == value)
+            assert len(place) and np.abs(log.times(name)[place] - time).min() < 1.0
 
 
 def test_two_scopes_that_trigger_each_other_lose_nothing(tg: Target, diagram: Path) -> None:

@@ -81,7 +81,7 @@ def test_the_stand_in_says_what_a_target_says(tmp_path: Path, monkeypatch: pytes
                 stand_in.do_start()
                 wait_for(lambda: tg.ExecTime > 0.1 and stand_in.do_status()["ExecTime"] > 0.1)
                 for verb in ("signals", "parameters", "scopes", "drawing"):
-                    assert stand_in.request(verb) == tg.request(verb), verb
+                    assert stand_in.request(verb) == tg.request(verb, deadline=60), verb
                 assert tg.status().keys() >= stand_in.request("status").keys()
                 names = ["wave.y", "law.y"]
                 kinds = [
