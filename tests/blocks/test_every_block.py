@@ -71,6 +71,12 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
         "safe": [0.0, 0.0, 0.0],
         "model": str(ROOT / "diagrams" / "models" / "rotorcraft.xml"),
     }
+    if (
+        block.interface.inputs.get("command") is not None
+        and name.startswith("mavlink.")
+        and "n" not in (block.interface.inputs["command"].signal.shape)
+    ):
+        values |= {"initial": [0.0, 0.0, 0.1, 0.5], "safe": [0.1, 0.0, 0.0, 0.0]}
     required = [key for key, param in block.interface.params.items() if param.required]
     if {"file", "folder"} & {*required}:  # few blocks read or write files, and all tests come by here
         folder = request.getfixturevalue("tmp_path")
