@@ -1,21 +1,26 @@
-"""The ports of a diagram's devices: each has one, unless they share it; ends of a cable have one setting."""
+"""The ports of a diagram's devices: each has one, unless they share it; ends of a cable have one setting.
+
+An input may have the port of an output: it reads what comes back there.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from quadvis.block import CABLE, Device, Input, LineDevice, NewsDevice, Output
+from quadvis.block import CABLE, Card, Device, Input, LineDevice, NewsDevice, Output
 from quadvis.diagram.draft import Draft
 from quadvis.errors import Faults, Place
 from quadvis.machine.files import file_key
 from quadvis.machine.serial_port import Line
 
+Key = tuple[object, bool]  # what a device has for itself alone, and whether it sends there
+
 
 def check_devices(drafts: Sequence[Draft], faults: Faults) -> None:
-    """Report ports that two devices have, and cables with unlike ends."""
-    taken: dict[object, Draft] = {}
+    """Report ports that two devices have, and ports with unlike ends."""
+    taken: dict[Key, Draft] = {}
+    ends: dict[str, LineDevice] = {}
     shared: dict[str, list[Draft]] = {}
-    cables: dict[str, LineDevice] = {}
     for draft in drafts:
         device = draft.block
         if not isinstance(device, Device):
@@ -24,30 +29,44 @@ def check_devices(drafts: Sequence[Draft], faults: Faults) -> None:
         is_cable = port.startswith(CABLE)
         keys = list(_keys(device))
         with faults.about(f"block '{draft.path}'"):
-            other = next((taken[key] for key in keys if key in taken), None)
-            if other is not None and _share(device, other.block):
-                _check_shared(shared.setdefault(port, [other]), draft, place, faults)
-            elif other is not None:
-                ends = "; a cable has one end for an output and one for an input" if is_cable else ""
-                problem = f"port '{port}' is that of block '{other.path}'"
-                faults.add(place, problem, f"name another one{ends}")
+            if device.shared and not is_cable:
+                _check_shared(shared.setdefault(f"{device.shared} {port}", []), draft, place, faults)
+            _check_taken(device, keys, taken, place, faults)
             if is_cable and device.shared:
                 problem = f"'{port}' is a cable between two blocks of the diagram"
                 faults.add(place, problem, "name a serial port, or such as udp:127.0.0.1:14550")
-            elif is_cable and isinstance(device, LineDevice) and isinstance(device.settings, Line):
-                _check_ends(cables.setdefault(port, device), device, place, faults)
-            elif is_cable:
+            elif is_cable and not (isinstance(device, LineDevice) and isinstance(device.settings, Line)):
                 faults.add(place, f"'{port}' is a cable for bytes", f"write such as {device.port_example}")
+            elif isinstance(device, LineDevice):
+                _check_ends(ends.setdefault(port, device), device, place, faults)
         for key in keys:
             taken.setdefault(key, draft)
 
 
-def _keys(device: Device) -> Iterable[object]:
+def _keys(device: Device) -> Iterable[Key]:
     """Return what a device has for itself alone."""
-    port = device.port_given
+    port, sends = device.port_given, isinstance(device, Output | NewsDevice)
     if port.startswith(CABLE):
-        return [(port, isinstance(device, Output))]
-    return device.settings.claims(port) if isinstance(device, LineDevice) else [file_key(port)]
+        return [(port, sends)]
+    if not isinstance(device, LineDevice):
+        return [(file_key(port), sends)]
+    return [(claim, sends or isinstance(device.settings, Card)) for claim in device.settings.claims(port)]
+
+
+def _check_taken(
+    device: Device, keys: Sequence[Key], taken: dict[Key, Draft], place: Place, faults: Faults
+) -> None:
+    """Report that another device has the port, or has it under another name."""
+    port = device.port_given
+    other = next((taken[key] for key in keys if key in taken), None)
+    if other is not None and not _share(device, other.block):
+        ends = "; a cable has one end for an output and one for an input" if port.startswith(CABLE) else ""
+        faults.add(place, f"port '{port}' is that of block '{other.path}'", f"name another one{ends}")
+        return
+    back = next((taken[claim, not sends] for claim, sends in keys if (claim, not sends) in taken), None)
+    if back is not None and isinstance(back.block, Device) and back.block.port_given != port:
+        remedy = f"write '{back.block.port_given}' in both, if the input is to read what comes back there"
+        faults.add(place, f"port '{port}' is that of block '{back.path}'", remedy)
 
 
 def _share(one: Device, other: object) -> bool:
@@ -57,19 +76,18 @@ def _share(one: Device, other: object) -> bool:
 
 def _check_shared(drafts: list[Draft], draft: Draft, place: Place, faults: Faults) -> None:
     """Report what keeps a device from sharing the port of others, which it joins."""
-    device, first = draft.block, drafts[0]
+    device = draft.block
+    drafts.append(draft)
+    first = drafts[0]
     assert isinstance(device, LineDevice) and isinstance(first.block, LineDevice)
     port = f"port '{device.port_given}' is that of block '{first.path}', too"
-    drafts.append(draft)
-    if str(device.settings) != str(first.block.settings):
-        faults.add(place, f"{port}, which sets it to {first.block.settings}", "give both one setting")
-    elif _sealer(device) != _sealer(first.block):
+    if _sealer(device) != _sealer(first.block):
         faults.add(place, f"{port}, which speaks there under another name", "give both the same parameters")
     elif isinstance(device, Input) and any(isinstance(each.block, Input) for each in drafts[:-1]):
         faults.add(place, f"{port}, and two blocks would read there", "let one block read")
     elif (load := sum(_load(each.block) for each in drafts)) > 1:
-        faults.add(place, f"the frames of all blocks at '{device.port_given}' take {load:.0%} of its time",
-                   "send fewer frames, or use a faster line")  # fmt: skip
+        problem = f"the frames of all blocks at '{device.port_given}' take {load:.0%} of its time"
+        faults.add(place, problem, "send fewer frames, or use a faster line")
 
 
 def _sealer(device: LineDevice) -> object:
@@ -86,7 +104,7 @@ def _load(device: object) -> float:
 
 
 def _check_ends(one: LineDevice, other: LineDevice, place: Place, faults: Faults) -> None:
-    """Report two devices at one cable with unlike settings."""
+    """Report two devices at one cable or port with unlike settings."""
     if str(one.settings) != str(other.settings):
         problem = f"the two ends of '{one.port_given}' are set to {one.settings} and {other.settings}"
         faults.add(place, problem, "give both one setting")

@@ -12,12 +12,13 @@ import os
 import select
 import signal
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import send_handle
 from typing import Any, NamedTuple
 
 from quadvis.block.output import LONGEST
@@ -65,8 +66,7 @@ class GuardianSetup:
     """What the guardian needs: ``words`` has an outbox for each of the ``ports``, in their order.
 
     Its process starts without ports, and takes them from the ``link``. ``supervisor`` is the process that
-    started it, ``on_host_loss`` what its death means. ``readers`` get the descriptors of shared ports, by
-    path.
+    started it, ``on_host_loss`` what its death means.
     """
 
     ports: tuple[OutputPort, ...]
@@ -76,7 +76,6 @@ class GuardianSetup:
     supervisor: int
     on_host_loss: str
     standing: Standing
-    readers: Mapping[str, Connection] = field(default_factory=dict)
 
 
 class Order(Enum):
@@ -95,7 +94,10 @@ class Watch:
 
 @dataclass(frozen=True)
 class Guarding:
-    """The ports are open and have their initial frames; what the system has granted."""
+    """The ports are open and have their initial frames; what the system has granted.
+
+    The descriptors of the ports that are lent come after it, in their order.
+    """
 
     grants: Grants
 
@@ -167,8 +169,12 @@ class Guardian:
                 refused.append((outlet, error))
         for outlet, refusal in refused:
             self._fail(outlet, refusal)
-        self._shared.lend(self._setup.readers)
         return not refused
+
+    @property
+    def lent(self) -> list[int]:
+        """The descriptors of the ports that input devices read."""
+        return [outlet.descriptor for outlet in self._outlets if outlet.port.lent]
 
     def run(self) -> None:
         """Serve the ports until nobody needs them any more."""
@@ -303,4 +309,6 @@ def guard(setup: GuardianSetup) -> None:
     guardian.look()
     if opened:
         setup.link.send(Guarding(grants))
+        for descriptor in guardian.lent:
+            send_handle(setup.link, descriptor, os.getppid())
     guardian.run()

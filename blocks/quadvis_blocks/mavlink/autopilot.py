@@ -58,7 +58,7 @@ class Autopilot(Station, AutopilotPorts, NewsDevice, Input):
     timeouts = Param(
         AUTO,
         type="str",
-        doc="names of its parameters, with spaces, that say after which time without set-points it acts; auto: "
+        doc="names of its parameters that say after which time without set-points it acts, with spaces; auto: "
         "COM_OF_LOSS_T, COM_RC_LOSS_T of PX4, GUID_TIMEOUT, RC_OVERRIDE_TIME of ArduPilot; '': none",
     )
     timeout_limit = Param(1.0, unit="s", above=0.0, doc="what none of these may exceed")
