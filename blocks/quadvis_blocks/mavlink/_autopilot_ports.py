@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from quadvis.block import Block, In, Out
+from quadvis.block import In, Out
 
 
-class AutopilotPorts(Block):
-    """The ports of an autopilot that every block has in its place."""
+class AutopilotPorts:
+    """The ports of every block that is an autopilot, or stands for one."""
 
     arm = In("bool", default=False, doc="whether the autopilot should be armed; it acts when this changes")
     valid = Out("bool", doc="whether there is an attitude, no older than ``max_age``")

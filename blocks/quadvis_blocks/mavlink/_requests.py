@@ -12,7 +12,7 @@ from quadvis_blocks.mavlink._complaints import Complaints
 from quadvis_blocks.mavlink._identity import PX4, AutopilotIdentity
 from quadvis_blocks.mavlink._packets import LooseMessage
 from quadvis_blocks.mavlink._rates import MeasuredRates
-from quadvis_blocks.mavlink._telemetry import Heartbeat
+from quadvis_blocks.mavlink._telemetry import FlightState
 from quadvis_blocks.mavlink._timeouts import AutopilotTimeouts
 
 SET_INTERVAL, COMMAND_ARM, SET_MODE = 511, 400, 176  # MAV_CMD
@@ -43,7 +43,7 @@ class Requests:
         self._speaker, self._who, self._complaints = speaker, who, complaints
         self.rates, self.timeouts, self.arming = rates, timeouts, arming
 
-    def due(self, time: float, arm: bool, heartbeat: Heartbeat) -> Iterator[LooseMessage]:
+    def due(self, time: float, arm: bool, flight: FlightState) -> Iterator[LooseMessage]:
         """Yield the messages to be sent now."""
         self._complaints.look(time)
         if not self._who.is_known:
@@ -57,7 +57,7 @@ class Requests:
             yield self._speaker.loose(
                 "PARAM_REQUEST_READ", **self._target(), param_id=name.encode(), param_index=-1
             )
-        request = self._arm(time, arm, heartbeat)
+        request = self._arm(time, arm, flight)
         if request is not None:
             yield self._asked(request)
 
@@ -77,12 +77,12 @@ class Requests:
             text = fields["text"].split(b"\0")[0].decode("utf-8", "replace")
             self._complaints.once(("text", text), f"the autopilot says: {text}")
 
-    def _arm(self, time: float, arm: bool, heartbeat: Heartbeat) -> ArmingRequest | None:
+    def _arm(self, time: float, arm: bool, flight: FlightState) -> ArmingRequest | None:
         settled = self.timeouts.is_settled
-        if arm and not heartbeat.armed and settled and (why := self.timeouts.refusal()):
+        if arm and not flight.armed and settled and (why := self.timeouts.refusal()):
             raise QuadvisError(f"the autopilot is not armed: {why}")
         before = self.arming.state
-        found = self.arming.step(time, arm, heartbeat.armed, heartbeat.mode, may=settled)
+        found = self.arming.step(time, arm, flight.armed, flight.mode, may=settled)
         if self.arming.state == GIVEN_UP != before:
             self._complaints.once(
                 "given up", "the autopilot does not do what it was asked to; it is asked no more"

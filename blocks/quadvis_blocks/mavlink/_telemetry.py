@@ -11,7 +11,7 @@ import numpy as np
 
 FASTEST = 100.0  # rad/s; no craft turns so fast
 ANGLE = 2 * math.pi + 1e-3  # rad; the greatest angle that anybody sends
-OVERTAKEN = 10_000  # ms: a message that is older than one before by less than this came late
+OVERTAKEN = 1000  # ms: a message that is older than one before by less than this came late
 
 
 class Attitude(NamedTuple):
@@ -37,7 +37,7 @@ class LocalPosition(NamedTuple):
     velocity: Any = np.full(3, math.nan)
 
 
-class Heartbeat(NamedTuple):
+class FlightState(NamedTuple):
     """The autopilot's mode, and whether it is armed."""
 
     mode: int = 0
@@ -74,12 +74,12 @@ def local_position(fields: Mapping[str, Any]) -> LocalPosition | None:
     return LocalPosition(position, velocity)
 
 
-def heartbeat(fields: Mapping[str, Any]) -> Heartbeat:
+def flight_state(fields: Mapping[str, Any]) -> FlightState:
     """Return what HEARTBEAT says."""
-    return Heartbeat(int(fields["custom_mode"]), bool(fields["base_mode"] & ARMED))
+    return FlightState(int(fields["custom_mode"]), bool(fields["base_mode"] & ARMED))
 
 
-class Verdict(Enum):
+class MessageFate(Enum):
     """What becomes of a message."""
 
     TAKEN = "taken"
@@ -91,7 +91,7 @@ READERS: Mapping[str, Callable[[Mapping[str, Any]], Any]] = {
     "ATTITUDE": attitude,
     "HIGHRES_IMU": inertial,
     "LOCAL_POSITION_NED": local_position,
-    "HEARTBEAT": heartbeat,
+    "HEARTBEAT": flight_state,
 }
 
 
@@ -99,7 +99,7 @@ KEPT_AS = {
     "ATTITUDE": "attitude",
     "HIGHRES_IMU": "inertial",
     "LOCAL_POSITION_NED": "local_position",
-    "HEARTBEAT": "heartbeat",
+    "HEARTBEAT": "flight",
 }
 
 
@@ -108,21 +108,21 @@ class Telemetry:
 
     def __init__(self) -> None:
         self.attitude, self.inertial = Attitude(), Inertial()
-        self.local_position, self.heartbeat = LocalPosition(), Heartbeat()
+        self.local_position, self.flight = LocalPosition(), FlightState()
         self._came = dict.fromkeys(READERS, math.nan)
         self._made: dict[str, int] = {}  # times since the autopilot's start (ms)
 
-    def take(self, name: str, fields: Mapping[str, Any], time: float) -> Verdict:
+    def take(self, name: str, fields: Mapping[str, Any], time: float) -> MessageFate:
         """Take a message that came at a time (s)."""
         made = fields.get("time_boot_ms", fields.get("time_usec", 0) // 1000)
         if 0 < self._made.get(name, 0) - made < OVERTAKEN:
-            return Verdict.LATE
+            return MessageFate.LATE
         found = READERS[name](fields)
         if found is None:
-            return Verdict.WRONG
+            return MessageFate.WRONG
         setattr(self, KEPT_AS[name], found)
         self._came[name], self._made[name] = time, made
-        return Verdict.TAKEN
+        return MessageFate.TAKEN
 
     def age(self, name: str, time: float) -> float:
         """Return the time since a message came (s); NaN before the first one."""

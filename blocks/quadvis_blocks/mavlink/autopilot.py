@@ -58,8 +58,8 @@ class Autopilot(Station, AutopilotPorts, NewsDevice, Input):
     timeouts = Param(
         AUTO,
         type="str",
-        doc="names of its parameters that say after which time without set-points it acts, with spaces; auto: "
-        "COM_OF_LOSS_T, COM_RC_LOSS_T of PX4, GUID_TIMEOUT, RC_OVERRIDE_TIME of ArduPilot; '': none",
+        doc="names of its parameters that say after which time without set-points it acts, with spaces; "
+        "auto: COM_OF_LOSS_T, COM_RC_LOSS_T of PX4, GUID_TIMEOUT, RC_OVERRIDE_TIME of ArduPilot; '': none",
     )
     timeout_limit = Param(1.0, unit="s", above=0.0, doc="what none of these may exceed")
     flight_mode = Param(
@@ -134,10 +134,10 @@ class Autopilot(Station, AutopilotPorts, NewsDevice, Input):
             self._requests.said(fields)
         elif name:
             verdict = self._said.take(name, fields, self._time)
-            if verdict is telemetry.Verdict.TAKEN:
+            if verdict is telemetry.MessageFate.TAKEN:
                 yield from [self._values()] * (name == "ATTITUDE")
             else:
-                yield LOST if verdict is telemetry.Verdict.LATE else REFUSED
+                yield LOST if verdict is telemetry.MessageFate.LATE else REFUSED
 
     def output(self) -> Any:
         """Return age, counts, and what the autopilot has said last."""
@@ -154,7 +154,7 @@ class Autopilot(Station, AutopilotPorts, NewsDevice, Input):
             said.age("LOCAL_POSITION_NED", time),
             *said.local_position,
             said.age("HEARTBEAT", time),
-            *said.heartbeat,
+            *said.flight,
             requests.arming.state,
             requests.timeouts.longest if math.isfinite(requests.timeouts.longest) else math.nan,
             self._who.system,
@@ -167,7 +167,7 @@ class Autopilot(Station, AutopilotPorts, NewsDevice, Input):
 
     def write(self, arm: bool, time: float) -> None:
         """Ask for what is due; QuadvisError if the autopilot is to be armed and must not be."""
-        self._waiting += self._requests.due(time, arm, self._said.heartbeat)
+        self._waiting += self._requests.due(time, arm, self._said.flight)
         if self._waiting and time >= self._flushed + TOGETHER:
             self._complaints.asked(time)
             self.tell(loosened(self._waiting))

@@ -55,7 +55,7 @@ class RcOverride(StationCommand):
 
     def ending(self) -> bytes:
         """Return the message that gives the channels back."""
-        return self._with([RELEASED[channel > FIRST] for channel in self.channels])
+        return self._with([RELEASED[int(channel) > FIRST] for channel in self.channels])
 
     def _with(self, values: list[int]) -> bytes:
         given = dict(zip((int(channel) for channel in self.channels), values, strict=True))
