@@ -110,7 +110,7 @@ def test_a_rate_that_falls_back_is_asked_for_again_and_reported_once() -> None:
         for _ in range(30 * SECOND):
             run.step()
             slow.append(0) if run["age"] <= 0.03 else slow.append(slow.pop() + 1)
-        assert sum(slow) > 4 * RATE and max(slow) < 3 * SECOND
+        assert sum(slow) > RATE and max(slow) < 3 * SECOND
         asked = [at for at, each in run.fake.of("COMMAND_LONG") if each.command == 511]
         assert all(later - earlier >= 1.0 - 1e-9 for earlier, later in pairwise(asked))
         assert 8 <= len(asked) <= 20 and len(asked) == run["requests"]
