@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from enum import Enum
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from quadvis.block.declare import Out
 from quadvis.block.device import CABLE, LineDevice
 from quadvis.block.sizes import parameter_sizes
-from quadvis.machine.ports import PortError, Waiting
+from quadvis.machine.ports import OpenPort, PortError, Waiting
 
 KEPT = 4096  # bytes at most that wait for the rest of their message
 
@@ -40,7 +40,7 @@ class Input(LineDevice):
     refused = Out("int64", doc="messages that were damaged")
 
     actual_port = ""  # what a real-time run puts in the place of `pty:NAME`
-    adopted = -1  # the descriptor of the port, if that is the one of an output device
+    lent: Callable[[], OpenPort] | None = None  # gives a port that is open, in a real-time run that shares it
 
     def decode(self, received: bytearray) -> Iterator[Any]:
         """Take all whole messages off the beginning of ``received``, and leave the rest there.
@@ -56,12 +56,9 @@ class Input(LineDevice):
         self._age, self._counts = math.nan, {Counted.LOST: 0, Counted.REFUSED: 0}
         self._newest = self._nothing()
         path = self.actual_port or self.port_given
-        if self.adopted >= 0:
-            self._port = self.settings.adopt(self.adopted)
-        elif path.startswith(CABLE):
+        if path.startswith(CABLE):
             raise PortError(f"{path} is a cable, and only a real-time run makes cables")
-        else:
-            self._port = self.settings.open(path)
+        self._port = self.settings.open(path) if self.lent is None else self.lent()
 
     def read(self, time: float) -> None:
         """Take all messages that have come."""

@@ -1,7 +1,4 @@
-"""The ports of a diagram's devices: each has one, unless they share it; ends of a cable have one setting.
-
-An input may have the port of an output: it reads what comes back there.
-"""
+"""The ports of a diagram's devices: each has one, unless they share it; ends of a cable have one setting."""
 
 from __future__ import annotations
 
@@ -13,85 +10,106 @@ from quadvis.errors import Faults, Place
 from quadvis.machine.files import file_key
 from quadvis.machine.serial_port import Line
 
-Key = tuple[object, bool]  # what a device has for itself alone, and whether it sends there
+Key = tuple[object, bool]  # what a device has for itself, and whether it sends there
 
 
 def check_devices(drafts: Sequence[Draft], faults: Faults) -> None:
-    """Report ports that two devices have, and ports with unlike ends."""
+    """Report ports that two devices have, and cables with unlike ends."""
     taken: dict[Key, Draft] = {}
-    ends: dict[str, LineDevice] = {}
-    shared: dict[str, list[Draft]] = {}
+    users: dict[str, list[Draft]] = {}
     for draft in drafts:
         device = draft.block
         if not isinstance(device, Device):
             continue
-        port, place = device.port_given, draft.places.get(device.port_parameter, draft.place)
-        is_cable = port.startswith(CABLE)
-        keys = list(_keys(device))
+        place = draft.places.get(device.port_parameter, draft.place)
+        others = users.setdefault(device.port_given, [])
         with faults.about(f"block '{draft.path}'"):
-            if device.shared and not is_cable:
-                _check_shared(shared.setdefault(f"{device.shared} {port}", []), draft, place, faults)
-            _check_taken(device, keys, taken, place, faults)
-            if is_cable and device.shared:
-                problem = f"'{port}' is a cable between two blocks of the diagram"
-                faults.add(place, problem, "name a serial port, or such as udp:127.0.0.1:14550")
-            elif is_cable and not (isinstance(device, LineDevice) and isinstance(device.settings, Line)):
-                faults.add(place, f"'{port}' is a cable for bytes", f"write such as {device.port_example}")
-            elif isinstance(device, LineDevice):
-                _check_ends(ends.setdefault(port, device), device, place, faults)
-        for key in keys:
+            if device.port_given.startswith(CABLE):
+                _check_cable(device, others, taken, place, faults)
+            elif others and all(_share(device, other.block) for other in others):
+                _check_shared(others, draft, place, faults)
+            else:
+                _check_taken(device, taken, place, faults)
+        others.append(draft)
+        for key in _keys(device):
             taken.setdefault(key, draft)
+
+
+def _sends(device: Device) -> bool:
+    return isinstance(device, Output | NewsDevice) and not isinstance(device, Input)
 
 
 def _keys(device: Device) -> Iterable[Key]:
     """Return what a device has for itself alone."""
-    port, sends = device.port_given, isinstance(device, Output | NewsDevice)
+    port, sends = device.port_given, _sends(device)
     if port.startswith(CABLE):
         return [(port, sends)]
     if not isinstance(device, LineDevice):
         return [(file_key(port), sends)]
-    return [(claim, sends or isinstance(device.settings, Card)) for claim in device.settings.claims(port)]
+    return [(claim, sends) for claim in device.settings.claims(port)]
 
 
-def _check_taken(
-    device: Device, keys: Sequence[Key], taken: dict[Key, Draft], place: Place, faults: Faults
+def _check_cable(
+    device: Device, others: Sequence[Draft], taken: dict[Key, Draft], place: Place, faults: Faults
 ) -> None:
-    """Report that another device has the port, or has it under another name."""
+    """Report what is no end of a cable, an end that two devices have, and ends with unlike settings."""
     port = device.port_given
-    other = next((taken[key] for key in keys if key in taken), None)
-    if other is not None and not _share(device, other.block):
-        ends = "; a cable has one end for an output and one for an input" if port.startswith(CABLE) else ""
+    if device.shared:
+        problem = f"'{port}' is a cable between two blocks of the diagram"
+        faults.add(place, problem, "name a serial port, or such as udp:127.0.0.1:14550")
+        return
+    if not (isinstance(device, LineDevice) and isinstance(device.settings, Line)):
+        faults.add(place, f"'{port}' is a cable for bytes", f"write such as {device.port_example}")
+        return
+    _check_taken(device, taken, place, faults)
+    for other in others[:1]:
+        if isinstance(other.block, LineDevice) and str(other.block.settings) != str(device.settings):
+            problem = f"the two ends of '{port}' are set to {other.block.settings} and {device.settings}"
+            faults.add(place, problem, "give both one setting")
+
+
+def _check_taken(device: Device, taken: dict[Key, Draft], place: Place, faults: Faults) -> None:
+    """Report that another device has the port, perhaps under another name."""
+    port, keys = device.port_given, list(_keys(device))
+    is_cable = port.startswith(CABLE)
+    if other := next((taken[key] for key in keys if key in taken), None):
+        ends = "; a cable has one end for an output and one for an input" if is_cable else ""
         faults.add(place, f"port '{port}' is that of block '{other.path}'", f"name another one{ends}")
         return
     back = next((taken[claim, not sends] for claim, sends in keys if (claim, not sends) in taken), None)
-    if back is not None and isinstance(back.block, Device) and back.block.port_given != port:
-        remedy = f"write '{back.block.port_given}' in both, if the input is to read what comes back there"
+    if back is not None and not is_cable:
+        assert isinstance(back.block, Device)
+        remedy = f"write '{back.block.port_given}' in both, if one is to read what comes back to the other"
         faults.add(place, f"port '{port}' is that of block '{back.path}'", remedy)
 
 
 def _share(one: Device, other: object) -> bool:
-    """Return whether two devices may have one port together."""
-    return isinstance(other, Device) and bool(one.shared) and one.shared == other.shared
+    """Return whether two devices may have a port together: by one word, or one sends and the other reads."""
+    if not (isinstance(one, LineDevice) and isinstance(other, LineDevice)):
+        return False
+    if isinstance(one.settings, Card) or isinstance(other.settings, Card):
+        return False
+    if one.shared or other.shared:
+        return one.shared == other.shared
+    return _sends(one) != _sends(other)
 
 
-def _check_shared(drafts: list[Draft], draft: Draft, place: Place, faults: Faults) -> None:
+def _check_shared(others: Sequence[Draft], draft: Draft, place: Place, faults: Faults) -> None:
     """Report what keeps a device from sharing the port of others, which it joins."""
-    device = draft.block
-    drafts.append(draft)
-    first = drafts[0]
+    device, first = draft.block, others[0]
     assert isinstance(device, LineDevice) and isinstance(first.block, LineDevice)
     port = f"port '{device.port_given}' is that of block '{first.path}', too"
-    if _sealer(device) != _sealer(first.block):
+    blocks = [each.block for each in (*others, draft)]
+    sealers = [block.sealer() for block in blocks if isinstance(block, Output | NewsDevice)]
+    if str(device.settings) != str(first.block.settings):
+        faults.add(place, f"{port}, which sets it to {first.block.settings}", "give both one setting")
+    elif any(sealer != sealers[0] for sealer in sealers):
         faults.add(place, f"{port}, which speaks there under another name", "give both the same parameters")
-    elif isinstance(device, Input) and any(isinstance(each.block, Input) for each in drafts[:-1]):
+    elif isinstance(device, Input) and any(isinstance(each.block, Input) for each in others):
         faults.add(place, f"{port}, and two blocks would read there", "let one block read")
-    elif (load := sum(_load(each.block) for each in drafts)) > 1:
+    elif (load := sum(map(_load, blocks))) > 1:
         problem = f"the frames of all blocks at '{device.port_given}' take {load:.0%} of its time"
         faults.add(place, problem, "send fewer frames, or use a faster line")
-
-
-def _sealer(device: LineDevice) -> object:
-    return device.sealer() if isinstance(device, Output | NewsDevice) else None
 
 
 def _load(device: object) -> float:
@@ -101,10 +119,3 @@ def _load(device: object) -> float:
     sealer = device.sealer()
     count = len(device.safe_frame()) + (sealer.added if sealer is not None else 0)
     return (device.settings.time(count) + device.settings.gap) / device.interval
-
-
-def _check_ends(one: LineDevice, other: LineDevice, place: Place, faults: Faults) -> None:
-    """Report two devices at one cable or port with unlike settings."""
-    if str(one.settings) != str(other.settings):
-        problem = f"the two ends of '{one.port_given}' are set to {one.settings} and {other.settings}"
-        faults.add(place, problem, "give both one setting")

@@ -68,11 +68,7 @@ class Datagrams(NamedTuple):
             opened.close()
             what = "listen at" if listens else "send to"
             raise PortError(f"cannot {what} {quoted(port)}: {reason(error)}") from error
-        return OpenDatagrams(opened, answers=self.sends and listens)
-
-    def adopt(self, descriptor: int) -> OpenPort:
-        """Return a socket that another process has opened."""
-        return OpenDatagrams(socket.socket(fileno=descriptor), answers=True)
+        return OpenDatagrams(opened)
 
     def missing(self, port: str) -> str:
         """Return "": only who opens it finds out."""
@@ -96,15 +92,14 @@ class Datagrams(NamedTuple):
 
 
 class OpenDatagrams(OpenPort):
-    """A socket of datagrams; one that ``answers`` sends to the first who speaks, and hears nobody else."""
+    """A socket of datagrams."""
 
-    def __init__(self, opened: socket.socket, *, answers: bool = False) -> None:
-        self.socket, self._answers = opened, answers
+    def __init__(self, opened: socket.socket) -> None:
+        self.socket = opened
         self._dropped = self._drops()
 
-    @property
-    def descriptor(self) -> int:
-        """The descriptor of the socket."""
+    def fileno(self) -> int:
+        """Return its descriptor."""
         return self.socket.fileno()
 
     def write(self, piece: bytes) -> int:
@@ -125,8 +120,6 @@ class OpenDatagrams(OpenPort):
         """Return the datagrams that have come."""
         drops = self._drops()
         found: list[bytes] = []
-        if self._answers:
-            self._answers = not self._answer()
         while len(found) < MOST:
             try:
                 found.append(self.socket.recv(LARGEST))
@@ -157,3 +150,22 @@ class OpenDatagrams(OpenPort):
         except OSError:  # other systems than Linux
             return 0
         return int(MEMINFO.unpack(words)[DROPS])
+
+
+class LentDatagrams(OpenDatagrams):
+    """A socket that another process has opened and sends with; this one reads.
+
+    Both have one socket, so what is read here is no longer there for the other process to look at: whoever is
+    first to speak is made the one to whom frames go here.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        super().__init__(socket.socket(fileno=descriptor))
+
+    def read_waiting(self) -> Waiting:
+        """Return the datagrams that have come."""
+        try:
+            self.socket.getpeername()
+        except OSError:
+            self._answer()
+        return super().read_waiting()

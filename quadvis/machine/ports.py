@@ -38,11 +38,6 @@ class OpenPort:
 
     whole = True
 
-    @property
-    def descriptor(self) -> int:
-        """The descriptor of the port, which another process may adopt; -1 where none can."""
-        return -1
-
     def write(self, piece: bytes) -> int:
         """Write as many bytes as there is room for; return their number. PortError if the port is gone."""
         raise NotImplementedError
@@ -73,9 +68,6 @@ class PortSettings(Protocol):
     def open(self, port: str) -> OpenPort:
         """Open the port; PortError in one sentence if that cannot be."""
 
-    def adopt(self, descriptor: int) -> OpenPort:
-        """Return a port that another process has opened and goes on to use: both may read and write."""
-
     def missing(self, port: str) -> str:
         """Return a sentence if the port is surely not there, else ""."""
 
@@ -100,10 +92,6 @@ class Card:
     def open(self, port: str) -> OpenPort:
         """Open the port; PortError in one sentence if that cannot be."""
         raise NotImplementedError
-
-    def adopt(self, descriptor: int) -> OpenPort:
-        """Refuse: what a driver has opened belongs to its process."""
-        raise PortError("what the driver of a card has opened belongs to its process")
 
     def missing(self, port: str) -> str:
         """Return "": who opens the port finds it."""

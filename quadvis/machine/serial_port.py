@@ -61,11 +61,7 @@ class Line(NamedTuple):
 
     def open(self, port: str) -> OpenPort:
         """Open, lock and set up a port; PortError in one sentence if that cannot be."""
-        return OpenLine(open_port(port, self), own=True)
-
-    def adopt(self, descriptor: int) -> OpenPort:
-        """Return a port that another process has opened, and keeps locked."""
-        return OpenLine(descriptor, own=False)
+        return OpenLine(open_port(port, self))
 
     def missing(self, port: str) -> str:
         """Return a sentence if there is no port of this path, else ""."""
@@ -86,12 +82,11 @@ class OpenLine(OpenPort):
 
     whole = False
 
-    def __init__(self, descriptor: int, *, own: bool) -> None:
-        self._descriptor, self._own = descriptor, own
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
 
-    @property
-    def descriptor(self) -> int:
-        """The descriptor of the port."""
+    def fileno(self) -> int:
+        """Return its descriptor."""
         return self._descriptor
 
     def write(self, piece: bytes) -> int:
@@ -108,8 +103,17 @@ class OpenLine(OpenPort):
         return Waiting((found,), late=len(found) >= BACKLOG)
 
     def close(self) -> None:
-        """Close it, and let others open the port again if it is not another process's."""
-        (close_port if self._own else os.close)(self._descriptor)
+        """Let others open the port again, and close it."""
+        close_port(self._descriptor)
+
+
+class LentLine(OpenLine):
+    """A serial port that another process has opened, and keeps."""
+
+    def close(self) -> None:
+        """Give the descriptor back; the port stays that of the other process."""
+        with suppress(OSError):
+            os.close(self._descriptor)
 
 
 def open_port(path: str, line: Line) -> int:

@@ -20,7 +20,6 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from multiprocessing import parent_process
 from multiprocessing.connection import Connection
-from multiprocessing.reduction import recv_handle
 from typing import Any, NamedTuple
 
 from quadvis.diagram.load import load_text
@@ -89,17 +88,11 @@ class Supply(NamedTuple):
     """What an application waits for before it opens its blocks, since other processes make it.
 
     ``lines`` has what the ends of its other links are opened with, by the names of the links; ``ports`` the
-    ptys of its input devices, by their paths. The descriptors of the ports that are ``lent`` to input devices
-    come after it, in the order of their paths.
+    ptys of its input devices, by their paths.
     """
 
     lines: Mapping[str, Any]
     ports: Mapping[str, str]
-    lent: tuple[str, ...]
-
-    def receive_lent(self, link: Connection) -> dict[str, int]:
-        """Return these descriptors, by the paths of the devices."""
-        return {path: recv_handle(link) for path in self.lent}
 
 
 @dataclass(frozen=True)
@@ -200,14 +193,12 @@ class _Application:
             schedule, names, limits, shared, clock, lambda: engine.hold_safe(), setup.computer
         )
         supply: Supply = setup.link.recv()
-        lent = supply.receive_lent(setup.link)
         with ExitStack() as stack:
             carriers = open_carriers(part, {**setup.lines, **supply.lines})
             stack.callback(close_all, carriers.values())
             engine = self._engine = Engine(live(part, carriers), diagram.seed, pacer)
             pacer.write_into(engine.memory)
-            reports = Reports(setup.link, clock)
-            setup.devices.bind(engine, supply.ports, lent, reports.take)
+            setup.devices.bind(engine, supply.ports, Reports(setup.link, clock).take)
             captures = stack.enter_context(Captures(engine, clock))
             captures.start()
             if setup.wishes.profile:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -22,33 +21,40 @@ from quadvis.realtime.guard import Guard
 from quadvis.realtime.guardian import Alarm, Standing, outboxes, words_for
 from quadvis.realtime.heartbeat import Patience
 from quadvis.realtime.outlet import OutputPort
+from quadvis.realtime.shared_ports import lent_port
 
 Report = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class PortBindings:
-    """What the devices of an application need: the guardian's words, the outbox of each output, by path."""
+    """What the devices of an application need, by path.
+
+    These are the guardian's words with the number of each outbox, and what gives inputs at shared ports the
+    descriptors of these.
+    """
 
     words: Any = None
     boxes: Mapping[str, int] = field(default_factory=dict)
+    lenders: Mapping[str, Connection] = field(default_factory=dict)
 
-    def bind(self, engine: Engine, ports: Mapping[str, str], lent: Mapping[str, int], report: Report) -> None:
+    def bind(self, engine: Engine, ports: Mapping[str, str], report: Report) -> None:
         """Bind the devices of an engine, before it opens them.
 
-        ``ports`` are the paths of the ptys of those inputs that are at the end of a cable, ``lent`` the
-        descriptors of those that read the port of an output; ``report`` takes what devices have to say.
+        ``ports`` are the paths of the ptys of those inputs that are at the end of a cable; ``report`` takes
+        what a device has to say during the run.
         """
         boxes = outboxes(self.words) if self.boxes else []
-        for path, _ in devices(engine.graph):
+        for path, device in devices(engine.graph):
             block = engine.bound(path)
             block.report = partial(_report, report, path)
             if path in self.boxes:
                 block.deliver = boxes[self.boxes[path]].put
+            if path in self.lenders:
+                assert isinstance(device, LineDevice)
+                block.lent = partial(lent_port, device.settings, self.lenders[path])
             if path in ports:
                 block.actual_port = ports[path]
-            elif path in lent:
-                block.adopted = lent[path]
 
 
 def _report(report: Report, path: str, sentence: str) -> None:
@@ -68,14 +74,12 @@ class Devices:
         words = context.RawArray("q", words_for(len(self._outputs))) if self._outputs else None
         boxes = {path: number for number, path in enumerate(self._outputs)}
         self.ports: dict[str, str] = {}  # of inputs at the end of a cable, by path, from `open` on
-        self.lent: dict[str, int] = {}  # descriptors for inputs at the port of an output, from `open` on
-        owners = {device.port_given: path for path, device in self._outputs.items() if not _on_cable(device)}
-        self._owners = {
-            path: owners[device.port_given]
-            for path, device in self._inputs.items()
-            if device.port_given in owners and not isinstance(device.settings, Card)
-        }  # the output whose port an input reads
-        self.bindings = PortBindings(words, boxes)
+        self._shared = _shared(self._outputs, self._inputs)
+        pipes = {
+            path: context.Pipe() for path, device in self._inputs.items() if device.port_given in self._shared
+        }
+        self._readers = {self._inputs[path].port_given: pipe[0] for path, pipe in pipes.items()}
+        self.bindings = PortBindings(words, boxes, {path: pipe[1] for path, pipe in pipes.items()})
         lines = {device.port_given: device.settings for device in self._all() if _on_cable(device)}
         self.cables = [Cable(port, line) for port, line in lines.items() if isinstance(line, Line)]
         self._guard: Guard | None = None
@@ -84,7 +88,14 @@ class Devices:
         """Start the guardian, and return its process; None if nothing needs one."""
         if not self._outputs:
             return None
-        self._guard = Guard(self._context, self.bindings.words, patiences, self._on_host_loss, self._standing)
+        self._guard = Guard(
+            self._context,
+            self.bindings.words,
+            patiences,
+            self._on_host_loss,
+            self._standing,
+            self._readers,
+        )
         self._guard.start()
         return self._guard.process.pid
 
@@ -98,14 +109,7 @@ class Devices:
                 self.ports[path] = ends[device.port_given].b
         if self._guard is not None:
             ports = [self._output_port(path, device, ends) for path, device in self._outputs.items()]
-            found = self._guard.open(ports, announce)
-            self.lent = {path: found[owner] for path, owner in self._owners.items()}
-
-    def forget_lent(self) -> None:
-        """Close the descriptors that the applications have got."""
-        for descriptor in self.lent.values():
-            os.close(descriptor)
-        self.lent = {}
+            self._guard.open(ports, announce)
 
     def missing(self) -> Iterator[str]:
         """Yield a sentence for each device whose port is surely not there."""
@@ -142,7 +146,7 @@ class Devices:
 
     def _output_port(self, path: str, device: Output | NewsDevice, ends: Mapping[str, Ends]) -> OutputPort:
         port = ends[device.port_given].a if _on_cable(device) else device.port_given
-        return OutputPort.of(device, path, port, lent=path in self._owners.values())
+        return OutputPort.of(device, path, port, shared=device.port_given in self._shared)
 
 
 def guards_all(part: Graph) -> bool:
@@ -153,6 +157,17 @@ def guards_all(part: Graph) -> bool:
         if "write" in node.block.interface.arguments or type(node.block).write_safe is not Block.write_safe
     ]
     return bool(writers) and all(isinstance(block, Output) or block.harmless for block in writers)
+
+
+def _shared(outputs: Mapping[str, LineDevice], inputs: Mapping[str, LineDevice]) -> set[str]:
+    """Return the ports that several devices have together."""
+    found, seen = set(), set()
+    for path, device in {**outputs, **inputs}.items():
+        port = device.port_given
+        if port in seen or (path in outputs and path in inputs):
+            found.add(port)
+        seen |= set() if _on_cable(device) or isinstance(device.settings, Card) else {port}
+    return found
 
 
 def _on_cable(device: Device) -> bool:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
 from multiprocessing.process import BaseProcess
-from multiprocessing.reduction import recv_handle
 from typing import Any
 
 from quadvis.errors import RunError
@@ -41,7 +40,8 @@ class Guard:
     """Starts the guardian, tells it whom to watch and what to send, and hears its alarms.
 
     ``words`` (a RawArray of `words_for` words) hold the outboxes of `quadvis.realtime.guardian.outboxes`,
-    in the order of the ports: whoever gives commands puts frames there.
+    in the order of the ports: whoever gives commands puts frames there. ``readers`` get the descriptors of
+    shared ports, by path.
     """
 
     def __init__(
@@ -51,11 +51,21 @@ class Guard:
         patiences: Sequence[Patience],
         on_host_loss: str,
         standing: Standing,
+        readers: Mapping[str, Connection] | None = None,
     ) -> None:
         self._ports: tuple[OutputPort, ...] = ()
         self._looked = looked(words)
         self._link, self._theirs = context.Pipe()
-        setup = GuardianSetup((), words, tuple(patiences), self._theirs, os.getpid(), on_host_loss, standing)
+        setup = GuardianSetup(
+            (),
+            words,
+            tuple(patiences),
+            self._theirs,
+            os.getpid(),
+            on_host_loss,
+            standing,
+            readers or {},
+        )
         self.process: BaseProcess = context.Process(target=guard, args=(setup,), name="guardian")
         self._started = self._lost = False
 
@@ -66,11 +76,8 @@ class Guard:
         self._started = True
         self._theirs.close()
 
-    def open(self, ports: Sequence[OutputPort], announce: Announce) -> dict[str, int]:
-        """Wait until all ports have their initial frames; RunError if one refuses.
-
-        Return the descriptors of the ports that are lent, by their blocks.
-        """
+    def open(self, ports: Sequence[OutputPort], announce: Announce) -> None:
+        """Wait until all ports have their initial frames; RunError if one refuses."""
         self._ports = tuple(ports)
         self._say(self._ports)
         until = time.monotonic() + START
@@ -79,7 +86,7 @@ class Guard:
                 said = self._receive()
                 if isinstance(said, Guarding):
                     announce(f"real time, guardian: {said.grants}")
-                    return {port.block: recv_handle(self._link) for port in self._ports if port.lent}
+                    return
                 raise RunError(said.reason, block=said.block)
         raise RunError(f"the guardian was not ready after {START:g} s")
 

@@ -12,13 +12,12 @@ import os
 import select
 import signal
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import partial
 from multiprocessing.connection import Connection
-from multiprocessing.reduction import send_handle
 from typing import Any, NamedTuple
 
 from quadvis.block.output import LONGEST
@@ -66,7 +65,8 @@ class GuardianSetup:
     """What the guardian needs: ``words`` has an outbox for each of the ``ports``, in their order.
 
     Its process starts without ports, and takes them from the ``link``. ``supervisor`` is the process that
-    started it, ``on_host_loss`` what its death means.
+    started it, ``on_host_loss`` what its death means. ``readers`` get the descriptors of shared ports, by
+    path.
     """
 
     ports: tuple[OutputPort, ...]
@@ -76,6 +76,7 @@ class GuardianSetup:
     supervisor: int
     on_host_loss: str
     standing: Standing
+    readers: Mapping[str, Connection] = field(default_factory=dict)
 
 
 class Order(Enum):
@@ -94,10 +95,7 @@ class Watch:
 
 @dataclass(frozen=True)
 class Guarding:
-    """The ports are open and have their initial frames; what the system has granted.
-
-    The descriptors of the ports that are lent come after it, in their order.
-    """
+    """The ports are open and have their initial frames; what the system has granted."""
 
     grants: Grants
 
@@ -169,12 +167,8 @@ class Guardian:
                 refused.append((outlet, error))
         for outlet, refusal in refused:
             self._fail(outlet, refusal)
+        self._shared.lend(self._setup.readers)
         return not refused
-
-    @property
-    def lent(self) -> list[int]:
-        """The descriptors of the ports that input devices read."""
-        return [outlet.descriptor for outlet in self._outlets if outlet.port.lent]
 
     def run(self) -> None:
         """Serve the ports until nobody needs them any more."""
@@ -309,6 +303,4 @@ def guard(setup: GuardianSetup) -> None:
     guardian.look()
     if opened:
         setup.link.send(Guarding(grants))
-        for descriptor in guardian.lent:
-            send_handle(setup.link, descriptor, os.getppid())
     guardian.run()

@@ -9,7 +9,6 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
 from multiprocessing.process import BaseProcess
-from multiprocessing.reduction import send_handle
 from typing import TYPE_CHECKING, Any
 
 from quadvis.diagram.sections.overload import WARN
@@ -101,14 +100,11 @@ class Member:
         self.process.start()
         self._theirs.close()
 
-    def supply(self, lines: Mapping[str, Any], ports: Mapping[str, str], lent: Mapping[str, int]) -> None:
+    def supply(self, lines: Mapping[str, Any], ports: Mapping[str, str]) -> None:
         """Let the application open its blocks, and get ready to run; see `Supply`."""
         self._supplied = True
-        own = {path: descriptor for path, descriptor in lent.items() if path in self._part}
         with suppress(OSError):  # it may have ended
-            self._link.send(Supply(lines, ports, tuple(own)))
-            for descriptor in own.values():
-                send_handle(self._link, descriptor, self.process.pid)
+            self._link.send(Supply(lines, ports))
 
     def shift(self, shift: int) -> None:
         """Let each tick be due so much (ns) later than by the start."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from quadvis.block import NewsDevice, Output, Sealer
 from quadvis.machine.ports import ChannelError, OpenPort, PortError, PortSettings
@@ -19,9 +19,8 @@ class OutputPort:
 
     ``path`` is the port, ``interval`` the time from one frame to the next (ns); ``initial`` and ``safe`` are
     whole frames. ``beginning`` and ``ending`` are sent once, before and after all frames. After safe frames
-    for the time ``held`` (ns) none follow; 0 means that there is no such time. An input device reads a port
-    that is ``lent``. ``news`` are sent once each, and have none of these. A ``shared`` port has other
-    outlets, too.
+    for the time ``held`` (ns) none follow; 0 means that there is no such time. ``news`` are sent once each,
+    and have none of these. A ``shared`` port has other outlets, too.
     """
 
     block: str
@@ -34,18 +33,16 @@ class OutputPort:
     beginning: bytes = b""
     ending: bytes = b""
     held: int = 0
-    lent: bool = False
     news: bool = False
     shared: bool = False
 
     @staticmethod
-    def of(device: Output | NewsDevice, block: str, path: str, lent: bool = False) -> OutputPort:
+    def of(device: Output | NewsDevice, block: str, path: str, shared: bool = False) -> OutputPort:
         """Return the port of a device."""
         settings, interval = device.settings, round(device.interval * NANOSECONDS)
-        sealer, shared = device.sealer(), bool(device.shared)
         if isinstance(device, NewsDevice):
-            news = OutputPort(block, path, settings, interval, b"", b"", sealer, news=True)
-            return replace(news, lent=lent, shared=shared)
+            sealer = device.sealer()
+            return OutputPort(block, path, settings, interval, b"", b"", sealer, news=True, shared=shared)
         return OutputPort(
             block,
             path,
@@ -53,11 +50,10 @@ class OutputPort:
             interval,
             device.initial_frame(),
             device.safe_frame(),
-            sealer,
+            device.sealer(),
             device.beginning(),
             device.ending(),
             round(device.held * NANOSECONDS),
-            lent,
             shared=shared,
         )
 
@@ -86,11 +82,6 @@ class Outlet:
         self._safe_since = 0  # the instant of the first safe frame; 0 if the newest frame was none
         self._released = False
         self._safe_frames = 0
-
-    @property
-    def descriptor(self) -> int:
-        """The descriptor of the open port."""
-        return self._opened.descriptor if self._opened is not None else -1
 
     @property
     def is_open(self) -> bool:

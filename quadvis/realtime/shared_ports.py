@@ -1,18 +1,30 @@
-"""Ports that several devices have together: opened once by the guardian.
+"""Ports that several devices have together: opened once by the guardian, and read by an application.
 
-What outlets send there is put one after another, never into each other.
+What outlets send there is put one after another, never into each other. The application that reads has the
+guardian's own descriptor: a locked line cannot be opened twice, and answers to datagrams come to the socket
+that has sent.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
+from multiprocessing.connection import Connection
+from multiprocessing.reduction import recv_handle, send_handle
+from typing import Protocol, cast
 
+from quadvis.machine.datagrams import LentDatagrams
 from quadvis.machine.ports import OpenPort, PortError, PortSettings
+from quadvis.machine.serial_port import LentLine, Line
 from quadvis.realtime.outlet import OutputPort
 
 ROOM = 512  # bytes that may wait for the line before an outlet leaves a frame out
+LENT = 10.0  # s in which an application has got the port
+
+
+class _Descriptor(Protocol):
+    def fileno(self) -> int: ...
 
 
 class SharedPort(OpenPort):
@@ -32,9 +44,9 @@ class SharedPort(OpenPort):
         return self
 
     @property
-    def descriptor(self) -> int:
-        """The descriptor of the port; -1 if it has none."""
-        return self._opened.descriptor if self._opened is not None else -1
+    def descriptor(self) -> int | None:
+        """The descriptor of the port; None if it is not open."""
+        return None if self._opened is None else cast(_Descriptor, self._opened).fileno()
 
     def write(self, piece: bytes) -> int:
         """Take all bytes; those for which the port has no room go before the next ones."""
@@ -81,3 +93,19 @@ class SharedPorts:
         first = self._first.setdefault(port.path, port)
         made = self._ports.setdefault(port.path, SharedPort(port.settings, port.path))
         return replace(port, sealer=first.sealer), made.open
+
+    def lend(self, readers: Mapping[str, Connection]) -> None:
+        """Give each reader the descriptor of its port, by path."""
+        for path, reader in readers.items():
+            shared = self._ports.get(path)
+            if shared is not None and shared.descriptor is not None:
+                with suppress(OSError):  # the application has ended
+                    send_handle(reader, shared.descriptor, None)
+
+
+def lent_port(settings: PortSettings, reader: Connection) -> OpenPort:
+    """Return a port that the guardian has opened and lent; PortError if it does not come."""
+    if not reader.poll(LENT):
+        raise PortError("the guardian has not lent the port")
+    descriptor = recv_handle(reader)
+    return LentLine(descriptor) if isinstance(settings, Line) else LentDatagrams(descriptor)

@@ -194,8 +194,7 @@ class _Supervisor:
             process = member.process.pid or 0
             self._devices.watch(process)
             self._cables.watch(process)
-            member.supply(self._lines.of(member.computer), self._devices.ports, self._devices.lent)
-        self._devices.forget_lent()
+            member.supply(self._lines.of(member.computer), self._devices.ports)
 
     def _open_devices(self) -> None:
         """Let the outputs have their initial frames; RunError has a sentence for each port that is missing.

@@ -112,7 +112,7 @@ def test_a_peer_that_speaks_first_is_answered_and_heard() -> None:
 def test_the_two_have_one_name_and_one_setting() -> None:
     os.symlink("/dev/null", "line")
     for port, back, words in (
-        ("/dev/null", "line", "is that of block 'out'; write '/dev/null' in both, if the input is to read"),
+        ("/dev/null", "line", "is that of block 'out'; write '/dev/null' in both, if one is to read"),
         (
             "udp::9",
             "udp:127.0.0.1:9",

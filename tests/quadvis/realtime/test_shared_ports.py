@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import os
 import select
+import socket
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from multiprocessing import Pipe
+from typing import Any
 
 import numpy as np
 import pytest
 
 from quadvis.block.output import LONGEST
+from quadvis.machine.datagrams import Datagrams
 from quadvis.machine.mailbox import Mailbox
 from quadvis.machine.ports import PortError
 from quadvis.machine.serial_port import Line, open_port
 from quadvis.realtime.news import NewsOutlet, news_of
 from quadvis.realtime.outlet import Outlet, OutputPort
 from quadvis.realtime.reports import MOST, Reports
-from quadvis.realtime.shared_ports import ROOM, SharedPorts
+from quadvis.realtime.shared_ports import ROOM, SharedPort, SharedPorts, lent_port
 from tests.quadvis.realtime.ptys import Pty, ptys
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="ports are Linux's")
@@ -155,14 +158,58 @@ def test_the_port_is_closed_when_its_last_outlet_is(rig: Rig) -> None:
 
 
 def test_a_reader_gets_what_comes_to_a_line_that_nobody_else_may_open(rig: Rig) -> None:
-    lent = LINE.adopt(os.dup(rig.outlets[2].descriptor))
+    ours, theirs = Pipe()
+    rig.shared.lend({rig.pty.path: ours})
+    lent = lent_port(LINE, theirs)
     os.write(rig.pty.peer, b"hello")
-    assert select.select([lent.descriptor], [], [], 10)[0]
+    assert select.select([lent.fileno()], [], [], 10)[0]  # type: ignore[attr-defined]
     assert lent.read_waiting().pieces == (b"hello",)
     lent.close()
     with pytest.raises(PortError, match="is in use by another program"):
         open_port(rig.pty.path, LINE)
     assert rig.serve(0) == b"1a 2b "
+
+
+def datagrams(port: str) -> tuple[SharedPort, Any]:
+    shared, (ours, theirs) = SharedPorts(), Pipe()
+    output = OutputPort("out", port, Datagrams(True), MS, b"first", b"safe", shared=True)
+    taken, opens = shared.taken(output)
+    assert opens is not None
+    opened = opens()
+    assert isinstance(opened, SharedPort)
+    shared.lend({port: ours})
+    return opened, lent_port(taken.settings, theirs)
+
+
+def test_answers_to_datagrams_come_to_the_reader() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
+        peer.bind(("127.0.0.1", 0))
+        peer.settimeout(10)
+        opened, lent = datagrams(f"udp:127.0.0.1:{peer.getsockname()[1]}")
+        opened.write(b"question")
+        data, address = peer.recvfrom(100)
+        peer.sendto(b"answer", address)
+        assert select.select([lent.fileno()], [], [], 10)[0]
+        assert (data, lent.read_waiting().pieces) == (b"question", (b"answer",))
+        lent.close()
+        opened.close()
+
+
+def test_the_first_who_speaks_is_answered_though_another_process_reads() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    opened, lent = datagrams(f"udp::{port}")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
+        peer.settimeout(10)
+        assert opened.write(b"nobody") == 6
+        peer.sendto(b"hello", ("127.0.0.1", port))
+        assert select.select([lent.fileno()], [], [], 10)[0]
+        assert lent.read_waiting().pieces == (b"hello",)
+        opened.write(b"you")
+        assert peer.recv(100) == b"you"
+    lent.close()
+    opened.close()
 
 
 def test_reports_have_their_time_and_are_not_endless() -> None:
