@@ -24,6 +24,7 @@ class AutopilotIdentity:
         self.system, self.component = system, component
         self.firmware = NO_AUTOPILOT  # MAV_AUTOPILOT, from its first heartbeat on
         self.others: Counter[Sender] = Counter()
+        self._early: Counter[Sender] = Counter()  # messages from before it is known who is who
 
     @property
     def is_known(self) -> bool:
@@ -37,6 +38,8 @@ class AutopilotIdentity:
         fits = self.system in (0, system) and self.component in (0, component)
         if is_real and fits and not self.is_known:
             self.system, self.component = system, component
+            del self._early[packet.sender]
+            self.others += self._early
         if is_real and packet.sender == (self.system, self.component):
             self.firmware = int(heartbeat["autopilot"])
 
@@ -44,5 +47,5 @@ class AutopilotIdentity:
         """Return whether a packet is the autopilot's; count it if it is not."""
         if packet.sender == (self.system, self.component):
             return True
-        self.others[packet.sender] += 1
+        (self.others if self.is_known else self._early)[packet.sender] += 1
         return False
