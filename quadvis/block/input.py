@@ -67,6 +67,7 @@ class Input(LineDevice):
         except PortError as error:
             self._gone, found = f"{self.port_given}: {error}, at t = {time:.9g} s", Waiting()
         fresh = 0
+        self._counts[Counted.LOST] += found.skipped
         for piece in found.pieces:
             self._received += piece
             for message in self.decode(self._received):

@@ -108,6 +108,10 @@ class Output(LineDevice):
         """Return the bytes that are sent at every end."""
         return self._frame({name: param.name for name, param in self.interface.safe.items()})
 
+    def outgoing(self, *values: Any) -> tuple[Any, ...]:
+        """Return what goes out at a step in the place of the inputs: a device may let them change slowly."""
+        return values
+
     def write_safe(self, time: float) -> None:
         """Hand over the safe frame."""
         self.deliver(self.safe_frame())
@@ -152,7 +156,7 @@ def _writing(frame: Callable[..., bytes]) -> Callable[..., None]:
     """Return the ``write`` of an output device, which asks for the same inputs as its ``frame``."""
 
     def write(self: Output, *values: Any) -> None:
-        self.deliver(checked_frame(frame(self, *values)))
+        self.deliver(checked_frame(frame(self, *self.outgoing(*values))))
 
     write.__signature__ = inspect.signature(frame)  # type: ignore[attr-defined]
     write.__doc__ = "Hand over the frame of a command."

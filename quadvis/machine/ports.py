@@ -23,11 +23,13 @@ class ChannelError(PortError):
 class Waiting(NamedTuple):
     """What has come: pieces in their order.
 
-    ``late`` says that the system had no room for more, so that nobody knows how old they are.
+    ``late`` says that the system had no room for more, so that nobody knows how old they are. ``skipped`` is
+    the number of pieces that newer ones have replaced.
     """
 
     pieces: tuple[bytes, ...] = ()
     late: bool = False
+    skipped: int = 0
 
 
 class OpenPort:

@@ -69,13 +69,13 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
         "highest": [1.0, 1.0, -1.0],
         "initial": [0.0, 0.0, 0.5],
         "safe": [0.0, 0.0, 0.0],
+        "ranges": [3, 3, 3],
+        "scale": [1.0, 2.0, -0.5],
         "model": str(ROOT / "diagrams" / "models" / "rotorcraft.xml"),
     }
-    if (
-        block.interface.inputs.get("command") is not None
-        and name.startswith("mavlink.")
-        and "n" not in (block.interface.inputs["command"].signal.shape)
-    ):
+    if name == "hardware.digital_out":
+        values["initial"] = [0, 1, 0]
+    if name in ("mavlink.attitude_target", "mavlink.rate_target", "mavlink.manual_control"):
         values |= {"initial": [0.0, 0.0, 0.1, 0.5], "safe": [0.1, 0.0, 0.0, 0.0]}
     required = [key for key, param in block.interface.params.items() if param.required]
     if {"file", "folder"} & {*required}:  # few blocks read or write files, and all tests come by here
