@@ -8,8 +8,8 @@ import numpy as np
 
 from quadvis.block import Out, Param, ParameterError
 from quadvis_blocks.hardware._cards.devices import CardInput
-from quadvis_blocks.hardware._cards.frames import MICRO, Kind
-from quadvis_blocks.hardware._cards.ports import Channel
+from quadvis_blocks.hardware._cards.frames import MICRO, ChannelKind
+from quadvis_blocks.hardware._cards.ports import CardChannel
 from quadvis_blocks.hardware._cards.ranges import input_range
 
 MARGIN = 0.05  # of a range, beyond its ends; what is farther out was not measured in it
@@ -27,7 +27,7 @@ class AdcIn(CardInput):
     `quadvis_blocks.hardware._cards`. A board at a serial line sends the frames of `_cards.frames`.
     """
 
-    kind = Kind.ANALOG
+    kind = ChannelKind.ANALOG
 
     ranges = Param(
         type="float64[n]", unit="V", doc="highest voltage of each channel; negative: of both signs"
@@ -45,10 +45,10 @@ class AdcIn(CardInput):
         if not self.ranges.all():
             raise ParameterError("ranges", "ranges must be different from 0 V, element by element")
 
-    def card_channels(self) -> list[Channel]:
+    def card_channels(self) -> list[CardChannel]:
         """Return the channels with their ranges."""
         pairs = zip(self.channels, self.ranges, strict=True)
-        return [Channel(int(number), input_range(float(code))) for number, code in pairs]
+        return [CardChannel(int(number), input_range(float(code))) for number, code in pairs]
 
     def is_differential(self) -> bool:
         """Return whether each channel is the difference of two wires."""

@@ -9,8 +9,8 @@ import numpy as np
 
 from quadvis.block import In, Initial, Out, Param, ParameterError, Safe, State
 from quadvis_blocks.hardware._cards.devices import CardOutput
-from quadvis_blocks.hardware._cards.frames import MICRO, Kind
-from quadvis_blocks.hardware._cards.ports import Channel
+from quadvis_blocks.hardware._cards.frames import MICRO, ChannelKind
+from quadvis_blocks.hardware._cards.ports import CardChannel
 from quadvis_blocks.hardware._cards.ranges import OUTPUT_RANGES, check_between
 
 
@@ -27,7 +27,7 @@ class DacOut(CardOutput):
     `quadvis_blocks.hardware._cards`. A board at a serial line takes the frames of `_cards.frames`.
     """
 
-    kind = Kind.ANALOG
+    kind = ChannelKind.ANALOG
 
     ranges = Param(
         type="int64[n]", min=0, max=len(OUTPUT_RANGES) - 1, doc="range of each channel, by its code"
@@ -88,10 +88,10 @@ class DacOut(CardOutput):
         """Return the frame of the levels of a command."""
         return self.frame_of(self._micro(command))
 
-    def card_channels(self) -> list[Channel]:
+    def card_channels(self) -> list[CardChannel]:
         """Return the channels with their ranges."""
         pairs = zip(self.channels, self.ranges, strict=True)
-        return [Channel(int(number), OUTPUT_RANGES[code]) for number, code in pairs]
+        return [CardChannel(int(number), OUTPUT_RANGES[code]) for number, code in pairs]
 
     def _ends(self) -> tuple[Any, Any]:
         """Return the levels of lowest and highest."""

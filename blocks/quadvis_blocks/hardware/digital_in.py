@@ -6,7 +6,7 @@ from typing import Any
 
 from quadvis.block import Out, Param
 from quadvis_blocks.hardware._cards.devices import CardInput
-from quadvis_blocks.hardware._cards.frames import Kind
+from quadvis_blocks.hardware._cards.frames import ChannelKind
 
 
 class DigitalIn(CardInput):
@@ -19,7 +19,7 @@ class DigitalIn(CardInput):
     `quadvis_blocks.hardware._cards`. A board at a serial line sends the frames of `_cards.frames`.
     """
 
-    kind = Kind.DIGITAL
+    kind = ChannelKind.DIGITAL
 
     inverted = Param(False, "bool", doc="on is the low level")
     on = Out("bool[n]", doc="whether each line is on")

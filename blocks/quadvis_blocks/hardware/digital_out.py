@@ -8,7 +8,7 @@ import numpy as np
 
 from quadvis.block import In, Initial, Param, Safe
 from quadvis_blocks.hardware._cards.devices import CardOutput
-from quadvis_blocks.hardware._cards.frames import Kind
+from quadvis_blocks.hardware._cards.frames import ChannelKind
 
 
 class DigitalOut(CardOutput):
@@ -18,7 +18,7 @@ class DigitalOut(CardOutput):
     `quadvis_blocks.hardware._cards`. A board at a serial line takes the frames of `_cards.frames`.
     """
 
-    kind = Kind.DIGITAL
+    kind = ChannelKind.DIGITAL
 
     inverted = Param(False, "bool", doc="on is the low level")
     initial = Initial("command", doc="command before the first one, for each element")

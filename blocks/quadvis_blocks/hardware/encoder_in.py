@@ -8,7 +8,7 @@ import numpy as np
 
 from quadvis.block import Out, Param
 from quadvis_blocks.hardware._cards.devices import CardInput
-from quadvis_blocks.hardware._cards.frames import Kind
+from quadvis_blocks.hardware._cards.frames import ChannelKind
 
 
 class EncoderIn(CardInput):
@@ -22,7 +22,7 @@ class EncoderIn(CardInput):
     `quadvis_blocks.hardware._cards`. A board at a serial line sends the frames of `_cards.frames`.
     """
 
-    kind = Kind.COUNTS
+    kind = ChannelKind.COUNTS
 
     bits = Param(24, "int64", min=2, max=32, doc="bits of a counter, after which it wraps")
     scale = Param(

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from quadvis.block import Counted, ParameterError, PortError
 from quadvis.errors import RunError
 from quadvis.machine.capture import GOOD, HOPELESS, OPENING, STATUS, Post
-from quadvis_blocks.hardware._cards.frames import LONGEST, Kind, decode, encode
+from quadvis_blocks.hardware._cards.frames import LONGEST, ChannelKind, decode, encode
 from quadvis_blocks.hardware._cards.ports import CardInputs, Reading
 from quadvis_blocks.hardware._cards.reading import work
 from quadvis_blocks.hardware.adc_in import AdcIn
@@ -31,7 +31,7 @@ GIVEN: dict[str, Any] = {"channels": [3, 1], "ranges": [-10.0, 5.0]}
 
 def frame(three: float, one: float) -> bytes:
     """Return a frame of a board with three channels."""
-    return encode(Kind.ANALOG, [(1, round(1e6 * one)), (2, 77), (3, round(1e6 * three))])
+    return encode(ChannelKind.ANALOG, [(1, round(1e6 * one)), (2, 77), (3, round(1e6 * three))])
 
 
 @pytest.fixture
@@ -60,7 +60,7 @@ def test_what_is_damaged_incomplete_or_impossible_is_refused_and_other_kinds_are
         for number, came in enumerate(
             (
                 bytes(spoilt),
-                encode(Kind.ANALOG, [(1, 0)]),
+                encode(ChannelKind.ANALOG, [(1, 0)]),
                 frame(-10.51, 0.0),
                 frame(0.0, -0.26),
                 bytes([9] * 2000),
@@ -68,13 +68,13 @@ def test_what_is_damaged_incomplete_or_impossible_is_refused_and_other_kinds_are
         ):
             assert line.step(came)["refused"] >= number + 1
         before = line.step(b"\0")["refused"]
-        found = line.step(encode(Kind.DIGITAL, [(1, 1), (3, 1)]) + frame(-10.49, 5.24))
+        found = line.step(encode(ChannelKind.DIGITAL, [(1, 1), (3, 1)]) + frame(-10.49, 5.24))
         assert (found["voltage"], found["refused"]) == ([-10.49, 5.24], before)
 
 
 @given_by(st.lists(st.tuples(st.integers(1, 255), st.integers(-(2**31), 2**31 - 1)), max_size=40))
 def test_a_frame_says_what_it_was_made_of(values: list[tuple[int, int]]) -> None:
-    made = encode(Kind.ANALOG, values)
+    made = encode(ChannelKind.ANALOG, values)
     assert 0 not in made[:-1]
     assert len(made) <= LONGEST
     found = decode(made[:-1])

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from quadvis.block import ChannelError, ParameterError, PortError
 from quadvis.realtime.outlet import Outlet, OutputPort
 from quadvis.testing import drive, drive_output
-from quadvis_blocks.hardware._cards.frames import Kind, decode
+from quadvis_blocks.hardware._cards.frames import ChannelKind, decode
 from quadvis_blocks.hardware.dac_out import DacOut
 from tests.blocks.hardware.cards import Cards, standing_in
 
@@ -40,7 +40,7 @@ def device(**given: Any) -> DacOut:
 def levels(frame: bytes) -> list[float]:
     """Return the levels (V) of a frame."""
     found = decode(frame[:-1])
-    assert found is not None and found.kind is Kind.ANALOG
+    assert found is not None and found.kind is ChannelKind.ANALOG
     return [value / 1e6 for value in found.values.values()]
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from quadvis_blocks.hardware._cards.frames import Kind, encode
+from quadvis_blocks.hardware._cards.frames import ChannelKind, encode
 from quadvis_blocks.hardware._cards.ports import CardInputs, open_card
 from quadvis_blocks.hardware.digital_in import DigitalIn
 from tests.blocks.hardware.board_line import board
@@ -17,9 +17,9 @@ from tests.blocks.hardware.cards import standing_in
 def test_the_newest_lines_of_a_board_count(inverted: bool) -> None:
     with board(DigitalIn, channels=[2, 5], inverted=inverted) as line:
         assert line.step()["on"] == [False, False]
-        found = line.step(encode(Kind.DIGITAL, [(1, 0), (2, 1), (5, 0)]))
+        found = line.step(encode(ChannelKind.DIGITAL, [(1, 0), (2, 1), (5, 0)]))
         assert found["on"] == [not inverted, inverted]
-        assert line.step(encode(Kind.DIGITAL, [(2, 0), (5, 2)]))["refused"] == 1
+        assert line.step(encode(ChannelKind.DIGITAL, [(2, 0), (5, 2)]))["refused"] == 1
 
 
 @pytest.mark.parametrize("port", ["comedi:DEVICE", "nidaqmx:Dev1"])

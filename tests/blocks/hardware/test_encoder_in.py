@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadvis_blocks.hardware._cards.frames import Kind, encode
+from quadvis_blocks.hardware._cards.frames import ChannelKind, encode
 from quadvis_blocks.hardware._cards.ports import CardInputs, open_card
 from quadvis_blocks.hardware.encoder_in import EncoderIn
 from tests.blocks.hardware.board_line import board
@@ -19,7 +19,7 @@ from tests.blocks.hardware.cards import standing_in
 
 def counts(*values: int) -> bytes:
     """Return the frame of a board's counters."""
-    return encode(Kind.COUNTS, list(enumerate(values, 1)))
+    return encode(ChannelKind.COUNTS, list(enumerate(values, 1)))
 
 
 def test_counts_go_on_beyond_the_ends_of_a_counter() -> None:

@@ -15,16 +15,16 @@ from typing import Any
 
 from quadvis.block import PortError
 from quadvis.errors import sentence
-from quadvis_blocks.hardware._cards.frames import Kind
-from quadvis_blocks.hardware._cards.ports import CardRequest, Channel, described
+from quadvis_blocks.hardware._cards.frames import ChannelKind
+from quadvis_blocks.hardware._cards.ports import CardChannel, CardRequest, described
 from quadvis_blocks.hardware._cards.ranges import Range
 
 SUBDEVICES = {  # by kind, and by whether it sends
-    (Kind.ANALOG, True): ("COMEDI_SUBD_AO",),
-    (Kind.ANALOG, False): ("COMEDI_SUBD_AI",),
-    (Kind.DIGITAL, True): ("COMEDI_SUBD_DO", "COMEDI_SUBD_DIO"),
-    (Kind.DIGITAL, False): ("COMEDI_SUBD_DI", "COMEDI_SUBD_DIO"),
-    (Kind.COUNTS, False): ("COMEDI_SUBD_COUNTER",),
+    (ChannelKind.ANALOG, True): ("COMEDI_SUBD_AO",),
+    (ChannelKind.ANALOG, False): ("COMEDI_SUBD_AI",),
+    (ChannelKind.DIGITAL, True): ("COMEDI_SUBD_DO", "COMEDI_SUBD_DIO"),
+    (ChannelKind.DIGITAL, False): ("COMEDI_SUBD_DI", "COMEDI_SUBD_DIO"),
+    (ChannelKind.COUNTS, False): ("COMEDI_SUBD_COUNTER",),
 }
 CLOSE = 1e-6  # of a range that is another one
 
@@ -73,13 +73,13 @@ class ComediCard:
         """Close the device."""
         self._comedi.comedi_close(self._device)
 
-    def _at(self, place: int) -> tuple[Channel, tuple[int, Any, int]]:
+    def _at(self, place: int) -> tuple[CardChannel, tuple[int, Any, int]]:
         return self._request.channels[place], self._channels[place]
 
     def _read(self, place: int) -> float:
         comedi, channel, (place_of_range, card_range, most) = self._comedi, *self._at(place)
         number = channel.number - 1
-        if self._request.kind is Kind.DIGITAL:
+        if self._request.kind is ChannelKind.DIGITAL:
             done, found = comedi.comedi_dio_read(self._device, self._subdevice, number)
         else:
             done, found = comedi.comedi_data_read(
@@ -106,13 +106,13 @@ class ComediCard:
         what = f"{self._request.kind.name.lower()} {'outputs' if sends else 'inputs'}"
         raise PortError(f"card '{self._request.device}' has no {what}")
 
-    def _set_up(self, channel: Channel, sends: bool) -> tuple[int, Any, int]:
+    def _set_up(self, channel: CardChannel, sends: bool) -> tuple[int, Any, int]:
         """Return place and contents of a channel's range among those of the card, and the greatest count."""
         comedi, number = self._comedi, channel.number - 1
         there = comedi.comedi_get_n_channels(self._device, self._subdevice)
         if channel.number > there:
             raise PortError(f"{described(self._request, channel)} does not exist: it has {max(0, there)}")
-        if self._request.kind is Kind.DIGITAL:
+        if self._request.kind is ChannelKind.DIGITAL:
             way = comedi.COMEDI_OUTPUT if sends else comedi.COMEDI_INPUT
             comedi.comedi_dio_config(
                 self._device, self._subdevice, number, way
@@ -123,7 +123,7 @@ class ComediCard:
         place, found = self._range(channel, channel.range)
         return place, found, most
 
-    def _range(self, channel: Channel, wanted: Range) -> tuple[int, Any]:
+    def _range(self, channel: CardChannel, wanted: Range) -> tuple[int, Any]:
         comedi, number = self._comedi, channel.number - 1
         there = []
         for place in range(comedi.comedi_get_n_ranges(self._device, self._subdevice, number)):

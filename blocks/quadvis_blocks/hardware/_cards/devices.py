@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from quadvis.block import Counted, Input, Line, LineDevice, Output, Param, PortSettings
-from quadvis_blocks.hardware._cards.frames import Kind, encode, take
-from quadvis_blocks.hardware._cards.ports import CardInputs, CardOutputs, Channel, request_of
+from quadvis_blocks.hardware._cards.frames import ChannelKind, encode, take
+from quadvis_blocks.hardware._cards.ports import CardChannel, CardInputs, CardOutputs, request_of
 from quadvis_blocks.hardware._cards.ranges import check_channels
 
 
@@ -17,7 +17,7 @@ class CardDevice(LineDevice):
     """A device with channels of one kind, of a card with a driver or of a board at a serial line."""
 
     line = Line("baud")
-    kind: ClassVar[Kind]
+    kind: ClassVar[ChannelKind]
 
     port = Param(type="port", doc="comedi:/dev/comedi0, nidaqmx:Dev1, or the line of a board: pty:board")
     baud = Param(115_200, "int64", min=1, max=10**7, doc="speed of the line of a board (1/s)")
@@ -27,9 +27,9 @@ class CardDevice(LineDevice):
         """Refuse wrong channels."""
         check_channels(self.channels)
 
-    def card_channels(self) -> list[Channel]:
+    def card_channels(self) -> list[CardChannel]:
         """Return the channels with their ranges."""
-        return [Channel(int(number)) for number in self.channels]
+        return [CardChannel(int(number)) for number in self.channels]
 
 
 class CardOutput(CardDevice, Output):

@@ -23,7 +23,7 @@ MICRO = 1_000_000
 WORD = 1 << 32
 
 
-class Kind(Enum):
+class ChannelKind(Enum):
     """What the values of a frame are."""
 
     ANALOG = ord("A")
@@ -31,24 +31,24 @@ class Kind(Enum):
     COUNTS = ord("C")
 
 
-class Values(NamedTuple):
+class ChannelValues(NamedTuple):
     """A whole frame: its kind, and its values by channel."""
 
-    kind: Kind
+    kind: ChannelKind
     values: Mapping[int, int]
 
 
-def encode(kind: Kind, values: Iterable[tuple[int, int]]) -> bytes:
+def encode(kind: ChannelKind, values: Iterable[tuple[int, int]]) -> bytes:
     """Return the frame of channels and their values."""
     body = bytes([kind.value]) + b"".join(ENTRY.pack(channel, _signed(value)) for channel, value in values)
     return stuffed(body + CHECK.pack(zlib.crc32(body))) + END
 
 
-def decode(piece: bytes) -> Values | None:
+def decode(piece: bytes) -> ChannelValues | None:
     """Return what stood before the end of a frame; None if that is not a whole frame."""
     try:
         body = unstuffed(piece)
-        kind = Kind(body[0])
+        kind = ChannelKind(body[0])
     except (ValueError, IndexError):
         return None
     inside = len(body) - CHECK.size
@@ -58,10 +58,10 @@ def decode(piece: bytes) -> Values | None:
         or zlib.crc32(body[:inside]) != CHECK.unpack_from(body, inside)[0]
     ):
         return None
-    return Values(kind, dict(ENTRY.iter_unpack(body[1:inside])))
+    return ChannelValues(kind, dict(ENTRY.iter_unpack(body[1:inside])))
 
 
-def take(received: bytearray) -> Iterator[Values | None]:
+def take(received: bytearray) -> Iterator[ChannelValues | None]:
     """Take all frames that end in these bytes; yield each, or None for one that is not whole."""
     while (end := received.find(END)) >= 0:
         piece = bytes(received[:end])

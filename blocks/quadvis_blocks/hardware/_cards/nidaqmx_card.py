@@ -11,8 +11,8 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 from quadvis.block import PortError
-from quadvis_blocks.hardware._cards.frames import Kind
-from quadvis_blocks.hardware._cards.ports import CardRequest, Channel, described
+from quadvis_blocks.hardware._cards.frames import ChannelKind
+from quadvis_blocks.hardware._cards.ports import CardChannel, CardRequest, described
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -58,7 +58,7 @@ class NidaqmxOutputs:
             with suppress(self._nidaqmx.errors.Error):
                 task.close()
 
-    def _add(self, task: Any, channel: Channel) -> None:
+    def _add(self, task: Any, channel: CardChannel) -> None:
         number, device = channel.number - 1, self._request.device
         if channel.range is None:
             task.do_channels.add_do_chan(f"{device}/port0/line{number}")
@@ -78,7 +78,11 @@ class NidaqmxInputs:
 
         self._request, self._nidaqmx = request, nidaqmx
         self._tasks: list[Any] = []
-        groups = [[each] for each in request.channels] if request.kind is Kind.COUNTS else [request.channels]
+        groups = (
+            [[each] for each in request.channels]
+            if request.kind is ChannelKind.COUNTS
+            else [request.channels]
+        )
         try:
             for group in groups:
                 with named(nidaqmx, described(request, group[0])):
@@ -109,9 +113,9 @@ class NidaqmxInputs:
             with suppress(self._nidaqmx.errors.Error):
                 task.close()
 
-    def _add(self, task: Any, channel: Channel) -> None:
+    def _add(self, task: Any, channel: CardChannel) -> None:
         number, device, constants = channel.number - 1, self._request.device, self._nidaqmx.constants
-        if self._request.kind is Kind.COUNTS:
+        if self._request.kind is ChannelKind.COUNTS:
             task.ci_channels.add_ci_ang_encoder_chan(
                 f"{device}/ctr{number}",
                 decoding_type=constants.EncoderType.X_4,

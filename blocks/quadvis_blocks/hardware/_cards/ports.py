@@ -13,7 +13,7 @@ from quadvis.block import Card, ChannelError, OpenPort, ParameterError, PortErro
 from quadvis.errors import quoted, sentence
 from quadvis.machine.capture import CaptureRequest
 from quadvis.machine.captured_card import CapturedCard
-from quadvis_blocks.hardware._cards.frames import LONGEST, MICRO, Kind, decode
+from quadvis_blocks.hardware._cards.frames import LONGEST, MICRO, ChannelKind, decode
 from quadvis_blocks.hardware._cards.ranges import Range
 
 DRIVERS = {  # the module of each, what a port is, and what to do if the module is missing
@@ -27,7 +27,7 @@ DRIVERS = {  # the module of each, what a port is, and what to do if the module 
 READER = "quadvis_blocks.hardware._cards.reading:work"
 
 
-class Channel(NamedTuple):
+class CardChannel(NamedTuple):
     """A channel of a card: its number, from 1, and the range of an analog one."""
 
     number: int
@@ -40,8 +40,8 @@ class CardRequest:
 
     driver: str
     device: str
-    kind: Kind
-    channels: tuple[Channel, ...]
+    kind: ChannelKind
+    channels: tuple[CardChannel, ...]
     differential: bool = False
 
     @property
@@ -71,7 +71,7 @@ class OpenCard(Protocol):
 
 
 def request_of(
-    port: str, parameter: str, kind: Kind, channels: Sequence[Channel], differential: bool = False
+    port: str, parameter: str, kind: ChannelKind, channels: Sequence[CardChannel], differential: bool = False
 ) -> CardRequest | None:
     """Return what a port asks of a card; None if it is no driver's. ParameterError if it names no device."""
     driver, colon, device = port.partition(":")
@@ -120,7 +120,7 @@ class OpenOutputs(OpenPort):
         """Put out the values of a frame; ChannelError at its end if a channel has refused its own."""
         found = decode(piece[:-1])
         assert found is not None
-        scale = MICRO if self._request.kind is Kind.ANALOG else 1
+        scale = MICRO if self._request.kind is ChannelKind.ANALOG else 1
         refused = []
         for place, channel in enumerate(self._request.channels):
             try:
@@ -160,6 +160,6 @@ class CardInputs(CapturedCard):
         return self.card.claims(sends=False)
 
 
-def described(request: CardRequest, channel: Channel) -> str:
+def described(request: CardRequest, channel: CardChannel) -> str:
     """Return words for a channel of a card, for messages."""
     return f"channel {channel.number} of {quoted(f'{request.driver}:{request.device}')}"

@@ -6,7 +6,7 @@ import time
 
 from quadvis.block import PortError
 from quadvis.machine.capture import GOOD, OPENING, Post
-from quadvis_blocks.hardware._cards.frames import MICRO, Kind, encode
+from quadvis_blocks.hardware._cards.frames import MICRO, ChannelKind, encode
 from quadvis_blocks.hardware._cards.ports import Reading, open_card
 
 OPEN, CALL = 5.0, 2.0  # s that the driver has to open a card, and to read it
@@ -15,7 +15,7 @@ OPEN, CALL = 5.0, 2.0  # s that the driver has to open a card, and to read it
 def work(post: Post, reading: Reading) -> None:
     """Read a card until a call fails; then return, to be called again."""
     request, interval = reading.request, reading.interval
-    scale = MICRO if request.kind is Kind.ANALOG else 1
+    scale = MICRO if request.kind is ChannelKind.ANALOG else 1
     numbers = [channel.number for channel in request.channels]
     post.calling(OPEN)
     try:
