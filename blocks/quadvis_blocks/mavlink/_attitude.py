@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from quadvis.block import all_finite
 from quadvis_blocks._angles import wrapped
 
 AXES = ("quadvis", "ros")
@@ -31,13 +32,17 @@ def quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, flo
     )
 
 
-def to_ned(position: Any, attitude: Any, axes: int, north: float) -> tuple[Any, Any]:
+def is_whole(position: Any, roll: float, pitch: float, yaw: float) -> bool:
+    """Return whether no number of a pose is missing."""
+    return bool(all_finite(position) and math.isfinite(roll) and math.isfinite(pitch) and math.isfinite(yaw))
+
+
+def to_ned(position: Any, roll: float, pitch: float, yaw: float, axes: int, north: float) -> tuple[Any, Any]:
     """Return a position (3,) (m) in north, east, down, and angles (3,) (rad) of MAVLink.
 
     ``north`` is the direction of our x, of y with the axes of ROS, clockwise from north (rad).
     """
     ahead, right = position[0], position[1]
-    roll, pitch, yaw = attitude[0], attitude[1], attitude[2]
     if axes == ROS:
         ahead, right, pitch, yaw = right, ahead, -pitch, 0.5 * math.pi - yaw
     cosine, sine = math.cos(north), math.sin(north)

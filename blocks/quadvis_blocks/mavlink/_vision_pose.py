@@ -9,7 +9,7 @@ import numpy as np
 
 from quadvis.block import Block, In, Out, Param, State, Work
 from quadvis_blocks._stamps import NEWS, RESTART, SIZE, begin, judge, keep
-from quadvis_blocks.mavlink._attitude import AXES, ned_sigma, to_ned
+from quadvis_blocks.mavlink._attitude import AXES, is_whole, ned_sigma, to_ned
 
 
 class VisionPose(Block):
@@ -23,7 +23,9 @@ class VisionPose(Block):
         RESTART, unit="s", above=0.0, doc="how long a restarted clock must run before its stamps count"
     )
     position = In("float64[3]", unit="m", doc="x, y, h; with the axes of ros x, y, z")
-    attitude = In("float64[3]", unit="rad", doc="roll, pitch, yaw")
+    roll = In(unit="rad", doc="right side down")
+    pitch = In(unit="rad", doc="nose up; of ros nose down")
+    yaw = In(unit="rad", doc="clockwise from above, from x; of ros counterclockwise")
     stamp = In(unit="s", default=math.nan, doc="instant of the picture")
     valid = In("bool", default=True, doc="whether this is a pose")
     covariance = In(
@@ -50,15 +52,21 @@ class VisionPose(Block):
         begin(self.stamps)
 
     def output(
-        self, position: Any, attitude: Any, stamp: float, valid: bool, covariance: Any, time: float
+        self,
+        position: Any,
+        roll: float,
+        pitch: float,
+        yaw: float,
+        stamp: float,
+        valid: bool,
+        covariance: Any,
+        time: float,
     ) -> Any:
         """Return whether the pose is sent, and as what."""
         self.verdict, self.moment = judge(self.stamps, stamp, time, self.restart)
-        whole = np.isfinite(position).all() and np.isfinite(attitude).all()
-        sent = bool(valid and whole and self.verdict == NEWS)
-        if not sent:
+        if not (valid and self.verdict == NEWS and is_whole(position, roll, pitch, yaw)):
             return False, np.full(3, np.nan), np.full(3, np.nan), np.full(4, np.nan)
-        place, angles = to_ned(position, attitude, self.axes, self.north)
+        place, angles = to_ned(position, roll, pitch, yaw, self.axes, self.north)
         return True, place, angles, ned_sigma(covariance, self.axes, self.north)
 
     def update(self, stamp: float, time: float) -> None:

@@ -9,10 +9,11 @@ import numpy as np
 
 from quadvis.block import NewsOutput
 from quadvis_blocks._stamps import NEWS, judge
-from quadvis_blocks.mavlink._attitude import to_ned, to_ned_covariance
+from quadvis_blocks.mavlink._attitude import is_whole, to_ned, to_ned_covariance
 from quadvis_blocks.mavlink._station import Station
 from quadvis_blocks.mavlink._vision_pose import VisionPose
 
+LATEST = 1e12  # s
 ORDER = (0, 1, 2, 5)  # where x, y, z and yaw are among x, y, z, roll, pitch, yaw
 
 
@@ -29,17 +30,24 @@ class VisionPosition(Station, VisionPose, NewsOutput):
     """
 
     def frame(
-        self, position: Any, attitude: Any, stamp: float, valid: bool, covariance: Any, time: float
+        self,
+        position: Any,
+        roll: float,
+        pitch: float,
+        yaw: float,
+        stamp: float,
+        valid: bool,
+        covariance: Any,
+        time: float,
     ) -> bytes:
         """Return the message of a pose; none if it is not sent."""
-        whole = np.isfinite(position).all() and np.isfinite(attitude).all()
         verdict, moment = judge(self.stamps, stamp, time, self.restart)
-        if not (valid and whole and verdict == NEWS):
+        if not (valid and verdict == NEWS and is_whole(position, roll, pitch, yaw)):
             return b""
-        place, angles = to_ned(position, attitude, self.axes, self.north)
+        place, angles = to_ned(position, roll, pitch, yaw, self.axes, self.north)
         return self.framed(
             "VISION_POSITION_ESTIMATE",
-            usec=round(1e6 * moment),
+            usec=round(1e6 * min(max(moment, 0.0), LATEST)),
             **dict(zip(("x", "y", "z"), map(float, place), strict=True)),
             **dict(zip(("roll", "pitch", "yaw"), map(float, angles), strict=True)),
             covariance=_triangle(to_ned_covariance(covariance, self.axes, self.north)),

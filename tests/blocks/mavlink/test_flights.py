@@ -62,7 +62,9 @@ blocks:
     with: {port: "PORT" KEY}
     in:
       position: {value: [1, 2, 3], unit: m}
-      attitude: {value: [0.1, 0.2, 0.3], unit: rad}
+      roll: 0.1 rad
+      pitch: 0.2 rad
+      yaw: 0.3 rad
       stamp: clock.y
 """
 OWN = '''

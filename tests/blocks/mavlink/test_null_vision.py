@@ -14,7 +14,9 @@ def test_place_and_angles_are_those_of_the_message() -> None:
         NullVision(),
         rate="10 Hz",
         position=[1.0, 2.0, 3.0],
-        attitude=[0.1, 0.2, 0.3],
+        roll=0.1,
+        pitch=0.2,
+        yaw=0.3,
         stamp=[0.0],
         covariance=np.diag([0.04, 0.09, 0.01, 0.0004]),
     )
@@ -24,7 +26,6 @@ def test_place_and_angles_are_those_of_the_message() -> None:
 
 
 def test_what_is_not_sent_is_missing() -> None:
-    found = drive(
-        NullVision(), rate="10 Hz", position=[1.0, 2.0, 3.0], attitude=[0.1, 0.2, 0.3], valid=[False]
-    )
+    given = {"position": [1.0, 2.0, 3.0], "roll": 0.1, "pitch": 0.2, "yaw": 0.3}
+    found = drive(NullVision(), rate="10 Hz", valid=[False], **given)
     assert not found.sent[-1] and np.isnan(found.place[-1]).all() and np.isnan(found.sigma[-1]).all()

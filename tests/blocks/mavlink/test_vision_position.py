@@ -32,7 +32,7 @@ class Run:
     def __init__(self, **given: Any) -> None:
         self.block = device(**given)
         inputs = {
-            "position": np.zeros(3), "attitude": np.zeros(3), "stamp": 0.0, "valid": True,
+            "position": np.zeros(3), "roll": 0.0, "pitch": 0.0, "yaw": 0.0, "stamp": 0.0, "valid": True,
             "covariance": np.full((4, 4), np.nan),
         }  # fmt: skip
         self.engine = alone(self.block, inputs, {}, parse_period("10 Hz"))
@@ -59,7 +59,7 @@ def test_a_pose_above_the_ceilings_origin_is_north_east_down() -> None:
     with run.engine:
         run.step(valid=False)
         (found,) = run.step(
-            position=np.array([1.0, 2.0, 3.0]), attitude=np.array([0.1, 0.2, 0.3]), stamp=0.05, valid=True
+            position=np.array([1.0, 2.0, 3.0]), roll=0.1, pitch=0.2, yaw=0.3, stamp=0.05, valid=True
         )
     assert (found.get_type(), found.usec) == ("VISION_POSITION_ESTIMATE", 50_000)
     assert (found.x, found.y, found.z) == (1.0, 2.0, -3.0)
@@ -100,7 +100,7 @@ def body(roll: float, pitch: float, yaw: float, axes: int) -> Any:
 def test_the_craft_points_where_it_pointed(
     axes: int, angles: tuple[float, float, float], place: tuple[float, float, float]
 ) -> None:
-    moved, turned = to_ned(np.array(place), np.array(angles), axes, 0.0)
+    moved, turned = to_ned(np.array(place), *angles, axes, 0.0)
     assert rotation(*turned) == pytest.approx(body(*angles, axes), abs=1e-12)
     x, y, z = place
     assert moved.tolist() == ([x, y, -z] if axes == 0 else [y, x, -z])
@@ -110,7 +110,7 @@ def test_the_craft_points_where_it_pointed(
 def test_where_x_does_not_point_north_all_is_turned(
     place: tuple[float, float, float], yaw: float, north: float
 ) -> None:
-    moved, turned = to_ned(np.array(place), np.array([0.1, 0.2, yaw]), 0, north)
+    moved, turned = to_ned(np.array(place), 0.1, 0.2, yaw, 0, north)
     level = rotation(0.0, 0.0, north)
     assert moved == pytest.approx(level @ (np.array(place) * [1, 1, -1]), abs=1e-9)
     assert rotation(*turned) == pytest.approx(level @ rotation(0.1, 0.2, yaw), abs=1e-9)
@@ -125,7 +125,7 @@ def test_a_covariance_is_turned_as_its_pose(axes: int) -> None:
     turned = [
         (*place, yaw[2])
         for place, yaw in (
-            to_ned(each[:3], np.array([0.0, 0.0, each[3] * 1e-3]), axes, north) for each in samples[:20_000]
+            to_ned(each[:3], 0.0, 0.0, each[3] * 1e-3, axes, north) for each in samples[:20_000]
         )
     ]
     measured = np.cov(np.array(turned).T * np.array([[1], [1], [1], [1e3]]))
@@ -150,8 +150,12 @@ def test_the_twin_shows_what_would_be_sent() -> None:
     from quadvis_blocks.mavlink.null_vision import NullVision
 
     inputs = {
-        "position": [[1.0, 2.0, 3.0]] * 3, "attitude": [[0.1, 0.2, 0.3]] * 3, "stamp": [0.0, 0.0, 0.15],
-    }  # fmt: skip
+        "position": [[1.0, 2.0, 3.0]] * 3,
+        "roll": [0.1] * 3,
+        "pitch": [0.2] * 3,
+        "yaw": [0.3] * 3,
+        "stamp": [0.0, 0.0, 0.15],
+    }
     found = [drive(block, rate="10 Hz", **inputs) for block in (NullVision(north=0.5), device(north=0.5))]
     for name in ("sent", "place", "angles", "sigma"):
         one, other = (np.asarray(getattr(each, name)) for each in found)
