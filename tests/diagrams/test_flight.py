@@ -44,7 +44,7 @@ COMPUTERS = {"world", "vision_pc", "target"}
 
 
 def test_devices_need_real_time_and_no_other_variant_does() -> None:
-    assert on_devices() == (("flight.yaml", "hil"), ("flight.yaml", "flight"))
+    assert on_devices() == (("flight.yaml", "hil"), ("flight.yaml", "flight"), ("mavlink.yaml", "flight"))
     for name, variant in on_devices():
         with pytest.raises(QuadvisError, match="only a real-time run may do so"):
             quadvis.load(DIAGRAMS / name, variant=variant).run()

@@ -21,6 +21,7 @@ class Station(LineDevice):
     """
 
     shared = "mavlink"
+    port_example = "udp:127.0.0.1:14550"
     line = Line("baud")
 
     port = Param(
