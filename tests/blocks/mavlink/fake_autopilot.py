@@ -43,6 +43,9 @@ class MavPty(mavutil.mavfile):  # type: ignore[misc]
     def write(self, data: bytes) -> None:
         os.write(self.fd, data)
 
+    def close(self) -> None:
+        """Leave the pty to its owner."""
+
 
 def over_udp(port: int, system: int = 1, component: int = 1) -> Any:
     """Return mavutil's connection that listens at a port."""
@@ -158,6 +161,7 @@ class Running:
     def __exit__(self, *_: object) -> None:
         self._ends.set()
         self._thread.join()
+        self.fake.link.close()
 
     def _live(self) -> None:
         while not self._ends.is_set():

@@ -243,6 +243,31 @@ def test_while_its_mode_is_not_what_was_asked_for_it_is_not_armed() -> None:
         assert 400 not in [each.command for _, each in run.fake.of("COMMAND_LONG")]
 
 
+def test_the_newest_of_many_counts_and_the_age_does_not_grow() -> None:
+    """D2: 400 messages a second, for a task at 100 Hz that stands still for 2 s."""
+    mav = speaker(1, 1)
+    mav.heartbeat_send(common.MAV_TYPE_QUADROTOR, PX4, 0, 0, 4)
+    with bench() as run:
+        run.fake.pump = lambda _: None  # type: ignore[method-assign]  # its answers would be of the same sender
+        run.put(sent(mav))
+        number = 0
+        for _ in range(200):
+            for _ in range(4):
+                number += 1
+                mav.attitude_send(5 * number, number / 1e4, 0.0, 0.0, 0.0, 0.0, 0.0)
+            run.put(sent(mav))
+            run.step()
+            assert run["age"] == 0.0 and run["roll"] == np.float32(number / 1e4)
+        assert run["lost"] == 600
+        before = number
+        for _ in range(20):  # what finds room while nobody reads
+            number += 1
+            mav.attitude_send(5 * number, number / 1e4, 0.0, 0.0, 0.0, 0.0, 0.0)
+        run.put(sent(mav))
+        run.step()
+        assert run["lost"] == 600 + number - before - 1 and run["age"] == 0.0
+
+
 def test_another_definition_is_counted_by_number_and_reported() -> None:
     """D11: 10 messages with a changed list of fields."""
     kind = dialect("common").names["ATTITUDE"]

@@ -163,6 +163,22 @@ def test_over_a_line_as_well() -> None:
     os.close(slave)
 
 
+def test_an_autopilot_without_set_points_hears_requests_and_heartbeats_all_the_same() -> None:
+    port = free()
+    text = TEXT[: TEXT.index("  wish:")] + TEXT[TEXT.index("  autopilot:") : TEXT.index("    in: {arm")]
+    Path("flight.yaml").write_text(
+        text.replace("PORT", f"udp:127.0.0.1:{port}").replace("STOP", "3 s").replace(" KEY", "")
+    )
+    with autopilot(over_udp(port)) as fake:
+        result = run()
+    assert result["autopilot.valid"][-1] and 2 <= len(fake.of("HEARTBEAT")) <= 6
+    assert fake.rates and {each.get_type() for _, each in fake.heard} == {
+        "HEARTBEAT",
+        "COMMAND_LONG",
+        "PARAM_REQUEST_READ",
+    }
+
+
 def test_signed_both_ways(folder: Path) -> None:
     keys = folder / "home" / "mavlink"
     keys.mkdir(parents=True)
@@ -172,9 +188,9 @@ def test_signed_both_ways(folder: Path) -> None:
     (keys / "lab.key").chmod(0o600)
     port = free()
     write(f"udp:127.0.0.1:{port}", key="lab")
-    link = over_udp(port)
-    link.setup_signing(KEY, sign_outgoing=True)
     for _ in range(2):  # the second run goes on with the times of the first
+        link = over_udp(port)
+        link.setup_signing(KEY, sign_outgoing=True)
         with autopilot(link) as fake:
             result = run()
             time.sleep(0.1)
