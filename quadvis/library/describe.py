@@ -10,7 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import TAGS, Block, Declared, Device, FixedInput, In, LineDevice, Out, Output, Param, State
+from quadvis.block import (
+    TAGS,
+    Block,
+    Declared,
+    Device,
+    FixedInput,
+    In,
+    Input,
+    LineDevice,
+    NewsDevice,
+    Out,
+    Output,
+    Param,
+    State,
+)
 from quadvis.library.catalogue import Catalogue
 from quadvis.machine.columns import table
 
@@ -65,7 +79,8 @@ def _device(block: type[Device]) -> str:
         line = f", {serial}" if serial is not None else ""
     else:
         line = ", read by a process of its own"
-    return f"{'output' if rate else 'input'} by the port of '{block.port_parameter}'{line}{rate}"
+    sends = bool(rate) or (issubclass(block, NewsDevice) and not issubclass(block, Input))
+    return f"{'output' if sends else 'input'} by the port of '{block.port_parameter}'{line}{rate}"
 
 
 def _input_row(port: In, direct: bool) -> tuple[str, ...]:

@@ -38,9 +38,11 @@ class NewsOutlet(Outlet):
         self.due = now + self.port.interval
         if safe:
             return
-        self._taken = self._taken or now
         try:
-            busy = bool(self._rest or self._opened.unsent())
-            self._write(self._rest if busy else self._sealed(self._newest() or b"", now), now)
+            if self._rest or self._opened.unsent():
+                self._write(self._rest, now)
+                return
+            self._taken = now  # a port with nothing to send is not stuck
+            self._write(self._sealed(self._newest() or b"", now), now)
         except PortError as error:
             raise type(error)(f"{self.port.path}: {error}") from error

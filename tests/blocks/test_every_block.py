@@ -97,6 +97,8 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
     block = block.with_ports(told) if told else block
     if name == "hardware.digital_out":
         values["initial"] = [0, 1, 0]
+    if name in ("mavlink.attitude_target", "mavlink.rate_target", "mavlink.manual_control"):
+        values |= {"initial": [0.0, 0.0, 0.1, 0.5], "safe": [0.1, 0.0, 0.0, 0.0]}
     required = [key for key, param in block.interface.params.items() if param.required]
     if {"file", "folder"} & {*required}:  # few blocks read or write files, and all tests come by here
         folder = request.getfixturevalue("tmp_path")

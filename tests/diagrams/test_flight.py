@@ -46,6 +46,7 @@ COMPUTERS = {"world", "vision_pc", "target"}
 def test_devices_need_real_time_and_no_other_variant_does() -> None:
     assert on_devices() == (
         *(("flight.yaml", variant) for variant in ("hil", "flight", "text_imu")),
+        ("mavlink.yaml", "flight"),
         *(("takeover.yaml", variant) for variant in ("crsf", "sbus", "joystick")),
     )
     for name, variant in on_devices():

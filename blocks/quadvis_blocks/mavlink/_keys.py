@@ -21,7 +21,7 @@ from quadvis_blocks.mavlink._signing import MINUTE, Clock, signing_time
 
 KEY = re.compile(r"[0-9a-fA-F]{64}")
 NAME = re.compile(r"[A-Za-z0-9][\w.-]*")
-MARK, SENT, HEARD, CLEAN, BOOT, STREAMS = 0, 1, 2, 3, 4, 6  # words; BOOT is two
+MARK, SENT, HEARD, BOOT, STREAMS = 0, 1, 2, 3, 5  # words; BOOT is two
 ROOM = 61  # streams that can be heard
 WORDS = STREAMS + 2 * ROOM
 MAGIC = int.from_bytes(b"mavtime1", "little")
@@ -50,8 +50,8 @@ def read_key(name: str) -> bytes:
 class KeptTimes:
     """The times of a key, see `quadvis_blocks.mavlink._signing.SigningTimes`.
 
-    One process of all ``signs``. QuadvisError if another one does. If the last one did not end in order
-    and the machine has been started anew, the file may lack its last half minute, which is left out.
+    One process of all ``signs``; QuadvisError if another one does. After a start of the machine the file may
+    lack the last half minute before that, which is left out.
     """
 
     def __init__(self, name: str, *, signs: bool, clock: Clock = time.time_ns) -> None:
@@ -69,16 +69,15 @@ class KeptTimes:
             raise QuadvisError(f"the signing key {quoted(name)} is in use by another run") from None
         except OSError as error:
             raise QuadvisError(f"cannot use '{path}': {reason(error)}") from None
-        self._words, self._signs = memoryview(self._map).cast("Q"), signs
+        self._words = memoryview(self._map).cast("Q")
         if signs:
             self._begin(clock)
 
     def _begin(self, clock: Clock) -> None:
         words, boot = self._words, _boot()
-        unsure = not words[CLEAN] and (words[BOOT], words[BOOT + 1]) != boot
-        if words[MARK] == MAGIC and unsure:
+        if words[MARK] == MAGIC and (words[BOOT], words[BOOT + 1]) != boot:
             words[SENT] = max(words[SENT] + MINUTE, signing_time(clock))
-        words[MARK], words[CLEAN] = MAGIC, 0
+        words[MARK] = MAGIC
         words[BOOT], words[BOOT + 1] = boot
         self._map.flush()
 
@@ -120,9 +119,7 @@ class KeptTimes:
         return 0
 
     def close(self) -> None:
-        """Give the times back, in order."""
-        if self._signs:
-            self._words[CLEAN] = 1
+        """Give the times back."""
         self._words.release()
         self._map.close()
         os.close(self._file)

@@ -46,3 +46,12 @@ def angles(number: int) -> tuple[float, float, float]:
 def read(data: bytes, **given: Any) -> Iterator[Any]:
     """Yield the messages that pymavlink finds in bytes, bad ones too."""
     return iter(speaker(**given).parse_buffer(data) or [])
+
+
+def received(block: Any, frame: bytes) -> Any:
+    """Return the one message that pymavlink reads in a frame of a device; AssertionError if it is not one."""
+    sealer = block.sealer()
+    sealer.seal(b"", 0)  # with the first heartbeat
+    (found,) = read(sealer.seal(frame, 1))
+    assert (found.get_srcSystem(), found.get_srcComponent()) == (block.own_system, block.own_component)
+    return found

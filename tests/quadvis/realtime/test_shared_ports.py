@@ -118,6 +118,15 @@ def test_a_sealer_sends_by_itself_where_there_are_only_news(rig: Rig) -> None:
     assert rig.pty.read() == b"beat "
 
 
+def test_long_silence_is_no_stuck_port(rig: Rig) -> None:
+    news = rig.outlets[2]
+    for at in range(0, 5000, 500):
+        news.serve(BEGIN + at * MS, safe=at == 3000)
+    rig.box.put(b"late", 1)
+    news.serve(BEGIN + 5000 * MS, safe=False)
+    assert rig.pty.read().endswith(b"1late beat ")
+
+
 def test_frames_are_never_put_into_each_other(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     random = np.random.default_rng(4)
     monkeypatch.setattr(
