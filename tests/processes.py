@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +25,20 @@ def children(process: subprocess.Popen[Any]) -> list[int]:
     return found
 
 
-def wait_for(condition: Any) -> Any:
+def holder(path: str, processes: list[int]) -> int:
+    """Return the process, of these, that has a file open; 0 if none has."""
+    for process in processes:
+        with suppress(OSError):
+            for link in Path(f"/proc/{process}/fd").iterdir():
+                with suppress(OSError):
+                    if os.readlink(link) == path:
+                        return process
+    return 0
+
+
+def wait_for(condition: Any, patience: float = 60.0) -> Any:
     """Return what a condition gives once it gives something."""
-    end = time.monotonic() + 60
+    end = time.monotonic() + patience
     while time.monotonic() < end:
         found = condition()
         if found:

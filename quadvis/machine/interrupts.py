@@ -7,8 +7,11 @@ them ignored, as by nohup, goes on.
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from types import FrameType
+from typing import Any
 
 ENDS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 KEYS = {signal.SIGINT, *ENDS} - {signal.SIGTERM}  # sent by a terminal to all its processes
@@ -38,9 +41,27 @@ def leave_to_parent() -> None:
 
 @contextmanager
 def held_back() -> Iterator[None]:
-    """Delay the terminal's signals; processes begun inside ignore them until `leave_to_parent`."""
+    """Delay the terminal's signals; processes begun inside ignore them until `leave_to_parent`.
+
+    A signal that this thread blocks is taken by another one, and its handler then runs here all the same. So
+    in the main thread the handlers wait, too, that of SIGTERM among them.
+    """
+    late: list[int] = []
     before = signal.pthread_sigmask(signal.SIG_BLOCK, KEYS)
+    handlers = _replaced(lambda number, _: late.append(number))
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        for number in late[:1]:
+            signal.raise_signal(number)
+
+
+def _replaced(handler: Callable[[int, FrameType | None], None]) -> dict[int, Any]:
+    """Let a handler take the place of Python's; return those that were there. None in other threads."""
+    if threading.current_thread() is not threading.main_thread():
+        return {}
+    found = {number: signal.getsignal(number) for number in {signal.SIGINT, *ENDS}}
+    return {number: signal.signal(number, handler) for number in found if callable(found[number])}

@@ -69,9 +69,13 @@ def supervise(
     try:
         return supervisor.follow(tend)
     except BaseException as error:
-        for note in supervisor.end():
+        try:
+            notes = supervisor.end()
+        except BaseException as again:  # one that came before it was held back, or was held back
+            error, notes = again, supervisor.end()
+        for note in notes:
             error.add_note(note)
-        raise
+        raise error
     finally:
         steering.end()
 

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from quadvis.links.frame import Decoder, encode, longest, stuffed, unstuffed
 from quadvis.links.message import Message, MessageSignal
 from quadvis.units import Unit
+from tests.damage import damaged
 
 
 def message(count: int = 1, name: str = "y") -> Message:
@@ -136,21 +137,6 @@ def test_endless_noise_takes_no_memory() -> None:
 
 
 KINDS = ("flip", "drop", "insert")
-
-
-def damaged(data: bytes, share: float, random: np.random.Generator) -> bytes:
-    """Return the bytes with a share of them flipped, dropped, or followed by a new one."""
-    found = np.frombuffer(data, np.uint8).copy()
-    hit = random.random(found.size) < share
-    kind = random.integers(0, len(KINDS), found.size)
-    flipped = hit & (kind == 0)
-    found[flipped] ^= random.integers(1, 256, int(flipped.sum()), np.uint8)
-    inserted = np.flatnonzero(hit & (kind == 2))
-    dropped = np.flatnonzero(hit & (kind == 1))
-    keep = np.ones(found.size, bool)
-    keep[dropped] = False
-    whole = np.insert(found, inserted, random.integers(0, 256, inserted.size, np.uint8))
-    return whole[np.insert(keep, inserted, True)].tobytes()
 
 
 def through_damage(frames: int, seed: int) -> None:
