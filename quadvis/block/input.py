@@ -108,7 +108,7 @@ class Input(LineDevice):
             del self._received[: len(self._received) if self._port.whole else -KEPT]
         if fresh:
             self._counts[Counted.LOST] += fresh - 1
-            self._stamp = time
+            self._stamp = time - found.age
         self._age = time - self._stamp
 
     def send(self, piece: bytes) -> int:

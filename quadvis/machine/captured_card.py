@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import multiprocessing
+import time
 from dataclasses import dataclass
 
 from quadvis.machine.capture import ENDED, OPENING, UNLIKE, CaptureRequest
 from quadvis.machine.capture_process import CaptureProcess
 from quadvis.machine.ports import Card, OpenPort, PortError, Waiting
+
+NANOSECONDS = 10**9
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,8 @@ class CapturePort(OpenPort):
             return Waiting()
         skipped = found.number - self._number - 1 if self._number > 0 else 0
         self._instant, self._number = found.instant, found.number
-        return Waiting((bytes(found.payload),), skipped=max(0, skipped))
+        age = (time.monotonic_ns() - found.instant) / NANOSECONDS
+        return Waiting((bytes(found.payload),), skipped=max(0, skipped), age=age)
 
     def close(self) -> None:
         """End the process; PortError if the card is lost."""

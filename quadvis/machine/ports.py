@@ -24,12 +24,13 @@ class Waiting(NamedTuple):
     """What has come: pieces in their order.
 
     ``late`` says that the system had no room for more, so that nobody knows how old they are. ``skipped`` is
-    the number of pieces that newer ones have replaced.
+    the number of pieces that newer ones have replaced, ``age`` (s) is that of the newest one, if it is known.
     """
 
     pieces: tuple[bytes, ...] = ()
     late: bool = False
     skipped: int = 0
+    age: float = 0.0
 
 
 class OpenPort:

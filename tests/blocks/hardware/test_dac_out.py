@@ -262,3 +262,18 @@ def test_two_devices_may_have_one_card_but_no_channel_in_common() -> None:
     one, two = device(port="nidaqmx:Dev1"), device(port="nidaqmx:Dev1", channels=[2, 6])
     claims = [{*made.settings.claims(made.port_given)} for made in (one, two)]
     assert len(claims[0] & claims[1]) == 1
+
+
+@pytest.mark.parametrize("driver", DRIVERS)
+def test_safe_levels_need_no_import(cards: Cards, driver: str) -> None:
+    outlet = outlet_of(driven(cards, driver))
+    outlet.serve(time.monotonic_ns(), safe=False)
+
+    def refuse(name: str, *_: Any, **__: Any) -> Any:
+        raise AssertionError(f"{name} is imported")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("builtins.__import__", refuse)
+        outlet.serve(time.monotonic_ns() + 10**9, safe=True)
+        outlet.finish(time.monotonic_ns())
+    assert cards.last() == {0: pytest.approx(2.0, abs=5 / 4095), 1: pytest.approx(1.0, abs=5 / 4095)}
