@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -164,7 +165,7 @@ def test_a_request_is_sent_at_each_step_and_never_waits(tmp_path: Path) -> None:
         reader.step()
         reader.step(line(0.1))
         assert reader.heard(12) == b"?IMU\r\n" * 2
-        for _ in range(20_000):  # far more than the system keeps, if nobody hears
+        for _ in range(3_000):  # far more than the system keeps, if nobody hears
             reader.engine.run(1)
         assert reader.step(line(0.2))["roll"] == 0.2
 
@@ -253,3 +254,20 @@ def test_check_reports_all_faults_of_the_file_at_their_places(tmp_path: Path) ->
         quadvis.load(tmp_path / "x.yaml")
     (fault,) = caught.value.faults
     assert (Path(fault.place.file).name, fault.problem) == ("x.yaml", "'imv.yaml': there is no such file")
+
+
+def test_of_datagrams_the_newest_counts_and_the_others_are_counted() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        place = free.getsockname()
+    block = MessageIn(port=f"udp::{place[1]}", protocol=LAB)
+    engine = alone(block, {}, {}, parse_period("50 Hz"))
+    with engine, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
+        for step in range(50):
+            for number in range(8):
+                peer.sendto(line_of(8 * step + number), place)
+            peer.sendto(line_of(0)[:-3], place)  # what is left of it belongs to no other
+            engine.run(1)
+            assert round(1e6 * engine.read(ALONE, "roll")) == 8 * step + 7
+            assert engine.read(ALONE, "age") == 0.0
+        assert (engine.read(ALONE, "lost"), engine.read(ALONE, "refused")) == (50 * 7, 50)

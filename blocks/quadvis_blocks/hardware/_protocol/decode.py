@@ -206,30 +206,33 @@ def _parses(each: WireField) -> list[Callable[[bytes], Number]]:
 
 def pattern(message: ProtocolMessage) -> bytes:
     """Return the regular expression of a line; its groups are the numbers, and the checksum's digits."""
+    mark = message.check.mark if message.check is not None else b""
     stops = b"".join([each.data[:1] for each in message.fields if isinstance(each, FixedBytes)])
-    stops += message.terminator[:1] + (message.check.mark[:1] if message.check is not None else b"")
+    stops += message.terminator[:1] + mark[:1]
     found = re.escape(message.header)
-    for each in message.fields:
+    for number, each in enumerate(message.fields):
+        after = message.fields[number + 1 : number + 2]
+        behind = after[0].data if after and isinstance(after[0], FixedBytes) else mark or message.terminator
         if isinstance(each, FixedBytes):
             found += re.escape(each.data)
         elif isinstance(each, ValueField):
-            one = _one(each)
-            found += re.escape(each.between).join([one] * each.value.count)
+            ones = [_one(each, each.between)] * (each.value.count - 1) + [_one(each, behind)]
+            found += re.escape(each.between).join(ones)
         elif isinstance(each, CounterField):
             assert isinstance(each.form, Printed)
-            found += each.form.pattern
+            found += each.form.pattern(behind)
         else:
             found += b"[^" + re.escape(stops) + b"]*+"
     if message.check is not None:
         digits = DIGITS * message.check.algorithm.size
-        found += re.escape(message.check.mark) + b"([0-9A-Fa-f]{%d})" % digits
+        found += re.escape(mark) + b"([0-9A-Fa-f]{%d})" % digits
     return found + re.escape(message.terminator)
 
 
-def _one(each: ValueField) -> bytes:
+def _one(each: ValueField, behind: bytes) -> bytes:
     if each.value.words:
         words = b"(" + b"|".join(map(re.escape, each.value.words)) + b")"
     else:
         assert isinstance(each.form, Printed)
-        words = each.form.pattern
+        words = each.form.pattern(behind)
     return b"(?:" + words + b")?" if each.value.optional else words

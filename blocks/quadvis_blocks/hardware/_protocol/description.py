@@ -19,8 +19,9 @@ from quadvis_blocks.hardware._protocol.checksums import Algorithm
 from quadvis_blocks.hardware._protocol.forms import STEP, Binary, Form
 
 NOWHERE = Place("")
-LONGEST_TEXT = 1024  # bytes of a line
+LONGEST = 1024  # bytes of a message
 BODY, ALL = "body", "all"
+NUMERALS = b"0123456789+-. abcdefABCDEF"  # of numbers in text
 WHOLE = 2.0**63 - 1024  # the largest float that an int64 holds
 
 
@@ -241,6 +242,15 @@ class ProtocolMessage:
             if found:
                 return found[0]
         return -math.inf, math.inf
+
+    @property
+    def terminated_inside(self) -> bool:
+        """Whether its terminator, of text, could come before its end."""
+        inside = [self.header] + ([self.check.mark] if self.check is not None else [])
+        for each in self.fields:
+            inside += [each.data] if isinstance(each, FixedBytes) else []
+            inside += [each.between, *each.value.words] if isinstance(each, ValueField) else []
+        return self.terminator[:1] in NUMERALS or any(self.terminator in piece for piece in inside)
 
     @property
     def is_marked(self) -> bool:

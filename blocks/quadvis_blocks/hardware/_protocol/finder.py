@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from quadvis.block import Counted
 from quadvis_blocks.hardware._protocol.damage import DamageCount, damage_count
 from quadvis_blocks.hardware._protocol.decode import Damage, decoding
-from quadvis_blocks.hardware._protocol.description import LONGEST_TEXT, ProtocolMessage
+from quadvis_blocks.hardware._protocol.description import ALL, LONGEST, ProtocolMessage
 from quadvis_blocks.hardware._protocol.encode import DIGITS
 
 Values = tuple[Any, ...]
@@ -144,7 +144,7 @@ UNPRINTABLE = re.compile(rb"[^\x20-\x7e\t]")
 
 def _line_end(received: bytearray, at: int, end: bytes) -> int:
     """Return the place behind a line; 0 if this is none, -1 if it may become one."""
-    last = at + LONGEST_TEXT
+    last = at + LONGEST
     found = received.find(end, at, last)
     odd = UNPRINTABLE.search(received, at, last if found < 0 else found)
     if found >= 0:
@@ -193,7 +193,7 @@ def _any_line(message: ProtocolMessage) -> Look:
     assert check is not None
     digits = DIGITS * check.algorithm.size
     seal = re.compile(re.escape(check.mark) + b"([0-9A-Fa-f]{%d})" % digits + re.escape(end))
-    begin = 0 if check.over == "all" else len(start)
+    begin = 0 if check.over == ALL else len(start)
 
     def look(received: bytearray, at: int) -> _Seen:
         if received[at : at + len(start)] != start[: len(received) - at]:

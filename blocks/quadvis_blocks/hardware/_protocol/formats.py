@@ -17,6 +17,7 @@ from quadvis.units import Unit, UnitError, read_quantity
 from quadvis_blocks.hardware._protocol.bytes_written import text_bytes
 from quadvis_blocks.hardware._protocol.checksums import AMBIGUOUS, NAMES, NONE, algorithm
 from quadvis_blocks.hardware._protocol.description import (
+    LONGEST,
     Check,
     FixedBytes,
     IgnoredField,
@@ -33,6 +34,7 @@ STRUCT = {
 }  # fmt: skip
 ORDER = {"<": LITTLE, ">": BIG, "!": BIG}
 MOST = 256
+TWICE = "it stands inside of it, too"
 _CODE = re.compile(r"(?P<count>[0-9]{0,3})(?P<code>[a-zA-Z?])|(?P<blank>\s+)")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
 _PIECE = re.compile(r"%[^%a-zA-Z]*[a-zA-Z]|%%|[^%]+|%")
@@ -65,7 +67,12 @@ def message_of(written: WrittenMessage) -> ProtocolMessage:
     ]
     order = ORDER.get(written.format[:1], BIG)
     check = _check(written.checksum, is_text, order)
-    return ProtocolMessage("format", is_text, header, tuple(named), check, terminator)
+    made = ProtocolMessage("format", is_text, header, tuple(named), check, terminator)
+    if made.size > LONGEST:
+        raise ParameterError("format", f"format has {made.size} bytes; a message has {LONGEST} at most")
+    if is_text and made.terminated_inside:
+        raise ParameterError("terminator", f"terminator must end the message, and {TWICE}")
+    return made
 
 
 def _bytes(name: str, text: str) -> bytes:

@@ -19,11 +19,12 @@ WIDEST = 40  # characters of a number
 LARGEST = 1e15  # of a number in text, so that it has no more characters than that
 
 FORMAT = re.compile(r"%[-+ 0]*(?P<width>[0-9]{0,2})(?:\.(?P<digits>[0-9]{1,2}))?(?P<kind>[diufFeEgGxX])")
-_BLANKS = rb"[ ]{0,40}"
-_WHOLE = rb"[-+]?[0-9]{1,20}"
-_DECIMAL = rb"[-+]?(?:[0-9]{1,20}(?:\.[0-9]{0,20})?|\.[0-9]{1,20})"
-_FLOATING = _DECIMAL + rb"(?:[eE][-+]?[0-9]{1,3})?"
-_HEXADECIMAL = rb"[0-9A-Fa-f]{1,16}"
+# All possessive: a number that has matched is not tried again in another way, so no line takes long.
+_BLANKS = rb"[ ]{0,40}+"
+_WHOLE = rb"[-+]?[0-9]{1,20}+"
+_DECIMAL = rb"[-+]?(?:[0-9]{1,20}+(?:\.[0-9]{0,20}+)?+|\.[0-9]{1,20}+)"
+_FLOATING = _DECIMAL + rb"(?:[eE][-+]?[0-9]{1,3}+)?+"
+_HEXADECIMAL = rb"[0-9A-Fa-f]{1,16}+"
 
 
 class Binary(NamedTuple):
@@ -83,11 +84,13 @@ class Printed(NamedTuple):
         """True of a whole number."""
         return self.kind in "dx"
 
-    @property
-    def pattern(self) -> bytes:
-        """The regular expression of its text, with the digits as its one group; blanks may stand around."""
+    def pattern(self, behind: bytes) -> bytes:
+        """Return the regular expression of its text, with the digits as its one group.
+
+        Blanks may stand around it, if not those with which the text ``behind`` it begins.
+        """
         digits = {"d": _WHOLE, "f": _DECIMAL, "x": _HEXADECIMAL}.get(self.kind, _FLOATING)
-        return _BLANKS + rb"(" + digits + rb")" + _BLANKS
+        return _BLANKS + rb"(" + digits + rb")" + (b"" if behind.startswith(b" ") else _BLANKS)
 
     @property
     def limits(self) -> tuple[float, float]:

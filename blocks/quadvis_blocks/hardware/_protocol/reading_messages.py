@@ -18,6 +18,7 @@ from quadvis_blocks.hardware._protocol.checksums import (
 from quadvis_blocks.hardware._protocol.description import (
     ALL,
     BODY,
+    LONGEST,
     Check,
     CounterField,
     FixedBytes,
@@ -36,7 +37,7 @@ CRC = "crc"
 MARK = b"*"
 MOST_FIELDS = 200
 CAN_BYTES = 8  # of a frame
-PRINTABLE = range(0x20, 0x7F)
+PRINTABLE, TAB = range(0x20, 0x7F), 9
 
 
 def read_message(name: str, node: YamlNode, order: YamlNode | None, faults: Faults) -> ProtocolMessage | None:
@@ -116,7 +117,7 @@ class _Reader:
         odd = (
             self.is_text
             and key != "request"
-            and any(byte not in PRINTABLE and byte != 9 and not ends for byte in found or b"")
+            and any(byte not in PRINTABLE and byte != TAB and not ends for byte in found or b"")
         )
         if node is not None and odd:
             self.faults.add(node.place, f"'{key}' of a line of text must be printable ASCII")
@@ -158,11 +159,25 @@ class _Reader:
         return tuple(blank)
 
     def _checked(self, message: ProtocolMessage) -> ProtocolMessage | None:
+        place = self.given["fields"].place
+        if message.size > LONGEST:
+            self.faults.add(place, f"a message of {message.size} bytes is too long", f"{LONGEST} can be read")
         if message.is_text:
             self._check_separated(message)
-        if len(self.faults) > self.before:
-            return None
-        return message
+            self._check_text(message)
+        return None if len(self.faults) > self.before else message
+
+    def _check_text(self, message: ProtocolMessage) -> None:
+        """Refuse text with bytes that do not show, and a terminator that stands inside, too."""
+        fixed = [each.data for each in message.fields if isinstance(each, FixedBytes)]
+        marks = [message.check.mark] if message.check is not None else []
+        if any(byte not in PRINTABLE and byte != TAB for piece in (*fixed, *marks) for byte in piece):
+            self.faults.add(
+                self.given["fields"].place, "what stands in a line of text must be printable ASCII"
+            )
+        if message.terminated_inside:
+            problem = "the terminator could stand inside the message, too"
+            self.faults.add(self.given["terminator"].place, problem, "choose the byte by which a line ends")
 
     def _check_separated(self, message: ProtocolMessage) -> None:
         """Refuse two numbers in text between which nothing stands: nobody could tell where one ends."""

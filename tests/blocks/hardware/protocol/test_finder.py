@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from quadvis.block import Counted
 from quadvis_blocks.hardware._protocol.checksums import xor
 from quadvis_blocks.hardware._protocol.decode import Decoded, decoding
-from quadvis_blocks.hardware._protocol.description import LONGEST_TEXT, DeviceProtocol, ProtocolMessage
+from quadvis_blocks.hardware._protocol.description import LONGEST, DeviceProtocol, ProtocolMessage
 from quadvis_blocks.hardware._protocol.encode import encode
 from quadvis_blocks.hardware._protocol.reading import read_protocol
 from tests.blocks.hardware.protocol.damage import finder, flipped, split, taken
@@ -133,7 +133,7 @@ def test_a_million_random_bytes_do_no_harm(protocols: dict[str, DeviceProtocol],
     search, kept = finder(message, protocols[kind]), list[int]()
     noise = random.bytes(1_000_000)
     assert split(taken(search, noise, 4096, kept))[0] == []
-    assert max(kept) <= max(LONGEST_TEXT, message.size)
+    assert max(kept) <= max(LONGEST, message.size)
     good = stream(message, 3)
     assert same(split(taken(search, b"\r\n" + b"".join(good)))[0], said(message, good))
 
@@ -144,7 +144,7 @@ def test_a_flood_of_beginnings_does_no_harm(protocols: dict[str, DeviceProtocol]
     for piece in (message.header, message.prefix, message.prefix + b"1", message.prefix + b"1.0,"):
         search, kept = finder(message, protocols[kind]), list[int]()
         assert split(taken(search, piece * 4000, 4096, kept))[0] == []
-        assert max(kept) <= LONGEST_TEXT + len(piece)
+        assert max(kept) <= LONGEST + len(piece)
         good = stream(message, 3)
         found = split(taken(search, b"\r\n" + b"".join(good)))[0]
         assert same(found[-2:], said(message, good)[-2:])

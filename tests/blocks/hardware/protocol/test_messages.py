@@ -215,3 +215,14 @@ def test_a_number_in_text_is_one_as_printf_writes_it(
 ) -> None:
     whole = f"{line}{pynmea2.NMEASentence.checksum(line[1:-1]):02x}\r\n".encode()
     assert isinstance(decoding(depth)(whole), Decoded) is is_good
+
+
+def test_blanks_between_numbers_never_take_long(tmp_path: Path) -> None:
+    """Each gap could be split in many ways, and so the line in too many to try."""
+    text = NMEA.replace('separator: ","', 'separator: " "').replace("range: [0, 200]", "elements: 12")
+    made = message(text, "depth", tmp_path)
+    values = [np.arange(12.0), 1.0]
+    assert isinstance(decoding(made)(encode(made, values)), Decoded)
+    assert decoding(made)(b"$SDDPT" + 30 * b" " + (30 * b" ").join([b"1"] * 13) + b"x*00\r\n") is None
+    wide = encode(made, values).replace(b" ", 20 * b" ")
+    assert decoding(made)(wide) is Damage.CHECKSUM  # the form is right

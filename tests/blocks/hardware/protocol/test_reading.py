@@ -122,6 +122,17 @@ def test_all_faults_are_reported_together(tmp_path: Path) -> None:
         ("words: {N: 1, S: -1}", "words: {N: north}", "'N' must be a whole number, not 'north'"),
         ("{ignore: text}", "{ignore: 3}", "'ignore' must be 'text' in a line of text, not '3'"),
         ("{ignore: text}", "{type: u8, bits: [{width: 3}]}", "the field in line 22 to bytes"),
+        (
+            'terminator: "\\r\\n"',
+            'terminator: ","',
+            "the terminator could stand inside the message, too; choose",
+        ),
+        (
+            'terminator: "\\r\\n"',
+            "terminator: e",
+            "the terminator could stand inside the message, too; choose",
+        ),
+        ("- SDDPT", "- '\\x01'", "what stands in a line of text must be printable ASCII"),
         ("header: $", "header: '\\xAA'", "'header' of a line of text must be printable ASCII"),
     ],
 )
@@ -143,3 +154,9 @@ def test_a_missing_file_is_reported(tmp_path: Path) -> None:
 
     with pytest.raises(DiagramError, match="there is no such file"):
         read_protocol(tmp_path / "none.yaml")
+
+
+def test_a_message_that_is_too_long_to_be_read_is_refused(tmp_path: Path) -> None:
+    text = BYTES.replace("elements: 3", "elements: 256").replace("type: i16", "type: i64")
+    with pytest.raises(DiagramError, match="a message of 2071 bytes is too long; 1024 can be read"):
+        protocol(text.replace("type: u8, counts", "type: u16, counts"), tmp_path)
