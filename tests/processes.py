@@ -36,14 +36,14 @@ def holder(path: str, processes: list[int]) -> int:
     return 0
 
 
-def wait_for(condition: Any, patience: float = 60.0) -> Any:
+def wait_for(condition: Any, patience: float = 60.0, pause: float = 0.02) -> Any:
     """Return what a condition gives once it gives something."""
     end = time.monotonic() + patience
     while time.monotonic() < end:
         found = condition()
         if found:
             return found
-        time.sleep(0.02)
+        time.sleep(pause)
     raise AssertionError("it did not happen")
 
 

@@ -42,11 +42,7 @@ class PulseOutput(Output):
         check_channels(self.channels, self.lowest, self.highest, self.most)
         if (np.asarray(self.longest) <= self.shortest).any():
             raise ParameterError("longest", "longest must be above shortest")
-        lower, upper = np.minimum(self.lowest, self.highest), np.maximum(self.lowest, self.highest)
-        for name in ("initial", "safe"):
-            value = getattr(self, name)
-            if ((value < lower) | (value > upper)).any():
-                raise ParameterError(name, f"{name} must lie between lowest and highest, element by element")
+        check_ends(self, "initial", "safe")
 
     def start(self) -> None:
         """Begin at the pulses of the initial command."""
@@ -73,14 +69,11 @@ class PulseOutput(Output):
         return self.widths + np.clip(self._widths(command) - self.widths, -most, most)
 
     def _widths(self, command: Any) -> Any:
-        if np.isnan(command).any():
-            raise ValueError("a command is NaN")
-        shares = np.clip((command - self.lowest) / (self.highest - self.lowest), 0.0, 1.0)
-        return self.shortest + shares * (self.longest - self.shortest)
+        return self.shortest + shares(command, self.lowest, self.highest) * (self.longest - self.shortest)
 
     def _command(self, widths: Any) -> Any:
-        shares = (widths - self.shortest) / (self.longest - self.shortest)
-        return self.lowest + shares * (self.highest - self.lowest)
+        span = self.longest - self.shortest
+        return self.lowest + (widths - self.shortest) / span * (self.highest - self.lowest)
 
 
 class CountOutput(PulseOutput):
@@ -108,3 +101,19 @@ def check_channels(channels: Any, lowest: Any, highest: Any, most: int) -> None:
         raise ParameterError("channels", "channels must be different from each other")
     if np.equal(lowest, highest).any():
         raise ParameterError("highest", "highest must be different from lowest, element by element")
+
+
+def check_ends(block: Any, *names: str) -> None:
+    """Refuse commands of a block beyond its ``lowest`` and ``highest``, which may be the other way round."""
+    lower, upper = np.minimum(block.lowest, block.highest), np.maximum(block.lowest, block.highest)
+    for name in names:
+        value = getattr(block, name)
+        if ((value < lower) | (value > upper)).any():
+            raise ParameterError(name, f"{name} must lie between lowest and highest, element by element")
+
+
+def shares(command: Any, lowest: Any, highest: Any) -> Any:
+    """Return where commands lie between their ends, from 0 to 1; ValueError for NaN."""
+    if np.isnan(command).any():
+        raise ValueError("a command is NaN")
+    return np.clip((command - lowest) / (highest - lowest), 0.0, 1.0)

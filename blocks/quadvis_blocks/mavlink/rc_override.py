@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import In, Initial, Out, Param, ParameterError, Safe
-from quadvis_blocks.hardware._sbus import check_channels, shares
+from quadvis.block import In, Initial, Out, Param, Safe
+from quadvis_blocks.hardware._pulses import check_channels, check_ends, shares
 from quadvis_blocks.mavlink._command import StationCommand
 
 LOW, HIGH = 1000, 2000  # us, of the ends of a stick
@@ -38,12 +38,8 @@ class RcOverride(StationCommand):
     def check(self) -> None:
         """Refuse wrong channels, and initial and safe commands beyond the ends."""
         super().check()
-        check_channels(self.channels, self.lowest, self.highest)
-        lower, upper = np.minimum(self.lowest, self.highest), np.maximum(self.lowest, self.highest)
-        for name in ("initial", "safe"):
-            value = getattr(self, name)
-            if ((value < lower) | (value > upper)).any():
-                raise ParameterError(name, f"{name} must lie between lowest and highest, element by element")
+        check_channels(self.channels, self.lowest, self.highest, CHANNELS)
+        check_ends(self, "initial", "safe")
 
     def output(self, command: Any) -> Any:
         """Return what is sent."""

@@ -11,6 +11,7 @@ from quadvis.testing.alone import ALONE, alone
 from quadvis.units import parse_period
 from quadvis_blocks.mavlink.autopilot import Autopilot
 from tests.blocks.mavlink.fake_autopilot import FakeAutopilot, MavPty
+from tests.quadvis.realtime.ptys import arrive
 
 RATE = 100  # Hz of the block
 
@@ -28,7 +29,7 @@ class Bench:
         self.bound.deliver = self._send
         self.requests: list[float] = []
         self.steps = 0
-        self.fake = FakeAutopilot(MavPty(self.peer, 1, 1), **(fake or {}))
+        self.fake = FakeAutopilot(MavPty(self.peer, 1, 1, port=self.port), **(fake or {}))
 
     @property
     def time(self) -> float:
@@ -49,7 +50,7 @@ class Bench:
 
     def put(self, data: bytes) -> None:
         """Let bytes come to the block besides those of the fake."""
-        os.write(self.peer, data)
+        arrive(self.peer, self.port, data)
 
     def __getitem__(self, name: str) -> Any:
         return self.engine.read(ALONE, name)

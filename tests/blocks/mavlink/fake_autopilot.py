@@ -19,6 +19,8 @@ os.environ.setdefault("MAVLINK_DIALECT", "common")
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import common
 
+from tests.quadvis.realtime.ptys import arrive
+
 PX4, ARDUPILOT = common.MAV_AUTOPILOT_PX4, common.MAV_AUTOPILOT_ARDUPILOTMEGA
 ATTITUDE, IMU, POSITION = 30, 105, 32
 GOOD = {
@@ -28,9 +30,10 @@ GOOD = {
 
 
 class MavPty(mavutil.mavfile):  # type: ignore[misc]
-    """mavutil's connection over one end of a pty."""
+    """mavutil over one end of a pty; ``port`` is the other one, if who reads there must not wait."""
 
-    def __init__(self, descriptor: int, system: int, component: int) -> None:
+    def __init__(self, descriptor: int, system: int, component: int, port: int = -1) -> None:
+        self._port = port
         os.set_blocking(descriptor, False)
         mavutil.mavfile.__init__(self, descriptor, "pty", source_system=system, source_component=component)
 
@@ -41,7 +44,10 @@ class MavPty(mavutil.mavfile):  # type: ignore[misc]
             return b""
 
     def write(self, data: bytes) -> None:
-        os.write(self.fd, data)
+        if self._port >= 0:
+            arrive(self.fd, self._port, data)
+        else:
+            os.write(self.fd, data)
 
     def close(self) -> None:
         """Leave the pty to its owner."""

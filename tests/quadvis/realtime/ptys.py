@@ -7,6 +7,7 @@ import select
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from quadvis.machine.serial_port import BACKLOG, unread
 from tests.processes import wait_for
 
 
@@ -42,8 +43,9 @@ class Pty:
 
 def arrive(peer: int, port: int, data: bytes) -> None:
     """Send bytes from the peer of a pty, and wait until a reader of the port need not wait for them."""
+    there = unread(port)
     os.write(peer, data)
-    assert select.select([port], [], [], 60)[0]
+    wait_for(lambda: unread(port) >= min(there + len(data), BACKLOG), pause=1e-4)
 
 
 @contextmanager
