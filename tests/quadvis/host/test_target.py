@@ -11,7 +11,8 @@ import pytest
 import quadvis
 from quadvis.errors import QuadvisError
 from quadvis.host.local import _answers
-from quadvis.host.target import PROPERTIES, Target
+from quadvis.host.properties import PROPERTIES
+from quadvis.host.target import Target
 from quadvis.output.log_reader import Log
 from tests.processes import linux, wait_for
 from tests.quadvis.host.targets import LOOP, ROOT, Running, running_target
@@ -321,6 +322,7 @@ def test_parts_of_a_log_have_the_names_of_xpc_target(tg: Target, tmp_path: Path)
 def test_a_bounded_log_has_the_newest_samples(tg: Target, diagram: Path) -> None:
     tg.load(diagram)
     assert (tg.MaxLogSamples, tg.LogMode, tg.NumLogWraps) == (float("inf"), "Normal", 0)
+    assert "MaxLogSamples    all" in str(tg)
     before = [each["name"] for each in tg.logs()]
     tg.MaxLogSamples = 30
     assert (tg.MaxLogSamples, tg.LogMode, tg.Status) == (30, "Wrapped", "ready")
