@@ -67,6 +67,15 @@ def test_an_application_goes_through_its_states_as_in_xpc_target(tg: Target, dia
     assert [each["name"] for each in tg.logs()][-2:] == ["loop-1", "loop-2"]
 
 
+@pytest.mark.slow
+def test_whoever_has_stopped_a_run_may_start_the_next_one_at_once(tg: Target, diagram: Path) -> None:
+    tg.load(diagram)
+    with tg.operator():
+        for _ in range(10):
+            tg.start()
+            tg.stop()
+
+
 def test_the_list_of_properties_reads_as_in_xpc_target(tg: Target, diagram: Path) -> None:
     tg.load(diagram)
     tg.start()
