@@ -10,12 +10,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from quadvis.errors import QuadvisError, sentence, suggestion
+from quadvis.errors import QuadvisError
 from quadvis.host.connection import HostConnection, connect
-from quadvis.host.logs import PARTS, TargetLogs
+from quadvis.host.logs import TargetLogs
+from quadvis.host.properties import PART_NAMES, PROPERTIES, known, shown
 from quadvis.host.scope import HostScope
 from quadvis.machine.columns import table
-from quadvis.units import Unit, format_quantity
 from quadvis.wire.limits import PIECE
 
 if TYPE_CHECKING:
@@ -29,22 +29,6 @@ if TYPE_CHECKING:
 
 LOADING = 120.0  # s that a target has to get an application ready
 STOPPING = 20.0  # s that a run has to come to its end
-SECOND = Unit.parse("s")
-
-# What `status` says, by the names of xPC Target, with the names that Python's style wants.
-PROPERTIES: Mapping[str, str] = {
-    "Application": "application", "Mode": "mode", "Status": "state", "CPUOverload": "cpu_overload",
-    "ExecTime": "exec_time", "SessionTime": "session_time", "StopTime": "stop_time",
-    "SampleTime": "sample_time", "MinTET": "min_tet", "AvgTET": "avg_tet", "MaxTET": "max_tet",
-    "MaxLogSamples": "max_log_samples", "LogMode": "log_mode", "NumLogWraps": "num_log_wraps",
-    "ViewMode": "view_mode",
-    "NumSignals": "num_signals", "NumParameters": "num_parameters", "Scopes": "scope_numbers",
-    "Tasks": "tasks", "Problem": "problem", "Passed": "passed", "Verdicts": "verdicts", "Log": "log_name",
-    "Variant": "variant", "Hash": "hash", "DefaultParamSet": "default_param_set",
-}  # fmt: skip
-_BY_ALIAS = {alias: name for name, alias in PROPERTIES.items()} | {name: name for name in PROPERTIES}
-_PARTS = {alias: name for name, alias in PARTS.items()} | {name: name for name in PARTS}
-_TIMES = ("ExecTime", "SessionTime", "StopTime", "SampleTime", "MinTET", "AvgTET", "MaxTET")
 
 
 class Target:
@@ -119,22 +103,22 @@ class Target:
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
             raise AttributeError(name)
-        if name in _PARTS:
-            return self.getlog(_PARTS[name])
-        known = _known(name)
-        if known == "Scopes":
+        if name in PART_NAMES:
+            return self.getlog(PART_NAMES[name])
+        meant = known(name)
+        if meant == "Scopes":
             return [each["id"] for each in self.request("scopes")]
-        found = self.status().get(known)
-        return math.inf if known == "MaxLogSamples" and found is None else found
+        found = self.status().get(meant)
+        return math.inf if meant == "MaxLogSamples" and found is None else found
 
     def __setattr__(self, name: str, value: Any) -> None:
-        known = _known(name)
-        if known in ("StopTime", "SampleTime"):
-            self._connection.operate("settime", deadline=LOADING, **{known: float(value)})
-        elif known == "ViewMode":
+        meant = known(name)
+        if meant in ("StopTime", "SampleTime"):
+            self._connection.operate("settime", deadline=LOADING, **{meant: float(value)})
+        elif meant == "ViewMode":
             number = None if str(value).lower() == "all" else int(value)
             self._connection.operate("setview", id=number)
-        elif known == "MaxLogSamples":
+        elif meant == "MaxLogSamples":
             self._connection.operate("setlog", deadline=LOADING, MaxLogSamples=float(value))
         else:
             raise AttributeError(
@@ -146,7 +130,7 @@ class Target:
 
     def __str__(self) -> str:
         found = self.status()
-        rows = [(name, _shown(name, found[name])) for name in PROPERTIES if name in found and name != "Tasks"]
+        rows = [(name, shown(name, found[name])) for name in PROPERTIES if name in found and name != "Tasks"]
         return "\n".join([f"Target: {self.name}", *(f"  {line}" for line in table(rows))])
 
     def operator(self) -> Any:
@@ -391,18 +375,6 @@ class Target:
         return self._logs.samples(signal, first, count, decimation)
 
 
-def _known(name: str) -> str:
-    """Return the property that a name means, which may be the beginning of one, as in xPC Target."""
-    if name in _BY_ALIAS:
-        return _BY_ALIAS[name]
-    found = dict.fromkeys(full for each, full in _BY_ALIAS.items() if each.lower().startswith(name.lower()))
-    if len(found) == 1:
-        return next(iter(found))
-    problem = f"a target has no '{name}'"
-    remedy = f"write one of {', '.join(found)}" if found else suggestion(name, _BY_ALIAS)
-    raise AttributeError(sentence(problem, remedy))
-
-
 def _loaded(what: str | Path | Diagram, variant: str | None, settings: Given, params: Files) -> Diagram:
     if not isinstance(what, str | Path):
         return what
@@ -419,15 +391,3 @@ def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
         name: value.tolist() if hasattr(value, "tolist") else as_written(value)
         for name, value in values.items()
     }
-
-
-def _shown(name: str, value: Any) -> str:
-    if name in _TIMES and isinstance(value, float):
-        return format_quantity(value, SECOND, 4)
-    if name == "Verdicts":
-        from quadvis.run.verdict import verdict_text
-
-        return "; ".join(map(verdict_text, value))
-    if isinstance(value, list):
-        return "; ".join(map(str, value)) or "none"
-    return "none" if value in ("", None) else str(value)

@@ -78,8 +78,8 @@ class Session:
 
     @property
     def running(self) -> bool:
-        """True until all is over."""
-        return self._thread.is_alive()
+        """True until all is over; whoever was waiting for that may begin another one."""
+        return not self.over.done()
 
     @property
     def wraps(self) -> int:

@@ -11,7 +11,8 @@ import pytest
 import quadvis
 from quadvis.errors import QuadvisError
 from quadvis.host.local import _answers
-from quadvis.host.target import PROPERTIES, Target
+from quadvis.host.properties import PROPERTIES
+from quadvis.host.target import Target
 from quadvis.output.log_reader import Log
 from tests.processes import linux, wait_for
 from tests.quadvis.host.targets import LOOP, ROOT, Running, running_target
@@ -64,6 +65,15 @@ def test_an_application_goes_through_its_states_as_in_xpc_target(tg: Target, dia
     assert isinstance(log, Log)
     assert log.summary["stopped"].startswith("it was stopped at t = ")
     assert [each["name"] for each in tg.logs()][-2:] == ["loop-1", "loop-2"]
+
+
+@pytest.mark.slow
+def test_whoever_has_stopped_a_run_may_start_the_next_one_at_once(tg: Target, diagram: Path) -> None:
+    tg.load(diagram)
+    with tg.operator():
+        for _ in range(10):
+            tg.start()
+            tg.stop()
 
 
 def test_the_list_of_properties_reads_as_in_xpc_target(tg: Target, diagram: Path) -> None:
@@ -321,6 +331,7 @@ def test_parts_of_a_log_have_the_names_of_xpc_target(tg: Target, tmp_path: Path)
 def test_a_bounded_log_has_the_newest_samples(tg: Target, diagram: Path) -> None:
     tg.load(diagram)
     assert (tg.MaxLogSamples, tg.LogMode, tg.NumLogWraps) == (float("inf"), "Normal", 0)
+    assert "MaxLogSamples    all" in str(tg)
     before = [each["name"] for each in tg.logs()]
     tg.MaxLogSamples = 30
     assert (tg.MaxLogSamples, tg.LogMode, tg.Status) == (30, "Wrapped", "ready")
