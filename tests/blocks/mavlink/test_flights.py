@@ -270,6 +270,7 @@ class Killed:
             [*command, "--poll", "0", "--log", ""], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
         try:
+            wait_for(lambda: Path("process").exists() or process.poll() is not None)
             wait_for(lambda: self.going(fake) or process.poll() is not None)
             assert process.poll() is None, process.communicate()
             time.sleep(moment)
