@@ -315,10 +315,19 @@ def test_values_that_cannot_be_and_messages_that_came_late_do_not_count() -> Non
         run.step()
         assert run["roll"] == pytest.approx(0.1) and math.isnan(run["imu_age"])
         assert (run["lost"], run["refused"]) == (1, 3)
-        mav.attitude_send(20, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0)  # it was started anew
+        mav.attitude_send(20, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0)  # it was started anew, or this is damage
         run.put(sent(mav))
         run.step()
-        assert run["roll"] == 0.5
+        assert run["roll"] == pytest.approx(0.1) and run["refused"] == 4
+        mav.attitude_send(40, 0.25, 0.0, 0.0, 0.0, 0.0, 0.0)
+        run.put(sent(mav))
+        run.step()
+        assert run["roll"] == 0.25 and run["refused"] == 4
+        mav.attitude_send(4_000_000_000, 0.75, 0.0, 0.0, 0.0, 0.0, 0.0)
+        mav.attitude_send(60, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0)
+        run.put(sent(mav))
+        run.step()
+        assert run["roll"] == 0.5 and run["refused"] == 5
 
 
 @pytest.fixture
