@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from quadvis.block import Line, LineDevice, Param, ParameterError
-from quadvis_blocks.mavlink._dialect import dialect
+from quadvis_blocks.mavlink._dialect import MessageDefinition, dialect
 from quadvis_blocks.mavlink._keys import NAME
 from quadvis_blocks.mavlink._packets import LooseMessage, loosened
 from quadvis_blocks.mavlink._sealer import PacketSealer
@@ -48,11 +48,16 @@ class Station(LineDevice):
         kind = list(KINDS.values())[self.role]
         return PacketSealer(self.own_system, self.own_component, kind, self.key, self.signing_link)
 
+    def definition(self, name: str) -> MessageDefinition:
+        """Return what the dialect says of a message; ParameterError if it has none of this name."""
+        found = dialect(self.dialect).names.get(name)
+        if found is None:
+            raise ParameterError("dialect", f"dialect '{self.dialect}' has no message {name}")
+        return found
+
     def loose(self, name: str, **fields: object) -> LooseMessage:
         """Return a message of the dialect; ParameterError if the dialect has none of this name."""
-        definition = dialect(self.dialect).names.get(name)
-        if definition is None:
-            raise ParameterError("dialect", f"dialect '{self.dialect}' has no message {name}")
+        definition = self.definition(name)
         return LooseMessage(definition.number, definition.extra, definition.pack(**fields))
 
     def framed(self, name: str, **fields: object) -> bytes:

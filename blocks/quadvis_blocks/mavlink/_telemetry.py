@@ -11,6 +11,7 @@ import numpy as np
 
 FASTEST = 100.0  # rad/s; no craft turns so fast
 ANGLE = 2 * math.pi + 1e-3  # rad; the greatest angle that anybody sends
+AHEAD = 10_000  # ms at most from one message to the next, if its clock was not restarted
 OVERTAKEN = 1000  # ms: a message that is older than one before by less than this came late
 
 
@@ -111,18 +112,28 @@ class Telemetry:
         self.local_position, self.flight = LocalPosition(), FlightState()
         self._came = dict.fromkeys(READERS, math.nan)
         self._made: dict[str, int] = {}  # times since the autopilot's start (ms)
+        self._odd: dict[str, int] = {}  # those that did not follow the last one
 
     def take(self, name: str, fields: Mapping[str, Any], time: float) -> MessageFate:
         """Take a message that came at a time (s)."""
         made = fields.get("time_boot_ms", fields.get("time_usec", 0) // 1000)
-        if 0 < self._made.get(name, 0) - made < OVERTAKEN:
+        last = self._made.get(name, made)
+        if 0 < last - made < OVERTAKEN:
             return MessageFate.LATE
         found = READERS[name](fields)
-        if found is None:
+        if found is None or not (0 <= made - last < AHEAD or self._confirms(name, made)):
             return MessageFate.WRONG
         setattr(self, KEPT_AS[name], found)
         self._came[name], self._made[name] = time, made
         return MessageFate.TAKEN
+
+    def _confirms(self, name: str, made: int) -> bool:
+        """Return whether a time that does not follow the last one follows one of its kind: a restarted clock.
+
+        A checksum of 16 bits lets a few damaged messages through; one alone is not believed.
+        """
+        before, self._odd[name] = self._odd.get(name), made
+        return before is not None and 0 <= made - before < AHEAD
 
     def age(self, name: str, time: float) -> float:
         """Return the time since a message came (s); NaN before the first one."""

@@ -23,6 +23,10 @@ from quadvis_blocks.mavlink._station import SYSTEMS, Station
 from quadvis_blocks.mavlink._timeouts import AUTO, AutopilotTimeouts
 
 MODES = 1 << 32
+HEARD = (
+    "HEARTBEAT", "ATTITUDE", "HIGHRES_IMU", "LOCAL_POSITION_NED", "PARAM_VALUE", "COMMAND_ACK", "STATUSTEXT",
+)  # fmt: skip
+MANY = 20  # requests in a frame
 TOGETHER = 0.05  # s at least between two frames of requests, so that the guardian sends each
 REFUSED, LOST = Counted.REFUSED, Counted.LOST
 
@@ -66,20 +70,26 @@ class Autopilot(Station, AutopilotPorts, NewsDevice, Input):
         NO_MODE, type="int64", min=NO_MODE, below=MODES, doc="its number of the mode to arm in; -1: as it is"
     )
 
+    def check(self) -> None:
+        """Refuse a dialect without the messages of an autopilot."""
+        super().check()
+        for name in HEARD:
+            self.definition(name)
+
     def open(self) -> None:
         """Open the port; nobody has spoken."""
         known, key = dialect(self.dialect), self.key
         self._times = KeptTimes(key, signs=False) if key else None
         proof = SignatureCheck(read_key(key), self._times) if self._times is not None else None
         self._scanner = PacketScanner(known.numbers, proof)
-        self._heard = {known.names[name].number: name for name in self._wanted()}
+        self._heard = {self.definition(name).number: name for name in HEARD}
         self._definitions = known.numbers
         self._who = AutopilotIdentity(int(self.target_system), int(self.target_component))
         self._complaints = Complaints(self.report, known.numbers, self._scanner.counts, bool(key))
         self._requests = Requests(
             self,
             self._who,
-            MeasuredRates({known.names[name].number: rate for name, rate in self._streams().items()}),
+            MeasuredRates({self.definition(name).number: rate for name, rate in self._streams().items()}),
             AutopilotTimeouts(self.timeouts, self.timeout_limit),
             Arming(int(self.flight_mode)),
             self._complaints,
@@ -96,10 +106,6 @@ class Autopilot(Station, AutopilotPorts, NewsDevice, Input):
             "HIGHRES_IMU": self.imu_rate,
             "LOCAL_POSITION_NED": self.position_rate,
         }
-
-    def _wanted(self) -> list[str]:
-        """Return the names of the messages that are looked into."""
-        return [*self._streams(), "HEARTBEAT", "PARAM_VALUE", "COMMAND_ACK", "STATUSTEXT"]
 
     def read(self, time: float) -> None:
         """Take all messages that have come."""
@@ -147,7 +153,7 @@ class Autopilot(Station, AutopilotPorts, NewsDevice, Input):
         """Return the block's own outputs, in their order."""
         said, counts, requests, time = self._said, self._scanner.counts, self._requests, self._time
         return (
-            said.age("ATTITUDE", time) <= self.max_age,
+            bool(self._age <= self.max_age),
             *said.attitude,
             said.age("HIGHRES_IMU", time),
             *said.inertial,
@@ -170,8 +176,8 @@ class Autopilot(Station, AutopilotPorts, NewsDevice, Input):
         self._waiting += self._requests.due(time, arm, self._said.flight)
         if self._waiting and time >= self._flushed + TOGETHER:
             self._complaints.asked(time)
-            self.tell(loosened(self._waiting))
-            self._waiting, self._flushed = [], time
+            self.tell(loosened(self._waiting[:MANY]))
+            self._waiting, self._flushed = self._waiting[MANY:], time
 
     def close(self) -> None:
         """Close the port, and report what did not count."""

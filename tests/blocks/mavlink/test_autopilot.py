@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import common
 
+from quadvis.block import ParameterError
 from quadvis.errors import RunError
 from quadvis_blocks.mavlink._arming import ARM, DONE, GIVEN_UP, IDLE, MODE
 from quadvis_blocks.mavlink._dialect import dialect
 from quadvis_blocks.mavlink._packets import LooseMessage, packet
 from quadvis_blocks.mavlink._signing import signing_time
+from quadvis_blocks.mavlink.autopilot import Autopilot
 from tests.blocks.mavlink.bench import RATE, bench
 from tests.blocks.mavlink.fake_autopilot import ARDUPILOT, ATTITUDE, GOOD, PX4
 from tests.blocks.mavlink.pymavlink_peer import KEY, speaker
@@ -196,6 +198,18 @@ def test_time_outs_that_the_autopilot_does_not_tell_refuse_arming_and_named_ones
         assert run["armed"]
 
 
+def test_many_time_outs_are_asked_for_in_several_frames() -> None:
+    parameters = {f"TIME_{number}": 0.5 for number in range(70)}
+    with bench({"parameters": parameters}, timeouts=" ".join(parameters)) as run:
+        run.step(3 * SECOND, arm=True)
+        assert run["armed"] and run["timeout"] == 0.5
+
+
+def test_a_dialect_without_its_messages_is_refused() -> None:
+    with pytest.raises(ParameterError, match="dialect 'minimal' has no message ATTITUDE"):
+        Autopilot(port="udp::14540", dialect="minimal")
+
+
 def test_whole_numbers_of_px4_are_read_from_their_bytes() -> None:
     kind = dialect("common").names["PARAM_VALUE"]
     value = np.frombuffer(np.int32(3).tobytes(), np.float32)[0]
@@ -301,10 +315,19 @@ def test_values_that_cannot_be_and_messages_that_came_late_do_not_count() -> Non
         run.step()
         assert run["roll"] == pytest.approx(0.1) and math.isnan(run["imu_age"])
         assert (run["lost"], run["refused"]) == (1, 3)
-        mav.attitude_send(20, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0)  # it was started anew
+        mav.attitude_send(20, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0)  # it was started anew, or this is damage
         run.put(sent(mav))
         run.step()
-        assert run["roll"] == 0.5
+        assert run["roll"] == pytest.approx(0.1) and run["refused"] == 4
+        mav.attitude_send(40, 0.25, 0.0, 0.0, 0.0, 0.0, 0.0)
+        run.put(sent(mav))
+        run.step()
+        assert run["roll"] == 0.25 and run["refused"] == 4
+        mav.attitude_send(4_000_000_000, 0.75, 0.0, 0.0, 0.0, 0.0, 0.0)
+        mav.attitude_send(60, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0)
+        run.put(sent(mav))
+        run.step()
+        assert run["roll"] == 0.5 and run["refused"] == 5
 
 
 @pytest.fixture

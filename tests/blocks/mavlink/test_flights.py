@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import random
 import signal
@@ -17,7 +18,13 @@ from typing import Any
 import pytest
 
 import quadvis
+from quadvis.diagram.sections.on_host_loss import SAFE
 from quadvis.errors import RunError
+from quadvis.realtime.guard import Guard
+from quadvis.realtime.guardian import Standing, words_for
+from quadvis.realtime.outlet import OutputPort
+from quadvis_blocks.mavlink.attitude_target import AttitudeTarget
+from quadvis_blocks.mavlink.rate_target import RateTarget
 from tests.blocks.mavlink.fake_autopilot import ARDUPILOT, FakeAutopilot, MavPty, Running, over_udp
 from tests.blocks.mavlink.pymavlink_peer import KEY
 from tests.processes import wait_for
@@ -179,13 +186,18 @@ def test_an_autopilot_without_set_points_hears_requests_and_heartbeats_all_the_s
     }
 
 
-def test_signed_both_ways(folder: Path) -> None:
+def store(folder: Path) -> None:
+    """Keep the key of the other side as 'lab'."""
     keys = folder / "home" / "mavlink"
     keys.mkdir(parents=True)
     for each in (keys.parent, keys):
         each.chmod(0o700)
     (keys / "lab.key").write_text(KEY.hex())
     (keys / "lab.key").chmod(0o600)
+
+
+def test_signed_both_ways(folder: Path) -> None:
+    store(folder)
     port = free()
     write(f"udp:127.0.0.1:{port}", key="lab")
     for _ in range(2):  # the second run goes on with the times of the first
@@ -215,6 +227,40 @@ def test_time_outs_refuse_arming_and_the_run_ends_released(value: float) -> None
     assert not fake.armed and fake.of("SET_ATTITUDE_TARGET")[-1][1].type_mask == 199
 
 
+def test_if_the_guardian_is_lost_the_supervisor_sends_signed_safe_set_points_in_its_place(
+    folder: Path,
+) -> None:
+    """Both processes use one key, one after the other; the receiver refuses what is older than the newest."""
+    store(folder)
+    port, context = free(), multiprocessing.get_context("spawn")
+    given = {"port": f"udp:127.0.0.1:{port}", "key": "lab"}
+    attitude = AttitudeTarget(initial=[0.0] * 4, safe=[0.0, 0.0, 0.0, 0.25], **given)
+    rates = RateTarget(initial=[0.0] * 4, safe=[0.0, 0.0, 0.0, 0.75], **given)
+    ports = [
+        OutputPort.of(each, name, given["port"], shared=True)
+        for name, each in (("a", attitude), ("r", rates))
+    ]
+    link = over_udp(port)
+    link.setup_signing(KEY, sign_outgoing=True)
+    with autopilot(link) as fake:
+        guard = Guard(context, context.RawArray("q", words_for(2)), [], SAFE, Standing())
+        guard.start()
+        try:
+            guard.open(ports, lambda _: None)
+            wait_for(lambda: len(fake.of("SET_ATTITUDE_TARGET")) >= 10)
+            guard.process.kill()
+            guard.process.join()
+            assert guard.alarm() is not None
+        finally:
+            unsafe = guard.close()
+        assert unsafe == []
+        wait_for(lambda: fake.of("SET_ATTITUDE_TARGET")[-1][1].thrust == 0.0 and fake.heard)
+        time.sleep(0.1)
+    last = [(each.type_mask, each.thrust) for _, each in fake.of("SET_ATTITUDE_TARGET")][-4:]
+    assert last == [(7, 0.25), (199, 0.0), (128, 0.75), (199, 0.0)]
+    assert all(each.get_signed() for _, each in fake.heard) and not fake.of("BAD_DATA")
+
+
 class Killed:
     """A run in a process of its own, of which the application is killed at a random moment."""
 
@@ -224,6 +270,7 @@ class Killed:
             [*command, "--poll", "0", "--log", ""], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
         try:
+            wait_for(lambda: Path("process").exists() or process.poll() is not None)
             wait_for(lambda: self.going(fake) or process.poll() is not None)
             assert process.poll() is None, process.communicate()
             time.sleep(moment)
