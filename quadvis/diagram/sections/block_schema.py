@@ -74,7 +74,7 @@ def _one_block(block: type[Block]) -> Schema:
     interface = block.interface
     required = [name for name, param in interface.params.items() if param.required]
     parameters: Schema = {
-        "additionalProperties": False,
+        "additionalProperties": ref("value") if block.ports_from() else False,
         "properties": {name: _parameter(param) for name, param in interface.params.items()},
     }
     inputs: Schema = {
