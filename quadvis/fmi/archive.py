@@ -1,7 +1,7 @@
 """The archive of an FMU: a ZIP file from anybody, read and unpacked within limits.
 
 Nothing of the archive is trusted. The number of its files and the size of its directory are known before
-`zipfile` reads it, names are checked before anything is unpacked, and no file grows beyond the announced size.
+`zipfile` reads it, names are checked before anything is unpacked, and no file grows beyond its announcement.
 """
 
 from __future__ import annotations

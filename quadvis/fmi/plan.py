@@ -13,12 +13,12 @@ from quadvis.fmi.archive import refused
 from quadvis.fmi.description import REALS, FmuDescription, FmuInterface, FmuVariable
 from quadvis.fmi.exchange import SLOT, FixedValues, Room, Setup
 from quadvis.fmi.packing import laid_out
-from quadvis.fmi.reading import one_interface, read_description
+from quadvis.fmi.reading import one_interface, read_fmu
 from quadvis.fmi.running import IsolatedFmu, LocalFmu, formatter
 from quadvis.fmi.signals import FmuSignal, converted, plain_name, settable, signals
 from quadvis.fmi.started import FmuLayout, StartedFmu
 from quadvis.fmi.units import Units
-from quadvis.fmi.unpacked import UnpackedFmu
+from quadvis.fmi.unpacked import UnpackedFmu, library_name
 from quadvis.machine.inputs import read_once
 
 AUTO, COSIMULATION, EXCHANGE = range(3)
@@ -50,9 +50,10 @@ class FmuPlan:
 
         ``kind`` is one of AUTO, COSIMULATION, EXCHANGE; ``taken`` are names that no signal may have.
         """
-        description = read_once(read_description, path)
+        description, names = read_once(read_fmu, path)
         exchange = kind == EXCHANGE or (kind == AUTO and description.cosimulation is None)
         interface = _interface(path, description, exchange=exchange)
+        library_name(path, names, description.version, interface.identifier)
         try:
             units = Units(description.units, units_text)
             return _planned(path, description, interface, units, set(taken), exchange=exchange)
@@ -171,6 +172,10 @@ def _planned(
     exchange: bool,
 ) -> FmuPlan:
     variables = description.variables
+    names = {*description.units, *(each.unit for each in variables), *(each.name for each in variables)}
+    if unused := sorted(units.confirmed.keys() - names):
+        problem = f"it has no unit and no variable '{unused[0]}', for which 'units' has a meaning"
+        raise QuadvisError(sentence(problem, suggestion(unused[0], sorted(names))))
     if not exchange and any(variable.kind == "Clock" for variable in variables):
         raise QuadvisError("it has clocks, which quadvis does not know")
 
@@ -192,10 +197,6 @@ def _planned(
         name = plain_name(f"{named.get(signal.references, signal.name)}{START}", taken)
         taken.add(name)
         starts.append(replace(signal, name=name))
-    if unused := units.unused():
-        names = [*description.units, *(variable.name for variable in variables)]
-        problem = f"it has no unit and no variable '{unused[0]}', for which 'units' has a meaning"
-        raise QuadvisError(sentence(problem, suggestion(unused[0], names)))
     if exchange:
         _refuse_events(description, inputs)
     direct = frozenset(

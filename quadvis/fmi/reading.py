@@ -38,12 +38,15 @@ _IDENTIFIER = re.compile(r"[A-Za-z_]\w{0,199}", re.ASCII)
 _Value = TypeVar("_Value")
 
 
-def read_description(path: str) -> FmuDescription:
-    """Return what the FMU in a file says about itself; QuadvisError, in a sentence, if it is not usable."""
+def read_fmu(path: str) -> tuple[FmuDescription, frozenset[str]]:
+    """Return what the FMU in a file says about itself, and the names of its files.
+
+    QuadvisError, in a sentence, if it is not usable.
+    """
     with opened(path) as archive:
-        data = archive.description()
+        data, names = archive.description(), frozenset(archive.names)
     try:
-        return describe(read_markup(data))
+        return describe(read_markup(data)), names
     except MarkupError as error:
         raise refused(path, f"its model description: {error}") from None
 

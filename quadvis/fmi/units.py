@@ -53,22 +53,16 @@ class Units:
 
     def __init__(self, known: Mapping[str, FmuUnit], confirmed: str = "") -> None:
         self._known = known
-        self._confirmed = dict(map(_confirmation, filter(None, map(str.strip, confirmed.split(",")))))
-        self._used = set[str]()
+        self.confirmed = dict(map(_confirmation, filter(None, map(str.strip, confirmed.split(",")))))
 
     def of(self, variable: FmuVariable) -> Conversion:
         """Return the conversion of a variable's values; QuadvisError for a unit that is not known."""
         for name in (variable.name, variable.unit):
-            if name and name in self._confirmed:
-                self._used.add(name)
-                return _relative(self._confirmed[name], variable)
+            if name and name in self.confirmed:
+                return _relative(self.confirmed[name], variable)
         if not variable.unit:
             return Conversion(Unit())
         return _relative(self._read(variable), variable)
-
-    def unused(self) -> list[str]:
-        """Return the names that the user has given and no variable has."""
-        return sorted(self._confirmed.keys() - self._used)
 
     def _read(self, variable: FmuVariable) -> Conversion:
         unit = self._known.get(variable.unit, FmuUnit(variable.unit))

@@ -7,6 +7,7 @@ import shutil
 import sys
 import tempfile
 import weakref
+from collections.abc import Collection
 from pathlib import Path
 
 from quadvis.errors import QuadvisError
@@ -28,9 +29,8 @@ class UnpackedFmu:
 
     def __init__(self, path: str, version: int, identifier: str) -> None:
         self._version = version
-        folders = _platforms(version)
         with opened(path) as archive:
-            library = _library(path, archive.names, folders, identifier)
+            library = library_name(path, archive.names, version, identifier)
             try:
                 self.folder = Path(tempfile.mkdtemp(prefix=PREFIX))
             except OSError as error:
@@ -70,8 +70,9 @@ def _platforms(version: int) -> list[str]:
     return found
 
 
-def _library(path: str, names: list[str], folders: list[str], identifier: str) -> str:
+def library_name(path: str, names: Collection[str], version: int, identifier: str) -> str:
     """Return the name of the library for this machine; QuadvisError if there is none."""
+    folders = _platforms(version)
     for folder in folders:
         name = f"binaries/{folder}/{identifier}{_SUFFIXES.get(sys.platform, '.so')}"
         if name in names:

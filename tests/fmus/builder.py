@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
+import os
 import platform
 import shutil
 import subprocess
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import pytest
 
 HERE = Path(__file__).parent
+KEPT = HERE.parents[1] / ".pytest_cache" / "fmus"
 TOKEN = "{8f1d4a62-trial}"
 HEADERS = Path(next(iter(importlib.util.find_spec("fmpy").submodule_search_locations))) / "c-code"  # type: ignore[union-attr, arg-type]
 needs_gcc = pytest.mark.skipif(
@@ -102,41 +104,40 @@ def _macro(name: str) -> str:
 
 
 def source(model: Model, version: int) -> str:
-    """Return model.inc."""
+    """Return the C of a model."""
     places = _places(model)
     letters = {"r": "R", "i": "I", "b": "B", "s": "S"}
-    lines = [f'#define TOKEN "{TOKEN}"', f"#define ENDS ({model.ends})", f"#define NEAR ({model.near})"]
-    lines.append(f"#define TIME_EVENT ({model.time_event})")
+    lines, starts = ['#include "framework.h"'], []
     for var in model.variables:
         array, place = places[var.name]
         argument = f"{letters[array]}({place})" if var.size == 0 else f"(&{letters[array]}({place}))"
         lines.append(f"#define v_{_macro(var.name)} {argument}")
-    starts = []
-    for var in model.variables:
-        array, place = places[var.name]
         values = var.start if isinstance(var.start, list | tuple) else [var.start]
         for number, value in enumerate(values if var.start is not None else ()):
             if array == "s":
                 starts.append(f'strcpy(S({place}), "{value}");')
             else:
-                starts.append(
-                    f"{letters[array]}({place + number}) = {float(value) if array == 'r' else int(value)};"
-                )  # type: ignore[arg-type]
+                number_text = float(value) if array == "r" else int(value)  # type: ignore[arg-type]
+                starts.append(f"{letters[array]}({place + number}) = {number_text};")
     pairs = [(places[var.derivative][1], places[var.name][1]) for var in model.variables if var.derivative]
-    lines.append(
-        f"static const int states[][2] = {{{', '.join(f'{{{a}, {b}}}' for a, b in pairs) or '{0, 0}'}}};"
-    )
-    rows = [f"{{{places[var.name][1]}, {max(1, var.size)}}}" for var in model.variables]
-    lines += [f"#if FMI == 3\nstatic const int places[][2] = {{{', '.join(rows)}}};\n#endif"]
+    rows = [(places[var.name][1], max(1, var.size)) for var in model.variables]
     lines += [
+        f'const char *const model_token = "{TOKEN}";',
+        f"const double model_near = {model.near};",
+        f"const int model_ends = {model.ends}, model_time_event = {model.time_event};",
+        f"const int model_states[][2] = {{{_pairs(pairs)}}}, model_places[][2] = {{{_pairs(rows)}}};",
         model.head,
-        f"static int start(Model *m) {{ {' '.join(starts)} {model.start} (void)m; return 0; }}",
-        f"static int update(Model *m) {{ {model.update} (void)m; (void)states; return 0; }}",
-        f"static int completed(Model *m) {{ (void)m; {model.completed} }}",
-        f"static void ended(Model *m) {{ (void)m; {model.ended} }}",
-        f"static int step(Model *m, double h) {{ (void)h; {model.step} (void)m; return 0; }}",
+        f"int model_start(Model *m) {{ {' '.join(starts)} {model.start} (void)m; return 0; }}",
+        f"int model_update(Model *m) {{ {model.update} (void)m; return 0; }}",
+        f"int model_completed(Model *m) {{ (void)m; {model.completed} }}",
+        f"void model_ended(Model *m) {{ (void)m; {model.ended} }}",
+        f"int model_step(Model *m, double h) {{ (void)h; {model.step} (void)m; return 0; }}",
     ]
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines) + f"\n/* of FMI {version} */\n"
+
+
+def _pairs(pairs: Sequence[tuple[int, int]]) -> str:
+    return ", ".join(f"{{{one}, {other}}}" for one, other in pairs) or "{0, 0}"
 
 
 def _variability(var: Var) -> str:
@@ -236,16 +237,31 @@ def description(model: Model, version: int) -> str:
     )
 
 
+def _compiled(*arguments: str) -> None:
+    subprocess.run(["gcc", "-fPIC", "-w", f"-I{HERE}", f"-I{HEADERS}", *arguments], check=True)
+
+
+def _framework(version: int) -> list[str]:
+    """Return the object files that all models of a version share; they are compiled once."""
+    key = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(HERE.glob("*.[ch]")))).hexdigest()[:12]
+    found = []
+    for name in ("framework.c", "unused.c")[: version - 1]:
+        path = KEPT / f"{name}-{version}-{key}.o"
+        if not path.is_file():
+            KEPT.mkdir(parents=True, exist_ok=True)
+            new = path.with_suffix(f".{os.getpid()}")
+            _compiled("-O1", "-c", f"-DFMI={version}", str(HERE / name), "-o", str(new))
+            os.replace(new, path)
+        found.append(str(path))
+    return found
+
+
 def library(model: Model, version: int, folder: Path) -> Path:
     """Compile the library of a model; return its path."""
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "model.inc").write_text(source(model, version))
+    (folder / "model.c").write_text(source(model, version))
     made = folder / f"{model.name}.so"
-    subprocess.run(
-        ["gcc", "-shared", "-fPIC", "-O1", "-w", f"-DFMI={version}", f"-I{folder}", f"-I{HEADERS}",
-         str(HERE / "framework.c"), "-o", str(made), "-lm"],
-        check=True,
-    )  # fmt: skip
+    _compiled("-shared", "-O1", str(folder / "model.c"), *_framework(version), "-o", str(made), "-lm")
     return made
 
 
@@ -261,4 +277,16 @@ def build(model: Model, version: int, path: Path) -> Path:
     return path
 
 
-__all__ = ["Model", "Var", "build", "cache", "description", "library", "needs_gcc", "replace"]
+def fmu(model: Model, version: int = 2) -> str:
+    """Return the path of a model's FMU, which is compiled once for all tests, and for all runs of them."""
+    parts = (source(model, version), description(model, version), _framework(version))
+    key = hashlib.sha256(repr((parts, sorted(model.resources.items()), version)).encode()).hexdigest()[:20]
+    path = KEPT / f"{model.name}-{key}.fmu"
+    if not path.is_file():
+        KEPT.mkdir(parents=True, exist_ok=True)
+        made = build(model, version, KEPT / f"{model.name}-{os.getpid()}.new")
+        os.replace(made, path)
+    return str(path)
+
+
+__all__ = ["Model", "Var", "build", "description", "fmu", "library", "needs_gcc", "replace"]

@@ -1,62 +1,39 @@
-/* All functions of FMI 2.0 or 3.0 (FMI is 2 or 3) over arrays of numbers, for the small models of the tests.
-
-   The builder writes "model.inc": how many numbers there are (REALS, INTEGERS, BOOLEANS, TEXTS), which of them
-   each value reference means, the states, and the functions of the model:
-       start    sets the start values
-       update   computes what follows from time, states, inputs and parameters
-       step     goes on by h (co-simulation)
-   Each returns a status, 0 for OK. */
-#include <math.h>
-#include <signal.h>
-#include <stdbool.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
+/* All functions of FMI 2.0 or 3.0 (FMI is 2 or 3) over arrays of numbers, for the small models of the tests. */
+#include <stddef.h>
+#include "framework.h"
 #if FMI == 2
 #include "fmi2Functions.h"
 typedef fmi2Status Status;
-typedef const fmi2CallbackFunctions *Callbacks;
 #else
 #include "fmi3Functions.h"
 typedef fmi3Status Status;
 #endif
-#define ROOM 512
+#define states model_states
+#define places model_places
+#define update model_update
+#define step model_step
+#define start model_start
+#define completed model_completed
+#define ended model_ended
+#define TOKEN model_token
+#define NEAR model_near
+#define ENDS model_ends
+#define TIME_EVENT model_time_event
 
-typedef struct Model Model;
-struct Numbers { double time; double r[64]; int64_t i[64]; bool b[16]; char s[4][ROOM]; double hidden[8]; };
-struct Model {
-    struct Numbers n;
-    char resources[ROOM], name[ROOM];
+void say(Model *m, int status, const char *text, double value) {
 #if FMI == 2
-    fmi2CallbackFunctions call;
-#else
-    fmi3LogMessageCallback log;
-    void *environment;
-#endif
-};
-#define TIME (m->n.time)
-#define R(k) (m->n.r[k])
-#define I(k) (m->n.i[k])
-#define B(k) (m->n.b[k])
-#define S(k) (m->n.s[k])
-#define HIDDEN(k) (m->n.hidden[k])
-
-static void say(Model *m, int status, const char *text, double value) {
-#if FMI == 2
-    m->call.logger(m->call.componentEnvironment, m->name, (fmi2Status)status, "trial", "%s: %g", text, value);
+    ((fmi2CallbackLogger)m->log)(m->environment, m->name, (fmi2Status)status, "trial", "%s: %g", text, value);
 #else
     char line[ROOM];
     snprintf(line, sizeof line, "%s: %g", text, value);
-    m->log(m->environment, (fmi3Status)status, "trial", line);
+    ((fmi3LogMessageCallback)m->log)(m->environment, (fmi3Status)status, "trial", line);
 #endif
 }
 
 static int hex(char c) { return c <= '9' ? c - '0' : (c | 32) - 'a' + 10; }
 
-/* Return the path of a resource; FMI 2.0 gives a URI, of which RFC 3986 says how it is read. */
-static void resource(Model *m, const char *file, char *path) {
+/* Give the path of a resource; FMI 2.0 gives a URI, of which RFC 3986 says how it is read. */
+void resource(Model *m, const char *file, char *path) {
 #if FMI == 2
     const char *from = strncmp(m->resources, "file://", 7) ? m->resources : m->resources + 7;
     char *to = path;
@@ -67,8 +44,6 @@ static void resource(Model *m, const char *file, char *path) {
     sprintf(path, "%s%s", m->resources, file);
 #endif
 }
-
-#include "model.inc"
 
 #if FMI == 2
 #define F(name) fmi2##name
@@ -104,37 +79,38 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String token, 
     VOID(type); VOID(visible); VOID(logging);
     Model *m = make(name, token, resources);
     if (!m) return NULL;
-    m->call = *call;
+    m->log = (void *)call->logger; m->environment = call->componentEnvironment;
     if (start(m)) { free(m); return NULL; }
     return m;
 }
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean t, fmi2Real tolerance, fmi2Real start_time,
                                fmi2Boolean s, fmi2Real stop) {
     VOID(t); VOID(tolerance); VOID(s); VOID(stop);
-    ((Model *)c)->n.time = start_time; return OK;
+    ((Model *)c)->time = start_time; return OK;
 }
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { VOID(c); return OK; }
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return (fmi2Status)update(c); }
 #define ACCESS(Name, type, item) \
     fmi2Status fmi2Get##Name(fmi2Component c, const fmi2ValueReference v[], size_t n, type out[]) { \
         Model *m = c; update(m); \
-        for (size_t k = 0; k < n; k++) out[k] = (type)m->n.item[v[k]]; return OK; } \
+        for (size_t k = 0; k < n; k++) out[k] = (type)m->item[v[k]]; return OK; } \
     fmi2Status fmi2Set##Name(fmi2Component c, const fmi2ValueReference v[], size_t n, const type in[]) { \
-        Model *m = c; for (size_t k = 0; k < n; k++) m->n.item[v[k]] = in[k]; return OK; }
+        Model *m = c; for (size_t k = 0; k < n; k++) m->item[v[k]] = in[k]; return OK; }
 ACCESS(Real, fmi2Real, r)
 ACCESS(Integer, fmi2Integer, i)
 ACCESS(Boolean, fmi2Boolean, b)
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference v[], size_t n, fmi2String out[]) {
-    for (size_t k = 0; k < n; k++) out[k] = ((Model *)c)->n.s[v[k]]; return OK;
+    for (size_t k = 0; k < n; k++) out[k] = ((Model *)c)->s[v[k]]; return OK;
 }
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference v[], size_t n, const fmi2String in[]) {
-    for (size_t k = 0; k < n; k++) snprintf(((Model *)c)->n.s[v[k]], ROOM, "%s", in[k]); return OK;
+    for (size_t k = 0; k < n; k++) snprintf(((Model *)c)->s[v[k]], ROOM, "%s", in[k]); return OK;
 }
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no) {
     Model *m = c; VOID(no);
-    if (fabs(m->n.time - t) > NEAR) { say(m, fmi2Error, "the step begins elsewhere", t); return fmi2Error; }
+    if (fabs(m->time - t) > NEAR) { say(m, fmi2Error, "the step begins elsewhere", t); return fmi2Error; }
+    m->time = t;
     int status = step(m, h);
-    m->n.time = t + h;
+    m->time = t + h;
     return (fmi2Status)status;
 }
 fmi2Status fmi2CancelStep(fmi2Component c) { VOID(c); return fmi2Error; }
@@ -164,7 +140,7 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, const f
 static Model *made(const char *name, const char *token, const char *resources, void *environment, fmi3LogMessageCallback log) {
     Model *m = make(name, token, resources);
     if (!m) return NULL;
-    m->log = log; m->environment = environment;
+    m->log = (void *)log; m->environment = environment;
     if (start(m)) { free(m); return NULL; }
     return m;
 }
@@ -185,17 +161,17 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String a, fmi3String b, fmi3S
 }
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean t, fmi3Float64 tolerance, fmi3Float64 start_time,
     fmi3Boolean s, fmi3Float64 stop) {
-    VOID(t); VOID(tolerance); VOID(s); VOID(stop); ((Model *)c)->n.time = start_time; return OK;
+    VOID(t); VOID(tolerance); VOID(s); VOID(stop); ((Model *)c)->time = start_time; return OK;
 }
 fmi3Status fmi3ExitInitializationMode(fmi3Instance c) { return (fmi3Status)update(c); }
 #define ACCESS(Name, type, item, table) \
     fmi3Status fmi3Get##Name(fmi3Instance c, const fmi3ValueReference v[], size_t n, type out[], size_t values) { \
         Model *m = c; update(m); size_t at = 0; \
-        for (size_t k = 0; k < n; k++) for (int e = 0; e < table[v[k]][1]; e++) out[at++] = (type)m->n.item[table[v[k]][0] + e]; \
+        for (size_t k = 0; k < n; k++) for (int e = 0; e < table[v[k]][1]; e++) out[at++] = (type)m->item[table[v[k]][0] + e]; \
         return at == values ? OK : fmi3Error; } \
     fmi3Status fmi3Set##Name(fmi3Instance c, const fmi3ValueReference v[], size_t n, const type in[], size_t values) { \
         Model *m = c; size_t at = 0; \
-        for (size_t k = 0; k < n; k++) for (int e = 0; e < table[v[k]][1]; e++) m->n.item[table[v[k]][0] + e] = in[at++]; \
+        for (size_t k = 0; k < n; k++) for (int e = 0; e < table[v[k]][1]; e++) m->item[table[v[k]][0] + e] = in[at++]; \
         return at == values ? OK : fmi3Error; }
 ACCESS(Float64, fmi3Float64, r, places)
 ACCESS(Float32, fmi3Float32, r, places)
@@ -209,18 +185,19 @@ ACCESS(Int64, fmi3Int64, i, places)
 ACCESS(UInt64, fmi3UInt64, i, places)
 ACCESS(Boolean, fmi3Boolean, b, places)
 fmi3Status fmi3GetString(fmi3Instance c, const fmi3ValueReference v[], size_t n, fmi3String out[], size_t values) {
-    VOID(values); for (size_t k = 0; k < n; k++) out[k] = ((Model *)c)->n.s[places[v[k]][0]]; return OK;
+    VOID(values); for (size_t k = 0; k < n; k++) out[k] = ((Model *)c)->s[places[v[k]][0]]; return OK;
 }
 fmi3Status fmi3SetString(fmi3Instance c, const fmi3ValueReference v[], size_t n, const fmi3String in[], size_t values) {
-    VOID(values); for (size_t k = 0; k < n; k++) snprintf(((Model *)c)->n.s[places[v[k]][0]], ROOM, "%s", in[k]); return OK;
+    VOID(values); for (size_t k = 0; k < n; k++) snprintf(((Model *)c)->s[places[v[k]][0]], ROOM, "%s", in[k]); return OK;
 }
 fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean no, fmi3Boolean *event, fmi3Boolean *end,
     fmi3Boolean *early, fmi3Float64 *last) {
     Model *m = c; VOID(no);
     *event = false; *end = ENDS; *early = false; *last = t + h;
-    if (fabs(m->n.time - t) > NEAR) { say(m, fmi3Error, "the step begins elsewhere", t); return fmi3Error; }
+    if (fabs(m->time - t) > NEAR) { say(m, fmi3Error, "the step begins elsewhere", t); return fmi3Error; }
+    m->time = t;
     int status = step(m, h);
-    m->n.time = t + h;
+    m->time = t + h;
     return (fmi3Status)status;
 }
 fmi3Status fmi3EnterEventMode(fmi3Instance c) { VOID(c); return OK; }
@@ -254,9 +231,9 @@ Status F(Reset)(void *c) { start(c); return OK; }
 void F(FreeInstance)(void *c) { ended(c); free(c); }
 Status F(EnterContinuousTimeMode)(void *c) { VOID(c); return OK; }
 #if FMI == 2
-Status fmi2SetTime(fmi2Component c, fmi2Real t) { ((Model *)c)->n.time = t; return OK; }
+Status fmi2SetTime(fmi2Component c, fmi2Real t) { ((Model *)c)->time = t; return OK; }
 #else
-Status fmi3SetTime(fmi3Instance c, fmi3Float64 t) { ((Model *)c)->n.time = t; return OK; }
+Status fmi3SetTime(fmi3Instance c, fmi3Float64 t) { ((Model *)c)->time = t; return OK; }
 #endif
 Status F(SetContinuousStates)(void *c, const double x[], size_t n) {
     Model *m = c; for (size_t k = 0; k < n; k++) R(states[k][0]) = x[k]; return OK;
@@ -281,9 +258,9 @@ typedef fmi2Byte Byte;
 #define DESERIALIZE fmi3DeserializeFMUState
 typedef fmi3Byte Byte;
 #endif
-Status GET_STATE(void *c, STATE *s) { if (!*s) *s = malloc(sizeof(struct Numbers)); memcpy(*s, c, sizeof(struct Numbers)); return OK; }
-Status SET_STATE(void *c, STATE s) { memcpy(c, s, sizeof(struct Numbers)); return OK; }
+Status GET_STATE(void *c, STATE *s) { if (!*s) *s = malloc(NUMBERS); memcpy(*s, c, NUMBERS); return OK; }
+Status SET_STATE(void *c, STATE s) { memcpy(c, s, NUMBERS); return OK; }
 Status FREE_STATE(void *c, STATE *s) { VOID(c); free(*s); *s = NULL; return OK; }
-Status STATE_SIZE(void *c, STATE s, size_t *n) { VOID(c); VOID(s); *n = sizeof(struct Numbers); return OK; }
+Status STATE_SIZE(void *c, STATE s, size_t *n) { VOID(c); VOID(s); *n = NUMBERS; return OK; }
 Status SERIALIZE(void *c, STATE s, Byte b[], size_t n) { VOID(c); memcpy(b, s, n); return OK; }
 Status DESERIALIZE(void *c, const Byte b[], size_t n, STATE *s) { VOID(c); *s = malloc(n); memcpy(*s, b, n); return OK; }

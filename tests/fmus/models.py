@@ -20,7 +20,7 @@ DAHLQUIST = Model(
         Var("k", causality=PAR, variability="fixed", start=1.0),
     ],
     update="v_der_x = -v_k * v_x;",
-    step="update(m); v_x += h * v_der_x;",
+    step="model_update(m); v_x += h * v_der_x;",
 )
 VAN_DER_POL = Model(
     "VanDerPol",
@@ -32,7 +32,7 @@ VAN_DER_POL = Model(
         Var("mu", causality=PAR, variability="fixed", start=1.0),
     ],
     update="v_der_x0 = v_x1; v_der_x1 = v_mu * (1.0 - v_x0 * v_x0) * v_x1 - v_x0;",
-    step="update(m); double a = v_der_x0, b = v_der_x1; v_x0 += h * a; v_x1 += h * b;",
+    step="model_update(m); double a = v_der_x0, b = v_der_x1; v_x0 += h * a; v_x1 += h * b;",
 )
 BALL = Model(
     "BouncingBall",
@@ -83,21 +83,26 @@ FEEDTHROUGH2 = Model(
         v_w_1 = v_v_1; v_w_2 = v_v_2; v_w_3 = v_v_3;""",
     interfaces=("CoSimulation",),
 )  # fmt: skip
-_WHOLE = ("Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64")
+WHOLE = ("Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64")
+LIMITS = {
+    f"{sign}Int{bits}": (0, 2**bits - 1) if sign else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    for sign in ("", "U")
+    for bits in (8, 16, 32, 64)
+}
 FEEDTHROUGH3 = Model(
     "Feedthrough",
     [
         Var("u", causality=IN, start=0.0), Var("y", causality=OUT, depends=("u",)),
         Var("f_in", "Float32", IN, start=0.0), Var("f_out", "Float32", OUT),
-        *(Var(f"{kind}_in", kind, IN, start=0) for kind in _WHOLE),
-        *(Var(f"{kind}_out", kind, OUT) for kind in _WHOLE),
+        *(Var(f"{kind}_in", kind, IN, start=0) for kind in WHOLE),
+        *(Var(f"{kind}_out", kind, OUT) for kind in WHOLE),
         Var("b_in", "Boolean", IN, start=False), Var("b_out", "Boolean", OUT),
         Var("text", "String", PAR, start="none", variability="fixed"), Var("length", "Int32", OUT),
         Var("gain", causality=PAR, variability="tunable", start=1.0),
         Var("v", causality=IN, start=[1.0, 2.0, 3.0], size=3), Var("w", causality=OUT, size=3),
     ],
     update=f"""v_y = v_gain * v_u; v_f_out = v_f_in; v_b_out = v_b_in; v_length = strlen(v_text);
-        {" ".join(f"v_{kind}_out = v_{kind}_in;" for kind in _WHOLE)}
+        {" ".join(f"v_{kind}_out = v_{kind}_in;" for kind in WHOLE)}
         for (int k = 0; k < 3; k++) v_w[k] = v_v[k];""",
     interfaces=("CoSimulation",),
 )  # fmt: skip
