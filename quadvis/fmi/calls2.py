@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -11,7 +12,9 @@ from quadvis.fmi.exchange import DISCARD, ENDING, EVENT, OK, Setup
 from quadvis.fmi.messages import Messages
 
 Call = Callable[[], int]
-EXCHANGE, COSIMULATION, TERMINATED = 0, 1, 3
+EXCHANGE, COSIMULATION = 0, 1
+LAST_TIME, TERMINATED = 2, 3
+NEAR = 1e-9  # s
 VALUES = {
     "Float64": "Real",
     "Int32": "Integer",
@@ -109,11 +112,17 @@ class Calls2:
         """Return a call that steps on from a time, both of which lie in the buffer."""
         return self._bound("DoStep", time, step, 1)
 
-    def discarded(self) -> int:
-        """Return what the status Discard of a step means: `ENDING` if the FMU asks to end the simulation."""
-        ended = ctypes.c_int()
+    def discarded(self, end: float) -> int:
+        """Return what the status Discard of a step means.
+
+        `ENDING` if the FMU asks to end the simulation; OK if it has done so at the end (s) of the step.
+        """
+        ended, reached = ctypes.c_int(), ctypes.c_double(-math.inf)
         asked = self._bound("GetBooleanStatus", TERMINATED, ctypes.byref(ended))()
-        return ENDING if asked == OK and ended.value else DISCARD
+        if asked != OK or not ended.value:
+            return DISCARD
+        self._bound("GetRealStatus", LAST_TIME, ctypes.byref(reached))()
+        return OK if reached.value >= end - NEAR else ENDING
 
     def begin_continuous(self) -> int:
         """Enter the continuous-time mode for the first time; `EVENT` if an instant of an event is known."""

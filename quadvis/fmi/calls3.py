@@ -67,14 +67,16 @@ class Calls3:
         step_on = self._bound("DoStep", time, step, _TRUE, *answers)
 
         def call() -> int:
-            status = step_on()
-            if ended.value:
+            if ended.value:  # it has asked for that at the end of the step before
                 return ENDING
-            return DISCARD if early.value and status == OK else status
+            status = step_on()
+            if early.value and status == OK:
+                return ENDING if ended.value else DISCARD
+            return status
 
         return call
 
-    def discarded(self) -> int:
+    def discarded(self, _: float) -> int:
         """Return what the status Discard of a step means."""
         return DISCARD
 

@@ -16,6 +16,7 @@ from quadvis.fmi.calls3 import Calls3
 from quadvis.fmi.exchange import (
     COMPLETE,
     DISCARD,
+    ENDING,
     ERROR,
     FORGET,
     FORMATS,
@@ -97,8 +98,8 @@ class FmuInstance:
         status = self._requests[request]()
         if not status:
             return OK
-        if status == DISCARD and request == STEP_ON and self._calls is not None:
-            status = self._calls.discarded()
+        if status == DISCARD and request == STEP_ON:
+            return self._discarded()
         return self._judged(status)
 
     def end(self) -> None:
@@ -109,6 +110,15 @@ class FmuInstance:
             self._kept.clear()
             self._calls.end(terminate=self._ready)
             self._calls = None
+
+    def _discarded(self) -> int:
+        """Return what the status Discard of a step means; an FMU may ask to end after a whole step."""
+        assert self._calls is not None
+        time, step = struct.unpack_from("2d", self._buffer, TIME)
+        if status := self._calls.discarded(time + step):
+            return self._judged(status)
+        self._requests[STEP_ON] = lambda: ENDING
+        return self.perform(GET)
 
     def _judged(self, status: int) -> int:
         """Return a status that counts, with what the FMU has said about it."""
