@@ -30,8 +30,8 @@ CHECKS = ("check", "check_written", "doubts")
 FILES = ("reads", "read_file", "verify_files")
 TAGS = ("not_replayable", "not_restorable", "harmless")
 RESERVED = {
-    "self", "time", "period", "interface", "numeric", "stepwise", "functions",
-    "open", "close", "write_safe",
+    "self", "time", "period", "until", "interface", "numeric", "stepwise", "functions",
+    "open", "close", "write_safe", "keep", "put_back",
     PORTS, "ports_from", "with_ports", "made_for",
     *CHECKS, *FILES, *METHODS, *TAGS,
 }  # fmt: skip
@@ -105,6 +105,7 @@ class Block:
     harmless: ClassVar[str] = ""  # why its writes need no safe values: "a file moves nothing"
     made_for: ClassVar[Mapping[str, Any] | None] = None  # the parameters from which the ports were made
     period: float = math.nan
+    until: float = math.inf  # time of the run's last tick (s), where it is known; not for compiled methods
 
     def __init_subclass__(cls, *, numeric: bool | None = None, bound: bool = False) -> None:
         if bound:
@@ -124,8 +125,9 @@ class Block:
         """Return the class with its ports for these parameters; ParameterError if a parameter is wrong.
 
         The ports of a class may depend on parameters, for example on the file of a model. Such a class has
-        a class method ``ports``, which asks for parameters by name and returns the ports by name. ``*inputs``
-        of a method then stands for all inputs, in the order of ``ports``.
+        a class method ``ports``, which asks for parameters by name and returns the ports by name, and what
+        else of the class depends on the file: parameters, states, methods, tags. ``*inputs`` of a method then
+        stands for all inputs, in the order of ``ports``; of ``output``, for those that are ``direct``.
         """
         names = cls.ports_from()
         if not names:
@@ -234,6 +236,18 @@ class Block:
     def close(self) -> None:
         """Release what ``open`` has acquired. This method is called even if ``open`` failed halfway."""
 
+    def keep(self) -> Any:
+        """Return, for a snapshot between two ticks, what is outside of memory and later outputs depend on.
+
+        Most blocks have all that in states, and return None.
+        """
+
+    def put_back(self, kept: Any) -> None:
+        """Go back to what `keep` has returned; None is the state before the first tick.
+
+        The states in memory are back by then. QuadvisError, in a sentence, if the block has no way back.
+        """
+
 
 def _interface(cls: type[Block]) -> Interface:
     found: dict[str, Declared] = {}
@@ -252,7 +266,8 @@ def _interface(cls: type[Block]) -> Interface:
         function = getattr(cls, method, None)
         if function is None:
             continue
-        names = _asked(function, tuple(inputs) if cls.ports_from() else None)
+        every = [name for name, port in inputs.items() if port.direct or method != "output"]
+        names = _asked(function, tuple(every) if cls.ports_from() else None)
         allowed = {"start": (), "read": ("time",)}.get(method, (*inputs, "time"))
         for name in names:
             if name not in allowed:
@@ -283,7 +298,7 @@ def _interface(cls: type[Block]) -> Interface:
 
 
 def _asked(function: Callable[..., Any], inputs: tuple[str, ...] | None) -> tuple[str, ...]:
-    """Return the names that a method asks for; ``*inputs`` means all ``inputs``, if these are not None."""
+    """Return the names that a method asks for; ``*inputs`` means these ``inputs``, if they are not None."""
     names: list[str] = []
     for name, parameter in tuple(inspect.signature(function).parameters.items())[1:]:
         every = parameter.kind == parameter.VAR_POSITIONAL and name == "inputs"

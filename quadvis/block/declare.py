@@ -63,10 +63,14 @@ class Declared:
 
 @dataclass(eq=False)
 class In(Declared):
-    """An input port. A port with a ``default`` may stay unconnected."""
+    """An input port. A port with a ``default`` may stay unconnected.
+
+    ``*inputs`` of a method means all inputs; of ``output``, all but those with ``direct=False``.
+    """
 
     type: str = "float64"
     default: Any = field(default=None, kw_only=True)
+    direct: bool = field(default=True, kw_only=True)
 
 
 @dataclass(eq=False)

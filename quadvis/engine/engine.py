@@ -9,6 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from quadvis.block import Block
 from quadvis.engine.clock import Clock, Unpaced
 from quadvis.engine.interpreter import Call, Executor, Interpreter, Stop
 from quadvis.engine.memory import Memory, Slot
@@ -29,6 +30,7 @@ class Snapshot:
     tick: int
     memory: bytes
     frames: tuple[Any, ...]
+    kept: tuple[Any, ...] = ()  # what blocks keep outside of memory, by the order of those that do
 
 
 class Engine:
@@ -49,12 +51,20 @@ class Engine:
         self._selves = self._interpreter.selves
         self.memory: Memory = self._interpreter.memory
         self.tuning = Tuning(self.program, {node.path: node.block for node in graph.nodes}, self.memory)
+        blocks = enumerate(self._selves)
+        self._keepers = [number for number, block in blocks if type(block).keep is not Block.keep]
         self._opened: list[int] = []
         self._ready: list[int] = []  # those whose ``open`` succeeded: their outputs must end at safe values
         for node, block in zip(graph.nodes, self.program.blocks, strict=True):
             for port, source in node.inputs.items():
                 if isinstance(source, Constant) and block.inputs[port].scalar == "frame":
                     self.memory.write(block.inputs[port], source.value)
+
+    def end_before(self, ticks: int) -> None:
+        """Let the blocks know that the run ends before a tick."""
+        for block in self._selves:
+            if not block.numeric:
+                block.until = float((ticks - 1) * self.period)
 
     @property
     def tick(self) -> int:
@@ -198,7 +208,8 @@ class Engine:
 
     def snapshot(self) -> Snapshot:
         """Return the whole state between two ticks."""
-        return Snapshot(self.tick, self.memory.content(), tuple(self.memory.frames))
+        kept = tuple([self._selves[number].keep() for number in self._keepers])
+        return Snapshot(self.tick, self.memory.content(), tuple(self.memory.frames), kept)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot of the same graph; the run from there repeats to the bit."""
@@ -208,6 +219,12 @@ class Engine:
         memory.raw[:] = snapshot.memory
         memory.frames[:] = snapshot.frames
         self._executor.tick = snapshot.tick
+        for number, kept in zip(self._keepers, snapshot.kept, strict=True):
+            try:
+                self._selves[number].put_back(kept)
+            except Exception as error:
+                path, block = self.program.blocks[number].path, self._selves[number]
+                raise cannot("go back", path, block, error, self.time) from error
 
     def slot(self, path: str, name: str) -> Slot:
         """Return the slot of a block's output, parameter, state or input; KeyError if it does not exist."""

@@ -233,6 +233,7 @@ class _Application:
             self._start = clock.start = setup.link.recv()  # all applications begin at one instant
             shared.control[control.START] = self._start
             ticks = shared.control[control.TICKS]
+            engine.end_before(ticks)
             self.goes_on_alone = diagram.on_host_loss == CONTINUE
             self._signals.looping = True
             if crew is not None:

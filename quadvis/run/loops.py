@@ -104,6 +104,7 @@ class Simulated:
         if profile:
             self._engine.measure()
         self._ticks = diagram.ticks
+        self._engine.end_before(self._ticks)
         self._choice = choose(self._engine, self._ticks, engine, announce)
         use(self._engine, self._choice)
 

@@ -167,6 +167,7 @@ class _Repeated:
         """Return the engine of a computer."""
         graph = with_playback(part.graph, part.inputs(self._run.ticks))
         made = Engine(graph, self._diagram.seed)
+        made.end_before(self._run.ticks)
 
         def tune(changes: Sequence[Change]) -> None:
             made.tuning.set_all([NewValue(*change[1:]) for change in changes])

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, Frame, In, Param, ParameterError, Shape, Sizes, parameter_sizes
+from quadvis.block import Block, Frame, In, Interface, Param, ParameterError, Shape, Sizes, parameter_sizes
 from quadvis.engine.engine import Engine
 from quadvis.engine.interpreter import Call
 from quadvis.engine.layout import TIME, Placed
@@ -67,6 +67,11 @@ class Rig:
     def placed(self) -> Placed:
         """The block's place in memory."""
         return self.engine.program[ALONE]
+
+    @property
+    def interface(self) -> Interface:
+        """The declarations of the block, which may differ between rigs if ports depend on parameters."""
+        return self.engine.graph[ALONE].block.interface
 
     @property
     def block(self) -> Any:

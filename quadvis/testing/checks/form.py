@@ -45,9 +45,11 @@ def tested(subject: Subject) -> None:
 def all_declarations_used(subject: Subject) -> None:
     """Check that some method asks for every input, and that every other declaration is named somewhere.
 
-    It may be named in a method, or in a function of the block's own library that a method calls.
+    It may be named in a method, or in a function of the block's own library that a method calls. What a file
+    declares has no name in the code.
     """
     interface = subject.block.interface
+    from_file = vars(subject.block) if subject.block.made_for is not None else {}
     asked = {name for names in interface.arguments.values() for name in names}
     idle = [name for name in interface.inputs if name not in asked]
     assert not idle, f"no method asks for {', '.join(idle)}; take it away"
@@ -56,10 +58,11 @@ def all_declarations_used(subject: Subject) -> None:
     functions = [value for value in values if inspect.isfunction(value)]
     names = {name for function in _reached(functions) for name in _named(function.__code__)}
     names |= {item.name for item in interface.safe.values()}  # `Block.write_safe` uses them
+    names |= {*subject.block.ports_from()}
     if issubclass(subject.block, Device):
         names |= subject.block.used_outside()
     groups = (interface.params, interface.derived, interface.states, interface.work)
-    idle = [name for group in groups for name in group if name not in names]
+    idle = [name for group in groups for name in group if name not in names and name not in from_file]
     assert not idle, f"no method uses {', '.join(idle)}; take it away"
 
 

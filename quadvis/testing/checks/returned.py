@@ -13,7 +13,7 @@ def returns_what_it_declares(subject: Subject) -> None:
         with rig.engine:
             for step in range(STEPS):
                 rig.feed(step)
-                for method, names in subject.block.interface.arguments.items():
+                for method, names in rig.interface.arguments.items():
                     slots = targets(placed, method)
                     if slots:
                         arguments = [memory.read(slot) for slot in sources(placed, names)]
