@@ -1,4 +1,4 @@
-"""What bad lines do to bytes: damage of many kinds, each a function of the bytes and of a random generator."""
+"""What bad lines do to bytes: damage of many kinds, each a function of the bytes and of a generator."""
 
 from __future__ import annotations
 

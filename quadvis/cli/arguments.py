@@ -85,7 +85,8 @@ def _checked(parser: Parser, words: Sequence[str]) -> list[str]:
     further += [place for place in parser.places if place.nargs in ("*", "+")] * (len(placed) - len(needed))
     for place, word in zip([*needed, *further], placed, strict=False):
         if place.choices is not None and word not in place.choices:
-            remedy = suggestion(word, map(str, place.choices))
+            named = [str(each) for each in place.choices]
+            remedy = suggestion(word, named) or f"choose from {', '.join(map(quoted, named))}"
             raise QuadvisError(sentence(f"{_name(place)} cannot be {quoted(word)}", remedy))
     if len(placed) < len(needed):
         missing = " and ".join(_name(place) for place in needed[len(placed) :])

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import errno
 import re
-import socket
 import struct
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from quadvis.errors import quoted, sentence
 from quadvis.machine.files import reason
 from quadvis.machine.ports import OpenPort, PortError, Waiting
+
+if TYPE_CHECKING:  # few programs have ports of datagrams, and all load this module
+    import socket
 
 UDP = "udp:"
 FORM = re.compile(r"udp:(?P<host>[\w.-]*|\[[\w:.%]+\]):(?P<number>[0-9]{1,5})")
@@ -55,6 +57,8 @@ class Datagrams(NamedTuple):
 
     def open(self, port: str) -> OpenPort:
         """Open a socket; PortError in one sentence if that cannot be."""
+        import socket
+
         address, listens = self._place(port)
         try:
             family, kind, protocol, _, place = socket.getaddrinfo(*address, type=socket.SOCK_DGRAM)[0]
@@ -138,6 +142,8 @@ class OpenDatagrams(OpenPort):
 
     def _answer(self) -> bool:
         """Make the first who has spoken the one to whom frames go; return whether anybody has."""
+        import socket
+
         try:
             address: Any = self.socket.recvfrom(1, socket.MSG_PEEK)[1]
             self.socket.connect(address)
@@ -146,6 +152,8 @@ class OpenDatagrams(OpenPort):
         return True
 
     def _drops(self) -> int:
+        import socket
+
         try:
             words = self.socket.getsockopt(socket.SOL_SOCKET, SO_MEMINFO, MEMINFO.size)
         except OSError:  # other systems than Linux
@@ -161,6 +169,8 @@ class LentDatagrams(OpenDatagrams):
     """
 
     def __init__(self, descriptor: int) -> None:
+        import socket
+
         super().__init__(socket.socket(fileno=descriptor))
 
     def read_waiting(self) -> Waiting:

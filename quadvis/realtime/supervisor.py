@@ -72,10 +72,12 @@ def supervise(
         try:
             notes = supervisor.end()
         except BaseException as again:  # one that came before it was held back, or was held back
-            error, notes = again, supervisor.end()
+            for note in supervisor.end():
+                again.add_note(note)
+            raise
         for note in notes:
             error.add_note(note)
-        raise error
+        raise
     finally:
         steering.end()
 

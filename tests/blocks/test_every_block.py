@@ -1,5 +1,6 @@
 """Every block of the library passes the conformance suite; a new one is covered without being named here."""
 
+import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +19,8 @@ from quadvis.testing.conformance import CHECKS, Subject
 from quadvis_blocks.vision.rendered_camera import RenderedCamera
 from quadvis_vision.camera.calibration import CameraCalibration
 from tests.blocks.hardware.can_frames import written
+from tests.fmus import models
+from tests.fmus.builder import fmu
 
 ROOT = Path(__file__).parents[2]
 PROTOCOL = str(ROOT / "diagrams" / "protocols" / "lab_imu.yaml")
@@ -94,6 +97,10 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
     if name.startswith("hardware.can_"):
         told = {"protocol": written(request.getfixturevalue("tmp_path")), "message": "actuator"}
         values["port"] = "can:virtual:conformance"
+    if name == "fmi.fmu":
+        if shutil.which("gcc") is None:
+            pytest.skip("compiles an FMU, with gcc")
+        told = {"file": fmu(models.VAN_DER_POL)}
     block = block.with_ports(told) if told else block
     if name == "hardware.digital_out":
         values["initial"] = [0, 1, 0]

@@ -1,7 +1,7 @@
 """The hover on the bench, `diagrams/flight.yaml` in its variant hil, with all its lines in the test's hands.
 
-Commands go over SBUS, circles and inertial unit over the frames of links; each line is a `BadLine`. What other
-programs do on the machine must not decide: ticks that are lost only count as overruns.
+Commands go over SBUS, circles and inertial unit over the frames of links; each line is a `BadLine`. What
+other programs do on the machine must not decide: ticks that are lost only count as overruns.
 """
 
 from __future__ import annotations
@@ -45,7 +45,11 @@ params: {{rc: {rc.near}}}
 links:
   pictures: {{from: world, to: vision_pc, room: [322, 452]}}
   circle_line:
-    {{from: vision_pc, to: target, via: serial, baud: 115200, port: {{from: {circles.near}, to: {circles.far}}}}}
+    from: vision_pc
+    to: target
+    via: serial
+    baud: 115200
+    port: {{from: {circles.near}, to: {circles.far}}}
   imu_line: {{from: world, to: target, via: serial, baud: 230400, port: {{from: {imu.near}, to: {imu.far}}}}}
 blocks:
   receiver: {{part: {parts}/sbus_receiver.yaml, at: world, with: {{port: {rc.far}}}, in: {{initial: $hover}}}}
@@ -63,8 +67,9 @@ log: {{}}
 class Bench:
     """A flight of the bench by the command `quadvis run`, from the beginning of the context to its end.
 
-    ``blocks`` are lines of the diagram that replace or add blocks, ``more`` is what else stands there, ``own``
-    the source of own blocks by the names of their files. ``rc``, ``circles`` and ``imu`` are the lines.
+    ``blocks`` are lines of the diagram that replace or add blocks, ``more`` is what else stands there,
+    ``own`` the source of own blocks by the names of their files. ``rc``, ``circles`` and ``imu`` are the
+    lines.
     """
 
     def __init__(
@@ -161,7 +166,7 @@ class Bench:
         os.kill(self.process.pid if name == "command" else self.member(name), number)
 
     def ended(self) -> tuple[int, str, str]:
-        """Wait for the end of all its processes; return the exit code, and what was said out and to errors."""
+        """Wait for the end of all its processes; return the exit code, and what was said, also of errors."""
         out, err = self.process.communicate(timeout=PATIENCE)
         wait_for(lambda: all(map(gone, self.members)), PATIENCE)
         return self.process.returncode, out or "", err or ""

@@ -114,10 +114,10 @@ def test_the_frames_of_a_device_say_how_long_it_is_held() -> None:
         hold = "1.5 s"
 
     class HeldAsGiven(Thruster):
-        hold = "keep"
-        keep = Param(2.0, unit="s", doc="time of safe frames")
+        hold = "kept"
+        kept = Param(2.0, unit="s", doc="time of safe frames")
 
-    assert [Thruster(**GIVEN).held, Held(**GIVEN).held, HeldAsGiven(**GIVEN, keep=3.0).held] == [0, 1.5, 3]
+    assert [Thruster(**GIVEN).held, Held(**GIVEN).held, HeldAsGiven(**GIVEN, kept=3.0).held] == [0, 1.5, 3]
 
 
 def test_what_a_sealer_adds_takes_its_time() -> None:
