@@ -211,6 +211,7 @@ DIAGRAM = """\
 quadvis: 1
 name: sticks
 rates: {fast: 50 Hz}
+overload: {max: 1000, consecutive: 1000, action: warn}
 stop_time: 1 s
 computers: {target: {}, radio: {}}
 blocks:
