@@ -61,6 +61,7 @@ class WireCheck:
         block = draft.block if known(draft.block) else cast(Block, draft.type)
         computer = draft.computer if known(draft.computer) else ""
         node = Node(draft.path, draft.kind, block, task, inputs, stream=draft.stream, computer=computer)
+        node.sizes.update(block.entry_counts)
         for name, param in interface.params.items() if known(draft.block) else ():
             shape = getattr(getattr(draft.block, name), "shape", ())
             if param.signal.scalar != "str" and not param.signal.unify(shape, node.sizes):

@@ -1,4 +1,4 @@
-"""Words of other programs for things that quadvis calls otherwise: "sample_time" for rate, "Mux" for stack.
+"""Words of other programs for things that quadvis calls otherwise: "sample_time" for rate.
 
 A word is looked up without case, blanks, `-` and `_`; its meaning depends on the words that are allowed
 there.
@@ -68,7 +68,7 @@ _MEANT = {
     "highest": "maximum",
     "final": "last end",
     # blocks of the library
-    "signal.stack": "mux vectorconcatenate concatenate",
+    "signal.concatenate": "mux vectorconcatenate stack join",
     "signal.sum": "add subtract adder summer",
     "signal.saturation": "saturate limiter clip clamp",
     "signal.unit_delay": "memory onestepdelay",

@@ -66,6 +66,7 @@ def _device(block: type[Device]) -> str:
 
 def _input_row(port: In, direct: bool) -> tuple[str, ...]:
     words = [] if direct else ["no direct feedthrough"]
+    words += ["any number"] if port.many else []
     if port.default is not None:
         default = "" if _is_nan(port.default) else f", {_short(value_text(port, port.default))}"
         words.append(f"optional{default}")
@@ -112,7 +113,11 @@ def example(name: str, block: type[Block]) -> list[str]:
     lines = [f"{name.rpartition('.')[2].rpartition(':')[2]}:", f"  block: {name}"]
     lines += [] if interface.continuous else ["  rate: ..."]
     required = {param.name: _sample(param, block) for param in interface.params.values() if param.required}
-    wired = {port.name: "block.port" for port in interface.inputs.values() if port.default is None}
+    wired = {
+        port.name: "[block.port, block.port]" if port.many else "block.port"
+        for port in interface.inputs.values()
+        if port.default is None
+    }
     for key, values in (("with", required), ("in", wired)):
         entries = [f"{item}: {text}" for item, text in values.items()]
         line = f"  {key}: {{{', '.join(entries)}}}"
@@ -143,7 +148,7 @@ def facts(name: str, block: type[Block]) -> dict[str, Any]:
             params[param.name] |= {"type": "choice", "choices": list(param.choices)}
     inputs = plain(interface.inputs.values())
     for port in interface.inputs.values():
-        inputs[port.name]["optional"] = port.default is not None
+        inputs[port.name] |= {"optional": port.default is not None, "many": port.many}
     return {
         "block": name,
         "doc": inspect.getdoc(block) or "",

@@ -428,4 +428,4 @@ def test_check_starts_quickly(project: Path) -> None:
     code, modules, calls, *heavy = found.stdout.splitlines()[-1].split()
     assert (code, heavy) == ("0", [])
     assert int(modules) < 260  # beside our own; numpy and argparse bring most of them
-    assert int(calls) < 450_000  # a quarter of a second of CPU
+    assert int(calls) < 455_000  # a quarter of a second of CPU

@@ -62,7 +62,7 @@ def test_a_word_of_another_program_is_one_fault(ours: str, theirs: str, key: str
 def test_words_of_other_programs_are_taken_only_where_nothing_is_near() -> None:
     assert closest("max", ["below", "mix"]) == "mix"
     assert closest("max", ["lower"]) is None
-    assert closest("Mux", ["signal.stack", "signal.sum"]) == "signal.stack"
+    assert closest("Mux", ["signal.concatenate", "signal.sum"]) == "signal.concatenate"
     assert suggestion("inputs", ["in", "out"]) == "did you mean 'in'?"
 
 
