@@ -18,22 +18,22 @@ from quadvis.block.declare import (
     entry_name,
 )
 from quadvis.block.device import CABLE, Counted, Device, Input, LineDevice, Output
-from quadvis.block.elements import all_finite, clip, copied, inward, saturated, zeros_like
+from quadvis.block.elements import all_finite, clip, copied, element, inward, saturated, zeros_like
 from quadvis.block.instants import INSTANT, passed, reached
 from quadvis.block.interface import METHODS, OUTSIDE, TAGS, Interface
 from quadvis.block.random import fill_normal, fill_uniform, normal, normal_like, random_signs, uniform
 from quadvis.block.signals import ANY, NO_FRAME, SCALARS, Frame, Shape, SignalType, Sizes
 from quadvis.block.sizes import parameter_sizes, units_of
+from quadvis.errors import OutOfRange
 from quadvis.machine.capture import CaptureRequest
 from quadvis.machine.serial_port import Line
 
 __all__ = [
     "ANY", "CABLE", "INSTANT", "METHODS", "NO_FRAME", "OUTSIDE", "OWN_MODULES", "SCALARS", "TAGS", "Block",
     "CaptureRequest", "CapturedInput", "Counted", "Declared", "Derived", "Device", "FixedInput", "Frame",
-    "In", "Initial", "Input", "Interface", "Line", "LineDevice", "Out", "Output", "Param",
+    "In", "Initial", "Input", "Interface", "Line", "LineDevice", "Out", "OutOfRange", "Output", "Param",
     "ParameterError", "Random", "Safe", "Shape", "SignalType", "Sizes", "SourceRecord", "State", "Work",
-    "all_finite", "clip", "copied", "entry_name", "fill_normal", "fill_uniform", "inward", "normal",
-    "normal_like",
-    "parameter_sizes", "passed", "random_signs", "reached", "saturated", "uniform", "units_of",
-    "zeros_like",
+    "all_finite", "clip", "copied", "element", "entry_name", "fill_normal", "fill_uniform", "inward",
+    "normal", "normal_like", "parameter_sizes", "passed", "random_signs", "reached", "saturated", "uniform",
+    "units_of", "zeros_like",
 ]  # fmt: skip

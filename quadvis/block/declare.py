@@ -48,7 +48,7 @@ class Declared:
         if self.signal.scalar == "frame" and self.signal.shape and not isinstance(self, State):
             problem = f"{type(self).__name__} cannot be '{self.type}': only a state holds several frames"
             raise TypeError(sentence(problem, "write frame"))
-        if self.signal.is_sum or self.signal.optional:
+        if self.signal.is_sum or self.signal.optional or "*" in self.signal.shape[1:]:
             self._check_sizes()
 
     def _check_sizes(self) -> None:
@@ -57,6 +57,9 @@ class Declared:
         if signal.is_sum and isinstance(self, In | Param):
             problem = f"{kind} cannot be '{self.type}': of a sum nobody knows the parts"
             raise TypeError(sentence(problem, "give it a size of its own"))
+        if "*" in signal.shape[1:] and not isinstance(self, State | Work):
+            problem = f"{kind} cannot be '{self.type}': only a state holds several values of any shape"
+            raise TypeError(sentence(problem, "write [*]"))
         if signal.optional and not isinstance(self, Param if signal.shape == ANY else In):
             problem = f"{kind} cannot be '{self.type}'"
             raise TypeError(sentence(problem, "only a parameter can be [*?], only an input [n?]"))

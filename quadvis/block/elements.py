@@ -13,6 +13,14 @@ def copied(value: Any) -> Any:
     return 1.0 * value
 
 
+def element(value: Any, index: int) -> Any:
+    """Return one number of a parameter ``[*?]``: a number counts for all elements, an array has one for each.
+
+    ``index`` counts all elements, along the last axis first.
+    """
+    return value if isinstance(value, float) else value.flat[index]
+
+
 def zeros_like(value: Any) -> Any:
     """Return a zero for each element, with the sign of that element; all elements must be finite."""
     return 0.0 * value

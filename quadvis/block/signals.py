@@ -21,7 +21,7 @@ ANY = ("*",)  # the shape of a declaration that any shape fits
 PLUS = "+"
 _SIZE = r"(?:[1-9]\d*|[a-z]\w*)"
 _SUM = rf"{_SIZE}(?:\+{_SIZE})*"
-_TYPE = re.compile(rf"(\w+)(?:\[({_SUM}(?:, *{_SUM})*|\*)(\??)\])?", re.ASCII)
+_TYPE = re.compile(rf"(\w+)(?:\[({_SUM}(?:, *{_SUM})*|(?:{_SUM}, *)*\*)(\??)\])?", re.ASCII)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +49,10 @@ NO_FRAME = Frame(np.zeros((0, 0, 3), np.uint8), math.nan, 0)
 class SignalType:
     """The type of a signal, a scalar kind and a shape: ``float64[4,2]``, ``float64[n]``, ``frame``.
 
-    A wire carries one frame; a state may hold several, ``frame[4]``. Sizes may be added up, ``float64[m+n]``.
-    With ``optional``, written ``[n?]``, a scalar fits, too: as an array of one element. Where any shape fits,
-    ``[*?]``, a scalar stays one, and counts for every element.
+    A wire carries one frame; a state may hold several, ``frame[4]``, and several values of any shape,
+    ``float64[16,*]``. Sizes may be added up, ``float64[m+n]``. With ``optional``, written ``[n?]``, a scalar
+    fits, too: as an array of one element. Where any shape fits, ``[*?]``, a scalar stays one, and counts for
+    every element.
     """
 
     scalar: str
@@ -89,9 +90,13 @@ class SignalType:
 
     def resolve(self, sizes: Sizes) -> Shape:
         """Return the shape with every symbol replaced; if ``sizes`` lacks it, ``*`` is a scalar, others 1."""
-        if self.shape == ANY:
-            return tuple(sizes.get("*", ()))
-        return tuple(sum(_terms(size, sizes)) if isinstance(size, str) else size for size in self.shape)
+        found: list[int] = []
+        for size in self.shape:
+            if size == "*":
+                found += sizes.get("*", ())
+            else:
+                found.append(sum(_terms(size, sizes)) if isinstance(size, str) else size)
+        return tuple(found)
 
     def unify(self, shape: Shape, sizes: Sizes) -> bool:
         """Match a concrete shape, and add the symbols that it fixes to ``sizes``; False if it cannot fit."""

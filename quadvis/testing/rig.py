@@ -248,7 +248,9 @@ def _choices(param: Param) -> list[Any]:
 def _shaken(param: Param, shape: Shape) -> Any:
     """Return random numbers near the default and within the inclusive bounds."""
     rng = np.random.default_rng(zlib.crc32(param.name.encode()))
-    default = np.broadcast_to(np.asarray(param.default, float), param.signal.resolve({"*": shape}))
+    default = np.asarray(param.default, float)
+    if param.signal.shape == ANY:
+        default = np.broadcast_to(default, shape)
     factor = rng.uniform(0.6, 1.4, default.shape)
     value = np.where(default == 0.0, factor, factor * default)
     least, most = -np.inf if param.min is None else param.min, np.inf if param.max is None else param.max

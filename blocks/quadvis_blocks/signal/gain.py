@@ -10,7 +10,9 @@ from quadvis.block import Block, In, Out, Param
 class Gain(Block):
     """A signal times a factor, element by element: ``y = factor * u``."""
 
-    factor = Param(1.0, unit="b/a", tune=True, doc="the factor")
+    factor = Param(
+        1.0, type="float64[*?]", unit="b/a", tune=True, doc="the factor, one for all elements or one each"
+    )
     u = In("float64[*]", unit="a", doc="any signal")
     y = Out("float64[*]", unit="b", doc="the product")
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
+
+import numpy as np
 
 from quadvis.block import Block, In, Out, Param, State, Work, clip
 
@@ -10,12 +13,20 @@ from quadvis.block import Block, In, Out, Param, State, Work, clip
 class RateLimiter(Block):
     """A signal that follows its input no faster than the limits allow, element by element.
 
-    ``y[k] = y[k-1] + min(max(u[k] - y[k-1], -falling T), rising T)`` with ``y[-1] = initial``.
+    ``y[k] = y[k-1] + min(max(u[k] - y[k-1], -falling T), rising T)`` with ``y[-1] = initial``, or, if no
+    initial value is given, ``y[0] = u[0]``.
     """
 
-    rising = Param(1.0, unit="a/s", min=0.0, tune=True, doc="fastest rise")
-    falling = Param(1.0, unit="a/s", min=0.0, tune=True, doc="fastest fall, a positive number")
-    initial = Param(0.0, unit="a", doc="every element of the output before the first sample")
+    rising = Param(1.0, type="float64[*?]", unit="a/s", min=0.0, tune=True, doc="fastest rise")
+    falling = Param(
+        1.0, type="float64[*?]", unit="a/s", min=0.0, tune=True, doc="fastest fall, a positive number"
+    )
+    initial = Param(
+        math.inf,
+        type="float64[*?]",
+        unit="a",
+        doc="output before the first sample; inf: that is the first input",
+    )
     u = In("float64[*]", unit="a", doc="any signal")
     y = Out("float64[*]", unit="a", doc="the limited signal")
     last = State("float64[*]")
@@ -27,9 +38,17 @@ class RateLimiter(Block):
 
     def output(self, u: Any) -> Any:
         """Return the value that is nearest to the input within the limits."""
-        self.given = self.last + clip(u - self.last, -self.falling * self.period, self.rising * self.period)
+        last = _before(self.last, u)
+        self.given = last + clip(u - last, -self.falling * self.period, self.rising * self.period)
         return self.given
 
     def update(self) -> None:
         """Keep the output."""
         self.last = self.given
+
+
+def _before(last: Any, u: Any) -> Any:
+    """Return the last output; where there is none, the input."""
+    if isinstance(u, float):
+        return u if math.isinf(last) else last
+    return np.where(np.isinf(last), u, last)
