@@ -41,6 +41,7 @@ class Block:
     not_replayable: ClassVar[str] = ""  # why a second run may differ from the first: "it reads a camera"
     not_restorable: ClassVar[str] = ""  # why it cannot return to a snapshot: "the model has no way back"
     harmless: ClassVar[str] = ""  # why its writes need no safe values: "a file moves nothing"
+    example: ClassVar[str] = ""  # entries under `blocks` that show its use, at the rates fast and continuous
     # The parameters and the numbers of inputs from which the ports were made; these numbers alone.
     made_for: ClassVar[Mapping[str, Any] | None] = None
     entry_counts: ClassVar[Mapping[str, int]] = NONE

@@ -32,7 +32,7 @@ CHECKS = ("check", "check_written", "doubts")
 FILES = ("reads", "read_file", "verify_files")
 TAGS = ("not_replayable", "not_restorable", "harmless")
 RESERVED = {
-    "self", "time", "period", "interface", "numeric", "stepwise", "functions",
+    "self", "time", "period", "interface", "numeric", "stepwise", "functions", "example",
     "open", "close", "write_safe",
     PORTS, "ports_from", "with_ports", "made_for", "entry_counts", "with_entries",
     *CHECKS, *FILES, *METHODS, *TAGS,

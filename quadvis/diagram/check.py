@@ -144,9 +144,9 @@ class WireCheck:
         if given == wanted:
             return True
         fitting = [name for name, port in outputs.items() if port.signal.scalar == wanted]
-        remedy = (
-            f"'{wire.block}.{fitting[0]}' is {wanted}" if len(fitting) == 1 else f"wire a {wanted} signal"
-        )
+        between = "logic.compare" if wanted == "bool" else "math.convert"
+        remedy = f"use a block '{between}'" if "frame" not in (wanted, given) else f"wire a {wanted} signal"
+        remedy = f"'{wire.block}.{fitting[0]}' is {wanted}" if len(fitting) == 1 else remedy
         problem = f"input '{link.port}' takes {wanted}, '{wire.source}' is {given}"
         self._fault(link.draft, link.connection.place, problem, remedy)
         return False

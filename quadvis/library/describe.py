@@ -107,8 +107,28 @@ def _kind(item: Declared) -> str:
     return " ".join(filter(None, (kind, unit))) or "number"
 
 
+EXAMPLE = """\
+quadvis: 1
+name: {name}
+rates: {{fast: 100 Hz}}
+solver: {{method: ode4, step: 10 ms}}
+stop_time: 1 s
+blocks:
+{blocks}"""  # a diagram of the example of a block
+
+
+def example_diagram(name: str, block: type[Block]) -> str:
+    """Return a diagram that runs the example of a block; "" if the block has none."""
+    entries = inspect.cleandoc(block.example)
+    if not entries:
+        return ""
+    return EXAMPLE.format(name=name.rpartition(".")[2], blocks=textwrap.indent(entries, "  ") + "\n")
+
+
 def example(name: str, block: type[Block]) -> list[str]:
-    """Return the entry of a diagram for a block, with all required inputs and parameters."""
+    """Return entries of a diagram that show the use of a block: its example, or what it requires."""
+    if block.example:
+        return inspect.cleandoc(block.example).splitlines()
     interface = block.interface
     lines = [f"{name.rpartition('.')[2].rpartition(':')[2]}:", f"  block: {name}"]
     lines += [] if interface.continuous else ["  rate: ..."]

@@ -24,6 +24,11 @@ class Delay(Block):
     kept = State("float64[1,*]", doc="the samples on their way, in a ring")
     place = State("int64", doc="where the ring begins")
 
+    example = """
+        wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
+        late: {block: signal.delay, rate: fast, with: {steps: 5}, in: {u: wave.y}}
+    """
+
     @classmethod
     def ports(cls, steps: int) -> dict[str, Any]:
         """Return room for the samples."""

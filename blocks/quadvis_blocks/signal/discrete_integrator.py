@@ -22,6 +22,15 @@ class DiscreteIntegrator(Integral, Block):
     freeze = In("bool", default=False, doc="true to keep the sum as it is")
     integral = State("float64[*]")
 
+    example = """
+        error: {block: sources.constant, rate: fast, with: {value: 0.5 m}}
+        integral:
+          block: signal.discrete_integrator
+          rate: fast
+          with: {lower: -0.2 m*s, upper: 0.2 m*s}
+          in: {u: error.y}
+    """
+
     def output(self, reset: bool, value: Any) -> Any:
         """Return the integral."""
         if fires(self.reset_on, reset, self.before, self.seen):

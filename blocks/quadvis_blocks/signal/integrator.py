@@ -20,6 +20,11 @@ class Integrator(Integral, Block):
 
     integral = State("float64[*]", continuous=True)
 
+    example = """
+        force: {block: sources.step, rate: continuous, with: {after: 2 m/s^2, at: 0.5 s}}
+        speed: {block: signal.integrator, with: {upper: 0.8 m/s}, in: {u: force.y}}
+    """
+
     def output(self, reset: bool, value: Any) -> Any:
         """Return the integral."""
         if fires(self.reset_on, reset, self.before, self.seen):

@@ -21,6 +21,11 @@ class LowPass(Block):
     y = Out("float64[*]", unit="a", doc="the smoothed signal")
     smooth = State("float64[*]")
 
+    example = """
+        wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
+        smooth: {block: signal.low_pass, rate: fast, with: {time_constant: 50 ms}, in: {u: wave.y}}
+    """
+
     def start(self) -> None:
         """Begin with the initial value."""
         self.smooth = self.initial

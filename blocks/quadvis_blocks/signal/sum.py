@@ -20,6 +20,12 @@ class Sum(Block):
     y = Out("float64[*]", unit="a", doc="the sum")
     minus = Derived("bool[u]", doc="which terms are subtracted")
 
+    example = """
+        wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
+        offset: {block: sources.constant, rate: fast, with: {value: 20 cm}}
+        error: {block: signal.sum, rate: fast, with: {signs: "+--"}, in: {u: [1 m, wave.y, offset.y]}}
+    """
+
     def check(self) -> None:
         """Refuse signs that are none, or of another number than the terms."""
         count = self.entry_counts.get("u", len(self.signs))

@@ -38,6 +38,11 @@ class TransportDelay(Block):
     waiting = State("int64")
     arrived = Work("int64")  # index of the value that is the output now
 
+    example = """
+        wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
+        radio: {block: signal.transport_delay, rate: fast, with: {delay: 50 ms}, in: {u: wave.y}}
+    """
+
     def check(self) -> None:
         """Refuse a delay that holds more values than there is room for."""
         check_delay(self.delay, CAPACITY - 1, self.period)

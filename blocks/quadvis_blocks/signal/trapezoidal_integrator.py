@@ -23,6 +23,11 @@ class TrapezoidalIntegrator(Integral, Block):
     integral = State("float64[*]")
     sum_now = Work("float64[*]")
 
+    example = """
+        wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
+        area: {block: signal.trapezoidal_integrator, rate: fast, in: {u: wave.y}}
+    """
+
     def output(self, u: Any, freeze: bool, reset: bool, value: Any) -> Any:
         """Return the integral."""
         if fires(self.reset_on, reset, self.before, self.seen):

@@ -15,6 +15,11 @@ class UnitDelay(Block):
     y = Out("float64[*]", unit="a", doc="the signal of one sample ago")
     last = State("float64[*]")
 
+    example = """
+        wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
+        before: {block: signal.unit_delay, rate: fast, in: {u: wave.y}}
+    """
+
     def start(self) -> None:
         """Begin with the initial value."""
         self.last = self.initial
