@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import ParameterError, clip
+from quadvis.block import ParameterError, element
 
 
 def refuse_reversed(lower: tuple[str, Any], upper: tuple[str, Any], *, equal: bool = True) -> None:
@@ -25,10 +25,18 @@ def refuse_reversed(lower: tuple[str, Any], upper: tuple[str, Any], *, equal: bo
 
 def bounded(value: Any, lower: Any, upper: Any, wrap: bool) -> Any:
     """Return a value between limits: held at them, or with ``wrap`` back at the other end, as an angle."""
-    if not wrap:
-        return clip(value, lower, upper)
-    span = upper - lower
-    turns = (value - lower) / span
     if isinstance(value, float):
-        return value - span * math.floor(turns)
-    return value - span * np.floor(turns)
+        return _bounded(value, lower, upper, wrap)
+    found = np.empty_like(value)
+    for index in range(value.size):
+        least, most = element(lower, index), element(upper, index)
+        found.flat[index] = _bounded(value.flat[index], least, most, wrap)
+    return found
+
+
+def _bounded(value: float, lower: float, upper: float, wrap: bool) -> float:
+    if wrap:
+        span = upper - lower
+        return value - span * math.floor((value - lower) / span)
+    held = lower if value < lower else value
+    return upper if held > upper else held

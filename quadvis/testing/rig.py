@@ -198,7 +198,7 @@ def _extremes(param: Param, sizes: Sizes) -> Iterator[Any]:
 
 
 def _rig(subject: Subject, block: Block, sizes: Sizes, steps: int, missing: bool = False) -> Rig:
-    interface = block.interface
+    interface = block.interface  # its own: kinds and units of ports may depend on parameters
     sizes |= parameter_sizes(block)
     for name, values in subject.inputs.items():
         interface.inputs[name].signal.unify(np.shape(values[0]), sizes)
@@ -207,7 +207,7 @@ def _rig(subject: Subject, block: Block, sizes: Sizes, steps: int, missing: bool
         for size in item.signal.symbols:
             if size != "*":
                 sizes.setdefault(size, VECTOR)
-    series = _series(subject, sizes, steps, missing)
+    series = _series(subject, interface.inputs, sizes, steps, missing)
     return Rig(alone(block, series[0], sizes, PERIOD, seed=1), series)
 
 
@@ -257,12 +257,14 @@ def _shaken(param: Param, shape: Shape) -> Any:
     return np.clip(value, least, most).tolist()
 
 
-def _series(subject: Subject, sizes: Sizes, steps: int, missing: bool) -> list[dict[str, Any]]:
+def _series(
+    subject: Subject, inputs: Mapping[str, In], sizes: Sizes, steps: int, missing: bool
+) -> list[dict[str, Any]]:
     rng = np.random.default_rng(zlib.crc32(subject.block.__name__.encode()))
     series: list[dict[str, Any]] = []
     for step in range(steps):
         row: dict[str, Any] = {}
-        for name, port in subject.block.interface.inputs.items():
+        for name, port in inputs.items():
             if name in subject.inputs:
                 row[name] = subject.inputs[name][step % len(subject.inputs[name])]
             elif series and rng.random() < 0.3:

@@ -35,12 +35,22 @@ class Gate(Block):
 
     def output(self, *u: Any) -> Any:
         """Return the result."""
-        found = u[0] ^ False
-        for place in range(1, len(u)):
-            if self.operator in (AND, NAND):
-                found = found & u[place]
-            elif self.operator in (OR, NOR):
-                found = found | u[place]
-            else:
-                found = found ^ u[place]
-        return found ^ (self.operator >= NOT)
+        first = u[0]
+        if isinstance(first, bool):
+            found = first
+            for place in range(1, len(u)):
+                found = _joined(self.operator, found, u[place])
+            return found != (self.operator >= NOT)
+        y = first.copy()
+        for index in range(y.size):
+            found = first.flat[index] != 0
+            for place in range(1, len(u)):
+                found = _joined(self.operator, found, u[place].flat[index] != 0)
+            y.flat[index] = found != (self.operator >= NOT)
+        return y
+
+
+def _joined(operator: int, a: bool, b: bool) -> bool:
+    if operator in (AND, NAND):
+        return a and b
+    return a or b if operator in (OR, NOR) else a != b

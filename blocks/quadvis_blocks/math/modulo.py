@@ -42,7 +42,7 @@ class Modulo(Block):
 
 
 def _rest(function: int, u: float, divisor: float) -> float:
-    rest = math.fmod(u, divisor)  # exact
+    rest = math.copysign(abs(u) % abs(divisor), u)  # exact
     if function == MOD and rest != 0.0 and (rest < 0.0) != (divisor < 0.0):
         return rest + divisor
     return rest

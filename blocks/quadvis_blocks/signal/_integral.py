@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out, Param, ParameterError, State
+from quadvis.block import Block, In, Out, Param, ParameterError, State, element
 from quadvis_blocks._edges import NAMES
 from quadvis_blocks._limits import refuse_reversed
 
@@ -58,4 +58,8 @@ def first(value: Any, initial: Any) -> Any:
     """Return what an output is reset to: the value, or the initial one where the value is NaN."""
     if isinstance(value, float):
         return initial if math.isnan(value) else value
-    return np.where(np.isnan(value), initial, value)
+    found = np.empty_like(value)
+    for index in range(value.size):
+        given = value.flat[index]
+        found.flat[index] = element(initial, index) if math.isnan(given) else given
+    return found

@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
-from quadvis.block import Block, In, Out, Param, State, Work, clip
+from quadvis.block import Block, In, Out, Param, State, Work, clip, element
 
 
 class RateLimiter(Block):
@@ -43,8 +41,13 @@ class RateLimiter(Block):
 
     def output(self, u: Any) -> Any:
         """Return the value that is nearest to the input within the limits."""
-        last = _before(self.last, u)
-        self.given = last + clip(u - last, -self.falling * self.period, self.rising * self.period)
+        if isinstance(u, float):
+            self.given = _limited(u, self.last, self.rising * self.period, self.falling * self.period)
+        else:
+            for index in range(u.size):
+                rise = element(self.rising, index) * self.period
+                fall = element(self.falling, index) * self.period
+                self.given.flat[index] = _limited(u.flat[index], self.last.flat[index], rise, fall)
         return self.given
 
     def update(self) -> None:
@@ -52,8 +55,8 @@ class RateLimiter(Block):
         self.last = self.given
 
 
-def _before(last: Any, u: Any) -> Any:
-    """Return the last output; where there is none, the input."""
-    if isinstance(u, float):
-        return u if math.isinf(last) else last
-    return np.where(np.isinf(last), u, last)
+def _limited(u: float, last: float, rise: float, fall: float) -> float:
+    """Return the next output; without a last one, the input."""
+    if math.isinf(last):
+        return u
+    return float(last + clip(u - last, -fall, rise))

@@ -31,7 +31,8 @@ class Select(Block):
 
     def output(self, index: Any, u: Any) -> Any:
         """Return the elements."""
-        if isinstance(index, int):
+        number = 1.0 * index  # compiled code can ask for a float, not for an int
+        if isinstance(number, float):
             return u[_place(index, u.size, self.outside)]
         y = np.empty(index.shape)
         for place in range(index.size):

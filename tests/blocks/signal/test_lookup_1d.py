@@ -79,9 +79,15 @@ def test_what_is_missing_is_missing_in_every_method() -> None:
         ({"breakpoints": [0], "values": [0]}, "breakpoints must be 2 at least, got 1"),
         ({"breakpoints": [0, 1], "values": [0, np.nan]}, "values must be"),
         ({"breakpoints": [0, 1], "values": [0, np.inf]}, "values must be finite"),
-        ({"breakpoints": [0, 1], "values": [0, 1], "interpolation": "hold", "outside": "linear"}, "outside m"),
     ],
 )  # fmt: skip
 def test_a_table_that_says_nothing_sure_is_refused(given: dict[str, object], problem: str) -> None:
     with pytest.raises(ParameterError, match=problem):
         Lookup1d(**given)
+
+
+def test_steps_have_no_slope_to_go_on_with() -> None:
+    with pytest.raises(
+        ParameterError, match="outside must be hold or refuse where the table holds its values"
+    ):
+        table(interpolation="hold", outside="linear")
