@@ -161,7 +161,7 @@ def test_editors_know_the_list() -> None:
 def test_describe_says_any_number() -> None:
     text = description("signal.sum", Catalogue().find("signal.sum"))
     assert "u  [*] a  any number  the terms" in text
-    assert "in: {u: [block.port, block.port]}" in text
+    assert "in: {first: block.port, u: [block.port, block.port]}" in description("weighted", Weighted)
     assert facts("signal.sum", Sum)["inputs"]["u"]["many"] is True
 
 
@@ -304,3 +304,35 @@ def test_a_wrong_parameter_of_ports_is_a_parameter_error() -> None:
     assert drive(Chosen(signs="+-"), u=[[1.0], [2.0]]).y.tolist() == [3.0]
     with pytest.raises(ParameterError, match="signs must be as many"):
         drive(Chosen(signs="+"), u=[[1.0], [2.0]])
+
+
+def test_an_entry_may_come_over_a_link_from_another_computer() -> None:
+    text = """quadvis: 1
+name: two
+computers: {near: {}, far: {}}
+rates: {fast: 10 Hz}
+stop_time: 0.2 s
+blocks:
+  x: {block: sources.ramp, rate: fast, at: near, with: {slope: 1 m/s, initial: 5 m}}
+  s: {block: signal.sum, rate: fast, at: far, in: {u: [1 m, {from: x.y, initial: 2 m}]}}
+  c: {block: signal.concatenate, rate: fast, at: far, in: {u: [s.y, {from: x.y, initial: 2 m}]}}
+"""
+    diagram = load_text(text, Path.cwd())
+    result = diagram.run()
+    assert result["s.y"] == pytest.approx([3.0, 6.0, 6.1])
+    assert result["c.y"][0].tolist() == [3.0, 2.0]
+    assert load_text(diagram.resolved, Path.cwd()).hash == diagram.hash
+
+
+def test_entries_of_other_tasks_are_latched_where_tasks_run_by_themselves() -> None:
+    blocks = """\
+  s:
+    block: signal.sum
+    rate: slow
+    in: {u: [{from: x.y, across: sample}, {from: b.y, across: delay}]}
+  b: {block: signal.gain, rate: fast, in: {u: {from: s.y, across: hold}}}
+"""
+    diagram = load_text(HEAD.replace("params", "tasking: multi\nparams") + blocks, Path.cwd())
+    wires = dict(diagram.graph["s"].wires())
+    assert wires["u[0]"].latched and wires["u[1]"].delayed
+    assert diagram.run()["s.y"][0] == 0.0
