@@ -273,7 +273,9 @@ def test_files_of_the_diagrams_own_folder_and_files_that_the_user_named_are_quot
         ("DiscreteTimeIntegrator", "signal.discrete_integrator"),
         ("TIME", "sources.clock"), ("Chirp Signal", "sources.chirp"), ("Clock", "sources.clock"),
         ("UniformRandomNumber", "sources.uniform_noise"), ("RepeatingSequence", "sources.repeating_sequence"),
-        ("SRFlipFlop", "logic.latch"),
+        ("SRFlipFlop", "logic.latch"), ("signal.stack", "signal.concatenate"),
+        ("signal.abs", "math.function"), ("signal.mux", "signal.concatenate"),
+        ("Sign", "math.function"), ("Demux", "signal.select"),
     ],
 )  # fmt: skip
 def test_blocks_are_found_by_the_names_of_simulink_and_bdsim(word: str, block: str) -> None:
