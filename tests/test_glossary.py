@@ -15,8 +15,10 @@ ROOMS = sorted(path.parent.name for path in (ROOT / "quadvis").glob("*/__init__.
 
 # Class names that are defined twice by leave. A block is named after its file: the name in a diagram decides.
 TWICE = {
+    "Clock": "the block sources.clock; what lets the ticks of a run go",
     "Constant": "the block sources.constant; in a graph, the value of an input without a wire",
     "Diagram": "the checked diagram; the same with methods that run it, which quadvis.load returns",
+    "Function": "the block math.function; a compiled method, by its address",
     "Recording": "the block sources.recording; recorded signals in memory",
     "Table": "the block sources.table; the table of a sweep, which quadvis.sweep returns",
 }

@@ -7,85 +7,23 @@ code of the author.
 
 from __future__ import annotations
 
-import inspect
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, ClassVar, TypeVar
+from collections.abc import Callable, Hashable, Mapping
+from types import MappingProxyType
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
-from quadvis.block.declare import Declared, Derived, In, Out, Param, ParameterError, Random, Safe, State, Work
+from quadvis.block.declare import ParameterError, entry_name
+from quadvis.block.interface import PORTS, Interface, arguments_of_ports, interface_of
 from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.machine.inputs import file_digest, read_once
 from quadvis.machine.source_line import file_of, source_line
 
 OWN_MODULES = "quadvis_own_blocks."  # prefix of the names of modules that come with a diagram
-METHODS = ("start", "read", "output", "write", "update", "deriv")
-OUTSIDE = ("read", "write")
-PORTS = "ports"
-CHECKS = ("check", "check_written", "doubts")
-FILES = ("reads", "read_file", "verify_files")
-TAGS = ("not_replayable", "not_restorable", "harmless")
-RESERVED = {
-    "self", "time", "period", "until", "interface", "numeric", "stepwise", "functions",
-    "open", "close", "write_safe", "keep", "put_back",
-    PORTS, "ports_from", "with_ports", "made_for",
-    *CHECKS, *FILES, *METHODS, *TAGS,
-}  # fmt: skip
-
+NONE: Mapping[str, int] = MappingProxyType({})
 _Read = TypeVar("_Read")
-
-
-@dataclass(frozen=True)
-class Interface:
-    """All declarations of a block class, collected when the class is defined."""
-
-    inputs: Mapping[str, In]
-    outputs: Mapping[str, Out]
-    params: Mapping[str, Param]
-    derived: Mapping[str, Derived]
-    states: Mapping[str, State]
-    work: Mapping[str, Work]
-    safe: Mapping[str, Safe]  # by the input that each value replaces
-    arguments: Mapping[str, tuple[str, ...]]  # method -> the names that it asks for
-
-    @cached_property
-    def feedthrough(self) -> frozenset[str]:
-        """The inputs that ``output`` asks for."""
-        return frozenset(self.arguments.get("output", ())) & frozenset(self.inputs)
-
-    @cached_property
-    def continuous(self) -> tuple[State, ...]:
-        """The states that a solver integrates."""
-        return tuple(state for state in self.states.values() if state.continuous)
-
-    @cached_property
-    def streams(self) -> tuple[str, ...]:
-        """The states that are random streams."""
-        return tuple(name for name, state in self.states.items() if isinstance(state, Random))
-
-    @cached_property
-    def wanted(self) -> tuple[str, ...]:
-        """The inputs that must be fed, since they have no default."""
-        return tuple(name for name, port in self.inputs.items() if port.default is None)
-
-    @cached_property
-    def required(self) -> tuple[str, ...]:
-        """The parameters that must be given."""
-        return tuple(name for name, param in self.params.items() if param.required)
-
-    @cached_property
-    def files_read(self) -> tuple[Param, ...]:
-        """The parameters that name a file or folder which the block reads."""
-        return tuple(param for param in self.params.values() if param.is_file and not param.writes)
-
-    @cached_property
-    def files_written(self) -> tuple[Param, ...]:
-        """The parameters that name a file or folder which the block writes."""
-        return tuple(param for param in self.params.values() if param.writes)
 
 
 class Block:
@@ -103,51 +41,82 @@ class Block:
     not_replayable: ClassVar[str] = ""  # why a second run may differ from the first: "it reads a camera"
     not_restorable: ClassVar[str] = ""  # why it cannot return to a snapshot: "the model has no way back"
     harmless: ClassVar[str] = ""  # why its writes need no safe values: "a file moves nothing"
-    made_for: ClassVar[Mapping[str, Any] | None] = None  # the parameters from which the ports were made
+    example: ClassVar[str] = ""  # entries under `blocks` that show its use, at the rates fast and continuous
+    # The parameters and the numbers of inputs from which the ports were made; these numbers alone.
+    made_for: ClassVar[Mapping[str, Any] | None] = None
+    entry_counts: ClassVar[Mapping[str, int]] = NONE
     period: float = math.nan
     until: float = math.inf  # time of the run's last tick (s), where it is known; not for compiled methods
+    _kinds: ClassVar[dict[Hashable, type[Block]]]
 
     def __init_subclass__(cls, *, numeric: bool | None = None, bound: bool = False) -> None:
         if bound:
             return
         if numeric is not None:
             cls.numeric = numeric
-        cls.interface = _interface(cls)
+        cls._kinds = {}
+        cls.interface = interface_of(cls)
 
     @classmethod
     def ports_from(cls) -> tuple[str, ...]:
-        """Return the names of the parameters on which the ports depend: the arguments of ``ports``."""
-        ports = getattr(cls, "ports", None)
-        return () if ports is None else tuple(inspect.signature(ports).parameters)
+        """Return the names of the parameters on which the ports depend, of the arguments of ``ports``."""
+        return tuple(name for name in arguments_of_ports(cls) if name in cls.interface.params)
 
     @classmethod
-    def with_ports(cls, parameters: Mapping[str, Any]) -> type[Block]:
+    def with_ports(cls, parameters: Mapping[str, Any], entries: Mapping[str, int] = NONE) -> type[Block]:
         """Return the class with its ports for these parameters; ParameterError if a parameter is wrong.
 
-        The ports of a class may depend on parameters, for example on the file of a model. Such a class has
-        a class method ``ports``, which asks for parameters by name and returns the ports by name, and what
+        ``entries`` has the number of signals of each input of any number; a class for which it is open stays
+        as it is. The ports of a class may depend on parameters, for example on the file of a model. Such a
+        class has a class method ``ports``, which asks for parameters, and for the number of signals of
+        inputs, by name, and returns the ports by name, a list of ports for an input of any number, and what
         else of the class depends on the file: parameters, states, methods, tags. ``*inputs`` of a method then
         stands for all inputs, in the order of ``ports``; of ``output``, for those that are ``direct``.
         """
-        names = cls.ports_from()
-        if not names:
+        if cls.made_for is None and not hasattr(cls, PORTS) and not cls.interface.many:
             return cls
-        declared = cls.interface.params
-        given = {name: declared[name].given(parameters.get(name)) for name in names}
-        if cls.made_for is not None:
-            same = all(np.array_equal(given[name], cls.made_for[name]) for name in names)
-            base: type[Block] = cls.__mro__[1]
-            return cls if same else base.with_ports(parameters)
-        try:
-            ports = getattr(cls, PORTS)(**given)
-        except QuadvisError:
-            raise
-        except Exception as error:
-            place = source_line(error, file_of(cls))
-            reason = f"{type(error).__name__}: {error}{f' in {place}' if place else ''}"
-            raise ParameterError(names[0], f"the ports cannot be made from {names[0]}: {reason}") from error
-        members = {**ports, "__doc__": cls.__doc__, "__module__": cls.__module__, "made_for": given}
-        return type(cls.__name__, (cls,), members)
+        base = cls._before_ports()
+        asked, many = base.ports_from(), base.interface.many
+        counts = {name: entries.get(name, cls.entry_counts.get(name)) for name in many}
+        if None in counts.values():
+            return cls
+        declared = base.interface.params
+        given = {name: declared[name].given(parameters.get(name)) for name in asked} | counts
+        if cls.made_for is not None and all(
+            np.array_equal(given[name], cls.made_for[name]) for name in given
+        ):
+            return cls
+        return base._made(given)
+
+    @classmethod
+    def _before_ports(cls) -> type[Block]:
+        """Return the class from which this one was made when its ports were known."""
+        kinds: tuple[type[Any], ...] = cls.__mro__
+        return kinds[0 if cls.made_for is None else 1]
+
+    @classmethod
+    def _made(cls, given: Mapping[str, Any]) -> type[Block]:
+        """Return the class with its ports; one class for equal values, unless these are files or arrays."""
+        files = any(cls.interface.params[name].is_file for name in cls.ports_from())
+        key = tuple(given.items())
+        if files or any(isinstance(value, np.ndarray) for value in given.values()):
+            return _kind(cls, given)
+        if key not in cls._kinds:
+            cls._kinds[key] = _kind(cls, given)
+        return cls._kinds[key]
+
+    def with_entries(self, **entries: int) -> Self:
+        """Return the block itself, whose inputs of any number now take so many signals.
+
+        A block that is made without a diagram does not know their number: ``Sum()`` becomes
+        ``Sum().with_entries(u=3)``. ParameterError if a parameter asks for another number.
+        """
+        kind = self._before_ports()
+        given = {name: getattr(self, name) for name in kind.ports_from()}
+        made: Any = kind._made(given | {name: entries[name] for name in kind.interface.many})
+        self.__class__ = made
+        self.check()
+        return self
 
     def __init__(self, *, period: float = math.nan, **parameters: Any) -> None:
         kind = type(self).with_ports(parameters)
@@ -249,76 +218,22 @@ class Block:
         """
 
 
-def _interface(cls: type[Block]) -> Interface:
-    found: dict[str, Declared] = {}
-    for base in reversed(cls.__mro__):
-        found.update({name: value for name, value in vars(base).items() if isinstance(value, Declared)})
-    for name in found:
-        if name in RESERVED:
-            raise TypeError(f"{cls.__name__}: '{name}' is reserved; choose another name")
-
-    def of(kind: type[Any]) -> dict[str, Any]:
-        return {name: value for name, value in found.items() if isinstance(value, kind)}
-
-    inputs, outputs, states = of(In), of(Out), of(State)
-    arguments = {}
-    for method in METHODS:
-        function = getattr(cls, method, None)
-        if function is None:
-            continue
-        every = [name for name, port in inputs.items() if port.direct or method != "output"]
-        names = _asked(function, tuple(every) if cls.ports_from() else None)
-        allowed = {"start": (), "read": ("time",)}.get(method, (*inputs, "time"))
-        for name in names:
-            if name not in allowed:
-                problem = f"{cls.__name__}.{method} asks for '{name}', which is not one of its inputs"
-                raise TypeError(sentence(problem, suggestion(name, allowed)))
-        arguments[method] = names
-    for name in cls.ports_from():
-        if name not in of(Param):
-            problem = f"{cls.__name__}.{PORTS} asks for '{name}', which is not one of its parameters"
-            raise TypeError(sentence(problem, suggestion(name, of(Param))))
-    if cls.numeric and not arguments.keys().isdisjoint(OUTSIDE):
-        problem = f"{cls.__name__} reads or writes outside, which no compiled method can"
-        raise TypeError(sentence(problem, "say numeric=False"))
-    if cls.numeric and any(state.signal.scalar == "frame" for state in states.values()):
-        problem = f"{cls.__name__} keeps a frame as a state, which no compiled method can"
-        raise TypeError(sentence(problem, "say numeric=False"))
-    if any(item.signal.scalar == "frame" for item in of(Work).values()):
-        problem = f"{cls.__name__} declares a frame as Work, which holds numbers"
-        raise TypeError(sentence(problem, "keep it in an attribute that output sets and update reads"))
-    if of(Work) and not {"output", "update"} <= arguments.keys():
-        raise TypeError(f"{cls.__name__} declares Work, which goes from output to update, but has not both")
-    if any(state.continuous for state in states.values()) != ("deriv" in arguments):
-        raise TypeError(f"{cls.__name__}: continuous states and a deriv method go together")
-    if outputs and "output" not in arguments:
-        raise TypeError(f"{cls.__name__} declares outputs but has no output method")
-    safe = _safe(cls, of(Safe).values(), inputs, arguments.get("write", ()))
-    return Interface(inputs, outputs, of(Param), of(Derived), states, of(Work), safe, arguments)
-
-
-def _asked(function: Callable[..., Any], inputs: tuple[str, ...] | None) -> tuple[str, ...]:
-    """Return the names that a method asks for; ``*inputs`` means these ``inputs``, if they are not None."""
-    names: list[str] = []
-    for name, parameter in tuple(inspect.signature(function).parameters.items())[1:]:
-        every = parameter.kind == parameter.VAR_POSITIONAL and name == "inputs"
-        names += inputs if every and inputs is not None else [name]
-    return tuple(names)
-
-
-def _safe(
-    cls: type[Block], declared: Iterable[Safe], inputs: Mapping[str, In], written: Sequence[str]
-) -> dict[str, Safe]:
-    """Return the safe values by input; TypeError if one is missing or replaces no input of ``write``."""
-    safe = {item.input: item for item in declared}
-    for name, item in safe.items():
-        if name not in written or name not in inputs:
-            problem = f"{cls.__name__}.{item.name} stands for '{name}', which is no input of its write method"
-            raise TypeError(sentence(problem, suggestion(name, written)))
-        item.stand_for(inputs[name])
-    for name in written:
-        if name in inputs and name not in safe and not cls.harmless:
-            problem = f"{cls.__name__}.write has no safe value for '{name}'"
-            remedy = f"declare safe_{name} = Safe('{name}'), or say in 'harmless' why it needs none"
-            raise TypeError(sentence(problem, remedy))
-    return safe
+def _kind(cls: type[Block], given: Mapping[str, Any]) -> type[Block]:
+    """Return a class with its ports for the values on which they depend."""
+    arguments = arguments_of_ports(cls)
+    many = {name: given[name] for name in cls.interface.many}
+    try:
+        made = getattr(cls, PORTS)(**{name: given[name] for name in arguments}) if arguments else {}
+    except QuadvisError:
+        raise
+    except Exception as error:
+        place = source_line(error, file_of(cls))
+        reason = f"{type(error).__name__}: {error}{f' in {place}' if place else ''}"
+        problem = f"the ports cannot be made from {arguments[0]}: {reason}"
+        raise ParameterError(arguments[0], problem) from error
+    ports = {name: port for name, port in made.items() if name not in many}
+    for name, count in many.items():
+        entries = made.get(name) or cls.interface.inputs[name].entries(count)
+        ports |= {entry_name(name, number): entry for number, entry in enumerate(entries)}
+    members = {"__doc__": cls.__doc__, "__module__": cls.__module__, "made_for": given, "entry_counts": many}
+    return type(cls.__name__, (cls,), ports | members)

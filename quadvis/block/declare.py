@@ -5,20 +5,25 @@ from __future__ import annotations
 import math
 import operator
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.block.signals import SCALARS, SignalType
+from quadvis.block.signals import ANY, SCALARS, SignalType
 from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.machine.datagrams import UDP, Address
 from quadvis.units import parse_units
 
 PORT_WANTED = "the path of a port, such as /dev/ttyUSB0, udp:HOST:PORT or pty:NAME"
 CABLE_PORT = re.compile(r"pty:[A-Za-z_]\w*")
+
+
+def entry_name(port: str, number: int) -> str:
+    """Return the name of the input that is one signal of an input of any number."""
+    return f"{port}[{number}]"
 
 
 class ParameterError(QuadvisError):
@@ -44,6 +49,21 @@ class Declared:
         if self.signal.scalar == "frame" and self.signal.shape and not isinstance(self, State):
             problem = f"{type(self).__name__} cannot be '{self.type}': only a state holds several frames"
             raise TypeError(sentence(problem, "write frame"))
+        if self.signal.is_sum or self.signal.optional or "*" in self.signal.shape[1:]:
+            self._check_sizes()
+
+    def _check_sizes(self) -> None:
+        """Refuse sizes from which no length could follow."""
+        signal, kind = self.signal, type(self).__name__
+        if signal.is_sum and isinstance(self, In | Param):
+            problem = f"{kind} cannot be '{self.type}': of a sum nobody knows the parts"
+            raise TypeError(sentence(problem, "give it a size of its own"))
+        if "*" in signal.shape[1:] and not isinstance(self, State | Work):
+            problem = f"{kind} cannot be '{self.type}': only a state holds several values of any shape"
+            raise TypeError(sentence(problem, "write [*]"))
+        if signal.optional and not isinstance(self, Param if signal.shape == ANY else In):
+            problem = f"{kind} cannot be '{self.type}'"
+            raise TypeError(sentence(problem, "only a parameter can be [*?], only an input [n?]"))
 
     def __set_name__(self, owner: Any, name: str) -> None:
         self.name = name
@@ -66,11 +86,20 @@ class In(Declared):
     """An input port. A port with a ``default`` may stay unconnected.
 
     ``*inputs`` of a method means all inputs; of ``output``, all but those with ``direct=False``.
+
+    With ``many=True`` it takes any number of signals, one at least: ``u = In("float64[*]", many=True)``. A
+    diagram lists them, ``in: {u: [left.y, right.y]}``. The class has an input for each, ``u[0]``, ``u[1]``,
+    as soon as their number is known; a method that asks for ``*u`` gets them as a tuple, in that order.
     """
 
     type: str = "float64"
     default: Any = field(default=None, kw_only=True)
     direct: bool = field(default=True, kw_only=True)
+    many: bool = field(default=False, kw_only=True)
+
+    def entries(self, count: int) -> list[In]:
+        """Return the inputs that stand for a port of any number."""
+        return [replace(self, many=False) for _ in range(count)]
 
 
 @dataclass(eq=False)
@@ -224,7 +253,7 @@ class Param(Declared):
             return "a path" if self.is_file else PORT_WANTED
         one, many = _WORDS[self.signal.scalar]
         unit = "" if self.unit == "1" else f" in {self.unit}"
-        if self.signal.shape == ("*",):
+        if self.signal.shape == ANY:
             return f"{one} or an array of {many}{unit}"
         return f"{_shape_text(self.signal.shape)}, {many}{unit}" if self.signal.shape else f"{one}{unit}"
 

@@ -13,12 +13,20 @@ def copied(value: Any) -> Any:
     return 1.0 * value
 
 
+def element(value: Any, index: int) -> Any:
+    """Return one number of a parameter ``[*?]``: a number counts for all elements, an array has one for each.
+
+    ``index`` counts all elements, along the last axis first.
+    """
+    return value if isinstance(value, float) else value.flat[index]
+
+
 def zeros_like(value: Any) -> Any:
     """Return a zero for each element, with the sign of that element; all elements must be finite."""
     return 0.0 * value
 
 
-def clip(value: Any, lower: float, upper: float) -> Any:
+def clip(value: Any, lower: Any, upper: Any) -> Any:
     """Return ``value`` held between the limits, element by element; NaN stays NaN."""
     if isinstance(value, float):
         held = lower if value < lower else value
@@ -40,9 +48,16 @@ def all_finite(value: Any) -> bool:
     return bool(np.all(np.isfinite(value)))
 
 
-def inward(slope: Any, value: Any, lower: float, upper: float) -> Any:
+def inward(slope: Any, value: Any, lower: Any, upper: Any) -> Any:
     """Return ``slope``, but zero for every element of ``value`` that is at a limit and would go beyond."""
     if isinstance(value, float):
-        return 0.0 if (value >= upper and slope > 0.0) or (value <= lower and slope < 0.0) else slope
-    outward = ((value >= upper) & (slope > 0.0)) | ((value <= lower) & (slope < 0.0))
-    return np.where(outward, 0.0, slope)
+        return _inward(slope, value, lower, upper)
+    found = np.empty_like(slope)
+    for index in range(slope.size):
+        least, most = element(lower, index), element(upper, index)
+        found.flat[index] = _inward(slope.flat[index], value.flat[index], least, most)
+    return found
+
+
+def _inward(slope: float, value: float, lower: float, upper: float) -> float:
+    return 0.0 if (value >= upper and slope > 0.0) or (value <= lower and slope < 0.0) else slope

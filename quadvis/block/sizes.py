@@ -11,8 +11,11 @@ from quadvis.units import Unit
 
 
 def parameter_sizes(block: Block) -> Sizes:
-    """Return the symbolic sizes that a block's parameters fix."""
-    sizes: Sizes = {}
+    """Return the symbolic sizes that a block's parameters fix, and the numbers of signals of its inputs.
+
+    A size with the name of an input of any number, ``Derived("float64[u]")``, is the number of its signals.
+    """
+    sizes: Sizes = dict(block.entry_counts)
     for param in block.interface.params.values():
         if not param.is_text:
             param.signal.unify(np.shape(getattr(block, param.name)), sizes)

@@ -16,7 +16,7 @@ class Bindings:
 
     def __init__(self) -> None:
         self.elements: list[dict[str, Unit]] = [{}]
-        self._known: dict[tuple[Declared, int], tuple[Unit, ...]] = {}
+        self._known: dict[tuple[Declared, int, tuple[int, ...]], tuple[Unit, ...]] = {}
 
     def match(self, pattern: tuple[Unit, ...], units: OpenUnits) -> int | None:
         """Bind variables by the units of the elements; return the first unit that does not fit, or None."""
@@ -70,16 +70,19 @@ class Bindings:
             return unit
         return bound.get(variable_of(unit)) or unit.substitute(bound)
 
-    def units(self, declared: Declared, count: int) -> tuple[Unit, ...]:
-        """Return the units of the elements of a port or parameter."""
-        found = self._known.get((declared, count))
+    def units(self, declared: Declared, count: int, parts: tuple[int, ...] = ()) -> tuple[Unit, ...]:
+        """Return the units of the elements of a port or parameter; of one that has ``parts`` part by part."""
+        found = self._known.get((declared, count, parts))
         if found is None:
-            if len(declared.units) == len(self.elements) == 1:
+            if len(parts) == len(declared.units) > 1:
+                pairs = zip(declared.units, parts, strict=True)
+                found = tuple([self.unit((unit,), index) for unit, size in pairs for index in range(size)])
+            elif len(declared.units) == len(self.elements) == 1:
                 found = (self.unit(declared.units, 0),) * count
             else:
                 found = tuple([self.unit(declared.units, index) for index in range(count)])
             if not any(unit.variables for unit in found):
-                self._known[declared, count] = found  # what is bound stays so
+                self._known[declared, count, parts] = found  # what is bound stays so
         return found
 
     def open(self, declared: Iterable[Declared]) -> list[str]:
@@ -87,12 +90,19 @@ class Bindings:
         names = {name for item in declared for unit in item.units for name in unit.variables}
         return sorted(name for name in names if any(name not in bound for bound in self.elements))
 
-    def spread(self) -> None:
-        """Give elements that say nothing, such as a plain 0, the unit of the others if these agree."""
-        for name in {name for bound in self.elements for name in bound}:
-            units = {bound[name] for bound in self.elements if name in bound}
+    def spread(self, outputs: Iterable[Declared] = ()) -> None:
+        """Give elements that say nothing, such as a plain 0, the unit of the others if these agree.
+
+        The parts of an output whose size is a sum are elements of one vector, too.
+        """
+        vectors = [{name} for name in sorted({name for bound in self.elements for name in bound})]
+        sums = [port for port in outputs if port.signal.is_sum]
+        vectors += [{name for unit in port.units for name in unit.variables} for port in sums]
+        for vector in vectors:
+            units = {bound[name] for bound in self.elements for name in vector if name in bound}
             if len(units) == 1:
-                self.bind(name, units.pop())
+                for name in vector:
+                    self.bind(name, *units)
 
     def bind(self, variable: str, unit: Unit) -> None:
         """Let a variable stand for a unit wherever it is open."""

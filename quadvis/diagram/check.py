@@ -61,6 +61,7 @@ class WireCheck:
         block = draft.block if known(draft.block) else cast(Block, draft.type)
         computer = draft.computer if known(draft.computer) else ""
         node = Node(draft.path, draft.kind, block, task, inputs, stream=draft.stream, computer=computer)
+        node.sizes.update(block.entry_counts)
         for name, param in interface.params.items() if known(draft.block) else ():
             shape = getattr(getattr(draft.block, name), "shape", ())
             if param.signal.scalar != "str" and not param.signal.unify(shape, node.sizes):
@@ -143,9 +144,9 @@ class WireCheck:
         if given == wanted:
             return True
         fitting = [name for name, port in outputs.items() if port.signal.scalar == wanted]
-        remedy = (
-            f"'{wire.block}.{fitting[0]}' is {wanted}" if len(fitting) == 1 else f"wire a {wanted} signal"
-        )
+        between = "logic.compare" if wanted == "bool" else "math.convert"
+        remedy = f"use a block '{between}'" if "frame" not in (wanted, given) else f"wire a {wanted} signal"
+        remedy = f"'{wire.block}.{fitting[0]}' is {wanted}" if len(fitting) == 1 else remedy
         problem = f"input '{link.port}' takes {wanted}, '{wire.source}' is {given}"
         self._fault(link.draft, link.connection.place, problem, remedy)
         return False

@@ -13,7 +13,6 @@ from quadvis.diagram.sections.rates import RATES
 from quadvis.diagram.sections.variants import VARIANTS
 from quadvis.diagram.spec import FileSpec
 from quadvis.diagram.values import named_parameters
-from quadvis.document import YamlNode
 from quadvis.errors import Faults, known
 from quadvis.graph.graph import Graph
 from quadvis.links.endpoints import links_of
@@ -34,11 +33,9 @@ def warn_parameters(spec: FileSpec, faults: Faults) -> None:
     for block in _blocks(spec):
         inputs = block.inputs if block.inputs is not None and known(block.inputs) else {}
         parameters = block.parameters if known(block.parameters) else {}
-        sources = (given.source for given in inputs.values())
-        initials = (given.initial for given in inputs.values())
-        for node in (*parameters.values(), *block.groups, *sources, *initials):
-            if isinstance(node, YamlNode):
-                used |= named_parameters(node)
+        wired = (node for given in inputs.values() for node in given.constants)
+        for node in (*parameters.values(), *block.groups, *wired):
+            used |= named_parameters(node)
     for link in spec[LINKS].values():
         for node in link.fields.values() if known(link) else ():
             used |= named_parameters(node)

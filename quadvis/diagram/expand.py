@@ -220,6 +220,9 @@ class Expansion:
         self, kind: type[Block], block: BlockSpec, values: Mapping[str, YamlNode | Unknown]
     ) -> type[Block] | Unknown:
         """Return the class with the ports that it has for its parameters, where they depend on some."""
+        entries = self._entries(kind, block)
+        if not known(entries):
+            return UNKNOWN
         given: dict[str, Any] = {}
         for name in kind.ports_from():
             node = values.get(name)
@@ -234,7 +237,7 @@ class Expansion:
                 return UNKNOWN
             given[name] = read[0]
         try:
-            return kind.with_ports(given)
+            return kind.with_ports(given, entries)
         except DiagramError as error:  # the faults of a file, each at its place
             for fault in error.faults:
                 self.faults.append(file_fault(fault, values, given, self.faults.subject))
@@ -243,6 +246,18 @@ class Expansion:
             place = node.place if node is not None and known(node) else block.place
             self.faults.add(place, "; ".join(str(error).splitlines()))
         return UNKNOWN
+
+    def _entries(self, kind: type[Block], block: BlockSpec) -> dict[str, int] | Unknown:
+        """Return how many signals each input of any number has, as far as it is wired."""
+        if not kind.interface.many:
+            return {}
+        inputs = block.inputs if block.inputs is not None and known(block.inputs) else {}
+        found = {name: inputs[name] for name in kind.interface.many if name in inputs}
+        for name, given in found.items():
+            if not given.entries:
+                self.faults.add(given.place, f"input '{name}' has no signal", "list one at least")
+                return UNKNOWN
+        return {name: len(given.entries) for name, given in found.items()}
 
     def _expand_part(
         self, scope: Scope, block: BlockSpec, values: dict[str, YamlNode | Unknown], files: tuple[str, ...]

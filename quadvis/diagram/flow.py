@@ -31,6 +31,7 @@ class Flow:
         self._settled: set[str] = set()
         self._reported: set[Place] = set()
         self._faulty = False  # whether anything was found wrong in the present case
+        self._declared = False  # whether blocks in rings have passed on what they know by declaration
         self._begun: set[str] = set()  # blocks that know some of their facts before the others
         # By reader and port, in the order of the names and ports: wires that still carry no fact, and those
         # of them that wait only for the other inputs of their block.
@@ -60,6 +61,12 @@ class Flow:
                 self._begun.add(link.draft.path)
                 self._take(link)
                 self._spread(link.draft.path)
+                continue
+            if not self._declared:
+                # Only rings wait: what declarations fix is known there, too, before a block goes ahead.
+                self._declared = True
+                for path in sorted(self._waiting):
+                    self._spread(path)
                 continue
             while not any(map(self._waits, self._from[producers[-1]])):
                 producers.pop()

@@ -96,7 +96,7 @@ class _Finder:
                 if entry in declared and entry not in given and entry not in replaced:
                     _join(uses[f"{name}.{entry}"], path, entry, inner if block.is_part else None)
         for words, given_input in _inputs(path, block):
-            for taken in (given_input.source, given_input.initial):
+            for taken in given_input.constants:
                 for name in _named(taken, scope):
                     uses[name].elsewhere[words] = None
 

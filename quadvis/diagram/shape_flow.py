@@ -21,8 +21,8 @@ class ShapeFlow(Flow):
     def knows(self, link: DraftWire) -> bool:
         """Say whether the producer's sizes are fixed."""
         node = self.nodes[link.wire.block]
-        shape = node.block.interface.outputs[link.wire.port].signal.shape
-        return all(size in node.sizes for size in shape if isinstance(size, str))
+        symbols = node.block.interface.outputs[link.wire.port].signal.symbols
+        return all(size in node.sizes for size in symbols)
 
     def case(self, path: str, links: Sequence[DraftWire]) -> Hashable:
         """Return the shapes that come in and those of its constants; parameters have fixed some sizes."""
@@ -79,7 +79,7 @@ class ShapeFlow(Flow):
         if signal.unify(tuple(shape), trial):
             sizes.update(trial)
             return True
-        fixed = not signal.shape or set(signal.shape) & set(sizes)
+        fixed = not signal.shape or set(signal.symbols) & set(sizes)
         wanted = signal.resolve(sizes) if fixed else signal.shape
         problem = f"input '{port}' takes {shape_text(wanted)}, {source}"
         self.fault(draft.path, draft.connections[port].place, problem, remedy if not wanted else "")
@@ -96,8 +96,8 @@ class ShapeFlow(Flow):
         if draft.block is UNKNOWN:
             return
         interface = node.block.interface
-        undecided = {size for port in self.undecided(path) for size in interface.inputs[port].signal.shape}
+        undecided = {size for port in self.undecided(path) for size in interface.inputs[port].signal.symbols}
         for declared in (*interface.outputs.values(), *interface.inputs.values()):
-            for size in declared.signal.shape:
-                if isinstance(size, str) and size not in undecided:
+            for size in declared.signal.symbols:
+                if size not in undecided:
                     node.sizes.setdefault(size, () if size == "*" else 1)

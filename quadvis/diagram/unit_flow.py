@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 
-from quadvis.block import Declared
+from quadvis.block import Declared, Sizes
 from quadvis.diagram.bindings import ONE, Bindings, variable_of
 from quadvis.diagram.draft import DraftWire, Key
 from quadvis.diagram.flow import Flow
@@ -40,15 +40,16 @@ class UnitFlow(Flow):
                 inputs, outputs = draft.interface.inputs, draft.interface.outputs
                 counts |= {name: math.prod(node.shape(name)) for name in (*inputs, *outputs)}
                 every = {**outputs, **params, **inputs}
-                self.cases[case] = dict(self._noted(self.bindings[path], every, counts))
+                self.cases[case] = dict(self._noted(self.bindings[path], every, counts, node.sizes))
             node.units.update(self.cases[case])
 
     @staticmethod
     def _noted(
-        bindings: Bindings, declared: Mapping[str, Declared], counts: Mapping[str, int]
+        bindings: Bindings, declared: Mapping[str, Declared], counts: Mapping[str, int], sizes: Sizes
     ) -> Iterator[tuple[str, tuple[Unit, ...]]]:
         for name, item in declared.items():
-            units = bindings.units(item, counts[name])
+            parts = item.signal.parts(sizes) if item.signal.is_sum else ()
+            units = bindings.units(item, counts[name], parts)
             if not any(unit.variables for unit in units):
                 yield name, tuple([unit.reduced for unit in units])
 
@@ -56,7 +57,9 @@ class UnitFlow(Flow):
         wire = link.wire
         node = self.nodes[wire.block]
         shape = node.shape(wire.port)
-        units = self.bindings[wire.block].units(node.block.interface.outputs[wire.port], math.prod(shape))
+        declared = node.block.interface.outputs[wire.port]
+        parts = declared.signal.parts(node.sizes) if declared.signal.is_sum else ()
+        units = self.bindings[wire.block].units(declared, math.prod(shape), parts)
         part = selected(shape, wire.index)
         assert part is not None, "the shapes have been checked"
         return units[part[0] : part[0] + math.prod(part[1])]
@@ -79,9 +82,11 @@ class UnitFlow(Flow):
         self.bindings[path] = found
 
     def knows(self, link: DraftWire) -> bool:
-        """Say whether the producer's variables are bound."""
+        """Say whether the producer's variables are bound, of a sum those of the elements that are read."""
         port = self.nodes[link.wire.block].block.interface.outputs[link.wire.port]
-        return not self.bindings[link.wire.block].open([port])
+        if not self.bindings[link.wire.block].open([port]):
+            return True
+        return port.signal.is_sum and not any(unit.variables for unit in self._of(link))
 
     def take(self, link: DraftWire) -> bool:
         """Match the units of the elements."""
@@ -136,7 +141,7 @@ class UnitFlow(Flow):
         if bindings.open(undecided) or self.drafts[path].block is UNKNOWN:
             return
         self._match_bare(path)
-        bindings.spread()
+        bindings.spread(interface.outputs.values())
         for variable in bindings.open(interface.inputs.values()):
             bindings.bind(variable, ONE)
             self._match_given(path)

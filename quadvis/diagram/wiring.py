@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
-from quadvis.block import Out
+from quadvis.block import Out, entry_name
 from quadvis.diagram.expand import Expansion
 from quadvis.diagram.reference import Reference
 from quadvis.diagram.scope import FlatBlock, Scope
@@ -74,8 +74,18 @@ class Wiring:
     def inputs(self, block: FlatBlock) -> Iterator[tuple[str, Source]]:
         """Yield the source of each input of a block."""
         inputs = block.spec.inputs or {}
+        counts = block.kind.entry_counts if known(block.kind) else {}
+        single = block.kind.interface.inputs if known(block.kind) else {}
         for port, given in inputs.items() if known(inputs) else ():
-            yield port, self._source(block.scope, given)
+            if port in counts:
+                for number, entry in enumerate(given.entries):
+                    yield entry_name(port, number), self._source(block.scope, entry)
+            elif isinstance(given.source, tuple) and port not in single:
+                for entry in given.source:
+                    self._source(block.scope, entry)
+                yield port, Source(given.place, UNKNOWN)
+            else:
+                yield port, self._source(block.scope, given)
 
     def outputs(self, name: str) -> Mapping[str, Out]:
         """Return the outputs of one of the diagram's own blocks or parts, as far as they are right."""
@@ -139,6 +149,10 @@ class Wiring:
 
     def _source(self, scope: Scope, given: InputSpec) -> Source:
         if given.source is UNKNOWN:
+            return Source(given.place, UNKNOWN)
+        if isinstance(given.source, tuple):
+            problem = "this input takes one signal, not a list of them"
+            self.faults.add(given.place, problem, "join them with a block 'signal.concatenate'")
             return Source(given.place, UNKNOWN)
         if isinstance(given.source, YamlNode):
             return Source(given.place, substitute(given.source, scope.params, self.faults))

@@ -195,8 +195,9 @@ class Layout:
         if not isinstance(source, Wire):
             return self._constants[node.path, port]
         slot = self._whole(node, source)
-        if not source.index:
-            return slot
-        part = selected(slot.shape, source.index)
-        assert part is not None, "the checker refuses parts that are not in one piece"
-        return Slot(slot.scalar, part[1], slot.position + part[0])
+        if source.index:
+            part = selected(slot.shape, source.index)
+            assert part is not None, "the checker refuses parts that are not in one piece"
+            slot = Slot(slot.scalar, part[1], slot.position + part[0])
+        # An input that takes a scalar as an array of one element, [n?], reads the same slot as such.
+        return slot if slot.shape or slot.scalar == "frame" else slot._replace(shape=node.shape(port))

@@ -84,7 +84,9 @@ class Record:
             for name, declared in group.items():
                 if declared.signal.scalar in ("str", "frame"):
                     continue
-                shape = declared.signal.resolve(sizes)
+                # A parameter may be a scalar where other blocks of its class have an array.
+                given = group is interface.params
+                shape = np.shape(getattr(block, name)) if given else declared.signal.resolve(sizes)
                 fields.append(Field(name, declared.signal.scalar, shape, offset))
                 offset += math.prod(shape)
         return Record(tuple(fields), offset, kept)

@@ -25,6 +25,13 @@ class QuadvisError(Exception):
     exit_code: ClassVar[int] = 2
 
 
+class OutOfRange(ArithmeticError):
+    """A value that a block does not take: a run ends with this sentence, the block, the time and the value.
+
+    A compiled method can raise it, with a text that is written out.
+    """
+
+
 class Odd(NamedTuple):
     """A character that looks like an ASCII one, and its place."""
 

@@ -29,8 +29,8 @@ def closest(word: str, candidates: Iterable[str]) -> str | None:
 
     Nearness is the edit distance with swapped neighbours counted as one slip; case and `-` for `_` do not
     count, and a dotted name (`signal.derivative`) is also found by its last part alone. Of equally near
-    candidates the one with the same first letter wins, then the first one. If no candidate is near, a word of
-    other programs for one of the candidates counts.
+    candidates the one with the same first letter wins, then the first one. If none is as near as one slip, a
+    word of other programs for one of the candidates counts before it.
     """
     if not 0 < len(word) <= _LONGEST:
         return None
@@ -42,7 +42,7 @@ def closest(word: str, candidates: Iterable[str]) -> str | None:
         first = candidate[:1] == word[:1]
         if cost is not None and (cost < least or (cost == least and first and not same)):
             found, least, same = candidate, cost, first
-    return found or synonym(word, names)
+    return found if found and least <= _EDIT else synonym(word, names) or found
 
 
 def _plain(word: str) -> str:

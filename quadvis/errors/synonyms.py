@@ -1,4 +1,4 @@
-"""Words of other programs for things that quadvis calls otherwise: "sample_time" for rate, "Mux" for stack.
+"""Words of other programs for things that quadvis calls otherwise: "sample_time" for rate.
 
 A word is looked up without case, blanks, `-` and `_`; its meaning depends on the words that are allowed
 there.
@@ -68,16 +68,51 @@ _MEANT = {
     "highest": "maximum",
     "final": "last end",
     # blocks of the library
-    "signal.stack": "mux vectorconcatenate concatenate",
+    "signal.concatenate": "mux vectorconcatenate stack join vector",
+    "signal.select": "selector index demux element",
     "signal.sum": "add subtract adder summer",
     "signal.saturation": "saturate limiter clip clamp",
+    "signal.dead_zone": "deadband",
+    "signal.backlash": "play",
+    "signal.relay": "hysteresis schmitt schmitttrigger bangbang",
+    "signal.quantizer": "quantize quantiser",
+    "signal.friction": "coulombfriction coulombandviscousfriction",
+    "signal.lookup_1d": "lookup lookuptable 1dlookuptable lookuptable1d interpolate interp1",
+    "signal.lookup_2d": "2dlookuptable lookuptable2d interp2",
     "signal.unit_delay": "memory onestepdelay",
+    "signal.delay": "samplesdelay delaysamples zn",
     "signal.transport_delay": "deadtime timedelay puredelay",
     "signal.rate_limiter": "slewrate slewratelimiter",
+    "signal.discrete_integrator": "discretetimeintegrator",
+    "signal.trapezoidal_integrator": "tustinintegrator trapezoidal",
+    "math.product": "multiply divide mult prod",
+    "math.dot": "dotproduct innerproduct",
+    "math.cross": "crossproduct",
+    "math.matrix_gain": "matrixmultiply matrixmultiplication statefeedback",
+    "math.function": "mathfunction trigonometricfunction roundingfunction trigonometry sin cos tan asin acos "
+    "atan sinh cosh tanh exp log log10 abs sign signum square sqrt reciprocal floor ceil round fix",
+    "math.atan2": "arctan2",
+    "math.power": "pow",
+    "math.min_max": "minmax minimum maximum min max extremum",
+    "math.modulo": "mod rem remainder fmod",
+    "math.convert": "datatypeconversion conversion cast typecast",
+    "logic.compare": "relationaloperator relational comparison comparetoconstant comparetozero",
+    "logic.gate": "logicaloperator logical and or not xor nand nor",
+    "logic.switch": "ifelse selectsignal",
+    "logic.multiport_switch": "multiportswitch indexvector multiplexer",
+    "logic.edge": "edgedetector detectchange detectrisepositive detectrisenonnegative risingedge",
+    "logic.latch": "flipflop srflipflop",
+    "logic.counter": "counterlimited counterfreerunning count",
+    "logic.on_delay": "ton timer timeron debounce",
     "sources.sine": "sinewave",
     "sources.pulse": "pulsegenerator squarewave",
     "sources.noise": "randomnumber whitenoise bandlimitedwhitenoise gaussiannoise",
-    "sources.table": "fromworkspace repeatingsequence waveform",
+    "sources.table": "fromworkspace waveform",
+    "sources.repeating_sequence": "repeatingsequencestair repeatingtable",
+    "sources.clock": "time digitalclock",
+    "sources.chirp": "chirpsignal sweep",
+    "sources.prbs": "pseudorandombinarysequence",
+    "sources.uniform_noise": "uniformrandomnumber random",
 }  # fmt: skip
 _STANDS_FOR: dict[str, list[str]] = {}
 for _ours, _theirs in _MEANT.items():

@@ -85,6 +85,7 @@ def _device(block: type[Device]) -> str:
 
 def _input_row(port: In, direct: bool) -> tuple[str, ...]:
     words = [] if direct else ["no direct feedthrough"]
+    words += ["any number"] if port.many else []
     if port.default is not None:
         default = "" if _is_nan(port.default) else f", {_short(value_text(port, port.default))}"
         words.append(f"optional{default}")
@@ -125,14 +126,38 @@ def _kind(item: Declared) -> str:
     return " ".join(filter(None, (kind, unit))) or "number"
 
 
+EXAMPLE = """\
+quadvis: 1
+name: {name}
+rates: {{fast: 100 Hz}}
+solver: {{method: ode4, step: 10 ms}}
+stop_time: 1 s
+blocks:
+{blocks}"""  # a diagram of the example of a block
+
+
+def example_diagram(name: str, block: type[Block]) -> str:
+    """Return a diagram that runs the example of a block; "" if the block has none."""
+    entries = inspect.cleandoc(block.example)
+    if not entries:
+        return ""
+    return EXAMPLE.format(name=name.rpartition(".")[2], blocks=textwrap.indent(entries, "  ") + "\n")
+
+
 def example(name: str, block: type[Block]) -> list[str]:
-    """Return the entry of a diagram for a block, with all required inputs and parameters."""
+    """Return entries of a diagram that show the use of a block: its example, or what it requires."""
+    if block.example:
+        return inspect.cleandoc(block.example).splitlines()
     interface = block.interface
     lines = [f"{name.rpartition('.')[2].rpartition(':')[2]}:", f"  block: {name}"]
     lines += [] if interface.continuous else ["  rate: ..."]
     needed = [param for param in interface.params.values() if param.required or _gives_ports(param, block)]
     required = {param.name: _sample(param, block) for param in needed}
-    wired = {port.name: "block.port" for port in interface.inputs.values() if port.default is None}
+    wired = {
+        port.name: "[block.port, block.port]" if port.many else "block.port"
+        for port in interface.inputs.values()
+        if port.default is None
+    }
     for key, values in (("with", required), ("in", wired)):
         entries = [f"{item}: {text}" for item, text in values.items()]
         line = f"  {key}: {{{', '.join(entries)}}}"
@@ -168,7 +193,7 @@ def facts(name: str, block: type[Block]) -> dict[str, Any]:
             params[param.name] |= {"type": "choice", "choices": list(param.choices)}
     inputs = plain(interface.inputs.values())
     for port in interface.inputs.values():
-        inputs[port.name]["optional"] = port.default is not None
+        inputs[port.name] |= {"optional": port.default is not None, "many": port.many}
     return {
         "block": name,
         "doc": inspect.getdoc(block) or "",

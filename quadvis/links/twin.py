@@ -17,7 +17,7 @@ import math
 from typing import Any
 
 from quadvis.block import Block, Derived, In, Out, Param, Random, State
-from quadvis.block.block import RESERVED
+from quadvis.block.interface import RESERVED
 from quadvis.links.link import Link
 from quadvis.links.message import FRAME, MessageSignal
 from quadvis.links.twin_code import (

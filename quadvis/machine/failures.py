@@ -11,7 +11,7 @@ import os
 import sys
 from collections.abc import Callable
 
-from quadvis.errors import quoted
+from quadvis.errors import OutOfRange, quoted
 from quadvis.machine.files import reason
 
 ROOM = 1 << 28  # bytes; if so much cannot be allocated, lack of memory is the cause of a failure
@@ -43,6 +43,8 @@ def surroundings(error: BaseException) -> str:
 
 def arithmetic(error: Exception) -> str:
     """Return which calculation has no finite result, or "" if the error is no failed calculation."""
+    if isinstance(error, OutOfRange):
+        return str(error)
     if isinstance(error, ZeroDivisionError):
         return "a division by zero"
     if isinstance(error, OverflowError):

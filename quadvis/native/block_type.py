@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import types
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from quadvis.block import Block, Shape
 from quadvis.engine.memory import Record, Slot
@@ -35,9 +35,13 @@ class MethodType:
 
 @dataclass(frozen=True)
 class BlockType:
-    """A block's class, record and methods, which are compiled together, and a hash of their source."""
+    """A block's class, record and methods, which are compiled together, and a hash of their source.
 
-    block: type[Block]
+    Classes that differ in their ports alone, such as those for each number of inputs, are one type if the
+    rest is equal.
+    """
+
+    block: type[Block] = field(compare=False)
     record: Record
     methods: tuple[MethodType, ...]
     source: str

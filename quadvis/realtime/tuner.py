@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from quadvis.block import Block
 from quadvis.engine.memory import Memory, Slot
 from quadvis.engine.program import Tunable
@@ -179,7 +181,7 @@ def box_room(part: Graph) -> int:
     for node in part.nodes:
         for param in node.block.interface.params.values():
             if param.tune and not param.is_text:
-                found += ENTRY + math.prod(param.signal.resolve(node.sizes))
+                found += ENTRY + np.size(getattr(node.block, param.name))
     return found
 
 

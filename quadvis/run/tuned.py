@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from quadvis.block import Param
+from quadvis.block import Param, entry_name
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.knobs import Knob
 from quadvis.diagram.settings import read_setting
@@ -47,11 +47,14 @@ def find_value(diagram: Diagram, name: str) -> tuple[str, str, Index]:
         raise QuadvisError(sentence(f"this run has no {quoted(name)}", suggestion(head, names)))
     interface = diagram.graph[wire.block].block.interface
     names = [*interface.outputs, *interface.inputs, *interface.params, *interface.states]
-    if wire.port not in names:
+    port, index = wire.port, wire.index
+    if index and isinstance(index[0], int) and entry_name(port, index[0]) in interface.inputs:
+        port, index = entry_name(port, index[0]), index[1:]
+    if port not in names:
         raise QuadvisError(
             sentence(f"block '{wire.block}' has no '{wire.port}'", suggestion(wire.port, names))
         )
-    return wire.block, wire.port, wire.index
+    return wire.block, port, index
 
 
 def tunable_names(diagram: Diagram) -> list[str]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, parameter_sizes
+from quadvis.block import ANY, Block, entry_name, parameter_sizes
 from quadvis.engine.engine import Engine
 from quadvis.engine.memory import Slot
 from quadvis.native.choice import PYTHON, choose, use
@@ -46,17 +46,24 @@ def drive(
 ) -> Driven:
     """Feed a block step by step and return its outputs.
 
-    Each input is one constant value or an array (a list for frames) with a leading time axis. ``rate`` is a
+    Each input is one constant value or an array (a list for frames) with a leading time axis; an input of any
+    number is a list of them. ``rate`` is a
     rate such as "10 Hz", a period such as "5 ms", or a number in Hz. ``steps`` is needed if no input has a
     time axis. ``engine`` is that of a run; "native" runs the block's machine code, as a flight does.
     TypeError if an input is unknown or missing, or if its shape does not fit. QuadvisError if the engine
     cannot be had.
     """
-    interface = block.interface
+    known = block.interface.inputs
     for name in inputs:
-        if name not in interface.inputs:
-            known = ", ".join(interface.inputs) or "none"
-            raise TypeError(f"{type(block).__name__} has no input '{name}'; it has {known}")
+        if name not in known:
+            names = ", ".join(known) or "none"
+            raise TypeError(f"{type(block).__name__} has no input '{name}'; it has {names}")
+    many = {name: inputs.pop(name) for name in block.interface.many if name in inputs}
+    if many:
+        block = block.with_entries(**{name: len(values) for name, values in many.items()})
+    for name, values in many.items():
+        inputs |= {entry_name(name, number): value for number, value in enumerate(values)}
+    interface = block.interface
     sizes = parameter_sizes(block)
     series = {}
     for name, port in interface.inputs.items():
@@ -83,10 +90,12 @@ def series_of(name: str, signal: Any, value: Any, sizes: dict[str, Any]) -> tupl
         return (value, False) if isinstance(value, list | tuple) else ([value], True)
     array = np.asarray(value)
     trial = dict(sizes)
-    if signal.shape != ("*",) and signal.unify(array.shape, trial):
+    # Of an input that also takes scalars, [n?], a list has a time axis.
+    whole = signal.shape != ANY and not (signal.optional and array.ndim)
+    if whole and signal.unify(array.shape, trial):
         sizes.update(trial)
         return array[None], True
-    if signal.shape == ("*",) and (array.ndim == 0 or sizes.get("*") == array.shape):
+    if signal.shape == ANY and (array.ndim == 0 or sizes.get("*") == array.shape):
         # A scalar for a block of any shape is a constant: it takes the shape of the other inputs.
         return array[None], True
     if array.ndim == 0 or not signal.unify(array.shape[1:], sizes):

@@ -4,13 +4,24 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, Frame, In, Interface, Param, ParameterError, Shape, Sizes, parameter_sizes
+from quadvis.block import (
+    ANY,
+    Block,
+    Frame,
+    In,
+    Interface,
+    Param,
+    ParameterError,
+    Shape,
+    Sizes,
+    parameter_sizes,
+)
 from quadvis.engine.engine import Engine
 from quadvis.engine.interpreter import Call
 from quadvis.engine.layout import TIME, Placed
@@ -42,6 +53,23 @@ class Subject:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "block", self.block.with_ports(self.given))
+
+    def of_any_number(self, counts: Sequence[int]) -> list[Subject]:
+        """Return the subject with each of some numbers of signals at its inputs of any number.
+
+        Numbers that contradict parameters are left out.
+        """
+        many = self.block.interface.many
+        found = []
+        for count in counts if many else ():
+            entries = dict.fromkeys(many, count)
+            try:
+                self.block(period=float(PERIOD), **self.given).with_entries(**entries)
+            except ParameterError:
+                continue
+            found.append(replace(self, block=self.block.with_ports(self.given, entries)))
+        assert found or not many, f"{' and '.join(many)} must take one of {counts} signals"
+        return found if many else [self]
 
     def make(self, **parameters: Any) -> Block:
         """Return the block with some parameters, the others as given or at their defaults.
@@ -143,7 +171,7 @@ def rigs(subject: Subject, *, missing: bool = False) -> Iterator[Rig]:
     """
     interface = subject.block.interface
     declared = (*interface.inputs.values(), *interface.outputs.values(), *interface.params.values())
-    free = any(item.signal.shape == ("*",) for item in declared)
+    free = any(item.signal.shape == ANY for item in declared)
     for shape in ((), (VECTOR,)) if free else ((),):
         for parameters in _parameters(subject, shape):
             yield _rig(subject, subject.make(**parameters), {"*": shape} if free else {}, STEPS, missing)
@@ -158,7 +186,7 @@ def extreme_rigs(subject: Subject) -> Iterator[tuple[str, Any, Rig]]:
     arrays = {
         name: param.default
         for name, param in params.items()
-        if param.signal.shape == ("*",) and name not in subject.given
+        if param.signal.shape == ANY and name not in subject.given
     }
     sizes = parameter_sizes(subject.make())
     for name, param in params.items():
@@ -186,16 +214,16 @@ def _extremes(param: Param, sizes: Sizes) -> Iterator[Any]:
 
 
 def _rig(subject: Subject, block: Block, sizes: Sizes, steps: int, missing: bool = False) -> Rig:
-    interface = block.interface
+    interface = block.interface  # its own: kinds and units of ports may depend on parameters
     sizes |= parameter_sizes(block)
     for name, values in subject.inputs.items():
         interface.inputs[name].signal.unify(np.shape(values[0]), sizes)
     groups = (interface.inputs, interface.outputs, interface.states, interface.work)
     for item in (item for group in groups for item in group.values()):
-        for size in item.signal.shape:
-            if isinstance(size, str) and size != "*":
+        for size in item.signal.symbols:
+            if size != "*":
                 sizes.setdefault(size, VECTOR)
-    series = _series(subject, sizes, steps, missing)
+    series = _series(subject, interface.inputs, sizes, steps, missing)
     return Rig(alone(block, series[0], sizes, PERIOD, seed=1), series)
 
 
@@ -207,13 +235,15 @@ def _parameters(subject: Subject, shape: Shape) -> Iterator[dict[str, Any]]:
     params = {
         name: param for name, param in subject.block.interface.params.items() if name not in subject.given
     }
-    arrays = {
+    every = {
         name: np.full(shape, param.default).tolist()
         for name, param in params.items()
-        if param.signal.shape == ("*",)
+        if param.signal.shape == ANY
     }
+    arrays = {name: value for name, value in every.items() if not params[name].signal.optional}
     yield arrays
-    others = [{name: value} for name, param in params.items() for value in _choices(param)]
+    others = [every] if shape and every != arrays else []
+    others += [{name: value} for name, param in params.items() for value in _choices(param)]
     real = {name: param for name, param in params.items() if param.signal.scalar == "float64"}
     if subject.block.numeric and real:
         others.append({name: _shaken(param, shape) for name, param in real.items()})
@@ -234,19 +264,23 @@ def _choices(param: Param) -> list[Any]:
 def _shaken(param: Param, shape: Shape) -> Any:
     """Return random numbers near the default and within the inclusive bounds."""
     rng = np.random.default_rng(zlib.crc32(param.name.encode()))
-    default = np.broadcast_to(np.asarray(param.default, float), param.signal.resolve({"*": shape}))
+    default = np.asarray(param.default, float)
+    if param.signal.shape == ANY:
+        default = np.broadcast_to(default, shape)
     factor = rng.uniform(0.6, 1.4, default.shape)
     value = np.where(default == 0.0, factor, factor * default)
     least, most = -np.inf if param.min is None else param.min, np.inf if param.max is None else param.max
     return np.clip(value, least, most).tolist()
 
 
-def _series(subject: Subject, sizes: Sizes, steps: int, missing: bool) -> list[dict[str, Any]]:
+def _series(
+    subject: Subject, inputs: Mapping[str, In], sizes: Sizes, steps: int, missing: bool
+) -> list[dict[str, Any]]:
     rng = np.random.default_rng(zlib.crc32(subject.block.__name__.encode()))
     series: list[dict[str, Any]] = []
     for step in range(steps):
         row: dict[str, Any] = {}
-        for name, port in subject.block.interface.inputs.items():
+        for name, port in inputs.items():
             if name in subject.inputs:
                 row[name] = subject.inputs[name][step % len(subject.inputs[name])]
             elif series and rng.random() < 0.3:

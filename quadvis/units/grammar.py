@@ -7,13 +7,13 @@ from collections.abc import Container
 from fractions import Fraction
 
 from quadvis.errors import QuadvisError, quoted, sentence
-from quadvis.units.names import SPELLINGS
+from quadvis.units.names import NUMBERED, SPELLINGS
 
 Powers = list[tuple[str, Fraction]]
 
 LONGEST = 80
 _GENERAL = "use m, s, rad, kg, N, V, Hz, px ..."
-_TOKEN = re.compile(r"([A-Za-z%]+)|([0-9]+(?:\.[0-9]+)?)|([*/^()-])")
+_TOKEN = re.compile(r"([abc]_[0-9]+|[A-Za-z%]+)|([0-9]+(?:\.[0-9]+)?)|([*/^()-])")
 _RAISED = re.compile("\N{SUPERSCRIPT MINUS}([¹²³])")
 _AROUND_OPERATOR = re.compile(r"\s*([*/^])\s*")
 
@@ -89,7 +89,7 @@ class _Reader:
                 raise UnitError(f"{quoted(self.text)} lacks a ')'")
         elif token == "1":
             result = []
-        elif token in self.names:
+        elif token in self.names or NUMBERED in token:
             result = [(token, Fraction(1))]
         else:
             raise self._fault(self.at - 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 VARIABLES = ("a", "b", "c")
+NUMBERED = "_"  # in names of further variables, a_0, a_1, and so on
 BASES = ("m", "kg", "s", "rad", "px", "A", "K", *VARIABLES)
 
 # A scale is a product of powers of these numbers, so it is never rounded; the large ones are for the pound.

@@ -1,8 +1,8 @@
 """Physical units of ports and parameters: comparing, combining, naming and unifying them.
 
 A unit is a product of powers: of primes and pi for its scale to SI, of the dimensions m, kg, s, rad, px, A,
-K, and of the unit variables a, b, c. So scales are exact and never rounded. Angles have their own dimension,
-so that Hz and rad/s differ.
+K, and of the unit variables a, b, c, a_0, a_1, and so on. So scales are exact and never rounded. Angles have
+their own dimension, so that Hz and rad/s differ.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from quadvis.units.grammar import LONGEST, UnitError, plain_spelling, read_power
 from quadvis.units.names import (
     BASES,
     DERIVED,
+    NUMBERED,
     PREFIXED,
     PREFIXES,
     PRIMES,
@@ -104,7 +105,7 @@ class Unit:
     @cached_property
     def variables(self) -> frozenset[str]:
         """The unit variables in this unit."""
-        return frozenset(symbol for symbol, _ in self.exponents if symbol in VARIABLES)
+        return frozenset(symbol for symbol, _ in self.exponents if symbol in VARIABLES or NUMBERED in symbol)
 
     def dimension_equals(self, other: Unit) -> bool:
         """Return whether a quantity can be converted from one unit to the other, such as m and mm."""
@@ -174,13 +175,17 @@ def _length_beside(powers: Mapping[str, int], scale: int, name: Unit, bases: Map
 
 
 def _in_bases(unit: Unit) -> Unit:
-    return Unit(unit.exponents, tuple(sorted(unit.exponents, key=lambda item: _ORDER.index(item[0]))))
+    return Unit(unit.exponents, tuple(sorted(unit.exponents, key=_place)))
 
 
 def _in_order(unit: Unit) -> Unit:
     """Return the unit with its factors in the usual order: m*s, not s*m; names for products come first."""
-    places = {symbol: place for place, symbol in enumerate(_ORDER)}
-    return Unit(unit.exponents, tuple(sorted(unit.symbols, key=lambda item: places.get(item[0], -1))))
+    return Unit(unit.exponents, tuple(sorted(unit.symbols, key=_place)))
+
+
+def _place(item: tuple[str, Fraction]) -> int:
+    """Return the place of a factor in a product; names that are no bases come first."""
+    return _ORDER.index(item[0]) if item[0] in _ORDER else -1
 
 
 def _length(unit: Unit) -> Fraction:
@@ -243,7 +248,10 @@ def _parse(text: str) -> Unit:
 def _product(text: str, table: Mapping[str, Unit]) -> Unit:
     """Return the product of the powers that a text in plain spelling names."""
     powers = read_powers(text, table)
-    parts = [(table[name].exponents, exponent) for name, exponent in powers]
+    parts = [
+        (table[name].exponents if name in table else [(name, Fraction(1))], exponent)
+        for name, exponent in powers
+    ]
     return _unit(((base, power * exponent) for bases, exponent in parts for base, power in bases), powers)
 
 

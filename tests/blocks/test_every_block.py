@@ -63,6 +63,27 @@ def centres() -> list[Any]:
     return [camera.project(square), camera.project(turned), partly, noise]
 
 
+# Values by the names of the blocks, where one name has several meanings, or a block takes only some numbers.
+PARAMETERS: dict[str, dict[str, Any]] = {
+    "signal.lookup_1d": {"breakpoints": [-1.0, 0.5, 2.0], "values": [1.0, 3.0, -1.0]},
+    "signal.lookup_2d": {
+        "rows": [0.0, 1.0],
+        "columns": [0.0, 0.5, 3.0],
+        "values": [[1.0, 2.0, 0.0], [3.0, -1.0, 5.0]],
+    },
+    "sources.repeating_sequence": {"times": [0.0, 0.25, 0.7], "values": [1.0, -1.0, 2.0]},
+}
+INPUTS: dict[str, dict[str, list[Any]]] = {
+    "logic.multiport_switch": {"index": [0]},
+    "math.function": {"u": [0.3, 0.5, 1.0, 0.75, 0.0625]},
+    "math.modulo": {"divisor": [3.0, -2.0, 0.7]},
+    "math.power": {"u": [0.3, 2.0, 7.5]},
+    "signal.lookup_1d": {"u": [-1.0, 0.2, 2.0, 1.7]},
+    "signal.lookup_2d": {"row": [0.0, 0.25, 1.0], "column": [3.0, 0.5, 1.1, 0.0]},
+    "signal.select": {"index": [0, 2, 1]},
+}
+
+
 @pytest.fixture
 def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[Any]) -> Subject:
     """The block of a test, with values by their names in the library for what random numbers do not suit."""
@@ -106,6 +127,7 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
         values["initial"] = [0, 1, 0]
     if name in ("mavlink.attitude_target", "mavlink.rate_target", "mavlink.manual_control"):
         values |= {"initial": [0.0, 0.0, 0.1, 0.5], "safe": [0.1, 0.0, 0.0, 0.0]}
+    values |= PARAMETERS.get(name, {})
     required = [key for key, param in block.interface.params.items() if param.required]
     if {"file", "folder"} & {*required}:  # few blocks read or write files, and all tests come by here
         folder = request.getfixturevalue("tmp_path")
@@ -115,7 +137,7 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
     given = {key: values[key] for key in required if key not in told} | told
     if "latency" in block.interface.params:
         given["latency"] = 0.15
-    inputs: dict[str, list[Any]] = {}
+    inputs: dict[str, list[Any]] = dict(INPUTS.get(name, {}))
     if name.startswith("vision."):
         places = [[0.0, 0.0, 1.5], [0.1, -0.2, 1.4], [3.0, 0.0, 1.5]]
         inputs = {"position": places, "attitude": [[0.05, -0.03, 0.3]], "frame": frames, "centres": centres}

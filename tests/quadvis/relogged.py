@@ -22,7 +22,7 @@ seed: 7
 blocks:
   noise: {block: sources.noise, rate: fast, with: {sigma: 0.1 m}}
   outside: {block: own.outside, rate: fast}
-  sum: {block: signal.sum, rate: fast, in: {a: noise.y, b: outside.y}}
+  sum: {block: signal.sum, rate: fast, in: {u: [noise.y, outside.y]}}
   filter: {block: signal.low_pass, rate: fast, with: {time_constant: 0.2 s}, in: {u: sum.y}}
   slow: {block: signal.gain, rate: slow, with: {factor: 2}, in: {u: {from: filter.y, across: sample}}}
 log: {every: {fast: 4}}

@@ -101,6 +101,7 @@ def test_the_facts_are_plain_json() -> None:
         "unit": "m",
         "doc": "what comes in",
         "optional": False,
+        "many": False,
     }
     assert found["inputs"]["w"]["optional"] is True
     assert found["params"]["gain"] == {

@@ -52,7 +52,7 @@ def loops(count: int) -> str:
     before = "source.y"
     for number in range(count // 4, 0, -1):
         rows.append(
-            f"  sum{number}: {{block: signal.sum, rate: fast, in: {{a: {before}, b: last{number}.y}}}}\n"
+            f"  sum{number}: {{block: signal.sum, rate: fast, in: {{u: [{before}, last{number}.y]}}}}\n"
             f"  gain{number}: {{block: signal.gain, rate: fast, in: {{u: sum{number}.y}}}}\n"
             f"  more{number}: {{block: signal.gain, rate: fast, in: {{u: gain{number}.y}}}}\n"
             f"  last{number}: {{block: signal.unit_delay, rate: fast, in: {{u: more{number}.y}}}}\n"
@@ -161,7 +161,7 @@ def test_a_variant_takes_a_block_that_an_earlier_one_had(
 
 def test_a_fault_in_one_of_many_equal_blocks_is_that_block_s() -> None:
     text = chain(200).replace("in: {u: b120.y}", "in: {u: 2 s}")
-    end = "  end: {block: signal.sum, rate: fast, in: {a: b199.y, b: b119.y}}\n"
+    end = "  end: {block: signal.sum, rate: fast, in: {u: [b199.y, b119.y]}}\n"
     with pytest.raises(DiagramError) as caught:
         load_text(text + end)
     assert [fault.subject for fault in caught.value.faults] == ["block 'end'"]

@@ -143,7 +143,7 @@ def test_what_no_log_holds_between_ticks_is_refused() -> None:
     Path("flight.yaml").write_text(
         TEXT.replace("outside, rate: fast", "outside, rate: continuous")
         .replace("seed: 7", "seed: 7\nsolver: {method: ode4, step: 1/60 s}")
-        .replace("outside.y}", "{from: outside.y, across: sample}}")
+        .replace("outside.y]", "{from: outside.y, across: sample}]")
     )
     flown()
     with pytest.raises(QuadvisError, match="block 'outside' reaches outside and moves between two ticks"):

@@ -15,8 +15,10 @@ from quadvis.api import check, load, load_text
 from quadvis.document import read_yaml
 from quadvis.errors import DiagramError, Fault, QuadvisError, closest, suggestion
 from quadvis.errors.caller import command_words
+from quadvis.library.catalogue import Catalogue
 from quadvis.machine.missing_file import file_trouble
 
+NAMES = Catalogue().names()
 HEAD = "quadvis: 1\nname: n\nrates: {fast: 100 Hz, slow: 10 Hz}\nstop_time: 1 s\n"
 DIAGRAM = HEAD + (
     "params: {size: 1 m}\n"
@@ -62,7 +64,7 @@ def test_a_word_of_another_program_is_one_fault(ours: str, theirs: str, key: str
 def test_words_of_other_programs_are_taken_only_where_nothing_is_near() -> None:
     assert closest("max", ["below", "mix"]) == "mix"
     assert closest("max", ["lower"]) is None
-    assert closest("Mux", ["signal.stack", "signal.sum"]) == "signal.stack"
+    assert closest("Mux", ["signal.concatenate", "signal.sum"]) == "signal.concatenate"
     assert suggestion("inputs", ["in", "out"]) == "did you mean 'in'?"
 
 
@@ -254,3 +256,27 @@ def test_files_of_the_diagrams_own_folder_and_files_that_the_user_named_are_quot
     with pytest.raises(DiagramError) as caught:
         load(path, params=tmp_path / "set.yaml")
     assert "hunter2" in str(caught.value) and "sesame" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("word", "block"),
+    [
+        ("Mux", "signal.concatenate"), ("Selector", "signal.select"), ("Add", "signal.sum"),
+        ("Product", "math.product"), ("Divide", "math.product"), ("DotProduct", "math.dot"),
+        ("Abs", "math.function"), ("Sqrt", "math.function"), ("cos", "math.function"),
+        ("MinMax", "math.min_max"), ("DataTypeConversion", "math.convert"), ("Switch", "logic.switch"),
+        ("MultiportSwitch", "logic.multiport_switch"), ("RelationalOperator", "logic.compare"),
+        ("CompareToConstant", "logic.compare"), ("LogicalOperator", "logic.gate"),
+        ("DeadZone", "signal.dead_zone"), ("Relay", "signal.relay"), ("Quantizer", "signal.quantizer"),
+        ("Lookup", "signal.lookup_1d"), ("1-D Lookup Table", "signal.lookup_1d"), ("Delay", "signal.delay"),
+        ("RateLimiter", "signal.rate_limiter"), ("Saturation", "signal.saturation"),
+        ("DiscreteTimeIntegrator", "signal.discrete_integrator"),
+        ("TIME", "sources.clock"), ("Chirp Signal", "sources.chirp"), ("Clock", "sources.clock"),
+        ("UniformRandomNumber", "sources.uniform_noise"), ("RepeatingSequence", "sources.repeating_sequence"),
+        ("SRFlipFlop", "logic.latch"), ("signal.stack", "signal.concatenate"),
+        ("signal.abs", "math.function"), ("signal.mux", "signal.concatenate"),
+        ("Sign", "math.function"), ("Demux", "signal.select"),
+    ],
+)  # fmt: skip
+def test_blocks_are_found_by_the_names_of_simulink_and_bdsim(word: str, block: str) -> None:
+    assert closest(word, NAMES) == block

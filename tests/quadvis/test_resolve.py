@@ -126,7 +126,7 @@ blocks:
   table: {block: sources.constant, rate: fast, with: {value: [[1 m, 2 s], [3 m, 4 s]]}}
   delay: {block: signal.unit_delay, rate: fast, with: {initial: 0}, in: {u: "mixed.y[0]"}}
   gain: {block: signal.gain, rate: fast, with: {factor: 0.1 N/m}, in: {u: delay.y}}
-  sum: {block: signal.sum, rate: fast, in: {a: gain.y, b: 2 kN, c: {from: sum.y, across: delay}}}
+  sum: {block: signal.sum, rate: fast, in: {u: [gain.y, 2 kN, {from: sum.y, across: delay}]}}
   integral: {block: signal.integrator, in: {u: {from: sum.y, across: hold}}}
   late: {block: signal.gain, rate: shifted, in: {u: {from: integral.y, across: sample}}}
   later: {block: signal.transport_delay, rate: fast, with: {initial: 3 m}, in: {u: "mixed.y[0:1]"}}
@@ -143,7 +143,7 @@ def test_units_that_wires_decide_are_written_out(tmp_path: Path) -> None:
     written = root.to_python()["blocks"]
     assert written["gain"]["with"] == {"factor": "0.1 N/m"}
     assert written["delay"]["with"] == {"initial": "0.0 m"}
-    assert written["sum"]["in"]["b"] == "2000.0 N"
+    assert written["sum"]["in"]["u"][1] == "2000.0 N"
     assert written["mixed"]["with"]["value"]["unit"] == "m rad 1"
     assert written["table"]["with"]["value"] == [["1.0 m", "2.0 s"], ["3.0 m", "4.0 s"]]
     assert root.to_python()["rates"]["shifted"] == {"rate": "1/30 s", "offset": "7/100 s"}

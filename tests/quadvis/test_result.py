@@ -22,7 +22,7 @@ name: inner
 ports: {in: [u], out: {position: stack.y, first: "stack.y[0]", twice: gain.y, raw: in.u}}
 blocks:
   gain: {block: signal.gain, with: {factor: 2}, in: {u: in.u}}
-  stack: {block: signal.stack, in: {a: in.u, b: gain.y, c: in.u}}
+  stack: {block: signal.concatenate, in: {u: [in.u, gain.y, in.u]}}
 """
 OUTER = """\
 quadvis: 1
@@ -39,7 +39,7 @@ stop_time: 1 s
 blocks:
   ramp: {block: sources.ramp, rate: fast, with: {slope: 1 m/s}}
   x: {part: outer.yaml, rate: fast, in: {u: ramp.y}}
-  all: {block: signal.stack, rate: fast, in: {a: ramp.y, b: ramp.y, c: x.one}}
+  all: {block: signal.concatenate, rate: fast, in: {u: [ramp.y, ramp.y, x.one]}}
 """
 NAMES = ("ramp.y", "x/inner/gain.y", "x/inner/stack.y", "all.y")
 
@@ -175,7 +175,7 @@ rates: {fast: 1 kHz}
 stop_time: STOP s
 blocks:
   wave: {block: sources.sine, rate: fast, with: {frequency: 1 Hz, amplitude: 2 m}}
-  all: {block: signal.stack, rate: fast, in: {a: wave.y, b: wave.y, c: wave.y}}
+  all: {block: signal.concatenate, rate: fast, in: {u: [wave.y, wave.y, wave.y]}}
 """
 JUDGED = """\
 expect:

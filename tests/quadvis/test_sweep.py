@@ -689,7 +689,7 @@ def test_the_final_value_of_a_vector_has_a_column_for_each_element(here: list[in
         "summary:\n  all: {signal: both.y, show: [rms, final], unit: cm}\n"
         '  last: {signal: "both.y[1:3]", show: [final]}\n  one: {signal: "both.y[1]", show: [final]}\n'
     ))  # fmt: skip
-    both = "  both: {block: signal.stack, rate: fast, in: {a: wave.y, b: law.y, c: noise.y}}\n"
+    both = "  both: {block: signal.concatenate, rate: fast, in: {u: [wave.y, law.y, noise.y]}}\n"
     Path("loop.yaml").write_text(text.replace("variants:\n", f"{both}variants:\n"))
     over = {"size": ["1 m", "2 m"], "seed": range(2)}
     table = quadvis.sweep("loop.yaml", over, output="x.csv")

@@ -69,8 +69,8 @@ def test_a_number_without_a_unit_is_free_until_the_unit_is_known(block: str) -> 
         ("sources.step, rate: c, with: {before: 1 m, after: 2}", "after", "m"),
         ("sources.sine, rate: c, with: {amplitude: 2, bias: 1 V, frequency: 1 Hz}", "amplitude", "V"),
         ("sources.ramp, rate: c, with: {initial: 2, slope: 3 m/s}", "initial", "m"),
-        ("signal.sum, rate: c, in: {a: metres.y, b: 2}", "b", "m"),
-        ("signal.sum, rate: c, in: {b: 2, a: metres.y}", "b", "m"),
+        ("signal.difference, rate: c, in: {plus: metres.y, minus: 2}", "minus", "m"),
+        ("signal.difference, rate: c, in: {minus: 2, plus: metres.y}", "minus", "m"),
     ],
 )
 def test_a_number_without_a_unit_is_refused_where_the_signal_has_one(
@@ -103,7 +103,7 @@ def test_what_one_ring_says_counts_in_the_next() -> None:
 """
     second = """\
   c: {block: signal.unit_delay, rate: c, with: {initial: 1}, in: {u: d.y}}
-  d: {block: signal.sum, rate: c, in: {a: c.y, b: b.y}}
+  d: {block: signal.sum, rate: c, in: {u: [c.y, b.y]}}
 """
     wanted = "block 'c': 'initial' has no unit, its unit here is m; write it in m"
     for blocks in (first + second, second + first):
@@ -115,7 +115,8 @@ KINDS: dict[str, tuple[list[str], list[str]]] = {  # parameters and inputs
     "sources.step": (["before", "after"], []),
     "sources.constant": (["value"], []),
     "signal.gain": (["factor"], ["u"]),
-    "signal.sum": ([], ["a", "b", "c"]),
+    "signal.sum": ([], ["u", "u", "u"]),
+    "signal.concatenate": ([], ["u", "u"]),
     "signal.unit_delay": (["initial"], ["u"]),
     "signal.discrete_integrator": (["initial"], ["u"]),
     "signal.rate_limiter": (["rising", "initial"], ["u"]),
@@ -135,10 +136,11 @@ def random_blocks(rng: random.Random) -> list[str]:
             values = {"value": rng.choice(NUMBERS)}
         if "rising" in values:
             values["rising"] = values["rising"].removeprefix("-")
-        wires = {
-            name: rng.choice(NUMBERS) if rng.random() < 0.2 else f"n{rng.randrange(count)}.y"
-            for name in inputs
-        }
+        sources = [
+            rng.choice(NUMBERS) if rng.random() < 0.2 else f"n{rng.randrange(count)}.y" for _ in inputs
+        ]
+        listed = {"u": f"[{', '.join(sources)}]"} if len(inputs) > 1 else {}
+        wires = listed or dict(zip(inputs, sources, strict=True))
         given = ", ".join(f"{name}: {value}" for name, value in values.items())
         wired = ", ".join(f"{name}: {value}" for name, value in wires.items())
         lines.append(f"  n{index}: {{block: {kind}, rate: c, with: {{{given}}}, in: {{{wired}}}}}\n")

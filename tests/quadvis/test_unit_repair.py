@@ -21,7 +21,7 @@ blocks:
   proportional: {block: signal.gain, rate: control, with: {factor: 0.5 V*s/rad}, in: {u: error.y}}
   integral_gain: {block: signal.gain, rate: control, with: {factor: 2 V/rad}, in: {u: error.y}}
   integral: {block: signal.discrete_integrator, rate: control, in: {u: integral_gain.y}}
-  voltage: {block: signal.sum, rate: control, in: {a: proportional.y, b: integral.y}}
+  voltage: {block: signal.sum, rate: control, in: {u: [proportional.y, integral.y]}}
   limited: {block: signal.saturation, rate: control, with: {lower: -12 V, upper: 12 V},
             in: {u: voltage.y}}
   back_emf: {block: signal.gain, rate: continuous, with: {factor: 0.01 V*s/rad}, in: {u: speed.y}}

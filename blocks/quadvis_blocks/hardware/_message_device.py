@@ -8,7 +8,7 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from quadvis.block import Line, Out, Param, ParameterError, PortSettings
-from quadvis.block.block import RESERVED
+from quadvis.block.interface import RESERVED
 from quadvis.errors import DiagramError, Fault, quoted, sentence, suggestion
 from quadvis.machine.datagrams import Datagrams
 from quadvis.machine.inputs import read_once

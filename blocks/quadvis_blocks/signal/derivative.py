@@ -50,6 +50,11 @@ class Derivative(Block):
     rate_now = Work("float64[*]")
     ok_now = Work("bool")
 
+    example = """
+        wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
+        speed: {block: signal.derivative, rate: fast, in: {u: wave.y}}
+    """
+
     def start(self) -> None:
         """Forget all samples."""
         begin(self.stamps)

@@ -15,6 +15,12 @@ class Distance(Block):
     b = In("float64[n]", unit="a", doc="another point")
     y = Out(unit="a", doc="the distance between them, not negative")
 
+    example = """
+        here: {block: sources.constant, rate: fast, with: {value: {value: [1, 2, 0], unit: m}}}
+        there: {block: sources.constant, rate: fast, with: {value: {value: [4, 6, 0], unit: m}}}
+        apart: {block: signal.distance, rate: fast, in: {a: here.y, b: there.y}}
+    """
+
     def output(self, a: Any, b: Any) -> float:
         """Return the length of the difference."""
         total = 0.0

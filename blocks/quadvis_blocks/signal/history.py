@@ -28,6 +28,11 @@ class History(Block):
     values = State(f"float64[{CAPACITY}]")  # at the ticks before this one, newest first
     kept = State("int64")
 
+    example = """
+        wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
+        earlier: {block: signal.history, rate: fast, in: {u: wave.y, instant: 0.1 s}}
+    """
+
     def output(self, u: float, instant: float, time: float) -> tuple[float, bool]:
         """Return the value at the instant."""
         if math.isnan(instant):

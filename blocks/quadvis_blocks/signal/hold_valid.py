@@ -42,6 +42,12 @@ class HoldValid(Block):
     moment = Work(unit="s")  # the instant of that stamp
     good = Work("bool")  # whether the value of this tick counts
 
+    example = """
+        wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
+        gap: {block: signal.outage, rate: fast, with: {during: [[0.2 s, 0.6 s]]}, in: {u: wave.y}}
+        held: {block: signal.hold_valid, rate: fast, in: {value: gap.y, valid: gap.ok}}
+    """
+
     def start(self) -> None:
         """Begin without a value."""
         begin(self.stamps)

@@ -16,10 +16,15 @@ class LowPass(Block):
     """
 
     time_constant = Param(0.1, unit="s", above=0.0, tune=True, doc="time to 63 % of a step")
-    initial = Param(0.0, unit="a", doc="every element of the output at the first sample")
+    initial = Param(0.0, type="float64[*?]", unit="a", doc="the output at the first sample")
     u = In("float64[*]", unit="a", doc="any signal")
     y = Out("float64[*]", unit="a", doc="the smoothed signal")
     smooth = State("float64[*]")
+
+    example = """
+        wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
+        smooth: {block: signal.low_pass, rate: fast, with: {time_constant: 50 ms}, in: {u: wave.y}}
+    """
 
     def start(self) -> None:
         """Begin with the initial value."""

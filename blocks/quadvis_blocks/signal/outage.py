@@ -23,6 +23,11 @@ class Outage(Block):
     last = State("float64[*]")
     out = Work("bool")  # whether there is an outage now
 
+    example = """
+        wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
+        gap: {block: signal.outage, rate: fast, with: {during: [[0.2 s, 0.6 s]]}, in: {u: wave.y}}
+    """
+
     def check(self) -> None:
         """Refuse outages that end before they begin."""
         for begin, end in self.during:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from quadvis.block import Block, In, Out, Param, ParameterError, clip
+from quadvis.block import Block, In, Out, Param, clip
+from quadvis_blocks._limits import refuse_reversed
 
 
 class Saturation(Block):
@@ -13,16 +14,19 @@ class Saturation(Block):
     With ``lower = -upper`` this is the function sigma of the paper's section 4.
     """
 
-    lower = Param(-1.0, unit="a", tune=True, doc="smallest value that passes")
-    upper = Param(1.0, unit="a", tune=True, doc="largest value that passes")
+    lower = Param(-1.0, type="float64[*?]", unit="a", tune=True, doc="smallest value that passes")
+    upper = Param(1.0, type="float64[*?]", unit="a", tune=True, doc="largest value that passes")
     u = In("float64[*]", unit="a", doc="any signal")
     y = Out("float64[*]", unit="a", doc="the signal within the limits")
 
+    example = """
+        wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
+        limited: {block: signal.saturation, rate: fast, with: {lower: -1 m, upper: 1.5 m}, in: {u: wave.y}}
+    """
+
     def check(self) -> None:
         """Refuse a lower limit above the upper limit."""
-        if self.lower > self.upper:
-            problem = f"lower must be at most upper, {self.upper:g}, got {self.lower:g}"
-            raise ParameterError("lower", problem)
+        refuse_reversed(("lower", self.lower), ("upper", self.upper))
 
     def output(self, u: Any) -> Any:
         """Return the signal within the limits."""

@@ -30,13 +30,18 @@ class TransportDelay(Block):
         above=0.0,
         doc="time until a change arrives; default: the 22 ms of a radio frame",
     )
-    initial = Param(0.0, unit="a", doc="every element of the output until the first input arrives")
-    u = In("float64[n]", unit="a", doc="a held signal")
-    y = Out("float64[n]", unit="a", doc="the signal of ``delay`` seconds ago")
+    initial = Param(0.0, type="float64[*?]", unit="a", doc="the output until the first input arrives")
+    u = In("float64[*]", unit="a", doc="a held signal")
+    y = Out("float64[*]", unit="a", doc="the signal of ``delay`` seconds ago")
     since = State(f"float64[{CAPACITY}]", unit="s")
-    values = State(f"float64[{CAPACITY},n]")  # the value that arrived last, then the values on their way
+    values = State(f"float64[{CAPACITY},*]")  # the value that arrived last, then the values on their way
     waiting = State("int64")
     arrived = Work("int64")  # index of the value that is the output now
+
+    example = """
+        wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
+        radio: {block: signal.transport_delay, rate: fast, with: {delay: 50 ms}, in: {u: wave.y}}
+    """
 
     def check(self) -> None:
         """Refuse a delay that holds more values than there is room for."""
@@ -45,7 +50,7 @@ class TransportDelay(Block):
     def start(self) -> None:
         """Begin with no value on its way."""
         self.since[0] = -math.inf
-        self.values[0, :] = self.initial
+        self.values[0] = self.initial
         self.waiting = 0
 
     def output(self, time: float) -> Any:
@@ -63,7 +68,7 @@ class TransportDelay(Block):
             self.waiting -= first
         self.waiting += 1
         self.since[self.waiting] = time
-        self.values[self.waiting, :] = u
+        self.values[self.waiting] = u
 
 
 def _arrived(since: Any, waiting: int, instant: float) -> int:

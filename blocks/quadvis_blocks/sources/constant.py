@@ -16,6 +16,10 @@ class Constant(Block):
     value = Param(0.0, type="float64[*]", unit="a", tune=True, doc="the value")
     y = Out("float64[*]", unit="a", doc="the value")
 
+    example = """
+        place: {block: sources.constant, rate: fast, with: {value: {value: [1, 2, 0.5], unit: m}}}
+    """
+
     def output(self) -> Any:
         """Return the value."""
         return self.value

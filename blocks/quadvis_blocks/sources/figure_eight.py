@@ -28,6 +28,10 @@ class FigureEight(Block):
     position = Out("float64[3]", unit="m", doc="x, y, h")
     velocity = Out("float64[3]", unit="m/s", doc="rate of change of the position")
 
+    example = """
+        path: {block: sources.figure_eight, rate: fast, with: {length: 0.4 m, width: 0.2 m, lap: 20 s}}
+    """
+
     def output(self, time: float) -> tuple[Any, Any]:
         """Return the position and the velocity at this time."""
         elapsed = max(0.0, time - self.begin)

@@ -24,6 +24,10 @@ class Noise(Block):
     draw = State("float64[*]")
     stream = Random()
 
+    example = """
+        error: {block: sources.noise, rate: fast, with: {sigma: 2 cm}}
+    """
+
     def start(self) -> None:
         """Draw the first sample."""
         self.draw = normal_like(self.stream, self.sigma)

@@ -17,6 +17,10 @@ class Sine(Block):
     bias = Param(0.0, unit="a", tune=True, doc="mean value")
     y = Out(unit="a", doc="the wave")
 
+    example = """
+        wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 0.5 Hz, phase: 90 deg}}
+    """
+
     def doubts(self) -> list[ParameterError]:
         """Warn of a wave that looks like a slower wave in the block's samples."""
         highest = 0.5 / self.period

@@ -18,6 +18,10 @@ class Step(Block):
     at = Param(1.0, unit="s", tune=True, doc="instant of the step")
     y = Out(unit="a", doc="the step")
 
+    example = """
+        command: {block: sources.step, rate: fast, with: {before: 0 m, after: 1 m, at: 0.5 s}}
+    """
+
     def output(self, time: float) -> Any:
         """Return the value on this side of the step."""
         return self.after if reached(time, self.at) else self.before

@@ -23,6 +23,13 @@ class Table(Block):
     interpolation = Param("linear", choices=("linear", "hold"), doc="what happens between the rows")
     y = Out("float64[n]", unit="a", doc="the vector")
 
+    example = """
+        path:
+          block: sources.table
+          rate: fast
+          with: {times: {value: [0, 0.5, 1], unit: s}, values: {value: [[0, 0], [1, 0], [1, 1]], unit: m}}
+    """
+
     def check(self) -> None:
         """Refuse times that do not increase, or a number of times that is not the number of rows."""
         if len(self.times) != len(self.values):

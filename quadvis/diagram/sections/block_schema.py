@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Mapping
 
-from quadvis.block import Block, Declared, Param
+from quadvis.block import Block, Declared, In, Param
 from quadvis.diagram.group import GROUP_KEY
 from quadvis.diagram.sections.forms import CONSTANT, NAME, SIGNAL, TEXT, VALUES, Schema, closed, map_of, ref
 from quadvis.graph.graph import CONTINUOUS, CROSSINGS
@@ -79,9 +79,7 @@ def _one_block(block: type[Block]) -> Schema:
     }
     inputs: Schema = {
         "additionalProperties": ref("input") if block.ports_from() else False,
-        "properties": {
-            name: {**ref("input"), "description": _words(port)} for name, port in interface.inputs.items()
-        },
+        "properties": {name: _input(port) for name, port in interface.inputs.items()},
         "required": [name for name, port in interface.inputs.items() if port.default is None],
     }
     found: Schema = {
@@ -93,6 +91,13 @@ def _one_block(block: type[Block]) -> Schema:
         given = {"required": ["with"], "properties": {"with": {"required": required}}}
         found["anyOf"] = [{"required": [GROUP_KEY]}, given]
     return found
+
+
+def _input(port: In) -> Schema:
+    form = ref("input")
+    if port.many:
+        form = {"if": {"type": "array"}, "then": {"items": form, "minItems": 1}, "else": form}
+    return {**form, "description": _words(port)}
 
 
 def _parameter(param: Param) -> Schema:
@@ -111,4 +116,5 @@ def _parameter(param: Param) -> Schema:
 def _words(item: Declared) -> str:
     unit = "" if item.unit == "1" else f", {item.unit}"
     kind = "choice" if isinstance(item, Param) and item.choices else item.type
-    return f"{item.doc} ({kind}{unit})"
+    many = ", any number" if isinstance(item, In) and item.many else ""
+    return f"{item.doc} ({kind}{unit}{many})"

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Param
+from quadvis.block import Param, entry_name
 from quadvis.graph.graph import CONTINUOUS, Node, Wire, selected
 from quadvis.graph.names import wire_text
 from quadvis.links.insertion import written
@@ -44,6 +44,8 @@ def resolved_block(node: Node, folder: Path, nodes: Mapping[str, Node]) -> dict[
             inputs[port] = _wire(source, nodes)
         elif source.value is not node.block.interface.inputs[port].default:
             inputs[port] = quantity(node, port, source.value)
+    for port, count in node.block.entry_counts.items():
+        inputs[port] = [inputs.pop(entry_name(port, number)) for number in range(count)]
     return found | ({"with": values} if values else {}) | ({"in": inputs} if inputs else {})
 
 

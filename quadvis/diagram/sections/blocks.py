@@ -22,14 +22,32 @@ INSIDE = "in"  # the name of a part's inputs for its blocks
 
 
 class InputSpec(NamedTuple):
-    """The source of an input: a signal or a constant, and how it crosses between rates and computers."""
+    """The source of an input: a signal or a constant, and how it crosses between rates and computers.
+
+    For an input of any number, a list of signals is a tuple of their sources.
+    """
 
     place: Place
-    source: Reference | YamlNode | Unknown
+    source: Reference | YamlNode | Unknown | tuple[InputSpec, ...]
     across: str | Unknown | None = None
     across_place: Place | None = None
     over: YamlNode | None = None
     initial: YamlNode | None = None
+
+    @property
+    def entries(self) -> tuple[InputSpec, ...]:
+        """What an input of any number takes: each entry of a list, or the one source that is written."""
+        if isinstance(self.source, YamlList):
+            return tuple(InputSpec(node.place, node) for node in self.source.items())
+        return self.source if isinstance(self.source, tuple) else (self,)
+
+    @property
+    def constants(self) -> tuple[YamlNode, ...]:
+        """The values in it, which may name parameters."""
+        if isinstance(self.source, tuple):
+            return tuple(value for entry in self.source for value in entry.constants)
+        own = (self.source,) if isinstance(self.source, YamlNode) else ()
+        return own if self.initial is None else (*own, self.initial)
 
 
 class BlockSpec(NamedTuple):
@@ -118,7 +136,12 @@ def _read_inputs(node: YamlNode, faults: Faults) -> dict[str, InputSpec] | Unkno
 
 
 def _read_input(node: YamlNode, faults: Faults) -> InputSpec:
-    """Read ``block.port``, ``{from: block.port, across: hold}``, ``1 m`` or ``{value: ..., unit: ...}``."""
+    """Read ``block.port``, ``{from: block.port, across: hold}``, ``1 m`` or ``{value: ..., unit: ...}``.
+
+    A list with a signal in it is one for an input of any number; a list of constants may be an array.
+    """
+    if isinstance(node, YamlList) and any(_names_signal(item) for item in node):
+        return InputSpec(node.place, tuple(_read_input(item, faults) for item in node))
     is_value = isinstance(node, YamlMap) and any(key in node for key in QUANTITY_KEYS)
     if isinstance(node, YamlMap) and is_value and "from" in node:
         faults.add(node.place, "a signal and a value are given at once", "keep 'from' or 'value'")
@@ -136,6 +159,13 @@ def _read_input(node: YamlNode, faults: Faults) -> InputSpec:
     if isinstance(node, YamlScalar) and is_reference(node.value):
         return InputSpec(node.place, read_reference(node, faults))
     return InputSpec(node.place, node)
+
+
+def _names_signal(node: YamlNode) -> bool:
+    """Say whether an entry of a list is meant as a signal."""
+    if isinstance(node, YamlMap):
+        return not any(key in node for key in QUANTITY_KEYS)
+    return isinstance(node, YamlScalar) and is_reference(node.value)
 
 
 def is_reference(text: str) -> bool:

@@ -58,7 +58,7 @@ def all_declarations_used(subject: Subject) -> None:
     functions = [value for value in values if inspect.isfunction(value)]
     names = {name for function in _reached(functions) for name in _named(function.__code__)}
     names |= {item.name for item in interface.safe.values()}  # `Block.write_safe` uses them
-    names |= {*subject.block.ports_from()}
+    names.update(subject.block.ports_from())
     if issubclass(subject.block, Device):
         names |= subject.block.used_outside()
     groups = (interface.params, interface.derived, interface.states, interface.work)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import CABLE, Param, ParameterError
+from quadvis.block import ANY, CABLE, Param, ParameterError
 from quadvis.errors import QuadvisError
 from quadvis.testing.rig import Subject, extreme_rigs
 
@@ -41,7 +41,7 @@ def _bad_values(param: Param) -> Iterator[Any]:
     if param.is_text or param.choices:
         return
     shape = param.signal.resolve({})
-    if param.signal.shape != ("*",):
+    if param.signal.shape != ANY:
         yield np.zeros((*shape, 2, 2)).tolist()
     numbers = [np.nan, *(bound for bound in (param.above, param.below) if bound is not None)]
     for bound, beyond in ((param.min, -np.inf), (param.max, np.inf)):

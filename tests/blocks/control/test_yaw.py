@@ -69,7 +69,7 @@ blocks:
     in:
       angle: {from: craft.angle, across: sample}
       angular_rate: {from: craft.angular_rate, across: sample}
-  sum: {block: signal.sum, rate: control, in: {a: law.torque, b: {value: 0.025, unit: rad/s^2}}}
+  sum: {block: signal.sum, rate: control, in: {u: [law.torque, {value: 0.025, unit: rad/s^2}]}}
 """
 
 

@@ -27,3 +27,37 @@ def test_arrays_are_integrated_and_limited_element_by_element() -> None:
 def test_an_initial_value_beyond_a_limit_is_refused() -> None:
     with pytest.raises(ParameterError, match="initial must lie between -inf and 1, got 2"):
         Integrator(initial=2.0, upper=1.0)
+
+
+def test_limits_and_resets_as_in_closed_form() -> None:
+    step = 0.05
+    t = np.arange(201) * step
+    u = np.where(t < 4 - 1e-9, 1.0, np.where(t < 7 - 1e-9, -1.0, 3.0))
+    reset = ((t >= 5 - 1e-9) & (t < 5.5 - 1e-9)) | (t >= 7.5 - 1e-9)
+    block = Integrator(lower=0.0, upper=2.0, initial=0.5)
+    y = drive(block, u=u, reset=reset, value=0.25, rate="20 Hz").y
+    wanted = {
+        1: 1.5, 1.5: 2, 3: 2, 4: 2, 4.5: 1.5, 5: 0.25, 5.1: 0.15, 5.25: 0, 6.5: 0, 7: 0, 7.25: 0.75,
+        7.5: 0.25, 8: 1.75, 8.25: 2, 10: 2,
+    }  # fmt: skip
+    found = [y[round(time / step)] for time in wanted]
+    assert found == pytest.approx(list(wanted.values()), abs=1e-9)
+
+
+def test_while_its_level_holds_a_reset_keeps_it_at_the_value() -> None:
+    block = Integrator(reset_on="level")
+    y = drive(block, u=[1.0] * 6, reset=[0, 0, 1, 1, 0, 0], value=5.0, rate="1 Hz").y
+    assert y == pytest.approx([0, 1, 5, 5, 5, 6])
+
+
+def test_with_wrap_an_angle_stays_between_its_limits() -> None:
+    y = drive(Integrator(upper=2 * np.pi, lower=0.0, wrap=True), u=2.0, rate="10 Hz", steps=100)
+    assert y.y == pytest.approx(np.mod(2.0 * y.time, 2 * np.pi), abs=1e-9)
+
+
+def test_each_element_may_have_limits_of_its_own() -> None:
+    block = Integrator(upper=[0.25, 1.0], initial=[0.0, 0.5])
+    y = drive(block, u=np.ones((11, 2)), rate="10 Hz").y
+    assert y[-1] == pytest.approx([0.25, 1.0]) and y[1] == pytest.approx([0.1, 0.6])
+    with pytest.raises(ParameterError, match=r"initial must lie between -inf and 0\.25, got 0\.5"):
+        Integrator(upper=[1.0, 0.25], initial=[0.0, 0.5])

@@ -54,9 +54,10 @@ def test_at_a_discrete_rate_the_solver_sees_no_edge_inside_its_steps() -> None:
 def integral_of_a_delayed_one(step: Fraction, delay: float, *, continuous: bool) -> float:
     fast = Task("fast", step, continuous=True)
     link = fast if continuous else Task("link", step)
+    inputs = {"u": Wire("delay", "y"), "reset": Constant(False), "value": Constant(0.0)}
     nodes = [
-        Node("delay", "", TransportDelay(delay=delay), link, {"u": Constant(np.ones(1))}, {"n": 1}),
-        Node("integral", "", Integrator(), fast, {"u": Wire("delay", "y", (0,))}, {"*": ()}),
+        Node("delay", "", TransportDelay(delay=delay), link, {"u": Constant(1.0)}, {"*": ()}),
+        Node("integral", "", Integrator(), fast, inputs, {"*": ()}),
     ]
     engine = Engine(Graph("test", nodes, "ode4", step))
     with engine:

@@ -20,4 +20,9 @@ def test_it_breaks_loops() -> None:
 
 def test_an_initial_value_that_is_no_number_is_refused() -> None:
     with pytest.raises(ParameterError, match="initial must be a number"):
-        UnitDelay(initial=[1.0, 2.0])
+        UnitDelay(initial="none")
+
+
+def test_each_element_may_have_an_initial_value_of_its_own() -> None:
+    found = drive(UnitDelay(initial=[1.0, 2.0]), u=[[3.0, 4.0], [5.0, 6.0]]).y
+    assert np.array_equal(found, [[1.0, 2.0], [3.0, 4.0]])

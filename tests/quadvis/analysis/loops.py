@@ -23,7 +23,7 @@ blocks:
     {block: signal.gain, rate: fast, with: {factor: $gain}, in: {u: {from: place.y, across: sample}}}
   damper:
     {block: signal.gain, rate: fast, with: {factor: $damping}, in: {u: {from: speed.y, across: sample}}}
-  both: {block: signal.sum, rate: fast, in: {a: spring.y, b: damper.y, c: MORE}}
+  both: {block: signal.sum, rate: fast, in: {u: [spring.y, damper.y, MORE]}}
   push: {block: signal.gain, rate: fast, with: {factor: -1}, in: {u: both.y}}
 EXTRA
 analyse:

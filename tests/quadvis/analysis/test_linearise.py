@@ -77,7 +77,7 @@ blocks:
     rate: slow
     with: {{factor: {-gain} 1/s}}
     in: {{u: {{from: place.y, across: sample}}}}
-  three: {{block: signal.stack, rate: slow, in: {{a: law.y}}}}
+  three: {{block: signal.concatenate, rate: slow, in: {{u: [law.y, 0, 0]}}}}
   radio:
     block: signal.transport_delay
     rate: link
@@ -203,7 +203,7 @@ stop_time: 1 s
 blocks:
   place: {block: signal.integrator, rate: continuous, with: {initial: 0 m}, in: {u: push.y}}
   still: {block: signal.gain, rate: continuous, with: {factor: 0 1/s}, in: {u: place.y}}
-  push: {block: signal.sum, rate: continuous, in: {a: still.y, b: 1 m/s}}
+  push: {block: signal.sum, rate: continuous, in: {u: [still.y, 1 m/s]}}
 """,
         )
     )

@@ -108,7 +108,7 @@ blocks:
   place: {block: signal.integrator, rate: continuous, with: {initial: 0 m}, in: {u: change.y}}
   decay: {block: signal.gain, rate: continuous, with: {factor: -1 1/s}, in: {u: place.y}}
   feed: {block: signal.gain, rate: continuous, with: {factor: 0.5 1/s}, in: {u: place.y}}
-  change: {block: signal.sum, rate: continuous, in: {a: decay.y, b: feed.y}}
+  change: {block: signal.sum, rate: continuous, in: {u: [decay.y, feed.y]}}
 """,
         )
     )
@@ -135,7 +135,7 @@ def test_scaled_by_its_gain_margin_a_loop_of_several_rates_is_at_the_edge(margin
         scaled = f"""  more:
     {{block: signal.gain, rate: control, with: {{factor: {factor}}}, in: {{u: law.torque}}}}
 """
-        changed = text.replace("  command:", f"{scaled}  command:").replace("{a: law.torque}", "{a: more.y}")
+        changed = text.replace("  command:", f"{scaled}  command:").replace("[law.torque,", "[more.y,")
         return load_text(changed, DIAGRAMS).analyse().stable
 
     assert is_stable(found * inside) and not is_stable(found * outside)

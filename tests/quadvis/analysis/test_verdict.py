@@ -125,7 +125,7 @@ blocks:
   decay: {block: signal.gain, rate: continuous, with: {factor: -1 1/s}, in: {u: place.y}}
   feed: {block: signal.gain, rate: continuous, with: {factor: 0.5 1/s}, in: {u: place.y}}
   more: {block: signal.gain, rate: continuous, with: {factor: $further}, in: {u: place.y}}
-  change: {block: signal.sum, rate: continuous, in: {a: decay.y, b: feed.y, c: more.y}}
+  change: {block: signal.sum, rate: continuous, in: {u: [decay.y, feed.y, more.y]}}
 analyse:
   cuts: {feed: feed.y, more: more.y, both: [feed.y, more.y], all: [decay.y, feed.y, more.y]}
   limits:

@@ -32,7 +32,7 @@ blocks:
     {block: signal.gain, rate: fast, TARGET with: {factor: 2 1/s^2}, in: {u: {from: PLACE, across: sample}}}
   damper:
     {block: signal.gain, rate: fast, TARGET with: {factor: 1.5 1/s}, in: {u: {from: SPEED, across: sample}}}
-  both: {block: signal.sum, rate: fast, TARGET in: {a: spring.y, b: damper.y}}
+  both: {block: signal.sum, rate: fast, TARGET in: {u: [spring.y, damper.y]}}
   push: {block: signal.gain, rate: fast, TARGET with: {factor: -1}, in: {u: both.y}}
 DELAYS
 analyse:
@@ -42,7 +42,7 @@ COMPUTERS = "computers: {world: {}, target: {}}\n"
 ENDS = (("force", "push", "hold"), ("place", "place", "sample"), ("speed", "speed", "sample"))
 DELAYS = "".join(
     f"""
-  one_{name}: {{block: signal.stack, rate: step, in: {{a: {{from: {source}.y, across: {across}}}}}}}
+  one_{name}: {{block: signal.concatenate, rate: step, in: {{u: [{{from: {source}.y, across: {across}}}]}}}}
   late_{name}:
     {{block: signal.transport_delay, rate: step, with: {{delay: {name}_DELAY}}, in: {{u: one_{name}.y}}}}
 """

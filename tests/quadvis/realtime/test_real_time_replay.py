@@ -34,14 +34,14 @@ overload: {action: warn}
 blocks:
   counter: {block: own.counter, rate: fast}
   noise: {block: sources.noise, rate: fast, with: {sigma: 0.1 m}}
-  sum: {block: signal.sum, rate: fast, in: {a: noise.y, b: counter.y}}
+  sum: {block: signal.sum, rate: fast, in: {u: [noise.y, counter.y]}}
   integral: {block: signal.integrator, in: {u: {from: sum.y, across: hold}}}
   delayed: {block: signal.gain, rate: slow, in: {u: {from: integral.y, across: delay}}}
 log: {every: {fast: 4}}
 """
 BACK = """\
   back: {block: signal.gain, rate: fast, in: {u: {from: delayed.y, across: newest}}}
-  sum: {block: signal.sum, rate: fast, in: {a: back.y,"""
+  sum: {block: signal.sum, rate: fast, in: {u: [back.y,"""
 COUNTER = '''
 """A block that reads a clock, which never says the same twice, and sometimes too slowly."""
 
@@ -139,7 +139,7 @@ def write_dragged() -> None:
     Path("blocks/own/drag.py").write_text(DRAG)
     text = TEXT.replace("seed: 7", "seed: 7\ntasking: multi").replace("across: hold", "across: newest")
     text = text.replace("  delayed: {block: signal.gain,", "  delayed: {block: own.drag,")
-    text = text.replace("  sum: {block: signal.sum, rate: fast, in: {a: noise.y,", BACK)
+    text = text.replace("  sum: {block: signal.sum, rate: fast, in: {u: [noise.y,", BACK)
     text = text.replace("from: integral.y, across: delay", "from: sum.y, across: newest")
     Path("flight.yaml").write_text(text)
 

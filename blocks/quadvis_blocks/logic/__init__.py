@@ -1,0 +1,1 @@
+"""Blocks of truth values: comparison, gates, switches, edges, counters."""

@@ -1,0 +1,1 @@
+"""Blocks that compute functions of values: products, matrices, trigonometry, extremes, rounding, kinds."""
