@@ -124,9 +124,10 @@ class Assembly:
         check_writers(drafts, sources, faults)
         check_devices(drafts, faults)
         ports = {name: wire_text(source) for name, source in wiring.ports()}
+        entries = {name: wire_text(source) for name, source in wiring.entries()}
         return Diagram(
             spec.name, spec.path, variant, graph, stop, seed, spec.values | context.values, listing,
-            self.variants, ports=MappingProxyType(ports), sources=sources,
+            self.variants, ports=MappingProxyType(ports), entries=MappingProxyType(entries), sources=sources,
             knobs=MappingProxyType(find_knobs(expansion)),
         )  # fmt: skip
 
