@@ -1,1 +1,1 @@
-"""A diagram, or a part of one, packed for other programs: C that needs nothing of quadvis, and FMUs made of it."""
+"""Parts of diagrams for other programs: C that needs nothing of quadvis, and FMUs that are made of it."""

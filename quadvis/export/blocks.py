@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,11 +14,17 @@ from quadvis.engine.program import COPY, Op, Program
 from quadvis.errors import QuadvisError
 from quadvis.export.c_functions import translated
 from quadvis.export.c_types import Unexportable
+from quadvis.export.selection import INPUT
+from quadvis.native import cache
 from quadvis.native.block_type import BlockType, MethodType
+from quadvis.native.cache import MachineCode
+from quadvis.native.library import surroundings
 from quadvis.native.machine_code import Compiled, target_machine
 from quadvis.native.runtime import RUNTIME
 
-PRELUDE = Path(__file__).parent / "c" / "prelude.h"
+ROOM = Path(__file__).parent
+PRELUDE = ROOM / "c" / "prelude.h"
+TRANSLATOR = ("assembly_text", "blocks", "c_functions", "c_operations", "c_types")  # of this room
 START = "start"
 Announce = Callable[[str], None]
 
@@ -31,28 +38,24 @@ class BlockCode(NamedTuple):
 
 def block_code(program: Program, blocks: Sequence[Block], announce: Announce | None = None) -> BlockCode:
     """Return the methods of a program's blocks in C; QuadvisError names the block that has none."""
-    kinds = dict(_kinds(program, blocks))
-    texts: dict[BlockType, tuple[str, str]] = {}
-    names = {}
-    for number, methods in kinds.items():
-        for kind in methods:
-            if kind not in texts:
-                if announce:
-                    announce(f"translating {kind.block.__name__}")
-                prefix = f"{kind.block.__name__}_{hashlib.sha256(kind.text.encode()).hexdigest()[:8]}"
-                texts[kind] = prefix, _translated(kind, prefix, program.blocks[number].path)
-            prefix = texts[kind][0]
+    texts: dict[str, str] = {}
+    names: dict[tuple[int, str], str] = {}
+    for number, kinds in _kinds(program, blocks):
+        for kind in kinds:
+            prefix = f"{kind.block.__name__}_{hashlib.sha256(kind.text.encode()).hexdigest()[:12]}"
+            if prefix not in texts:
+                texts[prefix] = _translated(kind, prefix, program.blocks[number].path, announce)
             names |= {(number, method.name): f"{prefix}_{method.name}" for method in kind.methods}
-    parts = [PRELUDE.read_text(encoding="utf-8"), *(text for _, text in texts.values())]
+    parts = [PRELUDE.read_text(encoding="utf-8"), *texts.values()]
     return BlockCode("\n".join(parts), names)
 
 
 def _kinds(program: Program, blocks: Sequence[Block]) -> Iterator[tuple[int, list[BlockType]]]:
-    """Yield the types of each block: that of its calls, and one of its ``start``."""
+    """Yield the types of each block: that of its calls, and one of its ``start``. Inputs are only copied."""
     calls: dict[int, list[Op]] = {number: [] for number in range(len(blocks))}
     phases = [phase for task in program.tasks for phase in task.phases.values()]
     for op in chain.from_iterable((*phases, program.derivatives)):
-        if op.method != COPY:
+        if op.method != COPY and program.blocks[op.block].kind != INPUT:
             calls[op.block].append(op)
     for number, ops in calls.items():
         record, block = program.blocks[number].record, type(blocks[number])
@@ -62,11 +65,24 @@ def _kinds(program: Program, blocks: Sequence[Block]) -> Iterator[tuple[int, lis
         yield number, [BlockType.of(block, record, methods) for methods in found]
 
 
-def _translated(kind: BlockType, prefix: str, path: str) -> str:
-    """Return the C of a block type; its functions and constants have the prefix."""
-    from quadvis.native.compiler import compiled_methods
+def _translated(kind: BlockType, prefix: str, path: str, announce: Announce | None) -> str:
+    """Return the C of a block type, which is kept; its functions and constants have the prefix."""
+    facts = (surroundings(), [(ROOM / f"{name}.py").read_bytes() for name in TRANSLATOR], prefix, kind.text)
+    key = hashlib.sha256(repr(facts).encode()).hexdigest()
+    kept = cache.load(key)
+    if kept is None:
+        if announce:
+            announce(f"writing {kind.block.__name__} in C, once")
+        kept = MachineCode(_written(kind, prefix, path).encode())
+        cache.keep(key, kept)
+    return kept.content.decode()
 
+
+def _written(kind: BlockType, prefix: str, path: str) -> str:
+    """Write a block type in C; QuadvisError, with the block's path, if that cannot be."""
     import numba
+
+    from quadvis.native.compiler import compiled_methods
 
     try:
         with _without_vectors():
@@ -116,15 +132,15 @@ def _entry(name: str, function: Compiled) -> str:
     )
 
 
-class _without_vectors:  # noqa: N801
+@contextmanager
+def _without_vectors() -> Iterator[None]:
     """Have numba make no vectors, which C does not have."""
+    from numba.core import config as settings
 
-    def __enter__(self) -> None:
-        from numba.core import config
-
-        self._config: Any = config
-        self._before = config.LOOP_VECTORIZE, config.SLP_VECTORIZE
-        config.LOOP_VECTORIZE = config.SLP_VECTORIZE = 0
-
-    def __exit__(self, *_: object) -> None:
-        self._config.LOOP_VECTORIZE, self._config.SLP_VECTORIZE = self._before
+    config: Any = settings
+    before = config.LOOP_VECTORIZE, config.SLP_VECTORIZE
+    config.LOOP_VECTORIZE = config.SLP_VECTORIZE = 0
+    try:
+        yield
+    finally:
+        config.LOOP_VECTORIZE, config.SLP_VECTORIZE = before

@@ -10,6 +10,17 @@ import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
 from quadvis.export.assembly_text import TextBlock, TextFunction, constants, functions, plain, split
+from quadvis.export.c_operations import (
+    ARITHMETIC,
+    FLAGS,
+    LIBRARY,
+    LOOSE,
+    arithmetic,
+    comparison,
+    comparison_of_reals,
+    conversion,
+    intrinsic,
+)
 from quadvis.export.c_types import (
     INTEGER,
     Unexportable,
@@ -27,51 +38,11 @@ from quadvis.export.c_types import (
     typed,
 )
 
-_FLAGS = {
-    "nsw", "nuw", "exact", "disjoint", "nneg", "samesign", "inbounds", "nusw", "volatile", "atomic", "inrange",
-    "nofpclass", "ninf", "nsz", "arcp", "nnan", "afn", "contract",
-}  # fmt: skip
-_LOOSE = {"fast", "reassoc"}  # sums in another order
-_WHOLE = {
-    "add": "+",
-    "sub": "-",
-    "mul": "*",
-    "and": "&",
-    "or": "|",
-    "xor": "^",
-    "udiv": "/",
-    "urem": "%",
-    "shl": "<<",
-    "lshr": ">>",
-}
-_SIGNED = {"sdiv": "/", "srem": "%", "ashr": ">>"}
-_REAL = {"fadd": "+", "fsub": "-", "fmul": "*", "fdiv": "/"}
-_COMPARED = {"eq": "==", "ne": "!=", "ugt": ">", "uge": ">=", "ult": "<", "ule": "<="}
-_COMPARED_SIGNED = {"sgt": ">", "sge": ">=", "slt": "<", "sle": "<="}
-_REALS = {
-    "oeq": "{a} == {b}", "ogt": "{a} > {b}", "oge": "{a} >= {b}", "olt": "{a} < {b}", "ole": "{a} <= {b}",
-    "one": "{a} < {b} || {a} > {b}", "ord": "{a} == {a} && {b} == {b}", "uno": "{a} != {a} || {b} != {b}",
-    "ueq": "!({a} < {b} || {a} > {b})", "ugt": "!({a} <= {b})", "uge": "!({a} < {b})", "ult": "!({a} >= {b})",
-    "ule": "!({a} > {b})", "une": "{a} != {b}", "true": "1", "false": "0",
-}  # fmt: skip
-# Functions of C's library that may be called, and LLVM's own that have the same meaning.
-LIBRARY = {
-    "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "exp",
-    "exp2", "expm1", "log", "log2", "log10", "log1p", "pow", "sqrt", "cbrt", "fmod", "remainder", "floor", "ceil",
-    "trunc", "rint", "nearbyint", "round", "fabs", "copysign", "fma", "hypot", "erf", "erfc", "ldexp", "malloc", "realloc",
-    "free", "memcpy", "memmove", "memset", "frexp",
-}  # fmt: skip
-_RENAMED = {"minnum": "least", "maxnum": "most", "roundeven": "to_even"}
 _NOTHING = (
-    "llvm.lifetime",
-    "llvm.assume",
-    "llvm.dbg",
-    "llvm.experimental.noalias",
-    "llvm.prefetch",
+    "llvm.lifetime", "llvm.assume", "llvm.dbg", "llvm.experimental.noalias", "llvm.prefetch",
     "llvm.invariant",
-)
+)  # fmt: skip
 _OVERFLOW = re.compile(r"llvm\.([su](?:add|sub|mul))\.with\.overflow\.i64")
-_INTRINSIC = re.compile(r"llvm\.(\w+)(?:\.[\w.]+)?$")
 _CALL = re.compile(r'^(?:(?:tail|musttail|notail) )?call (.*?)([@%])("(?:[^"\\]|\\.)*"|[\w.$-]+)\((.*)\)$')
 _PYTHON = re.compile(r"call [^@]*@(?:_?Py\w|numba_(?:un)?pickle|numba_runtime)")
 _RESULT = re.compile(r'^%("(?:[^"\\]|\\.)*"|[\w.$-]+) = (.*)$')
@@ -158,7 +129,13 @@ class _Writer:
             self._lines.append(f"{self._labels[block.label]}:;")
             for line in block.lines:
                 self._instruction(block, line)
-        lines = [*self._declared, f"goto {self._labels[self._function.blocks[0].label]};", *self._lines]
+        unused = [f"(void)a{number};" for number in range(len(self._function.parameters))]
+        lines = [
+            *unused,
+            *self._declared,
+            f"goto {self._labels[self._function.blocks[0].label]};",
+            *self._lines,
+        ]
         return "\n".join([_head(self._function, self._names) + " {", *(f"    {line}" for line in lines), "}"])
 
     def _phis_of(self, block: TextBlock) -> Iterable[tuple[str, str, dict[str, str]]]:
@@ -224,16 +201,17 @@ class _Writer:
             self._call(result, body)
             return
         words = rest.split(" ")
-        if _LOOSE & set(words[:4]):
+        if LOOSE & set(words[:4]):
             raise Unexportable("sums in another order have no translation into C")
-        while words and (words[0] in _FLAGS or words[0].startswith("nofpclass")):
+        while words and (words[0] in FLAGS or words[0].startswith("nofpclass")):
             words.pop(0)
         rest = " ".join(words)
         method: Callable[..., None] | None = getattr(self, f"_do_{opcode}", None)
         if method is not None:
             method(block, result, rest)
-        elif opcode in _WHOLE | _SIGNED | _REAL | {"frem": ""}:
-            self._arithmetic(opcode, result, rest)
+        elif opcode in ARITHMETIC:
+            kind, a, b = self._pair(rest)
+            self._put(result, kind, arithmetic(opcode, kind, a, b))
         elif " to " in rest:
             self._convert(opcode, result, rest)
         else:
@@ -248,72 +226,28 @@ class _Writer:
         one, other = split(operands)
         return kind, self._value(kind, one), self._value(kind, other)
 
-    def _arithmetic(self, opcode: str, result: str, rest: str) -> None:
-        kind, a, b = self._pair(rest)
-        if opcode == "frem":
-            expression = f"fmod({a}, {b})"
-        elif opcode in _REAL:
-            expression = f"{a} {_REAL[opcode]} {b}"
-        elif opcode in _SIGNED:
-            expression = f"({c_type(kind)})(({signed(kind)}){a} {_SIGNED[opcode]} ({signed(kind)}){b})"
-        else:
-            expression = f"({c_type(kind)})({a} {_WHOLE[opcode]} {b})"
-            expression += " & 1" if kind == "i1" else ""
-        self._put(result, kind, expression)
-
     def _convert(self, opcode: str, result: str, rest: str) -> None:
         source, target = rest.rsplit(" to ", 1)
         kind, operand = typed(source)
-        value, made = self._value(kind, operand), c_type(target)
-        match opcode:
-            case "zext" | "fpext" | "fptrunc" | "uitofp" | "fptoui":
-                expression = f"({made}){value}"
-            case "trunc":
-                expression = f"({made}){value}" + (" & 1" if target == "i1" else "")
-            case "sext" | "sitofp" if kind == "i1":
-                expression = f"({made})-(int8_t){value}"
-            case "sext" | "sitofp":
-                wide = f"({signed(target)})" if opcode == "sext" else ""
-                expression = f"({made}){wide}({signed(kind)}){value}"
-            case "fptosi":
-                expression = f"({made})({signed(target)}){value}"
-            case "ptrtoint":
-                expression = f"({made})(uintptr_t){value}"
-            case "inttoptr":
-                expression = f"(char *)(uintptr_t){value}"
-            case "bitcast" if {kind, target} == {"double", "i64"}:
-                expression = f"{'to_bits' if kind == 'double' else 'from_bits'}({value})"
-            case "bitcast" if kind == target:
-                expression = value
-            case _:
-                raise Unexportable(
-                    f"the conversion '{opcode}' from {kind} to {target} has no translation into C"
-                )
-        self._put(result, target, expression)
+        self._put(result, target, conversion(opcode, kind, target, self._value(kind, operand)))
 
-    def _do_fneg(self, _: TextBlock, result: str, rest: str) -> None:
+    def _do_fneg(self, _block: TextBlock, result: str, rest: str) -> None:
         kind, operand = typed(rest)
         self._put(result, kind, f"-{self._value(kind, operand)}")
 
-    def _do_freeze(self, _: TextBlock, result: str, rest: str) -> None:
+    def _do_freeze(self, _block: TextBlock, result: str, rest: str) -> None:
         kind, operand = typed(rest)
         self._put_parts(result, kind, self._parts(kind, operand))
 
-    def _do_icmp(self, _: TextBlock, result: str, rest: str) -> None:
+    def _do_icmp(self, _block: TextBlock, result: str, rest: str) -> None:
         predicate, _, rest = rest.partition(" ")
-        kind, a, b = self._pair(rest.removeprefix("samesign "))
-        if kind == "ptr":
-            a, b, kind = f"(uintptr_t){a}", f"(uintptr_t){b}", "i64"
-        if predicate in _COMPARED:
-            expression = f"{a} {_COMPARED[predicate]} {b}"
-        else:
-            expression = f"({signed(kind)}){a} {_COMPARED_SIGNED[predicate]} ({signed(kind)}){b}"
-        self._put(result, "i1", expression)
+        kind, a, b = self._pair(rest)
+        self._put(result, "i1", comparison(predicate, kind, a, b))
 
-    def _do_fcmp(self, _: TextBlock, result: str, rest: str) -> None:
+    def _do_fcmp(self, _block: TextBlock, result: str, rest: str) -> None:
         predicate, _, rest = rest.partition(" ")
         _, a, b = self._pair(rest)
-        self._put(result, "i1", _REALS[predicate].format(a=a, b=b))
+        self._put(result, "i1", comparison_of_reals(predicate, a, b))
 
     def _do_select(self, _block: TextBlock, result: str, rest: str) -> None:
         condition, one, other = split(rest)
@@ -326,27 +260,27 @@ class _Writer:
             result, kind, [f"{chosen} ? {one} : {other}" for one, other in zip(*pairs, strict=True)]
         )
 
-    def _do_load(self, _: TextBlock, result: str, rest: str) -> None:
+    def _do_load(self, _block: TextBlock, result: str, rest: str) -> None:
         kind, pointer, *_more = split(rest)
         place = self._value("ptr", pointer.removeprefix("ptr "))
         for path, leaf in leaves(kind):
             loaded = f"ld_{suffix(leaf)}({place} + {place_of(kind, path)})" + (" & 1" if leaf == "i1" else "")
             self._put(_part(result, path), leaf, loaded)
 
-    def _do_store(self, _: TextBlock, __: str, rest: str) -> None:
+    def _do_store(self, _block: TextBlock, _result: str, rest: str) -> None:
         given, pointer, *_more = split(rest)
         kind, operand = typed(given)
         place = self._value("ptr", pointer.removeprefix("ptr "))
         for (path, leaf), value in zip(leaves(kind), self._parts(kind, operand), strict=True):
             self._lines.append(f"st_{suffix(leaf)}({place} + {place_of(kind, path)}, {value});")
 
-    def _do_getelementptr(self, _: TextBlock, result: str, rest: str) -> None:
+    def _do_getelementptr(self, _block: TextBlock, result: str, rest: str) -> None:
         self._put(result, "ptr", self._address(rest))
 
     def _address(self, text: str) -> str:
         """Return the expression for a place: "i8, ptr %p, i64 8"."""
         words = text.split(" ")
-        while words and (words[0] in _FLAGS or not words[0]):
+        while words and (words[0] in FLAGS or not words[0]):
             words.pop(0)
         kind, base, *indices = split(" ".join(words))
         place = self._value("ptr", base.removeprefix("ptr "))
@@ -364,14 +298,14 @@ class _Writer:
                 place += f" + {step} * {size(kind)}"
         return f"({place})"
 
-    def _do_alloca(self, _: TextBlock, result: str, rest: str) -> None:
+    def _do_alloca(self, _block: TextBlock, result: str, rest: str) -> None:
         kind, *more = split(rest)
         count = int(more[0].split()[1]) if more and not more[0].startswith("align") else 1
         name = self._variable(result, "ptr")
         self._declared.append(f"uint64_t {name}room[{max(1, -(-size(kind) * count // 8))}];")
         self._lines.append(f"{name} = (char *){name}room;")
 
-    def _do_extractvalue(self, _: TextBlock, result: str, rest: str) -> None:
+    def _do_extractvalue(self, _block: TextBlock, result: str, rest: str) -> None:
         aggregate, *indices = split(rest)
         kind, operand = typed(aggregate)
         path = tuple(map(int, indices))
@@ -380,7 +314,7 @@ class _Writer:
             if place[: len(path)] == path:
                 self._put(_part(result, place[len(path) :]), leaf, value)
 
-    def _do_insertvalue(self, _: TextBlock, result: str, rest: str) -> None:
+    def _do_insertvalue(self, _block: TextBlock, result: str, rest: str) -> None:
         aggregate, given, *indices = split(rest)
         kind, operand = typed(aggregate)
         path = tuple(map(int, indices))
@@ -391,9 +325,9 @@ class _Writer:
         self._put_parts(result, kind, [*values.values()])
 
     def _do_fence(self, *_: object) -> None:
-        """An instance is used by one thread at a time."""
+        """Write nothing: an instance is used by one thread at a time."""
 
-    def _do_atomicrmw(self, _: TextBlock, result: str, rest: str) -> None:
+    def _do_atomicrmw(self, _block: TextBlock, result: str, rest: str) -> None:
         operation, _, rest = rest.partition(" ")
         pointer, given, *_more = split(rest)
         kind, operand = given.split(" ")[:2]
@@ -405,7 +339,7 @@ class _Writer:
         self._lines.append(f"{before} = ld_{suffix(kind)}({place});")
         self._lines.append(f"st_{suffix(kind)}({place}, {before} {sign} {self._value(kind, operand)});")
 
-    def _do_br(self, block: TextBlock, _: str, rest: str) -> None:
+    def _do_br(self, block: TextBlock, _result: str, rest: str) -> None:
         parts = split(rest)
         if len(parts) == 1:
             self._lines.append(self._jump(block, parts[0]))
@@ -415,7 +349,7 @@ class _Writer:
             f"if ({condition}) {{ {self._jump(block, parts[1])} }} else {{ {self._jump(block, parts[2])} }}"
         )
 
-    def _do_switch(self, block: TextBlock, _: str, rest: str) -> None:
+    def _do_switch(self, block: TextBlock, _result: str, rest: str) -> None:
         head, _, cases = rest.partition("[")
         given, default = split(head)
         kind, _, operand = given.partition(" ")
@@ -429,7 +363,8 @@ class _Writer:
     def _jump(self, block: TextBlock, label: str) -> str:
         """Return the jump from a block to another one, with the values that this takes from there."""
         target = plain(label.removeprefix("label "))
-        takes, gives = [], []
+        takes: list[str] = []
+        gives: list[str] = []
         for name, kind, values in self._phis[target]:
             given = values.get(block.label)
             if given is None:  # the first block has a number in place of a name
@@ -443,7 +378,7 @@ class _Writer:
             else f"goto {self._labels[target]};"
         )
 
-    def _do_ret(self, _: TextBlock, __: str, rest: str) -> None:
+    def _do_ret(self, _block: TextBlock, _result: str, rest: str) -> None:
         kind, operand = typed(rest)
         self._lines.append("return;" if kind == "void" else f"return {self._value(kind, operand)};")
 
@@ -484,38 +419,13 @@ class _Writer:
             if name not in LIBRARY:
                 raise Unexportable(f"'{name}' is not a function of C's library")
             return f"{name}({self._for_library(name, arguments, values)})"
-        match = _INTRINSIC.match(name)
-        function = match[1] if match else ""
-        kind = arguments[0][0] if arguments else ""
-        if function in ("memcpy", "memmove", "memset"):
-            return f"{function}({', '.join(values[:3])})"
-        if function in _RENAMED or function in LIBRARY:
-            return f"{_RENAMED.get(function, function)}({listed})"
-        a = values[0] if values else ""
-        if function in ("smax", "smin", "umax", "umin"):
-            sign, cast = (
-                ">" if function.endswith("max") else "<",
-                f"({signed(kind)})" if function[0] == "s" else "",
-            )
-            return f"({cast}{a} {sign} {cast}{values[1]} ? {a} : {values[1]})"
-        if function == "abs":
-            return f"(({signed(kind)}){a} < 0 ? ({c_type(kind)})(0 - {a}) : {a})"
-        if function == "usub":  # llvm.usub.sat
-            return f"({a} > {values[1]} ? ({c_type(kind)})({a} - {values[1]}) : 0)"
-        if function in ("ctlz", "cttz"):
-            return f"({c_type(kind)})zeros_{'above' if function == 'ctlz' else 'below'}({a}, {kind[1:]})"
-        if function == "ctpop":
-            return f"({c_type(kind)})bit_count({a})"
-        if name == "llvm.is.fpclass.f64":
-            return f"((class_of({a}) & {values[1]}) != 0)"
-        if function == "fmuladd":
-            return f"({a} * {values[1]} + {values[2]})"
-        if function == "x86" and name.startswith("llvm.x86.atomic.sub.cc.") and arguments[2][1] in ("4", "5"):
-            before = self._variable(f"{len(self._lines)}.before", arguments[1][0])
-            kinds = suffix(arguments[1][0])
-            self._lines.append(f"{before} = ld_{kinds}({a}); st_{kinds}({a}, {before} - {values[1]});")
+        if name.startswith("llvm.x86.atomic.sub.cc.") and arguments[2][1] in ("4", "5"):
+            kind, place = arguments[1][0], values[0]
+            before = self._variable(f"{len(self._lines)}.before", kind)
+            self._lines.append(f"{before} = ld_{suffix(kind)}({place});")
+            self._lines.append(f"st_{suffix(kind)}({place}, {before} - {values[1]});")
             return f"({before} {'==' if arguments[2][1] == '4' else '!='} {values[1]})"
-        raise Unexportable(f"'{name}' has no translation into C")
+        return intrinsic(name, arguments[0][0] if arguments else "", values)
 
     def _for_library(self, name: str, arguments: list[tuple[str, str]], values: list[str]) -> str:
         """Return the arguments as C's library takes them."""

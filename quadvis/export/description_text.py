@@ -69,7 +69,7 @@ def _lines_2(facts: Facts, variables: Sequence[Exported]) -> Iterator[str]:
     yield _experiment(facts)
     yield "  <ModelVariables>"
     for number, each in enumerate(variables):
-        attributes = f"{_name(each)} valueReference=\"{number}\" {_causality(each)}"
+        attributes = f'{_name(each)} valueReference="{number}" {_causality(each)}'
         kind = f"<{TYPES[2][each.scalar]}{_values(each)}/>"
         yield f"    <ScalarVariable {attributes}>{kind}</ScalarVariable>"
     yield "  </ModelVariables>"
@@ -78,7 +78,9 @@ def _lines_2(facts: Facts, variables: Sequence[Exported]) -> Iterator[str]:
     outputs = [each for each in variables if each.role == OUTPUT]
     if outputs:
         yield "    <Outputs>"
-        yield from (f'      <Unknown index="{indices[each.name]}"{_depends(each, variables, 1)}/>' for each in outputs)
+        yield from (
+            f'      <Unknown index="{indices[each.name]}"{_depends(each, variables, 1)}/>' for each in outputs
+        )
         yield "    </Outputs>"
         yield "    <InitialUnknowns>"
         yield from (f'      <Unknown index="{indices[each.name]}"/>' for each in outputs)
@@ -102,11 +104,12 @@ def _lines_3(facts: Facts, variables: Sequence[Exported]) -> Iterator[str]:
     yield _experiment(facts)
     yield "  <ModelVariables>"
     time = len(variables)
-    yield f'    <Float64 name="time" valueReference="{time}" causality="independent" variability="continuous" unit="s"/>'
+    facts_of_time = 'causality="independent" variability="continuous" unit="s"'
+    yield f'    <Float64 name="time" valueReference="{time}" {facts_of_time}/>'
     for number, each in enumerate(variables):
         kind = TYPES[3][each.scalar]
         sizes = "".join(f'<Dimension start="{size}"/>' for size in each.shape)
-        head = f"<{kind} {_name(each)} valueReference=\"{number}\" {_causality(each)}{_values(each)}"
+        head = f'<{kind} {_name(each)} valueReference="{number}" {_causality(each)}{_values(each)}'
         yield f"    {head}>{sizes}</{kind}>" if sizes else f"    {head}/>"
     yield "  </ModelVariables>"
     yield "  <ModelStructure>"
@@ -135,7 +138,9 @@ def _units(variables: Sequence[Exported]) -> Iterator[str]:
             plain = all(symbol in BASES and power.denominator == 1 for symbol, power in powers.items())
             base = "".join(f' {symbol}="{int(powers[symbol])}"' for symbol in BASES if symbol in powers)
             factor = f' factor="{unit.scale!r}"' if unit.scale != 1.0 else ""
-            yield f"    <Unit name={quoteattr(name)}>" + (f"<BaseUnit{base}{factor}/></Unit>" if plain else "</Unit>")
+            yield f"    <Unit name={quoteattr(name)}>" + (
+                f"<BaseUnit{base}{factor}/></Unit>" if plain else "</Unit>"
+            )
         yield "  </UnitDefinitions>"
 
 
@@ -157,7 +162,9 @@ def _values(each: Exported) -> str:
     found = f" unit={quoteattr(each.unit)}" if each.unit else ""
     if each.role == PARAMETER and each.scalar != "bool":
         limits = (("min", each.least), ("max", each.most))
-        found += "".join(f' {name}="{_number(each, value)}"' for name, value in limits if math.isfinite(value))
+        found += "".join(
+            f' {name}="{_number(each, value)}"' for name, value in limits if math.isfinite(value)
+        )
     if each.role in (INPUT, PARAMETER):
         found += f' start="{" ".join(_number(each, value) for value in each.start)}"'
     return found
@@ -172,7 +179,7 @@ def _number(each: Exported, value: float) -> str:
 
 
 def _depends(each: Exported, variables: Sequence[Exported], first: int) -> str:
-    """Return what an output follows at the same instant: places among the variables, counted from ``first``."""
+    """Return what an output follows at the same instant, by places among the variables from ``first`` on."""
     bases = set(each.follows)
     places = [
         str(place)

@@ -1,4 +1,4 @@
-"""`quadvis export --fmu`: a part of a diagram as an FMU, with its source in C and its library for this machine."""
+"""A part of a diagram as an FMU, with its source in C and its library for this machine."""
 
 from __future__ import annotations
 
@@ -80,7 +80,9 @@ def export_fmu(
     data = packed(files)
     _validate(data)
     write_output(path, FMU, data, diagram.inputs)
-    roles = {role: tuple(each.name for each in named if each.role == role) for role in (INPUT, OUTPUT, PARAMETER)}
+    roles = {
+        role: tuple(each.name for each in named if each.role == role) for role in (INPUT, OUTPUT, PARAMETER)
+    }
     return ExportedFmu(Path(path), version, roles[INPUT], roles[OUTPUT], roles[PARAMETER], facts.step)
 
 

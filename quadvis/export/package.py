@@ -53,7 +53,9 @@ def compiled(sources: Mapping[str, str], files: tuple[str, ...], name: str) -> b
         except OSError as error:
             raise QuadvisError(f"the C compiler cannot be run: {error.strerror}") from error
         if done.returncode:
-            lines = [line for line in done.stderr.splitlines() if "error" in line] or [f"code {done.returncode}"]
+            lines = [line for line in done.stderr.splitlines() if "error" in line] or [
+                f"code {done.returncode}"
+            ]
             raise QuadvisError(f"the C compiler refuses the sources: {quoted(lines[0], 200)}")
         return made.read_bytes()
 
@@ -64,7 +66,9 @@ def platform_folder(version: int) -> str:
     processors = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
     system, processor = systems.get(sys.platform), processors.get(platform.machine().lower())
     if system is None or processor is None:
-        raise QuadvisError(f"FMUs are not made on {sys.platform} for {platform.machine()}; Linux and macOS are known")
+        raise QuadvisError(
+            f"FMUs are not made on {sys.platform} for {platform.machine()}; Linux and macOS are known"
+        )
     return f"{system}64" if version == 2 and processor == "x86_64" else f"{processor}-{system}"
 
 

@@ -1,4 +1,4 @@
-"""A program as C: its memory at first, its variables, and what is called when, in the order of the interpreter."""
+"""A program as C: its memory at first, its variables, and what is called when."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import numpy as np
 
 from quadvis.engine.program import COPY, Op, Program, TaskProgram
 from quadvis.export.c_types import real
+from quadvis.export.selection import HELD
+from quadvis.export.selection import INPUT as FROM_OUTSIDE
 from quadvis.export.variables import INPUT, KINDS, OUTPUT, Exported
 from quadvis.native.tables import stage_numbers
 
@@ -123,6 +125,8 @@ class _Calls:
 
     def _op(self, op: Op) -> str:
         block = self._program.blocks[op.block]
+        if block.kind == FROM_OUTSIDE:
+            return self._copy(op._replace(sources=(block.field(HELD),)))
         places = [block.position, *(slot.position for slot in (*op.sources, *op.targets))]
         arguments = ", ".join(f"at(m, {place})" for place in places)
         return f'CALL({_text(block.path)}, "{op.method}", {self._names[op.block, op.method]}({arguments}));'

@@ -136,12 +136,10 @@ class _Inputs:
         """Yield the inputs: first those that are ports of the part, then what else comes in."""
         taken = set[str]()
         covered: dict[tuple[str, str], set[int]] = {pair: set() for pair in self._read}
-        for label, text in self._diagram.entries.items():
-            part, _, port = label.rpartition(".")
-            wire = read_name(text)
-            if part != name or wire is None or (wire.block, wire.port) not in self._read:
-                continue
+        for port, wire in self._entries(name):
             pair = wire.block, wire.port
+            if pair not in self._read:
+                continue
             numbers = _numbers(self._diagram.graph[wire.block], wire)
             if covered[pair] & {*numbers.ravel().tolist()}:
                 continue  # the diagram feeds two ports from one signal
@@ -160,6 +158,16 @@ class _Inputs:
             label = plain_name(f"{pair[0]}_{pair[1]}", taken)
             taken.add(label)
             yield self._terminal(label, pair, numbers)
+
+    def _entries(self, name: str) -> Iterator[tuple[str, Wire]]:
+        """Yield the inputs of the part, or of the block, with what feeds them."""
+        if name in self._inside:
+            yield from self._diagram.graph[name].wires()
+        for label, text in self._diagram.entries.items():
+            part, _, port = label.rpartition(".")
+            wire = read_name(text)
+            if part == name and wire is not None:
+                yield port, wire
 
     def _size(self, pair: tuple[str, str]) -> int:
         return int(np.prod(self._diagram.graph[pair[0]].shape(pair[1]), dtype=int))

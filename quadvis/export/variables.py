@@ -115,7 +115,7 @@ def _limits(param: Any) -> tuple[float, float]:
 
 
 class _Following:
-    """Which inputs an output follows at the same instant: along wires that are not late, through feedthrough."""
+    """Which inputs an output follows at the same instant: along wires that are not late."""
 
     def __init__(self, selection: Selection) -> None:
         self._graph = selection.graph

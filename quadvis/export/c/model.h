@@ -9,7 +9,7 @@
 typedef struct {
     uint64_t memory[SLOTS]; /* 8 bytes each: a double, a whole number, or a truth value in the first byte */
     int64_t tick;           /* the next to run */
-    double begin;           /* s: the time of the first tick */
+    double begin, now;      /* s: the time of the first tick; that which has been reached */
     uint8_t started;        /* the states have their first values */
     uint8_t arrived;        /* the time of the tick has come: what is due then can be computed */
     uint8_t fresh;          /* the outputs are those of the present inputs */

@@ -118,14 +118,16 @@ int model_advance(Model *m, double time) {
     if (!s->started && model_begin(m)) return 1;
     for (;;) {
         if (!s->arrived) {
-            if (time_of(s->tick) > end + NEAR) return 0;
+            if (time_of(s->tick) > end + NEAR) break;
             arrive(m);
         }
-        if (time_of(s->tick) > end - NEAR) return 0;
+        if (time_of(s->tick) > end - NEAR) break;
         if (outputs(m) || call_checks(m) || call_updates(m) || integrate(m)) return 1;
         s->tick++;
         s->arrived = 0;
     }
+    s->now = time;
+    return 0;
 }
 
 /* FMI's types are narrower and wider than those of the memory. */
