@@ -1,4 +1,4 @@
-"""The methods of blocks in C give the bits of the interpreted ones, and say where these raise an exception."""
+"""The methods of blocks in C give the bits of the interpreted ones, and fail where these do."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ GIVEN: dict[str, Any] = {
 # To compile takes seconds: a few stand for the others, with arrays that are allocated, noise, powers, loops.
 FIRST = ("signal.gain",)
 SOME = (
-    "plant.rotorcraft", "sources.noise", "sources.table", "signal.transport_delay", "estimation.position_filter",
-    "control.nested_saturation", "supervision.failsafe", "sensors.imu",
+    "plant.rotorcraft", "sources.noise", "sources.table", "signal.transport_delay",
+    "estimation.position_filter", "control.nested_saturation", "supervision.failsafe", "sensors.imu",
 )  # fmt: skip
 
 
@@ -48,7 +48,8 @@ def library(rig: Rig, folder: Path) -> tuple[dict[str, Any], dict[str, Op]]:
         listed = ", ".join(f"(char *)p[{k}]" for k in range(count))
         name = code.names[0, method]
         lines.append(
-            f'__attribute__((visibility("default"))) int call_{method}(char **p) {{ return {name}({listed}); }}'
+            f'__attribute__((visibility("default"))) int call_{method}(char **p) '
+            f"{{ return {name}({listed}); }}"
         )
     (folder / "blocks.c").write_text("\n".join(lines))
     made = folder / "blocks.so"
