@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
-from quadvis.export.variables import INPUT, OUTPUT, PARAMETER, Exported
+from quadvis.export.variables import INPUT, OUTPUT, PARAMETER, ExportedVariable
 from quadvis.units import Unit
 from quadvis.version import __version__
 
@@ -35,7 +35,7 @@ class Facts:
     stop: float
 
 
-def model_description(facts: Facts, variables: Sequence[Exported]) -> str:
+def model_description(facts: Facts, variables: Sequence[ExportedVariable]) -> str:
     """Return modelDescription.xml. In FMI 2.0 all variables are scalars."""
     lines = _lines_2(facts, variables) if facts.version == 2 else _lines_3(facts, variables)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + "\n".join(lines) + "\n"
@@ -52,7 +52,7 @@ def build_description(facts: Facts) -> str:
     )
 
 
-def _lines_2(facts: Facts, variables: Sequence[Exported]) -> Iterator[str]:
+def _lines_2(facts: Facts, variables: Sequence[ExportedVariable]) -> Iterator[str]:
     yield (
         f'<fmiModelDescription fmiVersion="2.0" modelName={quoteattr(facts.name)} guid="{facts.token}"'
         f' description={quoteattr(facts.doc)} generationTool="quadvis {__version__}"'
@@ -89,7 +89,7 @@ def _lines_2(facts: Facts, variables: Sequence[Exported]) -> Iterator[str]:
     yield "</fmiModelDescription>"
 
 
-def _lines_3(facts: Facts, variables: Sequence[Exported]) -> Iterator[str]:
+def _lines_3(facts: Facts, variables: Sequence[ExportedVariable]) -> Iterator[str]:
     yield (
         f'<fmiModelDescription fmiVersion="3.0" modelName={quoteattr(facts.name)}'
         f' instantiationToken="{facts.token}" description={quoteattr(facts.doc)}'
@@ -127,7 +127,7 @@ def _experiment(facts: Facts) -> str:
     return f'  <DefaultExperiment startTime="0.0" stopTime="{facts.stop!r}" stepSize="{facts.step!r}"/>'
 
 
-def _units(variables: Sequence[Exported]) -> Iterator[str]:
+def _units(variables: Sequence[ExportedVariable]) -> Iterator[str]:
     """Yield the definitions of all units: what SI makes of them."""
     names = {each.unit for each in variables if each.unit} | {"s"}
     if names:
@@ -144,12 +144,12 @@ def _units(variables: Sequence[Exported]) -> Iterator[str]:
         yield "  </UnitDefinitions>"
 
 
-def _name(each: Exported) -> str:
+def _name(each: ExportedVariable) -> str:
     doc = " ".join(each.doc.split())
     return f"name={quoteattr(each.name)}" + (f" description={quoteattr(doc)}" if doc else "")
 
 
-def _causality(each: Exported) -> str:
+def _causality(each: ExportedVariable) -> str:
     if each.role == PARAMETER:
         return 'causality="parameter" variability="tunable" initial="exact"'
     variability = "continuous" if each.scalar == "float64" else "discrete"
@@ -157,7 +157,7 @@ def _causality(each: Exported) -> str:
     return f'causality="{each.role}" variability="{variability}"{initial}'
 
 
-def _values(each: Exported) -> str:
+def _values(each: ExportedVariable) -> str:
     """Return unit, limits and start value as attributes."""
     found = f" unit={quoteattr(each.unit)}" if each.unit else ""
     if each.role == PARAMETER and each.scalar != "bool":
@@ -170,7 +170,7 @@ def _values(each: Exported) -> str:
     return found
 
 
-def _number(each: Exported, value: float) -> str:
+def _number(each: ExportedVariable, value: float) -> str:
     if each.scalar == "bool":
         return "true" if value else "false"
     if math.isinf(value):
@@ -178,7 +178,7 @@ def _number(each: Exported, value: float) -> str:
     return str(int(value)) if each.scalar == "int64" else repr(float(value))
 
 
-def _depends(each: Exported, variables: Sequence[Exported], first: int) -> str:
+def _depends(each: ExportedVariable, variables: Sequence[ExportedVariable], first: int) -> str:
     """Return what an output follows at the same instant, by places among the variables from ``first`` on."""
     bases = set(each.follows)
     places = [

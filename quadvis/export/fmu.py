@@ -17,7 +17,7 @@ from quadvis.export.description_text import SOURCES, Facts, build_description, m
 from quadvis.export.package import FMU, compiled, fmi_headers, library_suffix, packed, platform_folder
 from quadvis.export.program_text import program_calls, program_header
 from quadvis.export.selection import WHOLE, selected_blocks
-from quadvis.export.variables import INPUT, OUTPUT, PARAMETER, Exported, variables_of
+from quadvis.export.variables import INPUT, OUTPUT, PARAMETER, ExportedVariable, variables_of
 from quadvis.machine.files import PathLike, write_output
 
 C = Path(__file__).parent / "c"
@@ -86,7 +86,7 @@ def export_fmu(
     return ExportedFmu(Path(path), version, roles[INPUT], roles[OUTPUT], roles[PARAMETER], facts.step)
 
 
-def _scalars(variables: Sequence[Exported]) -> list[Exported]:
+def _scalars(variables: Sequence[ExportedVariable]) -> list[ExportedVariable]:
     """Return one variable for each element, as FMI 2.0 wants it."""
     return [
         replace(variable, name=name, slots=(slot,), shape=(), start=(start,))

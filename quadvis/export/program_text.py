@@ -11,14 +11,14 @@ from quadvis.engine.program import COPY, Op, Program, TaskProgram
 from quadvis.export.c_types import real
 from quadvis.export.selection import HELD
 from quadvis.export.selection import INPUT as FROM_OUTSIDE
-from quadvis.export.variables import INPUT, KINDS, OUTPUT, Exported
+from quadvis.export.variables import INPUT, KINDS, OUTPUT, ExportedVariable
 from quadvis.native.tables import stage_numbers
 
 SLOT = 8
 _LETTERS = {INPUT: "i", OUTPUT: "o"}
 
 
-def program_header(program: Program, variables: Sequence[Exported], token: str) -> str:
+def program_header(program: Program, variables: Sequence[ExportedVariable], token: str) -> str:
     """Return program.h: what the other files need to know of a program."""
     settable = sum(len(each.slots) for each in variables if each.role != OUTPUT)
     held = len(_held(program))
@@ -38,7 +38,7 @@ def program_header(program: Program, variables: Sequence[Exported], token: str) 
 
 
 def program_calls(
-    program: Program, variables: Sequence[Exported], names: Mapping[tuple[int, str], str]
+    program: Program, variables: Sequence[ExportedVariable], names: Mapping[tuple[int, str], str]
 ) -> str:
     """Return calls.h. ``names`` are the C functions by the number of a block and its method."""
     return "\n".join([*_tables(program, variables), *_Calls(program, names).lines()]) + "\n"
@@ -51,7 +51,7 @@ def _held(program: Program) -> list[int]:
     ]
 
 
-def _tables(program: Program, variables: Sequence[Exported]) -> Iterator[str]:
+def _tables(program: Program, variables: Sequence[ExportedVariable]) -> Iterator[str]:
     words = np.frombuffer(program.image, np.uint64)
     cells = ", ".join(f"[{place}] = UINT64_C({value})" for place, value in enumerate(words.tolist()) if value)
     yield f"static const uint64_t image[SLOTS] = {{{cells or '0'}}};"

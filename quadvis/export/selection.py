@@ -21,7 +21,7 @@ HELD = "held"  # their state: the value that was set
 
 
 @dataclass(frozen=True)
-class Terminal:
+class ExportPort:
     """An input or an output: elements of a port or of a state of a block, as a signal of its own."""
 
     name: str
@@ -34,16 +34,16 @@ class Terminal:
 
 
 @dataclass(frozen=True)
-class Selection:
+class ExportSelection:
     """Blocks of a diagram as a graph of their own, which has a block for each signal from outside."""
 
     name: str
     graph: Graph
-    inputs: tuple[Terminal, ...]
-    outputs: tuple[Terminal, ...]
+    inputs: tuple[ExportPort, ...]
+    outputs: tuple[ExportPort, ...]
 
 
-def selected_blocks(diagram: Diagram, name: str) -> Selection:
+def selected_blocks(diagram: Diagram, name: str) -> ExportSelection:
     """Return what a name means: a part, a block, or "." for the whole diagram.
 
     QuadvisError, in a sentence, if there is no such part, or if it has blocks that no FMU can have.
@@ -62,7 +62,7 @@ def selected_blocks(diagram: Diagram, name: str) -> Selection:
     nodes = [*inputs.nodes.values(), *(replace(node, inputs=inputs.wired(node)) for node in chosen)]
     step = graph.step if any(node.task.continuous for node in nodes) else None
     made = Graph(graph.name, nodes, graph.solver, step, graph.tasking)
-    return Selection(name, made, tuple(inputs.terminals), tuple(_outputs(diagram, name, chosen)))
+    return ExportSelection(name, made, tuple(inputs.terminals), tuple(_outputs(diagram, name, chosen)))
 
 
 def _belongs(path: str, name: str) -> bool:
@@ -132,7 +132,7 @@ class _Inputs:
         block: Block = type("FmuInput", (Block,), members)(period=float(task.period))
         return Node(self._names[pair], INPUT, block, task, {}, units={"y": producer.units[pair[1]]})
 
-    def _terminals(self, name: str) -> Iterator[Terminal]:
+    def _terminals(self, name: str) -> Iterator[ExportPort]:
         """Yield the inputs: first those that are ports of the part, then what else comes in."""
         taken = set[str]()
         covered: dict[tuple[str, str], set[int]] = {pair: set() for pair in self._read}
@@ -172,12 +172,12 @@ class _Inputs:
     def _size(self, pair: tuple[str, str]) -> int:
         return int(np.prod(self._diagram.graph[pair[0]].shape(pair[1]), dtype=int))
 
-    def _terminal(self, label: str, pair: tuple[str, str], numbers: Any) -> Terminal:
+    def _terminal(self, label: str, pair: tuple[str, str], numbers: Any) -> ExportPort:
         producer = self._diagram.graph[pair[0]]
         scalar = producer.block.interface.outputs[pair[1]].signal.scalar
         elements = tuple(int(k) for k in numbers.ravel())
         unit = _unit(producer, pair[1], elements)
-        return Terminal(label, self._names[pair], HELD, elements, tuple(numbers.shape), unit, scalar)
+        return ExportPort(label, self._names[pair], HELD, elements, tuple(numbers.shape), unit, scalar)
 
 
 def _numbers(node: Node, wire: Wire) -> Any:
@@ -192,7 +192,7 @@ def _unit(node: Node, port: str, elements: Sequence[int]) -> str:
     return names.pop() if len(names) == 1 else ""
 
 
-def _outputs(diagram: Diagram, name: str, chosen: Sequence[Node]) -> Iterator[Terminal]:
+def _outputs(diagram: Diagram, name: str, chosen: Sequence[Node]) -> Iterator[ExportPort]:
     inside = {node.path: node for node in chosen}
     for label, wire in _exports(diagram, name, inside):
         node = inside[wire.block]
@@ -201,7 +201,7 @@ def _outputs(diagram: Diagram, name: str, chosen: Sequence[Node]) -> Iterator[Te
             continue
         numbers = _numbers(node, wire)
         elements = tuple(int(k) for k in numbers.ravel())
-        yield Terminal(
+        yield ExportPort(
             label, wire.block, wire.port, elements, tuple(numbers.shape), _unit(node, wire.port, elements),
             declared.signal.scalar,
         )  # fmt: skip

@@ -11,14 +11,14 @@ import numpy as np
 
 from quadvis.engine.engine import Engine
 from quadvis.engine.memory import Slot
-from quadvis.export.selection import WHOLE, Selection
+from quadvis.export.selection import WHOLE, ExportSelection
 
 INPUT, OUTPUT, PARAMETER = "input", "output", "parameter"
 KINDS = {"float64": "d", "int64": "q", "bool": "b"}
 
 
 @dataclass(frozen=True)
-class Exported:
+class ExportedVariable:
     """A variable: ``slots`` has the slot of each element in memory, ``start`` their values in SI units.
 
     ``above`` and ``below`` are limits of a parameter, inclusive; ``follows`` are the inputs, by name, that an
@@ -48,7 +48,7 @@ class Exported:
             yield f"{self.name}[{','.join(str(index + 1) for index in place)}]", slot, start
 
 
-def variables_of(selection: Selection, engine: Engine) -> list[Exported]:
+def variables_of(selection: ExportSelection, engine: Engine) -> list[ExportedVariable]:
     """Return the variables of a selection, whose graph an engine runs; no two have one name."""
     found = [*_terminals(selection, engine), *_parameters(selection, engine)]
     names = set[str]()
@@ -58,11 +58,11 @@ def variables_of(selection: Selection, engine: Engine) -> list[Exported]:
         if name in names:  # a part may have an input and an output of one name
             name = f"{name}_out" if variable.role == OUTPUT else f"{name}_parameter"
         names.add(name)
-        made.append(Exported(**{**vars(variable), "name": name}))
+        made.append(ExportedVariable(**{**vars(variable), "name": name}))
     return made
 
 
-def _terminals(selection: Selection, engine: Engine) -> Iterator[Exported]:
+def _terminals(selection: ExportSelection, engine: Engine) -> Iterator[ExportedVariable]:
     following = _Following(selection)
     for role, terminals in ((INPUT, selection.inputs), (OUTPUT, selection.outputs)):
         for each in terminals:
@@ -73,7 +73,7 @@ def _terminals(selection: Selection, engine: Engine) -> Iterator[Exported]:
             declared = selection.graph[each.block].block.interface.outputs.get(each.port)
             doc = declared.doc if declared is not None and role == OUTPUT else ""
             unit = each.unit if each.scalar == "float64" else ""
-            yield Exported(
+            yield ExportedVariable(
                 each.name, role, each.scalar, slots, each.shape, unit, doc, start, -np.inf, np.inf, follows
             )
 
@@ -82,7 +82,7 @@ def _values(engine: Engine, scalar: str, slots: tuple[int, ...]) -> tuple[Any, .
     return tuple(engine.memory.read(Slot(scalar, (), slot)) for slot in slots)
 
 
-def _parameters(selection: Selection, engine: Engine) -> Iterator[Exported]:
+def _parameters(selection: ExportSelection, engine: Engine) -> Iterator[ExportedVariable]:
     """Yield the parameters that may change during a run."""
     prefix = "" if selection.name == WHOLE else f"{selection.name}/"
     for tunable in engine.program.tunables:
@@ -94,7 +94,7 @@ def _parameters(selection: Selection, engine: Engine) -> Iterator[Exported]:
         units = node.units.get(tunable.name)
         unit = str(units[0]) if units and len(set(units)) == 1 else "" if units else str(param.units[0])
         least, most = _limits(param)
-        yield Exported(
+        yield ExportedVariable(
             name, PARAMETER, tunable.slot.scalar, slots, tunable.slot.shape,
             unit if tunable.slot.scalar == "float64" else "", param.doc,
             _values(engine, tunable.slot.scalar, slots), least, most,
@@ -117,7 +117,7 @@ def _limits(param: Any) -> tuple[float, float]:
 class _Following:
     """Which inputs an output follows at the same instant: along wires that are not late."""
 
-    def __init__(self, selection: Selection) -> None:
+    def __init__(self, selection: ExportSelection) -> None:
         self._graph = selection.graph
         self._names: Mapping[str, list[str]] = {}
         for each in selection.inputs:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from quadvis.fmi.exchange import DISCARD, ENDING, EVENT, OK, Setup
+from quadvis.fmi.exchange import DISCARD, ENDING, EVENT, OK, FmuSetup
 from quadvis.fmi.messages import Messages
 
 Call = Callable[[], int]
@@ -61,7 +61,7 @@ class _EventInfo(ctypes.Structure):
 class Calls2:
     """An instance of an FMU of FMI 2.0; `instantiate` comes first."""
 
-    def __init__(self, library: ctypes.CDLL, setup: Setup, messages: Messages) -> None:
+    def __init__(self, library: ctypes.CDLL, setup: FmuSetup, messages: Messages) -> None:
         self._library, self._setup = library, setup
         libc = ctypes.CDLL(None)
         address = [ctypes.cast(function, ctypes.c_void_p) for function in (libc.calloc, libc.free)]

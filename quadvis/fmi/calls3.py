@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from quadvis.fmi.exchange import DISCARD, ENDING, EVENT, OK, Setup
+from quadvis.fmi.exchange import DISCARD, ENDING, EVENT, OK, FmuSetup
 from quadvis.fmi.messages import Messages
 
 Call = Callable[[], int]
@@ -18,7 +18,7 @@ _FALSE, _TRUE = ctypes.c_bool(False), ctypes.c_bool(True)
 class Calls3:
     """An instance of an FMU of FMI 3.0; `instantiate` comes first. The methods are those of `Calls2`."""
 
-    def __init__(self, library: ctypes.CDLL, setup: Setup, messages: Messages) -> None:
+    def __init__(self, library: ctypes.CDLL, setup: FmuSetup, messages: Messages) -> None:
         self._library, self._setup = library, setup
         self._logger = Logger(lambda _, status, __, text: messages.take(status, text))
         self._component = ctypes.c_void_p()

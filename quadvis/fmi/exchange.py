@@ -3,7 +3,7 @@
  control words | inputs | outputs | tunable parameters | states | derivatives
 
 Values of one type lie side by side, so that one call sets or gets them all. Who has only the buffer and a
-`Setup` as JSON can run the FMU: the caller's units, shapes and names stay with the caller.
+`FmuSetup` as JSON can run the FMU: the caller's units, shapes and names stay with the caller.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ FORMATS = {
 SIZES = {"d": 8, "f": 4, "b": 1, "B": 1, "h": 2, "H": 2, "i": 4, "I": 4, "q": 8, "Q": 8, "?": 1}
 
 
-class Section(NamedTuple):
+class ExchangeSection(NamedTuple):
     """``size`` values of one type, side by side from ``offset`` (bytes) on; an array is one reference."""
 
     kind: str
@@ -49,7 +49,7 @@ class Section(NamedTuple):
 class Laid(NamedTuple):
     """Sections of signals, one for each type, and the place (bytes) of each signal."""
 
-    sections: tuple[Section, ...]
+    sections: tuple[ExchangeSection, ...]
     places: list[int]
 
 
@@ -62,7 +62,7 @@ class FixedValues(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Setup:
+class FmuSetup:
     """All that is needed to run an FMU over a buffer. ``states`` is None for co-simulation.
 
     ``resources`` is a URI in FMI 2.0, a path in 3.0. ``states_at`` and ``slopes_at`` are bytes in the buffer.
@@ -76,9 +76,9 @@ class Setup:
     resources: str
     start_time: float
     fixed: tuple[FixedValues, ...]
-    inputs: tuple[Section, ...]
-    outputs: tuple[Section, ...]
-    tunable: tuple[Section, ...]
+    inputs: tuple[ExchangeSection, ...]
+    outputs: tuple[ExchangeSection, ...]
+    tunable: tuple[ExchangeSection, ...]
     states: int | None
     states_at: int
     slopes_at: int
@@ -93,16 +93,16 @@ class Setup:
         return asdict(self)
 
     @staticmethod
-    def read(data: dict[str, Any]) -> Setup:
+    def read(data: dict[str, Any]) -> FmuSetup:
         """Return what `plain` has given."""
         lists: dict[str, Any] = {
             "fixed": tuple(FixedValues(*each) for each in data["fixed"]),
             **{
-                name: tuple(Section(*each) for each in data[name])
+                name: tuple(ExchangeSection(*each) for each in data[name])
                 for name in ("inputs", "outputs", "tunable")
             },
         }
-        return Setup(**{**data, **lists})
+        return FmuSetup(**{**data, **lists})
 
 
 class Room:
@@ -111,9 +111,9 @@ class Room:
     def __init__(self) -> None:
         self.size = DATA
 
-    def section(self, version: int, kind: str, references: Sequence[int], size: int) -> Section:
+    def section(self, version: int, kind: str, references: Sequence[int], size: int) -> ExchangeSection:
         """Return a section for so many values of a type."""
-        made = Section(kind, tuple(references), size, self.size)
+        made = ExchangeSection(kind, tuple(references), size, self.size)
         self.take(SIZES[FORMATS[version][kind]] * size)
         return made
 

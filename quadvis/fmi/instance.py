@@ -37,9 +37,9 @@ from quadvis.fmi.exchange import (
     TIME,
     TUNE,
     WARNING,
+    ExchangeSection,
     FixedValues,
-    Section,
-    Setup,
+    FmuSetup,
 )
 from quadvis.fmi.messages import Messages
 
@@ -59,7 +59,7 @@ class FmuInstance:
     Each returns a status as in ``quadvis.fmi.exchange``; what the FMU says about it is in the buffer.
     """
 
-    def __init__(self, setup: Setup, buffer: Any, folder: str) -> None:
+    def __init__(self, setup: FmuSetup, buffer: Any, folder: str) -> None:
         self._setup, self._buffer, self._folder = setup, buffer, folder
         self._messages = Messages()
         self._calls: Calls2 | Calls3 | None = None
@@ -152,7 +152,7 @@ class FmuInstance:
 
         return call
 
-    def _array(self, section: Section) -> Any:
+    def _array(self, section: ExchangeSection) -> Any:
         kind = TYPES[FORMATS[self._setup.version][section.kind]]
         return (kind * section.size).from_buffer(self._buffer, section.offset)
 

@@ -11,7 +11,7 @@ from typing import Any
 from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.fmi.archive import refused
 from quadvis.fmi.description import REALS, FmuDescription, FmuInterface, FmuVariable
-from quadvis.fmi.exchange import SLOT, FixedValues, Room, Setup
+from quadvis.fmi.exchange import SLOT, FixedValues, FmuSetup, Room
 from quadvis.fmi.packing import laid_out
 from quadvis.fmi.reading import one_interface, read_fmu
 from quadvis.fmi.running import IsolatedFmu, LocalFmu, formatter
@@ -94,7 +94,7 @@ class FmuPlan:
         """
         unpacked = UnpackedFmu(self.path, self.description.version, self.interface.identifier)
         layout = self._layout
-        setup = Setup(
+        setup = FmuSetup(
             self.description.version,
             self.interface.identifier,
             self.description.token,

@@ -19,7 +19,7 @@ from typing import Any, Protocol
 
 from quadvis.errors import QuadvisError, sentence
 from quadvis.fmi import exchange
-from quadvis.fmi.exchange import END, FORGET, LENGTH, NUMBER, RESTORE, SAVE, TEXT, Setup
+from quadvis.fmi.exchange import END, FORGET, LENGTH, NUMBER, RESTORE, SAVE, TEXT, FmuSetup
 from quadvis.fmi.instance import MOST_STATE, FmuInstance
 
 START = 30.0  # s that an FMU has at least to be loaded and initialised
@@ -93,7 +93,7 @@ class _Common:
 
     buffer: Any
 
-    def __init__(self, setup: Setup, folder: Path) -> None:
+    def __init__(self, setup: FmuSetup, folder: Path) -> None:
         self._setup, self._folder = setup, folder
 
     def ask(self, request: int) -> None:
@@ -149,7 +149,7 @@ class _Common:
 class LocalFmu(_Common):
     """An FMU whose library is loaded into this process: what it does wrong ends this process, too."""
 
-    def __init__(self, setup: Setup, folder: Path) -> None:
+    def __init__(self, setup: FmuSetup, folder: Path) -> None:
         super().__init__(setup, folder)
         self.buffer = bytearray(setup.size)
         self._instance = FmuInstance(setup, self.buffer, str(folder))
@@ -178,7 +178,7 @@ class LocalFmu(_Common):
 class IsolatedFmu(_Common):
     """An FMU in a process of its own. A request that is not done within ``deadline`` (s) ends it."""
 
-    def __init__(self, setup: Setup, folder: Path, deadline: float) -> None:
+    def __init__(self, setup: FmuSetup, folder: Path, deadline: float) -> None:
         super().__init__(setup, folder)
         self._deadline = deadline
         self._file = _shared_file(setup.size)

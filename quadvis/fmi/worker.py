@@ -17,7 +17,7 @@ import sys
 import threading
 from contextlib import suppress
 
-from quadvis.fmi.exchange import ANSWERED, DATA, END, SLEEPS, SLOT, STATUS, Setup
+from quadvis.fmi.exchange import ANSWERED, DATA, END, SLEEPS, SLOT, STATUS, FmuSetup
 from quadvis.fmi.instance import FmuInstance
 
 
@@ -26,7 +26,7 @@ def main() -> None:
     buffer_file, asked, answered, life = map(int, sys.argv[1:5])
     given = json.load(sys.stdin)
     folder = given.pop("folder")
-    setup = Setup.read(given)
+    setup = FmuSetup.read(given)
     threading.Thread(target=_end_with_caller, args=(life, folder), daemon=True).start()
     _keep_quiet()
     buffer = mmap.mmap(buffer_file, setup.size)
