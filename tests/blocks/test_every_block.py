@@ -17,6 +17,8 @@ from quadvis.testing import drive
 from quadvis.testing.conformance import CHECKS, Subject
 from quadvis_blocks.vision.rendered_camera import RenderedCamera
 from quadvis_vision.camera.calibration import CameraCalibration
+from tests.fmus.builder import COMPILER, fmu
+from tests.fmus.models import BALL
 
 ROOT = Path(__file__).parents[2]
 CALIB = ROOT / "diagrams" / "calib"
@@ -77,7 +79,13 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
         values |= {"folder": str(_pictures(folder)), "file": str(_video(folder / "video.avi"))}
     if name == "sources.recording":
         values |= {"file": str(_log(folder / "run.mcap")), "signal": "eyes.centres"}
+    if name == "fmi.fmu":
+        if COMPILER is None:
+            pytest.skip("compiles an FMU with gcc")
+        values |= {"file": fmu(BALL)}
     given = {key: values[key] for key in required}
+    if name == "fmi.fmu":
+        given["isolation"] = "none"  # a process for each rig takes its time; see test_fmu.py
     if "latency" in block.interface.params:
         given["latency"] = 0.15
     inputs: dict[str, list[Any]] = {}

@@ -20,7 +20,7 @@ from quadvis.api import load_text
 from quadvis.block import ParameterError
 from quadvis.errors import DiagramError, RunError
 from quadvis.fmi.unpacked import PREFIX
-from quadvis.testing import drive
+from quadvis.testing import check_block, drive
 from quadvis_blocks.fmi.fmu import Fmu
 from tests.fmus import models
 from tests.fmus.builder import Model, Var, fmu, needs_gcc
@@ -274,7 +274,7 @@ blocks:
 HANGING = """
 import sys
 sys.path[:0] = {path!r}
-from quadvis.testing import drive
+from quadvis.testing import check_block, drive
 from quadvis_blocks.fmi.fmu import Fmu
 drive(Fmu(file={file!r}, deadline=100.0), rate="10 Hz", steps=100000000)
 """
@@ -490,3 +490,10 @@ def test_a_step_inside_that_does_not_divide_the_period_is_a_doubt() -> None:
     (doubt,) = Fmu(file=fmu(model, 3), period=0.5).doubts()
     assert "the FMU steps by 0.2 s inside, which does not divide its period, 0.5 s" in str(doubt)
     assert Fmu(file=fmu(model, 3), period=0.4).doubts() == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("version", [2, 3])
+def test_it_conforms_in_a_process_of_its_own(version: int) -> None:
+    given = {"file": fmu(models.INTEGRATOR, version), "isolation": "process", "kind": "cosimulation"}
+    check_block(Fmu, given=given, test=Path(__file__))
