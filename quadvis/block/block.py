@@ -31,7 +31,7 @@ FILES = ("reads", "read_file", "verify_files")
 TAGS = ("not_replayable", "not_restorable", "harmless")
 RESERVED = {
     "self", "time", "period", "until", "interface", "numeric", "stepwise", "functions",
-    "open", "close", "write_safe", "keep", "put_back",
+    "open", "close", "write_safe", "keep", "put_back", "brings_code",
     PORTS, "ports_from", "with_ports", "made_for",
     *CHECKS, *FILES, *METHODS, *TAGS,
 }  # fmt: skip
@@ -102,6 +102,7 @@ class Block:
     functions: ClassVar[tuple[Any, ...]] = ()  # plain functions with machine code that its methods call
     not_replayable: ClassVar[str] = ""  # why a second run may differ from the first: "it reads a camera"
     not_restorable: ClassVar[str] = ""  # why it cannot return to a snapshot: "the model has no way back"
+    brings_code: ClassVar[str] = ""  # the parameter whose file a run executes
     harmless: ClassVar[str] = ""  # why its writes need no safe values: "a file moves nothing"
     made_for: ClassVar[Mapping[str, Any] | None] = None  # the parameters from which the ports were made
     period: float = math.nan

@@ -43,7 +43,8 @@ def _own_blocks(options: argparse.Namespace) -> OwnBlocks:
 
     def say(folder: Path) -> None:
         if folder not in said:
-            print(f"own blocks from {str(folder)!r}", file=sys.stderr, flush=True)
+            what = "own blocks" if folder.is_dir() else "machine code"
+            print(f"{what} from {str(folder)!r}", file=sys.stderr, flush=True)
         said.add(folder)
 
     return say

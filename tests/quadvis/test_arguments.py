@@ -15,8 +15,9 @@ from quadvis.errors import QuadvisError
 
 HELP = "see 'quadvis --help'"
 COMMANDS = (
-    "run, replay, sweep, check, list, describe, analyse, draw, export, program, diff, plot, schema, camera, cache, "
-    "target, load, start, stop, unload, status, get, set, scope, log, sets, web, console, new, keys, wire"
+    "run, replay, sweep, check, list, describe, analyse, draw, export, program, diff, plot, schema, camera, "
+    "cache, target, load, start, stop, unload, status, get, set, scope, log, sets, web, console, new, keys, "
+    "wire"
 )
 
 
