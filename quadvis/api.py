@@ -15,6 +15,7 @@ from quadvis.library.catalogue import OwnBlocks
 
 if TYPE_CHECKING:
     from quadvis.analysis.analyse import Analysis
+    from quadvis.export.fmu import ExportedFmu
     from quadvis.output.recording import Recorded
     from quadvis.realtime.options import RealTime
     from quadvis.run.live import LiveRun
@@ -83,6 +84,12 @@ class Diagram(Checked):
     def varied(self, setting: str) -> Diagram:
         """Return the diagram, loaded again with one more parameter replaced: ``block.parameter=value``."""
         return _with_methods(loading.varied(self, setting))
+
+    def export_fmu(self, name: str, path: str | Path, *, version: int = 2) -> ExportedFmu:
+        """Write a part, a block, or "." for all of it, as an FMU; see ``quadvis.export.fmu.export_fmu``."""
+        from quadvis.export.fmu import export_fmu
+
+        return export_fmu(self, name, path, version=version)
 
     def draw(self) -> str:
         """Return a picture of the diagram as SVG."""

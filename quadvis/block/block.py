@@ -40,6 +40,7 @@ class Block:
     functions: ClassVar[tuple[Any, ...]] = ()  # plain functions with machine code that its methods call
     not_replayable: ClassVar[str] = ""  # why a second run may differ from the first: "it reads a camera"
     not_restorable: ClassVar[str] = ""  # why it cannot return to a snapshot: "the model has no way back"
+    brings_code: ClassVar[str] = ""  # the parameter whose file a run executes
     harmless: ClassVar[str] = ""  # why its writes need no safe values: "a file moves nothing"
     example: ClassVar[str] = ""  # entries under `blocks` that show its use, at the rates fast and continuous
     # The parameters and the numbers of inputs from which the ports were made; these numbers alone.

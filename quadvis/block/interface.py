@@ -33,7 +33,7 @@ FILES = ("reads", "read_file", "verify_files")
 TAGS = ("not_replayable", "not_restorable", "harmless")
 RESERVED = {
     "self", "time", "period", "until", "interface", "numeric", "stepwise", "functions", "example",
-    "open", "close", "write_safe", "keep", "put_back",
+    "open", "close", "write_safe", "keep", "put_back", "brings_code",
     PORTS, "ports_from", "with_ports", "made_for", "entry_counts", "with_entries",
     *CHECKS, *FILES, *METHODS, *TAGS,
 }  # fmt: skip

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from quadvis.cli.default_places import default_name, log_path, runs_folder
 from quadvis.errors import Fault, QuadvisError, RunError, counted
-from quadvis.machine.files import SVG, Kind, write_output
+from quadvis.machine.files import SVG, Kind, file_name, write_output
 from quadvis.machine.garbage import collected_from_now_on
 from quadvis.machine.shipped import PREFIX, named_file
 
@@ -43,7 +43,8 @@ def _own_blocks(options: argparse.Namespace) -> OwnBlocks:
 
     def say(folder: Path) -> None:
         if folder not in said:
-            print(f"own blocks from {str(folder)!r}", file=sys.stderr, flush=True)
+            what = "own blocks" if folder.is_dir() else "machine code"
+            print(f"{what} from {str(folder)!r}", file=sys.stderr, flush=True)
         said.add(folder)
 
     return say
@@ -345,6 +346,23 @@ def draw(options: argparse.Namespace) -> int:
     diagram = _load(options)
     output = options.output or f"{default_name(options, options.variant)}.svg"
     return _write(draw_diagram(diagram), output, SVG, diagram.inputs)
+
+
+def export(options: argparse.Namespace) -> int:
+    """Write a part of a diagram as an FMU."""
+    from quadvis.export.fmu import export_fmu
+    from quadvis.export.selection import WHOLE
+    from quadvis.machine.status_line import StatusLine
+
+    diagram = _load(options)
+    name = default_name(options, options.variant) if options.fmu == WHOLE else file_name(options.fmu)
+    output = options.output or f"{name}.fmu"
+    with StatusLine() as line:
+        made = export_fmu(diagram, options.fmu, output, version=options.fmi, announce=line.say)
+    for what, names in (("inputs", made.inputs), ("outputs", made.outputs), ("parameters", made.parameters)):
+        print(f"{what + ':':12}{', '.join(names) or 'none'}")
+    print(f"{output}: FMI {made.version}.0, steps of {made.step:.9g} s")
+    return 0
 
 
 def program(options: argparse.Namespace) -> int:

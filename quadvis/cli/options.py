@@ -63,6 +63,14 @@ signals (null unless both are logs): {compared, different: [{signal, unit, eleme
 different_rows, time_s}], only_old, only_new, unlike: [{signal, what}]}. A kind is added, removed or changed.
 Exit code: 0 the same, 1 different, 2 bad input."""
 
+EXPORT_HELP = """\
+Inputs are the inputs of the part, or what its blocks read from outside; outputs are those of the part, or, of
+a whole diagram, what it logs; parameters are those that can be tuned. All are in SI units. The FMU has its
+source in C and its library for this machine, and needs nothing of quadvis. At each communication point it has
+run all ticks before; its outputs are those of the tick at that time, with the inputs that were set last.
+Only numeric blocks can be exported; a C compiler must be there, and numba.
+Exit code: 0 done, fmpy finds no problem in it; 2 it cannot be exported, or bad input."""
+
 ANALYSE_HELP = """\
 Noise is removed, Newton's method finds a steady state nearby, and the loop is linearised there;
 a sampled loop is lifted over one hyperperiod. All signals of a cut are opened together.
@@ -153,6 +161,13 @@ def parser() -> Parser:
         metavar="PATH",
         help="default NAME.svg, with the variant in it; '-' for standard output",
     )
+    export = add("export", commands.export, "pack a part of a diagram for other programs", EXPORT_HELP)
+    _diagram_options(export)
+    words = "as an FMU: a part or a block of the diagram, or '.' for all of it"
+    export.add_argument("--fmu", metavar="PART", required=True, help=words)
+    words = "version of FMI, 2 or 3; default 2"
+    export.add_argument("--fmi", type=int, choices=(2, 3), default=2, metavar="N", help=words)
+    export.add_argument("--output", "-o", metavar="PATH", help="default PART.fmu, or NAME.fmu for all of it")
     program = add("program", commands.program, "print what is called at which ticks, and in which order")
     _diagram_options(program)
     _diff_options(

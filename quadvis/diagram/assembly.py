@@ -15,6 +15,7 @@ from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.doubts import warn_network, warn_parameters, warn_rates
 from quadvis.diagram.expand import Expansion, Kept
 from quadvis.diagram.flow import Cases
+from quadvis.diagram.foreign_code import check_code
 from quadvis.diagram.group_files import GroupFiles
 from quadvis.diagram.keys import RUN_SECTIONS
 from quadvis.diagram.knobs import find_knobs
@@ -123,10 +124,12 @@ class Assembly:
         sources = (*spec.paths, *self.parts.files, *self.groups.files, *self._params)
         check_writers(drafts, sources, faults)
         check_devices(drafts, faults)
+        check_code(drafts, self.catalogue.own_blocks, faults)
         ports = {name: wire_text(source) for name, source in wiring.ports()}
+        entries = {name: wire_text(source) for name, source in wiring.entries()}
         return Diagram(
             spec.name, spec.path, variant, graph, stop, seed, spec.values | context.values, listing,
-            self.variants, ports=MappingProxyType(ports), sources=sources,
+            self.variants, ports=MappingProxyType(ports), entries=MappingProxyType(entries), sources=sources,
             knobs=MappingProxyType(find_knobs(expansion)),
         )  # fmt: skip
 

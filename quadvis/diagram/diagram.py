@@ -48,6 +48,7 @@ class Diagram:
     settings: tuple[str, ...] = ()  # the parameters that were replaced, block.parameter=value
     warnings: tuple[Doubt, ...] = ()  # faults that do not prevent a run
     ports: Mapping[str, str] = field(default_factory=dict)  # of parts: the signals of blocks that they are
+    entries: Mapping[str, str] = field(default_factory=dict)  # inputs of parts: the signals that feed them
     sources: tuple[Path, ...] = ()  # the YAML files: its own, of bases, parts and parameter files
     files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of every file that was read, by path
     knobs: Mapping[str, Knob] = field(default_factory=dict)  # parameters of its own and of parts

@@ -71,6 +71,16 @@ class Wiring:
                     yield f"{child.prefix.removesuffix('/')}.{port}", source
             yield from self.ports(child)
 
+    def entries(self, scope: Scope | None = None) -> Iterator[tuple[str, Wire]]:
+        """Yield the inputs of every part that a signal feeds, by full names such as "control.position"."""
+        scope = scope or self.expansion.root
+        for child in scope.parts:
+            for port in child.spec[PORTS].inputs:
+                source = self._entry(child, port).source
+                if isinstance(source, Wire):
+                    yield f"{child.prefix.removesuffix('/')}.{port}", source
+            yield from self.entries(child)
+
     def inputs(self, block: FlatBlock) -> Iterator[tuple[str, Source]]:
         """Yield the source of each input of a block."""
         inputs = block.spec.inputs or {}

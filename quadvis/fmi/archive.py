@@ -39,7 +39,10 @@ _END_MARK, _LARGE_MARK = b"PK\x05\x06", b"PK\x06\x07"
 _LONGEST_COMMENT = 65_535
 _DRIVE = re.compile(r"[A-Za-z]:")
 _LOCAL_HEADER = 30  # bytes before the name of each file
-_DAMAGES = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError)
+_DAMAGES = (
+    zipfile.BadZipFile, zlib.error, struct.error, EOFError, NotImplementedError, RuntimeError, ValueError, OSError,
+    OverflowError,
+)  # fmt: skip
 
 
 class FmuArchive:

@@ -37,6 +37,7 @@ from quadvis.fmi.exchange import (
     TIME,
     TUNE,
     WARNING,
+    ValueGroup,
     FixedValues,
     UnitSetup,
     ValueGroup,

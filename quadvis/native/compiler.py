@@ -30,21 +30,29 @@ def compile_block(kind: BlockType, prefix: str) -> MachineCode:
     """
     import numba
 
-    scope = _Scope({field.name for field in kind.record.fields if field.shape})
-    pointer: Callable[[Any], Any] = numba.types.CPointer
     compiled: dict[str, Compiled] = {}
     try:
-        for method in kind.methods:
-            body = scope.jit(kind.function(method.name))
-            pointers = [
-                pointer(numba.from_dtype(kind.record.dtype)),
-                *(pointer(_pointed(each)) for each in (*method.arguments, *method.results)),
-            ]
-            compiled[method.name] = compile_function(_wrapper(method, body), pointers)
+        for name, function in compiled_methods(kind):
+            compiled[name] = function
         return machine_code(compiled, prefix)
     except (Unreadable, Unlinkable, NotImplementedError, numba.core.errors.NumbaError) as error:
         failed = next((method.name for method in kind.methods if method.name not in compiled), "")
         return MachineCode(refusal=f"method '{failed}': {_cause(error)}" if failed else str(error))
+
+
+def compiled_methods(kind: BlockType) -> Iterator[tuple[str, Compiled]]:
+    """Yield the methods of a block type, compiled one after the other; an exception if one cannot be."""
+    import numba
+
+    scope = _Scope({field.name for field in kind.record.fields if field.shape})
+    pointer: Callable[[Any], Any] = numba.types.CPointer
+    for method in kind.methods:
+        body = scope.jit(kind.function(method.name))
+        pointers = [
+            pointer(numba.from_dtype(kind.record.dtype)),
+            *(pointer(_pointed(each)) for each in (*method.arguments, *method.results)),
+        ]
+        yield method.name, compile_function(_wrapper(method, body), pointers)
 
 
 def compile_functions(functions: Sequence[NativeFunction], prefix: str) -> MachineCode:

@@ -191,11 +191,11 @@ def _prefix(key: str) -> str:
 
 
 def _key(text: str) -> str:
-    return hashlib.sha256(f"{_surroundings()}\n{text}".encode()).hexdigest()
+    return hashlib.sha256(f"{surroundings()}\n{text}".encode()).hexdigest()
 
 
 @functools.cache
-def _surroundings() -> str:
+def surroundings() -> str:
     """Return all that machine code depends on beside the blocks: software, processor, and the compiler."""
     room = hashlib.sha256()
     for name in COMPILER:

@@ -300,7 +300,7 @@ class Tables:
         ]
         both = zip(program.states, program.slopes, strict=True)
         self.states: Whole = np.array([*chain.from_iterable(both), *held], np.int64)
-        self.stages = _stages(program.solver, float(program.period))
+        self.stages = stage_numbers(program.solver, float(program.period))
         self.scratch = np.zeros(2 * len(program.states) + len(held))
         control = self._control
         if self._clock is not None:
@@ -344,7 +344,7 @@ def _runs(positions: Sequence[int]) -> Iterator[tuple[int, int]]:
             start = index
 
 
-def _stages(solver: str, step: float) -> NDArray[np.float64]:
+def stage_numbers(solver: str, step: float) -> NDArray[np.float64]:
     """Return for each stage its node (s), and the weights of its slope for the next stage and the result.
 
     In all formulas of `TABLEAUS` a stage depends on the slope of the stage before it and on no other.

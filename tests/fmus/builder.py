@@ -20,8 +20,10 @@ HERE = Path(__file__).parent
 KEPT = HERE.parents[1] / ".pytest_cache" / "fmus"
 TOKEN = "{8f1d4a62-trial}"
 HEADERS = Path(next(iter(importlib.util.find_spec("fmpy").submodule_search_locations))) / "c-code"  # type: ignore[union-attr, arg-type]
+_FITS = platform.system() == "Linux" and platform.machine() == "x86_64"
+COMPILER = shutil.which("gcc") if _FITS else None
 needs_gcc = pytest.mark.skipif(
-    shutil.which("gcc") is None or platform.system() != "Linux" or platform.machine() != "x86_64",
+    COMPILER is None,
     reason="compiles FMUs with gcc for Linux on x86-64",
 )
 FOLDERS = {2: "linux64", 3: "x86_64-linux"}

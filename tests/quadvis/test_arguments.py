@@ -15,7 +15,7 @@ from quadvis.errors import QuadvisError
 
 HELP = "see 'quadvis --help'"
 COMMANDS = (
-    "run, replay, sweep, check, list, describe, analyse, draw, program, diff, plot, schema, camera, cache, "
+    "run, replay, sweep, check, list, describe, analyse, draw, export, program, diff, plot, schema, camera, cache, "
     "target, load, start, stop, unload, status, get, set, scope, log, sets, profile, web, "
     "console, new, keys, wire"
 )

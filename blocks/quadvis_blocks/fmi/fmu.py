@@ -55,6 +55,8 @@ class Fmu(Block, numeric=False):
     )
     warnings = Param(False, type="bool", doc="whether the status Warning is no reason to end the run")
 
+    brings_code = "file"
+
     steps = State("int64", doc="steps that were done")
 
     plan: ClassVar[FmuPlan]

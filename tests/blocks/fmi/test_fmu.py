@@ -16,11 +16,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from quadvis.api import load_text
+import quadvis
+from quadvis.api import load, load_text
 from quadvis.block import ParameterError
 from quadvis.errors import DiagramError, RunError
 from quadvis.fmi.unpacked import PREFIX
-from quadvis.testing import drive
+from quadvis.testing import check_block, drive
 from quadvis_blocks.fmi.fmu import Fmu
 from tests.fmus import models
 from tests.fmus.builder import Model, Var, fmu, needs_gcc
@@ -274,7 +275,7 @@ blocks:
 HANGING = """
 import sys
 sys.path[:0] = {path!r}
-from quadvis.testing import drive
+from quadvis.testing import check_block, drive
 from quadvis_blocks.fmi.fmu import Fmu
 drive(Fmu(file={file!r}, deadline=100.0), rate="10 Hz", steps=100000000)
 """
@@ -490,3 +491,41 @@ def test_a_step_inside_that_does_not_divide_the_period_is_a_doubt() -> None:
     (doubt,) = Fmu(file=fmu(model, 3), period=0.5).doubts()
     assert "the FMU steps by 0.2 s inside, which does not divide its period, 0.5 s" in str(doubt)
     assert Fmu(file=fmu(model, 3), period=0.4).doubts() == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("version", [2, 3])
+def test_it_conforms_in_a_process_of_its_own(version: int) -> None:
+    given = {"file": fmu(models.INTEGRATOR, version), "isolation": "process", "kind": "cosimulation"}
+    check_block(Fmu, given=given, test=Path(__file__))
+
+
+def test_its_code_is_announced_or_refused_and_never_reaches_a_target(tmp_path: Path) -> None:
+    text = f"""\
+quadvis: 1
+name: trial
+rates: {{fast: 10 Hz}}
+stop_time: 1 s
+blocks: {{fmu: {{block: fmi.fmu, rate: fast, with: {{file: {fmu(models.STAIR)}}}}}}}
+"""
+    (tmp_path / "trial.yaml").write_text(text)
+    said: list[Path] = []
+    load(tmp_path / "trial.yaml", own_blocks=said.append)
+    assert said == [Path(fmu(models.STAIR))]
+    words = "is machine code, which is not to be run; leave own_blocks=False out if you trust it"
+    with pytest.raises(DiagramError, match=words):
+        load(tmp_path / "trial.yaml", own_blocks=False)
+    with pytest.raises(DiagramError, match=words):
+        load_text(text, tmp_path, own_blocks=False)  # as a target does it with what comes from a host
+
+
+def test_a_replay_runs_it_again_to_the_bit(tmp_path: Path) -> None:
+    text = f"""\
+quadvis: 1
+name: trial
+rates: {{fast: 10 Hz}}
+stop_time: 2 s
+blocks: {{fmu: {{block: fmi.fmu, rate: fast, with: {{file: {fmu(models.VAN_DER_POL)}, isolation: none}}}}}}
+"""
+    load_text(text, tmp_path).run(log=tmp_path / "run.mcap")
+    assert quadvis.replay(tmp_path / "run.mcap").same

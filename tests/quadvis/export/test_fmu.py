@@ -1,0 +1,306 @@
+"""Exported FMUs: fmpy finds no problem in them, and they give our numbers in fmpy and in our own block."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import quadvis
+from quadvis.api import Diagram, load_text
+from quadvis.block import ParameterError
+from quadvis.cli import main
+from quadvis.errors import QuadvisError
+from quadvis.export.package import OPTIONS
+from quadvis.testing import check_block, drive
+from quadvis_blocks.fmi.fmu import Fmu
+from tests.fmus.builder import needs_gcc
+
+pytestmark = needs_gcc
+BOTH = pytest.mark.parametrize("version", [2, pytest.param(3, marks=pytest.mark.slow)])
+HOVER = Path(__file__).parents[3] / "diagrams" / "hover.yaml"
+LAW = """\
+quadvis: 1
+name: law
+doc: A proportional law, and what it has commanded before.
+params: {gain: 3 1/s}
+ports: {in: [error], out: {command: scaled.y, late: memory.y}}
+blocks:
+  scaled: {block: signal.gain, with: {factor: $gain}, in: {u: in.error}}
+  memory: {block: signal.unit_delay, in: {u: scaled.y}}
+"""
+LOOP = """\
+quadvis: 1
+name: loop
+rates: {fast: 100 Hz, slow: 20 Hz}
+solver: {method: ode4, step: 5 ms}
+stop_time: 2 s
+blocks:
+  reference: {block: sources.step, rate: fast, with: {at: 0.5 s, after: 1 m}}
+  error:
+    block: signal.difference
+    rate: fast
+    in: {plus: reference.y, minus: {from: plant.y, across: sample}}
+  law: {block: signal.gain, rate: slow, with: {factor: 3 1/s}, in: {u: {from: error.y, across: sample}}}
+  late: {block: signal.unit_delay, rate: slow, in: {u: law.y}}
+  plant: {block: signal.integrator, in: {u: {from: late.y, across: hold}}}
+"""
+
+
+@pytest.fixture(scope="module")
+def loop() -> Diagram:
+    return load_text(LOOP)
+
+
+@pytest.fixture(scope="module")
+def whole(loop: Diagram, tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
+    return _Whole(loop, tmp_path_factory.mktemp("whole"))
+
+
+class _Whole(dict[int, Path]):
+    """The whole loop as FMUs, each made when it is asked for."""
+
+    def __init__(self, loop: Diagram, folder: Path) -> None:
+        self._loop, self._folder = loop, folder
+
+    def __missing__(self, version: int) -> Path:
+        path = self[version] = self._folder / f"loop{version}.fmu"
+        self._loop.export_fmu(".", path, version=version)
+        return path
+
+
+def by_fmpy(path: Path, stop: float, step: float, **more: Any) -> Any:
+    from fmpy import simulate_fmu
+
+    return simulate_fmu(str(path), stop_time=stop, step_size=step, output_interval=step, **more)
+
+
+@BOTH
+def test_fmpy_finds_no_problem_and_simulates_it_to_our_bits(
+    version: int, whole: dict[int, Path], loop: Diagram
+) -> None:
+    from fmpy.validation import validate_fmu
+
+    assert validate_fmu(str(whole[version])) == []
+    found, ours = by_fmpy(whole[version], 2.0, 0.005), loop.run()
+    for name, every in (("plant.y", 1), ("error.y", 2), ("reference.y", 2), ("law.y", 10), ("late.y", 10)):
+        assert np.array_equal(found[name][::every], ours[name]), name
+
+
+@BOTH
+def test_our_own_block_gives_the_same_bits(version: int, whole: dict[int, Path], loop: Diagram) -> None:
+    block = Fmu(file=str(whole[version]), isolation="none")
+    assert {name: port.unit for name, port in block.interface.outputs.items()} == {
+        "reference_y": "m", "error_y": "m", "law_y": "m/s", "late_y": "m/s", "plant_y": "m"
+    }  # fmt: skip
+    assert block.interface.params["law_factor"].unit == "1/s"
+    found = drive(block, rate="5 ms", steps=401)
+    assert np.array_equal(found.plant_y, loop.run()["plant.y"])
+
+
+@BOTH
+def test_communication_steps_may_be_longer_or_shorter_than_ticks(
+    version: int, whole: dict[int, Path], loop: Diagram
+) -> None:
+    ours = loop.run()["plant.y"]
+    assert np.array_equal(by_fmpy(whole[version], 2.0, 0.05)["plant.y"], ours[::10])
+    shorter = by_fmpy(whole[version], 2.0, 0.0025)["plant.y"]
+    assert np.array_equal(shorter[::2], ours)
+    assert np.array_equal(shorter[1::2], ours[:-1])
+
+
+@BOTH
+def test_parameters_have_their_effect(version: int, whole: dict[int, Path]) -> None:
+    other = load_text(LOOP.replace("factor: 3 1/s", "factor: 5 1/s")).run()["plant.y"]
+    found = by_fmpy(whole[version], 2.0, 0.005, start_values={"law.factor": 5.0})
+    assert np.array_equal(found["plant.y"], other)
+    block = Fmu(file=str(whole[version]), isolation="none", law_factor=5.0)
+    assert np.array_equal(drive(block, rate="5 ms", steps=401).plant_y, other)
+
+
+@pytest.mark.slow
+@BOTH
+def test_it_conforms_as_a_block(version: int, whole: dict[int, Path]) -> None:
+    """Its state is saved, restored, and brought into another process."""
+    given = {"file": str(whole[version]), "isolation": "none"}
+    check_block(Fmu, given=given, test=Path(__file__))
+
+
+def test_the_same_part_gives_the_same_bytes(loop: Diagram, whole: dict[int, Path], tmp_path: Path) -> None:
+    loop.export_fmu(".", tmp_path / "again.fmu")
+    assert (tmp_path / "again.fmu").read_bytes() == whole[2].read_bytes()
+
+
+@pytest.mark.slow
+@BOTH
+def test_its_sources_make_the_same_library(version: int, whole: dict[int, Path], tmp_path: Path) -> None:
+    """The files that the description names are compiled as an importer would, with all warnings."""
+    with zipfile.ZipFile(whole[version]) as archive:
+        archive.extractall(tmp_path)
+    (library,) = tmp_path.glob("binaries/*/loop.so")
+    files = ["steps.c", f"fmi{version}.c"]
+    made = tmp_path / "made.so"
+    warnings = ("-Wall", "-Wextra", "-Wno-unused-function", "-Wno-unused-label", "-Werror")
+    subprocess.run(
+        ["gcc", *OPTIONS, *warnings, *files, "-o", str(made), "-lm"], cwd=tmp_path / "sources", check=True
+    )
+    assert made.read_bytes() == library.read_bytes()
+
+
+def with_part(folder: Path) -> Path:
+    """Write a diagram with a part; return its path."""
+    (folder / "law.yaml").write_text(LAW)
+    lines = [
+        "  law: {slot: true, part: law.yaml, rate: slow, in: {error: {from: error.y, across: sample}}}"
+        if line.startswith("  law: ")
+        else line.replace("u: law.y", "u: law.command")
+        for line in LOOP.splitlines()
+    ]
+    text = "\n".join(lines)
+    (folder / "loop.yaml").write_text(text)
+    return folder / "loop.yaml"
+
+
+@pytest.mark.parametrize("isolation", ["none", pytest.param("process", marks=pytest.mark.slow)])
+def test_a_part_as_an_fmu_closes_its_loop_to_the_bit(isolation: str, tmp_path: Path) -> None:
+    path = with_part(tmp_path)
+    whole = quadvis.load(path)
+    made = whole.export_fmu("law", tmp_path / "law.fmu")
+    assert (made.inputs, made.outputs, made.step) == (("error",), ("command", "late"), 0.05)
+    assert set(made.parameters) == {"scaled.factor"}
+    (tmp_path / "other.yaml").write_text(
+        f"""\
+quadvis: 1
+name: other
+base: loop.yaml
+blocks: {{law: {{block: fmi.fmu, rate: slow, with: {{file: law.fmu, isolation: {isolation}}}}}}}
+"""
+    )
+    ours, other = whole.run(), quadvis.load(tmp_path / "other.yaml").run()
+    for name in ("plant.y", "law.command", "law.late"):
+        assert np.array_equal(ours[name], other[name]), name
+
+
+@pytest.mark.slow
+def test_the_controller_of_hover_flies_as_an_fmu_to_the_bit(tmp_path: Path) -> None:
+    hover = quadvis.load(HOVER, variant="geometric", stop_time="10 s")
+    hover.export_fmu("control", tmp_path / "control.fmu")
+    (tmp_path / "hover.yaml").write_text(
+        f"""\
+quadvis: 1
+name: hover with an FMU
+base: {{file: {HOVER}, variant: geometric}}
+stop_time: 10 s
+blocks: {{control: {{block: fmi.fmu, rate: control, with: {{file: control.fmu, isolation: none}}}}}}
+analyse: {{}}
+figures: []
+expect: []
+"""
+    )
+    ours, other = hover.run(), quadvis.load(tmp_path / "hover.yaml").run()
+    for name in ("craft.position", "craft.attitude", "control.thrust"):
+        assert np.array_equal(ours[name], other[name]), name
+
+
+@pytest.mark.slow
+def test_the_craft_of_hover_is_the_same_plant_in_fmpy_and_in_our_block(tmp_path: Path) -> None:
+    """Thrusts are held over a step; our block alone is driven with the same."""
+    hover = quadvis.load(HOVER, variant="geometric")
+    hover.export_fmu("craft", tmp_path / "craft.fmu")
+    craft = hover.graph["craft"].block
+    given = {
+        name: getattr(craft, name) for name, param in craft.interface.params.items() if not param.choices
+    }
+    rng = np.random.default_rng(1)
+    thrust = 1.2 + 0.1 * rng.standard_normal((200, 4))
+    ours = drive(type(craft)(**given), rate="5 ms", thrust=thrust)
+    block = Fmu(file=str(tmp_path / "craft.fmu"), isolation="none")
+    other = drive(block, rate="5 ms", thrust=thrust, wind=np.zeros((200, 3)))
+    for name in ("position", "velocity", "attitude", "rates"):
+        assert np.array_equal(getattr(ours, name), getattr(other, name)), name
+    inputs = np.zeros(200, [("time", float), *((f"thrust[{k}]", float) for k in range(1, 5))])
+    inputs["time"] = np.arange(200) * 0.005
+    for k in range(4):
+        inputs[f"thrust[{k + 1}]"] = thrust[:, k]
+    del inputs  # fmpy interpolates inputs; the slave itself is driven
+    from fmpy import extract, read_model_description
+    from fmpy.fmi2 import FMU2Slave
+
+    description = read_model_description(str(tmp_path / "craft.fmu"))
+    references = {each.name: each.valueReference for each in description.modelVariables}
+    slave = FMU2Slave(
+        guid=description.guid, unzipDirectory=extract(str(tmp_path / "craft.fmu"), str(tmp_path / "craft")),
+        modelIdentifier=description.coSimulation.modelIdentifier, instanceName="craft",
+    )  # fmt: skip
+    slave.instantiate()
+    slave.setupExperiment(startTime=0.0)
+    slave.enterInitializationMode()
+    slave.exitInitializationMode()
+    for k, row in enumerate(thrust[:-1]):
+        slave.setReal([references[f"thrust[{n}]"] for n in range(1, 5)], row.tolist())
+        slave.doStep(k * 0.005, 0.005)
+        found = slave.getReal([references[f"position[{n}]"] for n in range(1, 4)])
+        assert np.array_equal(found, ours.position[k + 1])
+    slave.terminate()
+    slave.freeInstance()
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "words"),
+    [
+        (LOOP, "lw", "there is no part and no block 'lw'; did you mean 'law'"),
+        (LOOP + "tasking: multi\n", "law", "'tasking: multi' cannot be exported"),
+        (
+            LOOP + "  eyes: {block: vision.camera, rate: slow, with: {device: 'x.avi'}}\n",
+            ".",
+            r"only numeric blocks can be exported, and these are not: 'eyes' \(vision.camera\)",
+        ),
+    ],
+)
+def test_what_cannot_be_exported_is_refused(text: str, name: str, words: str, tmp_path: Path) -> None:
+    with pytest.raises(QuadvisError, match=words):
+        load_text(text).export_fmu(name, tmp_path / "x.fmu")
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_a_compiler_a_sentence_says_so(
+    loop: Diagram, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    with pytest.raises(QuadvisError, match="an FMU is compiled by a C compiler, and there is none"):
+        loop.export_fmu("law", tmp_path / "x.fmu")
+
+
+@pytest.mark.slow
+def test_an_output_out_of_the_finite_numbers_is_an_error_with_its_block(tmp_path: Path) -> None:
+    text = LOOP.replace("factor: 3 1/s", "factor: 1e200 1/s")
+    load_text(text).export_fmu("law", tmp_path / "law.fmu")
+    from quadvis.errors import RunError
+
+    with pytest.raises(RunError, match="block 'law', t = 0 s: port 'y': the output is not finite"):
+        block = Fmu(file=str(tmp_path / "law.fmu"), isolation="none", direct="never")
+        drive(block, rate="20 Hz", u=[1e200, 0.0, 0.0])
+    with pytest.raises(ParameterError, match="factor"):
+        Fmu(file=str(tmp_path / "law.fmu"), factor="x")
+
+
+def test_the_command_says_what_it_has_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "loop.yaml").write_text(LOOP)
+    assert main(["export", "loop.yaml", "--fmu", "law", "-o", "law.fmu"]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        "inputs:     u", "outputs:    y", "parameters: factor", "law.fmu: FMI 2.0, steps of 0.05 s"
+    ]  # fmt: skip
+    assert main(["export", "loop.yaml", "--fmu", "none"]) == 2
+    assert "there is no part and no block 'none'" in capsys.readouterr().err
+    (tmp_path / "text.fmu").write_text("not an FMU")
+    assert main(["export", "loop.yaml", "--fmu", "law", "-o", "text.fmu"]) == 2
+    assert shutil.which("gcc") and (tmp_path / "text.fmu").read_text() == "not an FMU"
