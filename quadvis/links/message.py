@@ -2,7 +2,7 @@
 
 All numbers are little-endian, without gaps, in the order of the signals: 8 bytes for each float64 and int64,
 one for each bool. A picture is its height and width (int64), its stamp (float64, s), its sequence number
-(int64) and its pixels.
+(int64) and its pixels (uint8, 3 channels; none if it is not of this kind).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from quadvis.block import Frame, Shape
+from quadvis.block import NO_FRAME, Frame, Shape
 from quadvis.units import Unit
 
 FRAME = "frame"
@@ -128,8 +128,12 @@ class Message:
 
 
 def _picture_bytes(frame: Frame) -> bytes:
-    height, width = frame.pixels.shape[:2]
-    return _HEAD.pack(height, width, frame.stamp, frame.sequence) + frame.pixels.tobytes()
+    """Return a picture as bytes; of one that is none, such as a grey one, its stamp and no pixels."""
+    pixels = frame.pixels
+    if pixels.dtype != np.uint8 or pixels.ndim != 3 or pixels.shape[2] != CHANNELS:
+        pixels = NO_FRAME.pixels
+    height, width = pixels.shape[:2]
+    return _HEAD.pack(height, width, frame.stamp, frame.sequence) + pixels.tobytes()
 
 
 def _picture(data: bytes, place: int) -> tuple[Frame, int]:

@@ -2,11 +2,13 @@
 
 One stands beside each block of the path, in its task and on its computer, and hands the stamp on when the
 block does: at once if the block's output depends on its input of the same tick, else at its next tick. A
-stamp of NaN says that there is nothing new: the last one holds, at first the start of the run.
+stamp that is NaN, or infinite, says that there is nothing new: the last one holds, at first the start of the
+run.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from quadvis.block import Block, In, Out, State
@@ -24,11 +26,11 @@ class StampHolder(Block):
 
     def output(self, stamp: float) -> Any:
         """Return the stamp, or the last one if it is missing."""
-        return stamp if stamp == stamp else self.last
+        return stamp if math.isfinite(stamp) else self.last
 
     def update(self, stamp: float) -> None:
         """Keep it."""
-        self.last = stamp if stamp == stamp else self.last
+        self.last = stamp if math.isfinite(stamp) else self.last
 
 
 class StampKeeper(Block):
@@ -44,7 +46,7 @@ class StampKeeper(Block):
 
     def update(self, stamp: float) -> None:
         """Keep the stamp."""
-        self.last = stamp if stamp == stamp else self.last
+        self.last = stamp if math.isfinite(stamp) else self.last
 
 
 class AgeMeter(Block):
@@ -57,11 +59,11 @@ class AgeMeter(Block):
 
     def output(self, stamp: float, time: float) -> Any:
         """Return the age."""
-        return time - (stamp if stamp == stamp else self.last)
+        return time - (stamp if math.isfinite(stamp) else self.last)
 
     def update(self, stamp: float) -> None:
         """Keep the stamp."""
-        self.last = stamp if stamp == stamp else self.last
+        self.last = stamp if math.isfinite(stamp) else self.last
 
 
 class PresentStamp(Block):

@@ -10,7 +10,7 @@ import pytest
 from quadvis.analysis.ages import worst_age, worst_ages
 from quadvis.api import Diagram, load_text
 from quadvis.graph.graph import MULTI, SINGLE
-from quadvis.links.stamps import StampHolder, StampKeeper
+from quadvis.links.stamps import AgeMeter, StampHolder, StampKeeper
 from quadvis.testing import drive
 
 CHAIN = """
@@ -117,12 +117,17 @@ def test_an_age_at_the_block_that_gives_the_stamp() -> None:
     assert result.passed and result.outcome.verdicts[0].found == 0.0
 
 
-NAN = math.nan
+NAN, INF = math.nan, math.inf
 
 
 def test_a_holder_gives_the_last_stamp_and_a_keeper_that_of_one_tick_ago() -> None:
-    stamps = [NAN, 0.1, NAN, NAN, 0.4]
+    stamps = [NAN, 0.1, NAN, -INF, 0.4]
     held = drive(StampHolder(), stamp=stamps).held_stamp
     kept = drive(StampKeeper(), stamp=stamps).held_stamp
     np.testing.assert_array_equal(held, [0.0, 0.1, 0.1, 0.1, 0.4])
     np.testing.assert_array_equal(kept, [0.0, 0.0, 0.1, 0.1, 0.1])
+
+
+def test_a_stamp_of_a_camera_that_errs_ends_no_run() -> None:
+    ages = drive(AgeMeter(), stamp=[NAN, 0.05, INF, -INF, NAN], rate="10 Hz").age
+    np.testing.assert_allclose(ages, [0.0, 0.05, 0.15, 0.25, 0.35])

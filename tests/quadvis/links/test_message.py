@@ -59,6 +59,22 @@ def test_a_picture_comes_back_with_its_stamp_and_number() -> None:
     assert none.pixels.size == 0 and math.isnan(none.stamp) and none.sequence == 0
 
 
+@pytest.mark.parametrize(
+    "pixels",
+    [
+        np.zeros((4, 6), np.uint8),
+        np.zeros((4, 6, 1), np.uint8),
+        np.full((4, 6, 3), np.nan),
+        np.zeros(7, np.uint8),
+    ],
+    ids=["grey", "one channel", "float64", "a row"],
+)
+def test_a_picture_that_is_none_travels_without_pixels(pixels: np.ndarray) -> None:
+    message = Message((signal("picture", "frame"), signal("n", "int64")))
+    frame, number = message.unpack(message.pack((Frame(pixels, 0.25, 4), 7)))
+    assert (frame.pixels.shape, frame.stamp, frame.sequence, number) == ((0, 0, 3), 0.25, 4, 7)
+
+
 @pytest.mark.parametrize("wrong", [-1, 1])
 def test_bytes_of_another_length_are_refused(wrong: int) -> None:
     with pytest.raises(ValueError):
