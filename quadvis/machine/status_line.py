@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import select
 import sys
 from time import monotonic
 from types import TracebackType
@@ -14,7 +15,8 @@ PATIENCE, RENEWED = 2.0, 0.1  # s until a line is shown first, and until it is r
 class StatusLine:
     """A status line, rewritten in place on standard error; silent if that is no terminal.
 
-    A terminal that takes no text, or has closed, never delays the program: then the line is not shown.
+    A terminal that takes no text, or has closed, never delays the program: then the line is not shown. Nor
+    does a pipe that nobody reads: then what would be said is not.
     """
 
     def __init__(self, stream: TextIO | None = None) -> None:
@@ -33,7 +35,7 @@ class StatusLine:
         """Show a text in place of the previous one; print it where there is no terminal."""
         if self.shown:
             self.show(text)
-        else:
+        elif _takes_text(self.stream):
             print(text, file=self.stream, flush=True)
 
     def put(self, text: str) -> None:
@@ -78,6 +80,14 @@ def _open_terminal(stream: TextIO) -> int | None:
         return os.open(os.ttyname(stream.fileno()), os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
     except (OSError, ValueError, AttributeError):
         return None
+
+
+def _takes_text(stream: TextIO) -> bool:
+    """Return whether a stream takes a line at once; a pipe must have a page free for that."""
+    try:
+        return bool(select.select([], [stream.fileno()], [], 0)[1])
+    except (OSError, ValueError, AttributeError):  # it has no descriptor, or the system cannot say
+        return True
 
 
 class AnalysisLine(StatusLine):
