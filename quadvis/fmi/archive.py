@@ -40,8 +40,8 @@ _LONGEST_COMMENT = 65_535
 _DRIVE = re.compile(r"[A-Za-z]:")
 _LOCAL_HEADER = 30  # bytes before the name of each file
 _DAMAGES = (
-    zipfile.BadZipFile, zlib.error, struct.error, EOFError, NotImplementedError, RuntimeError, ValueError, OSError,
-    OverflowError,
+    zipfile.BadZipFile, zlib.error, struct.error, EOFError, NotImplementedError, RuntimeError, ValueError,
+    OSError, OverflowError,
 )  # fmt: skip
 
 

@@ -37,7 +37,6 @@ from quadvis.fmi.exchange import (
     TIME,
     TUNE,
     WARNING,
-    ValueGroup,
     FixedValues,
     UnitSetup,
     ValueGroup,
