@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 SCHEMA = Kind("the schema", (b"{",), rb'"\$schema"')
 FAILED = 1
 NO_VARIANT = "none"
+YAML = (".yaml", ".yml")
 
 
 def _load(options: argparse.Namespace, **more: Any) -> Any:
@@ -248,17 +249,22 @@ def camera(options: argparse.Namespace) -> int:
 
 
 def list_blocks(options: argparse.Namespace) -> int:
-    """Print all blocks, and the files that come with quadvis; 2 if a library cannot be loaded."""
-    from quadvis.library.describe import catalogue_lines, facts
-    from quadvis.library.shipped_files import shipped_lines
+    """Print all blocks and files that come with quadvis, or those with words; 2 if one cannot be loaded."""
+    from quadvis.library.listing import lines, listed_blocks, listed_files, matching
 
     catalogue = _catalogue(options)
+    blocks, failures = listed_blocks(catalogue)
+    files = listed_files()
+    if options.words:
+        found = matching([*blocks, *files], options.words)
+        blocks, files = [each for each in found if each in blocks], [each for each in found if each in files]
     if options.json:
-        blocks, failures = catalogue.load_all()
-        _print_json([facts(name, block) for name, block in blocks.items()])
+        from quadvis.library.describe import facts
+
+        _print_json([facts(each.name, catalogue.find(each.name)) for each in blocks])
     else:
-        lines, failures = catalogue_lines(catalogue, _width())
-        print("\n".join((*lines, "", *shipped_lines(_width()))))
+        parts = [lines(each, _width()) for each in (blocks, files) if each]
+        print("\n\n".join("\n".join(part) for part in parts))
     return _all_loaded(failures)
 
 
@@ -277,7 +283,7 @@ def _all_loaded(failures: list[str]) -> int:
 
 
 def describe(options: argparse.Namespace) -> int:
-    """Print the declarations of a block, or a file that comes with quadvis."""
+    """Print the declarations of a block, those of a part, or a file that comes with quadvis."""
     from quadvis.library.describe import description, facts
     from quadvis.library.shipped_files import shipped_text
 
@@ -287,6 +293,14 @@ def describe(options: argparse.Namespace) -> int:
             _print_json({"file": options.block, "path": str(named_file(options.block)), "text": text})
         else:
             print(text, end="")
+        return 0
+    if options.block.endswith(YAML):
+        from quadvis.diagram.part_description import part_description, part_facts
+
+        if options.json:
+            _print_json(part_facts(options.block))
+        else:
+            print(part_description(options.block, _width()))
         return 0
     block = _catalogue(options).find(options.block)
     if options.json:

@@ -129,15 +129,17 @@ def parser() -> Parser:
     _diagram_options(check)
     check.add_argument("--json", action="store_true", help="print the faults and warnings as JSON")
     blocks = add("list", commands.list_blocks, "list all blocks, and the files that come with quadvis")
-    blocks.add_argument("--json", action="store_true", help="print all declarations as JSON")
+    words = "show what has these words in its name or its text; the words of other programs count, too"
+    blocks.add_argument("words", nargs="*", metavar="WORD", help=words)
+    blocks.add_argument("--json", action="store_true", help="print the declarations of blocks as JSON")
     _own_block_option(blocks)
     describe = add(
         "describe",
         commands.describe,
-        "describe a block: ports, parameters, source; or show a file that comes with quadvis",
+        "describe a block or a part: ports, parameters; or show a file that comes with quadvis",
     )
     describe.add_argument(
-        "block", metavar="BLOCK", help="such as signal.derivative, or quadvis:parts/craft.yaml"
+        "block", metavar="BLOCK", help="such as signal.derivative, parts/pi.yaml, or quadvis:parts/craft.yaml"
     )
     describe.add_argument("--json", action="store_true", help="print its declarations as JSON")
     _own_block_option(describe)

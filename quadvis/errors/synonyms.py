@@ -122,5 +122,15 @@ for _ours, _theirs in _MEANT.items():
 
 def synonym(word: str, candidates: Collection[str]) -> str | None:
     """Return the candidate for which other programs use this word, or None."""
-    plain = re.sub(r"[-_ ]", "", word.rpartition(".")[2]).casefold()
+    plain = plain_word(word.rpartition(".")[2])
     return next((ours for ours in _STANDS_FOR.get(plain, ()) if ours in candidates), None)
+
+
+def foreign_words(ours: str) -> list[str]:
+    """Return the plain words of other programs for one of ours."""
+    return _MEANT.get(ours, "").split()
+
+
+def plain_word(word: str) -> str:
+    """Return a word as it is looked up."""
+    return re.sub(r"[-_ ]", "", word).casefold()

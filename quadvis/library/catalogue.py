@@ -18,11 +18,14 @@ import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
+from typing import TYPE_CHECKING
 
-from quadvis.block import Block
 from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.errors.caller import as_given
-from quadvis.library.own_package import OwnPackage
+
+if TYPE_CHECKING:
+    from quadvis.block import Block
+    from quadvis.library.own_package import OwnPackage
 
 STANDARD = "quadvis_blocks"
 GROUP = "quadvis.libraries"
@@ -99,11 +102,22 @@ class Catalogue:
             found += [f"{library}:{path}" for path in sorted(_walk(package))]
         return found
 
+    def standard_file(self, name: str) -> Path | None:
+        """Return the file of a block of the standard library; None for all other blocks."""
+        match = NAME.fullmatch(name)
+        if match is None or match["library"] or self._own_file(name):
+            return None
+        folders = importlib.import_module(STANDARD).__path__
+        files = [Path(folder, *name.split(".")).with_suffix(".py") for folder in folders]
+        return next(filter(os.path.isfile, files), None)
+
     def _load_own(self, file: Path, name: str) -> ModuleType:
         """Run the module of an own block, if that is permitted, and return it."""
         self._permit(file, name)
         assert self.own is not None
         if self._package is None:
+            from quadvis.library.own_package import OwnPackage  # it brings numpy, which a list does without
+
             self._package = OwnPackage(self.own)
         try:
             return self._package.module(file, name)
@@ -199,6 +213,8 @@ def _import(module: str, name: str) -> ModuleType | None:
 
 
 def _block_class(module: ModuleType, name: str) -> type[Block]:
+    from quadvis.block import Block
+
     found = dict.fromkeys(value for value in vars(module).values() if isinstance(value, type))
     own = [kind for kind in found if issubclass(kind, Block) and kind.__module__ == module.__name__]
     public = [block for block in own if not block.__name__.startswith("_")]

@@ -25,7 +25,6 @@ from quadvis.block import (
     Param,
     State,
 )
-from quadvis.library.catalogue import Catalogue
 from quadvis.machine.columns import table
 
 WIDEST = 30  # characters of a default value
@@ -36,12 +35,6 @@ LINE = 90  # characters of a line of an example
 def first_line(block: type[Block]) -> str:
     """Return the first sentence of a block's docstring."""
     return (inspect.getdoc(block) or "").partition("\n")[0]
-
-
-def catalogue_lines(catalogue: Catalogue, width: int | None = None) -> tuple[list[str], list[str]]:
-    """Return one line for each block, and one for each block that cannot be loaded."""
-    blocks, failures = catalogue.load_all()
-    return table([(name, first_line(block)) for name, block in blocks.items()], width), failures
 
 
 def description(name: str, block: type[Block], width: int | None = None) -> str:

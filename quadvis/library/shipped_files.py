@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 
 from quadvis.errors import QuadvisError, suggestion
-from quadvis.machine.columns import table
 from quadvis.machine.shipped import PREFIX, named_file, shipped_folder
 
 FOLDERS = ("parts", "crafts", "calib", "protocols", "sets")
@@ -19,11 +18,6 @@ def shipped_names() -> list[str]:
     return [PREFIX + file.relative_to(folder).as_posix() for file in files]
 
 
-def shipped_lines(width: int | None = None) -> list[str]:
-    """Return one line for each file: its name, and the sentence with which it begins."""
-    return table([(name, _first_sentence(shipped_text(name))) for name in shipped_names()], width)
-
-
 def shipped_text(name: str) -> str:
     """Return the text of a file by its name; QuadvisError if there is none."""
     names = shipped_names()
@@ -33,7 +27,7 @@ def shipped_text(name: str) -> str:
     return named_file(name).read_text(encoding="utf-8")
 
 
-def _first_sentence(text: str) -> str:
+def first_sentence(text: str) -> str:
     """Return the beginning of the comment at the top of a YAML or XML file."""
     if text.startswith("<!--"):
         lines = text.removeprefix("<!--").partition("-->")[0].splitlines()

@@ -34,7 +34,7 @@ COMMANDS = (
         (("run",), "FILE is missing; write 'quadvis run FILE'"),
         (("run", "--json"), "FILE is missing; write 'quadvis run FILE'"),
         (("run", "a", "b"), "'b' is one too many; write 'quadvis run FILE'"),
-        (("list", "signal"), "'signal' is one too many; write 'quadvis list'"),
+        (("schema", "signal"), "'signal' is one too many; write 'quadvis schema'"),
         (("run", "a", "--", "--json"), "'--json' is one too many; write 'quadvis run FILE'"),
         (("new",), "KIND and NAME is missing; write 'quadvis new block|device|diagram NAME'"),
         (("new", "block"), "NAME is missing; write 'quadvis new block|device|diagram NAME'"),

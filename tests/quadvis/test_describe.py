@@ -17,12 +17,10 @@ from quadvis.document import parse_yaml
 from quadvis.errors import DiagramError
 from quadvis.library.catalogue import Catalogue
 from quadvis.library.describe import (
-    catalogue_lines,
     default_text,
     description,
     example,
     facts,
-    first_line,
     table,
 )
 
@@ -145,25 +143,6 @@ def test_every_example_of_a_diagram_is_one(name: str, tmp_path: Path) -> None:
     lists = [f"'{param.name}' takes" for param in block.interface.params.values() if param.required]
     left = ("'block'", "'block.port'", "path", "'...'", *lists)
     assert [problem for problem in problems if not any(word in problem for word in left)] == []
-
-
-def test_every_block_is_listed_with_what_it_does() -> None:
-    catalogue = Catalogue()
-    lines, failures = catalogue_lines(catalogue)
-    assert failures == []
-    assert [line.split()[0] for line in lines] == catalogue.names()
-    for line in lines:
-        name = line.split()[0]
-        assert line.endswith(first_line(catalogue.find(name)))
-        assert first_line(catalogue.find(name)).endswith(".")
-
-
-def test_a_block_that_cannot_be_loaded_is_told_not_skipped(tmp_path: Path) -> None:
-    (tmp_path / "blocks" / "own").mkdir(parents=True)
-    (tmp_path / "blocks" / "own" / "broken.py").write_text("import nothing_like_it\n")
-    _, failures = catalogue_lines(Catalogue(tmp_path))
-    assert len(failures) == 1
-    assert "own.broken" in failures[0]
 
 
 def test_long_words_wrap_in_their_own_column() -> None:

@@ -1,0 +1,86 @@
+"""`quadvis list`: all blocks in one line each, without importing them, and the search by words."""
+
+from __future__ import annotations
+
+import inspect
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from quadvis.errors import QuadvisError
+from quadvis.library.catalogue import Catalogue
+from quadvis.library.listing import lines, listed_blocks, listed_files, matching
+
+
+def test_what_is_read_from_a_file_is_what_its_class_says() -> None:
+    catalogue = Catalogue()
+    listed, failures = listed_blocks(catalogue)
+    assert failures == []
+    assert [each.name for each in listed] == catalogue.names()
+    for each in listed:
+        assert each.text == inspect.getdoc(catalogue.find(each.name))
+        assert each.headline.endswith(".")
+
+
+def test_a_line_has_the_name_and_the_first_sentence() -> None:
+    listed, _ = listed_blocks(Catalogue())
+    for line, each in zip(lines(listed), listed, strict=True):
+        assert line.startswith(f"{each.name} ") and line.endswith(f" {each.headline}")
+
+
+def test_own_blocks_are_loaded_and_broken_ones_reported(tmp_path: Path) -> None:
+    folder = tmp_path / "blocks" / "own"
+    folder.mkdir(parents=True)
+    (folder / "broken.py").write_text("import nothing_like_it\n")
+    (folder / "sound.py").write_text(
+        'from quadvis.block import Block, Out\n\n\nclass Sound(Block):\n    """Own words."""\n\n'
+        "    y = Out()\n\n    def output(self):\n        return 1.0\n"
+    )
+    listed, failures = listed_blocks(Catalogue(tmp_path))
+    assert ("own.sound", "Own words.", "Own words.") in listed
+    assert len(failures) == 1 and "own.broken" in failures[0]
+
+
+@pytest.mark.parametrize(
+    ("words", "first"),
+    [
+        ("transport", "signal.transport_delay"),
+        ("Dead Time", "signal.transport_delay"),
+        ("dead-time", "signal.transport_delay"),
+        ("Mux", "signal.concatenate"),
+        ("RelationalOperator", "logic.compare"),
+        ("craft mjcf", "plant.mujoco_rotorcraft"),
+        ("hover.yaml", "quadvis:hover.yaml"),
+    ],
+)
+def test_words_find_a_block_by_its_name_its_text_or_as_others_call_it(words: str, first: str) -> None:
+    everything = [*listed_blocks(Catalogue())[0], *listed_files()]
+    assert matching(everything, words.split())[0].name == first
+
+
+def test_all_words_must_be_there_and_names_come_first() -> None:
+    listed, _ = listed_blocks(Catalogue())
+    found = [each.name for each in matching(listed, ["delay"])]
+    assert found[:4] == ["logic.on_delay", "signal.delay", "signal.transport_delay", "signal.unit_delay"]
+    assert "estimation.predictor" in found[4:]
+    assert {each.name for each in matching(listed, ["delay", "radio"])} < set(found)
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["saturatoin"], "nothing has the word 'saturatoin'; did you mean 'signal.saturation'?"),
+        (["xyzzy", "delay"], "nothing has the words 'xyzzy' and 'delay'; quadvis list shows all"),
+    ],
+)
+def test_words_that_nothing_has_get_a_sentence(words: list[str], sentence: str) -> None:
+    with pytest.raises(QuadvisError) as caught:
+        matching(listed_blocks(Catalogue())[0], words)
+    assert str(caught.value) == sentence
+
+
+def test_a_list_needs_no_numpy() -> None:
+    script = "import sys; from quadvis.cli import main; main(['list']); sys.exit('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", script], stdout=subprocess.DEVNULL).returncode == 0
