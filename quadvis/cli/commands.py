@@ -390,22 +390,10 @@ def program(options: argparse.Namespace) -> int:
 
 
 def plot(options: argparse.Namespace) -> int:
-    """Draw the figures of a log."""
-    from quadvis.diagram.sections.figures import read_figures
-    from quadvis.output.log_reader import read_log
-    from quadvis.output.plot import plot_log, plot_times
+    """Draw figures of logs."""
+    from quadvis.cli.plot import plot as perform
 
-    log = read_log(options.log)
-    if log.damage:
-        print(log.damage, file=sys.stderr)
-    output = Path(options.output) if options.output else None
-    if options.times:
-        paths = plot_times(log, output)
-    else:
-        paths = plot_log(log, read_figures(log.diagram, f"{log.path}: diagram"), output)
-    for path in paths:
-        print(path)
-    return 0
+    return perform(options, _own_blocks(options))
 
 
 def schema(options: argparse.Namespace) -> int:

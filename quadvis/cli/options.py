@@ -63,6 +63,15 @@ signals (null unless both are logs): {compared, different: [{signal, unit, eleme
 different_rows, time_s}], only_old, only_new, unlike: [{signal, what}]}. A kind is added, removed or changed.
 Exit code: 0 the same, 1 different, 2 bad input."""
 
+PLOT_HELP = """\
+examples:
+  quadvis plot runs/hover.mcap
+  quadvis plot runs/hover.mcap --signals craft.position,estimate.position -o position.svg
+  quadvis plot runs/hover.mcap --signals 'craft.position[1]' --against 'craft.position[0]'
+  quadvis plot runs/hover.mcap runs/hover-robust.mcap --figures diagrams/hover.yaml -o both.pdf
+
+Several logs are drawn over each other, two also with their difference. FILE of --figures is a diagram, or
+has only the key 'figures'; without it the figures are those of the first log's diagram."""
 EXPORT_HELP = """\
 Inputs are the inputs of the part, or what its blocks read from outside; outputs are those of the part, or, of
 a whole diagram, what it logs; parameters are those that can be tuned. All are in SI units. The FMU has its
@@ -175,14 +184,7 @@ def parser() -> Parser:
     _diff_options(
         add("diff", commands.diff, "print what differs between two diagrams, variants or logs", DIFF_HELP)
     )
-    plot = add("plot", commands.plot, "draw the figures that a log's diagram declares, as PNG")
-    plot.add_argument("log", metavar="LOG")
-    plot.add_argument(
-        "--times",
-        action="store_true",
-        help="draw the lateness and execution times of a real-time run's tasks",
-    )
-    plot.add_argument("--output", "-o", metavar="FOLDER", help="default: beside the log")
+    _plot_options(add("plot", commands.plot, "draw the figures of a log, or of several in one", PLOT_HELP))
     schema = add("schema", commands.schema, "print the JSON schema of diagrams, for editors")
     schema.add_argument("--output", "-o", metavar="PATH", help="default: standard output")
     _own_block_option(schema)
@@ -287,6 +289,21 @@ def _setting_options(parser: Parser) -> None:
 def _set_option(parser: Parser) -> None:
     words = "replace a parameter, such as control/roll.bandwidth='2 rad/s'; may be repeated"
     parser.add_argument("--set", action="append", default=[], metavar="BLOCK.PARAM=VALUE", help=words)
+
+
+def _plot_options(plot: Parser) -> None:
+    plot.add_argument("logs", metavar="LOG", nargs="+", help="log of a run, or of several to be compared")
+    words = "draw these signals, divided by commas; may be repeated"
+    plot.add_argument("--signals", metavar="A,B", action="append", default=[], help=words)
+    plot.add_argument("--against", metavar="SIGNAL", help="what lies across in place of the time")
+    words = "take the figures of this diagram, or of a file with 'figures' alone, in place of the log's own"
+    plot.add_argument("--figures", metavar="FILE", help=words)
+    words = "draw the lateness and execution times of a real-time run's tasks"
+    plot.add_argument("--times", action="store_true", help=words)
+    plot.add_argument("--show", action="store_true", help="open what was drawn")
+    words = "a file .svg, .pdf (all figures) or .png, or a folder for PNG files; default: beside the log"
+    plot.add_argument("--output", "-o", metavar="PATH", help=words)
+    _own_block_option(plot)
 
 
 def _sweep_options(parser: Parser) -> None:

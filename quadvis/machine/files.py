@@ -52,6 +52,7 @@ class Kind(NamedTuple):
 LOG = Kind("the log", (b"\x89MCAP0\r\n",))
 PNG = Kind("the picture", (b"\x89PNG\r\n",))
 JPG = Kind("the picture", (b"\xff\xd8\xff",))
+PDF = Kind("the document", (b"%PDF-",))
 PLOT = Kind("the plot", PNG.heads)
 SVG = Kind("the drawing", (b"<svg", b"<?xml"))
 

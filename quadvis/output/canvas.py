@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 RESOLUTION = 120  # dots an inch
 POINTS = 72.0  # an inch
+SAVED: Mapping[Any, Any] = {"savefig.dpi": RESOLUTION, "svg.hashsalt": "quadvis"}  # equal sheets, equal files
 TYPEFACE = "DejaVu Sans"  # it comes with matplotlib
 _BACKEND = ("backend", "backend_fallback")  # reading or setting these would load a backend
 
@@ -35,7 +36,7 @@ def blank_sheet(width: float, height: float, style: Mapping[Any, Any], **more: A
         from matplotlib.figure import Figure
 
         own = {key: value for key, value in library.rcParamsDefault.items() if key not in _BACKEND}
-        with library.rc_context({**own, "savefig.dpi": RESOLUTION, **style}):
+        with library.rc_context({**own, **SAVED, **style}):
             sheet = Figure(figsize=(width, height), dpi=RESOLUTION, **more)
             FigureCanvasAgg(sheet)
             yield sheet

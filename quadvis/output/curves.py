@@ -16,13 +16,17 @@ from quadvis.output.figures import Figure, Panel, Trace
 from quadvis.output.recording import Recorded
 from quadvis.units import Unit, parse_units
 
+NO_UNIT = Unit()
+
 
 @dataclass(frozen=True)
 class Curve:
     """The samples of one number in a stretch of the run, in the unit of the panel.
 
     A ``held`` curve stands still between samples, the samples of other curves are joined by lines. ``before``
-    is the value held when the stretch begins. ``whole`` numbers are counts, levels and truth values.
+    is the value held when the stretch begins. ``whole`` numbers are counts, levels and truth values. A curve
+    that does not stand over the time has the values that are across, ``across``, in the unit ``across_unit``.
+    ``recording`` is the number of the recording that it comes from, ``place`` its own number there.
     """
 
     label: str
@@ -32,6 +36,22 @@ class Curve:
     held: bool
     whole: bool
     before: float = math.nan
+    across: NDArray[np.float64] | None = None
+    across_unit: Unit = NO_UNIT
+    across_label: str = ""
+    recording: int = 0
+    place: int = 0
+
+
+def values_at(curve: Curve, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the values of a curve at other times; NaN before its first sample."""
+    if not curve.times.size:
+        return np.full(len(times), np.nan)
+    if curve.held:
+        places = np.searchsorted(curve.times, times, side="right") - 1
+        return np.where(places < 0, curve.before, curve.values[places])
+    inside = np.interp(times, curve.times, curve.values)
+    return np.where((times < curve.times[0]) | (times > curve.times[-1]), np.nan, inside)
 
 
 def panel_curves(recorded: Recorded, figure: Figure, panel: Panel) -> list[Curve]:
@@ -40,8 +60,9 @@ def panel_curves(recorded: Recorded, figure: Figure, panel: Panel) -> list[Curve
     if not found:
         raise QuadvisError(f"panel {quoted(panel.title)} has no signals; name one")
     shown = panel.unit or found[0].unit
+    over = None if panel.against is None else _one(recorded, panel.against, shown)
     curves = []
-    for curve in found:
+    for place, curve in enumerate(found):
         if not curve.unit.dimension_equals(shown):
             raise QuadvisError(f"{quoted(curve.label)} is in {curve.unit}, which cannot be shown in {shown}")
         part = (curve.times >= figure.start) & (curve.times <= figure.stop)
@@ -49,8 +70,24 @@ def panel_curves(recorded: Recorded, figure: Figure, panel: Panel) -> list[Curve
         earlier = values[curve.times < figure.start]
         before = float(earlier[-1]) if earlier.size else math.nan
         times = curve.times[part]
-        curves.append(replace(curve, unit=shown, times=times, values=values[part], before=before))
+        made = replace(curve, unit=shown, times=times, values=values[part], before=before, place=place)
+        if over is not None:
+            across = values_at(over, times)
+            made = replace(made, across=across, across_unit=over.unit, across_label=over.label)
+        curves.append(made)
     return curves
+
+
+def _one(recorded: Recorded, trace: Trace, shown: Unit) -> Curve:
+    """Return the one element that lies across, in the unit of the panel if that can be."""
+    elements = list(_elements(recorded, trace))
+    if len(elements) != 1:
+        name = wire_text(trace.signal)
+        raise QuadvisError(f"{quoted(name)} has {len(elements)} elements; name one of them to lie across")
+    curve = elements[0]
+    if not curve.unit.dimension_equals(shown):
+        return curve
+    return replace(curve, unit=shown, values=curve.values * (curve.unit.scale / shown.scale))
 
 
 def _elements(recorded: Recorded, trace: Trace) -> Iterator[Curve]:

@@ -13,10 +13,12 @@ import numpy as np
 
 from quadvis.output.curves import Curve
 from quadvis.output.style import COLOURS, DASHES, POINT, STYLE, fitted, measure, pretty
+from quadvis.units import Unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+METRE = Unit.parse("m")
 MOST_CURVES = len(COLOURS) * len(DASHES)  # curves that a legend can name
 FEW_SAMPLES = 40  # up to so many samples each one gets a mark
 LEAST_LABEL = 1.1  # inches; labels are not cut below this length to gain a column
@@ -111,12 +113,15 @@ def _label(name: str, note: str, room: float) -> str:
 def draw_panel(
     axes: Axes, curves: Sequence[Curve], reference: float | None, stretch: tuple[float, float], legend: Legend
 ) -> None:
-    """Draw curves over a stretch of the run (s), a dashed line at the reference, and the legend above."""
+    """Draw curves over a stretch of the run (s) or over another signal, and the legend above.
+
+    A dashed line is at the reference.
+    """
     from matplotlib.ticker import MaxNLocator
 
     end = max((float(curve.times[-1]) for curve in curves if curve.times.size), default=math.nan)
     handles = [
-        _draw_curve(axes, curve, stretch[0], end, _look(number, len(curves)))
+        _draw_curve(axes, curve, stretch[0], end, _look(number, curves))
         for number, curve in enumerate(curves)
     ]
     if reference is not None:
@@ -125,9 +130,12 @@ def draw_panel(
         axes.text(0.5, 0.5, "no samples", transform=axes.transAxes, ha="center", color="#777777")
     if all(curve.whole for curve in curves):
         axes.yaxis.set_major_locator(MaxNLocator("auto", integer=True))
-    axes.set_xlabel("time (s)")
     axes.set_ylabel(pretty(curves[0].unit))
-    axes.set_xlim(*(end if math.isfinite(end) else None for end in stretch))
+    if curves[0].across is None:
+        axes.set_xlabel("time (s)")
+        axes.set_xlim(*(end if math.isfinite(end) else None for end in stretch))
+    else:
+        _set_across(axes, curves[0])
     if not legend.labels:
         words = f"{len(curves)} signals, from dark to light"
         axes.set_title("\n".join(filter(None, (legend.title, words))), loc="left")
@@ -141,8 +149,24 @@ def draw_panel(
         text.set_text(label)  # set here, because matplotlib leaves out labels that begin with '_'
 
 
-def _look(number: int, count: int) -> dict[str, Any]:
-    """Return the style of a curve out of ``count``; no two curves look alike."""
+def _set_across(axes: Axes, curve: Curve) -> None:
+    """Name what lies across; two lengths have one scale, so that a path has its own form."""
+    unit = pretty(curve.across_unit)
+    axes.set_xlabel(f"{curve.across_label} ({unit})" if unit else curve.across_label)
+    axes.margins(x=STYLE["axes.ymargin"])
+    if curve.across_unit == curve.unit and curve.unit.dimension_equals(METRE):
+        axes.set_aspect("equal", adjustable="datalim")
+
+
+def _look(number: int, curves: Sequence[Curve]) -> dict[str, Any]:
+    """Return the style of a curve; no two curves look alike.
+
+    The curves of one signal in several recordings have one colour and several dashes, where that can be.
+    """
+    count = len(curves)
+    if max(curve.place for curve in curves) < len(COLOURS) and curves[-1].recording < len(DASHES):
+        curve = curves[number]
+        return {"color": COLOURS[curve.place], "linestyle": DASHES[curve.recording]}
     if count <= MOST_CURVES:
         dashes, colour = divmod(number, len(COLOURS))
         return {"color": COLOURS[colour], "linestyle": DASHES[dashes]}
@@ -154,6 +178,9 @@ def _look(number: int, count: int) -> dict[str, Any]:
 def _draw_curve(axes: Axes, curve: Curve, start: float, end: float, look: dict[str, Any]) -> Any:
     """Draw a curve; a held curve reaches from the start of the stretch to ``end``, the last sample."""
     times, values = curve.times, curve.values
+    if curve.across is not None:
+        (line,) = axes.plot(curve.across, values, label=curve.label, **look)
+        return line
     few = np.count_nonzero(np.isfinite(values)) <= FEW_SAMPLES
     marks = list(range(len(times)))
     if curve.held and math.isfinite(end):

@@ -1,4 +1,4 @@
-"""Pictures of a run as PNG files: figures are laid out in rows of panels and drawn by matplotlib.
+"""Pictures of runs as files: figures are laid out in rows of panels and drawn by matplotlib.
 
 Sampled signals are drawn as stairs, since they stand still between their ticks; those of the continuous rate
 as lines.
@@ -8,35 +8,43 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 from quadvis.errors import QuadvisError, quoted
-from quadvis.machine.files import PNG, write_output
+from quadvis.machine.files import PDF, PNG, SVG, reason, write_output
 from quadvis.output.canvas import blank_sheet
-from quadvis.output.curves import Curve, panel_curves
 from quadvis.output.figures import Figure, block_figures
+from quadvis.output.overlay import Drawn, RunOverlay, short_names
 from quadvis.output.panel import draw_panel, legend_of
 from quadvis.output.recording import Recorded
 from quadvis.output.style import STYLE, WIDTHS, fitted, measure
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Sheet
+
     from quadvis.output.log_reader import Log
 
 HEIGHT = 3.6  # inches of a row
 TITLE = 0.5  # inches for the title of a picture; each further line needs half of it
 LONGEST_NAME = 200  # bytes of a file's name without its number and suffix
 SIDE = 0.5  # inches that stay free beside a title
+KINDS = {".png": PNG, ".svg": SVG, ".pdf": PDF}  # of files that hold figures, by suffix
+UNDATED = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}  # equal figures, equal files
 
 
-def plot_log(log: Log, figures: Sequence[Figure], output: Path | None = None) -> list[Path]:
-    """Draw figures of a log, or one for each block if none are given; return the PNG files.
+def plot_logs(logs: Sequence[Log], figures: Sequence[Figure], output: Path | None = None) -> list[Path]:
+    """Draw figures of logs, or one for each block if none are given; return the files.
 
-    They are in ``output`` or in a folder beside the log. QuadvisError if the log lacks signals.
+    Several logs are drawn over each other, two also with their difference. ``output`` is a file whose suffix
+    is one of `KINDS`, or a folder for PNG files; it is a folder beside the first log if it is not given.
+    QuadvisError if a log lacks signals, or if a file cannot hold all figures.
     """
-    folder = output or log.path.with_name(f"{log.path.stem}-figures")
-    return plot_figures(log, figures or block_figures(log), folder, [log.path])
+    names = short_names([log.path for log in logs])
+    folder = output or logs[0].path.with_name("-".join(dict.fromkeys(names)).replace("/", "-") + "-figures")
+    overlay = RunOverlay(list(zip(names, logs, strict=True)))
+    return draw_figures(overlay, figures or block_figures(logs[0]), folder, [log.path for log in logs])
 
 
 def plot_times(log: Log, output: Path | None = None) -> list[Path]:
@@ -51,14 +59,39 @@ def plot_times(log: Log, output: Path | None = None) -> list[Path]:
 
 
 def plot_figures(
-    recorded: Recorded, figures: Iterable[Figure], folder: Path, inputs: Sequence[Path] = ()
+    recorded: Recorded, figures: Iterable[Figure], output: Path, inputs: Sequence[Path] = ()
 ) -> list[Path]:
-    """Draw every figure as `<number>-<title>.png` in `folder` and return the files.
+    """Draw every figure of one recording, as `draw_figures` does."""
+    return draw_figures(RunOverlay([("", recorded)]), figures, output, inputs)
+
+
+def draw_figures(
+    overlay: RunOverlay, figures: Iterable[Figure], output: Path, inputs: Sequence[Path] = ()
+) -> list[Path]:
+    """Draw every figure into the file ``output``, or into this folder, as ``<number>-<title>.png``.
 
     Before anything is drawn, QuadvisError names all signals that do not exist or do not fit their panel.
     Files that are `inputs`, or that are no pictures, are not replaced.
     """
-    found: list[tuple[Figure, list[list[Curve]]]] = []
+    found = _found(overlay, figures)
+    if output.suffix in KINDS:
+        _write_file(found, output, inputs)
+        return [output]
+    digits = len(str(len(found)))
+    paths = []
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+        for number, (figure, panels) in enumerate(found, 1):
+            paths.append(output / f"{number:0{digits}}-{_file_name(figure.title)}.png")
+            _write_file([(figure, panels)], paths[-1], inputs)
+    except OSError as error:
+        raise QuadvisError(f"cannot write figures to '{output}': {reason(error)}") from error
+    return paths
+
+
+def _found(overlay: RunOverlay, figures: Iterable[Figure]) -> list[tuple[Figure, list[Drawn]]]:
+    """Return the figures with the curves of their panels; QuadvisError has all that is wrong."""
+    found: list[tuple[Figure, list[Drawn]]] = []
     problems: list[str] = []
     for figure in figures:
         found.append((figure, []))
@@ -66,22 +99,35 @@ def plot_figures(
             problems.append(f"figure {quoted(figure.title)} has no panels; give it signals")
         for panel in figure.panels:
             try:
-                found[-1][1].append(panel_curves(recorded, figure, panel))
+                found[-1][1].extend(overlay.drawn(figure, panel))
             except QuadvisError as error:
                 problems.append(f"figure {quoted(figure.title)}: {error}")
     if problems:
         raise QuadvisError("\n".join(problems))
-    digits = len(str(len(found)))
-    paths = []
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for number, (figure, curves) in enumerate(found, 1):
-            paths.append(folder / f"{number:0{digits}}-{_file_name(figure.title)}.png")
-            _draw(figure, curves, paths[-1], inputs)
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise QuadvisError(f"cannot write figures to '{folder}': {reason}") from error
-    return paths
+    return found
+
+
+def _write_file(found: list[tuple[Figure, list[Drawn]]], path: Path, inputs: Sequence[Path]) -> None:
+    """Write figures into one file, which holds one picture unless it is a PDF."""
+    kind, form = KINDS[path.suffix], path.suffix[1:]
+    if len(found) > 1 and kind is not PDF:
+        remedy = "give a .pdf, or a folder, or choose by --signals"
+        raise QuadvisError(f"'{path}' holds one figure, and there are {len(found)}; {remedy}")
+
+    def save(file: BinaryIO) -> None:
+        if kind is PDF:
+            from matplotlib.backends.backend_pdf import PdfPages
+
+            with PdfPages(file, metadata=UNDATED[path.suffix]) as pages:
+                for figure, panels in found:
+                    _draw(figure, panels, pages.savefig)
+            return
+        for figure, panels in found:
+            _draw(
+                figure, panels, lambda sheet: sheet.savefig(file, format=form, metadata=UNDATED[path.suffix])
+            )
+
+    write_output(path, kind, save, inputs)
 
 
 def _file_name(title: str) -> str:
@@ -95,11 +141,12 @@ def _file_name(title: str) -> str:
     return name or "figure"
 
 
-def _draw(figure: Figure, panels: list[list[Curve]], path: Path, inputs: Sequence[Path]) -> None:
-    columns = min(len(WIDTHS), len(panels))
+def _draw(figure: Figure, panels: Sequence[Drawn], save: Callable[[Sheet], object]) -> None:
+    """Draw a figure on a sheet, and save that."""
+    paired = len(panels) == 2 * len(figure.panels)  # each with its difference
+    columns = 2 if paired else min(len(WIDTHS), len(panels))
     width = WIDTHS[columns - 1]
-    pairs = list(zip(figure.panels, panels, strict=True))
-    legends = [legend_of(panel.title, curves, panel.reference, width / columns) for panel, curves in pairs]
+    legends = [legend_of(panel.title, curves, panel.reference, width / columns) for panel, curves in panels]
     title = fitted(figure.title, width - SIDE, measure(STYLE["figure.titlesize"], bold=True), lines=3)
     # The highest legend of a row decides the height of the row, so that all axes have the same height.
     rows = [legends[start : start + columns] for start in range(0, len(legends), columns)]
@@ -108,7 +155,7 @@ def _draw(figure: Figure, panels: list[list[Curve]], path: Path, inputs: Sequenc
     with blank_sheet(width, height, STYLE, layout="constrained") as sheet:
         sheet.suptitle(title)
         grid = sheet.add_gridspec(len(rows), columns, height_ratios=heights)
-        for number, ((panel, curves), legend) in enumerate(zip(pairs, legends, strict=True)):
+        for number, ((panel, curves), legend) in enumerate(zip(panels, legends, strict=True)):
             axes = sheet.add_subplot(grid[divmod(number, columns)])
             draw_panel(axes, curves, panel.reference, (figure.start, figure.stop), legend)
-        write_output(path, PNG, lambda file: sheet.savefig(file, format="png"), inputs)
+        save(sheet)

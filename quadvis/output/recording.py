@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.errors import QuadvisError, quoted, suggestion
-from quadvis.graph.graph import Index, Node, selected
+from quadvis.graph.graph import Index, Node, Wire, selected
 from quadvis.graph.names import read_name
 
 SLOT = 8
@@ -255,6 +255,11 @@ class Recording:
             shape = f"the shape {list(port.shape)}, count from 0" if port.shape else "one element only"
             raise QuadvisError(f"there is no {quoted(name)}: {quoted(source)} has {shape}") from None
         return block, start, port, index
+
+    def wire(self, name: str) -> Wire:
+        """Return what a name means here, a port of a block with an index; QuadvisError if there is none."""
+        block, _, port, index = self.find(name)
+        return Wire(self.blocks[block].path.strip("/"), port.name, index)
 
     def _source(self, name: str) -> tuple[str, Index]:
         """Return the name of the block's port that a name means, and the index of its elements."""

@@ -25,7 +25,7 @@ from quadvis.graph.names import read_name
 from quadvis.output.figures import Figure, Panel, Trace, block_figures
 from quadvis.output.log import LogWriter
 from quadvis.output.log_reader import read_log
-from quadvis.output.plot import plot_figures, plot_log
+from quadvis.output.plot import plot_figures, plot_logs
 from quadvis.output.recording import RecordedBlock, RecordedPort
 from quadvis.units import Unit
 from tests.stages import mostly_slow
@@ -72,7 +72,7 @@ def trace(text: str, label: str = "") -> Trace:
 def plotted_log(path: Path, output: Path | None = None) -> list[Path]:
     """Draw a log as `quadvis plot` does."""
     log = read_log(path)
-    return plot_log(log, read_figures(log.diagram, f"{log.path}: diagram"), output)
+    return plot_logs([log], read_figures(log.diagram, f"{log.path}: diagram"), output)
 
 
 class Run:

@@ -11,6 +11,8 @@
               - {signal: "vision/pose.position[0]", label: camera}
             unit: cm                       # of the axis; the unit of the first signal if absent
             reference: 0                   # dashed line; the legend has the RMS of the distance from it
+          - signals: plant.position[1]
+            against: plant.position[0]     # what lies across in place of the time: a picture in the plane
       - title: Yaw angle                   # a figure of one panel may have the panel's keys
         signals: plant.attitude[2]
         unit: deg
@@ -41,16 +43,18 @@ from quadvis.output.stretch import NANOSECONDS, stamp
 from quadvis.units import Unit, UnitError, split_quantity
 
 STRETCH_KEYS = ("from", "to")
-PANEL_KEYS = ("signals", "title", "unit", "reference")
+PANEL_KEYS = ("signals", "title", "unit", "reference", "against")
 TRACE_KEYS = ("signal", "label")
-FIGURE_KEYS = ("title", *STRETCH_KEYS, "panels", "signals", "unit", "reference")
+FIGURE_KEYS = ("title", *STRETCH_KEYS, "panels", "signals", "unit", "reference", "against")
 
 
 class Figures(RunSection[Asked[Figure]]):
     """The figures of a run."""
 
     key = "figures"
-    words = "what `quadvis plot` draws: `{title, from, to, panels: [{title, signals, unit, reference}]}`"
+    words = (
+        "what `quadvis plot` draws: `{title, from, to, panels: [{title, signals, unit, reference, against}]}`"
+    )
 
     def read(self, node: YamlNode | None, context: Context) -> Asked[Figure]:
         """Return the figures in the order of the file."""
@@ -69,6 +73,7 @@ class Figures(RunSection[Asked[Figure]]):
             "signals": {"anyOf": [SIGNAL, list_of({"anyOf": [SIGNAL, trace]}, "curves of the panel")]},
             "title": TEXT,
             "unit": {**TEXT, "description": "of the axis; that of the first signal if absent"},
+            "against": {"anyOf": [SIGNAL, trace], "description": "lies across in place of the time"},
             "reference": {**QUANTITY, "description": "dashed line from which the RMS in the legend counts"},
         }
         figure = panel | {
@@ -145,7 +150,9 @@ class FigureReader:
         traces = [self.faults.read(self._trace, trace, shown) for trace in entries]
         level = self.faults.collect(_level, reference, unit, shown, place) if reference else None
         name = self.faults.collect(title.text) if title and not single else None
-        return Panel(tuple(trace for trace in traces if known(trace)), name or "", shown, level)
+        over = self.faults.read(self._trace, entry["against"], None) if "against" in entry else None
+        against = over if over is not None and known(over) else None
+        return Panel(tuple(trace for trace in traces if known(trace)), name or "", shown, level, against)
 
     def _trace(self, node: YamlNode, shown: Unit | None) -> Trace | Unknown:
         label = None

@@ -12,7 +12,7 @@ from quadvis.api import load_text
 from quadvis.diagram.sections.figures import read_figures
 from quadvis.errors import QuadvisError
 from quadvis.output.log_reader import read_log
-from quadvis.output.plot import plot_log
+from quadvis.output.plot import plot_logs
 from quadvis.run.session import metadata
 from quadvis.scopes.board import ScopeBoard
 from quadvis.scopes.file_names import FileNames
@@ -149,7 +149,7 @@ blocks:
     made.settle(30)
     log = read_log(tmp_path / "SC1DATA.mcap")
     assert log.complete and log.diagram == diagram.resolved
-    (picture,) = plot_log(log, read_figures(log.diagram, "log"), tmp_path)
+    (picture,) = plot_logs([log], read_figures(log.diagram, "log"), tmp_path)
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
