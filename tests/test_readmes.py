@@ -158,12 +158,10 @@ def table(text: str, heading: str) -> list[list[str]]:
     return rows
 
 
-SIGNATURES = {
-    words[1]: words
-    for row in table(TEXTS["README.md"], "Commands")
-    for span in re.findall(r"`(quadvis [^`]+)`", row[0])
-    for words in [span.split()]
-}
+SIGNATURES: dict[str, list[str]] = {}
+for row in table(TEXTS["README.md"], "Commands"):
+    for span in re.findall(r"`(quadvis [^`]+)`", row[0]):
+        SIGNATURES.setdefault(span.split()[1], []).extend(span.split())  # some commands have several rows
 
 
 def test_the_table_of_commands_has_every_command_and_no_other() -> None:

@@ -363,7 +363,9 @@ def draw(options: argparse.Namespace) -> int:
 
 
 def export(options: argparse.Namespace) -> int:
-    """Write a part of a diagram as an FMU."""
+    """Write a part of a diagram as an FMU, or the signals of a log for other programs."""
+    if options.fmu is None:
+        return _export_log(options)
     from quadvis.export.fmu import export_fmu
     from quadvis.export.selection import WHOLE
     from quadvis.machine.status_line import StatusLine
@@ -377,6 +379,35 @@ def export(options: argparse.Namespace) -> int:
         print(f"{what + ':':12}{', '.join(names) or 'none'}")
     print(f"{output}: FMI {made.version}.0, steps of {made.step:.9g} s")
     return 0
+
+
+def _export_log(options: argparse.Namespace) -> int:
+    """Write signals of a log."""
+    from quadvis.output.log_reader import read_log
+    from quadvis.output.table_files import FORMATS, TableRequest, write_table
+
+    if options.file.endswith(YAML):
+        raise QuadvisError(f"'{options.file}' is no log of a run; add --fmu PART to pack a part of a diagram")
+    if options.output is None:
+        raise QuadvisError(f"say where to, by -o FILE with the suffix {', '.join(FORMATS)}")
+    log = read_log(options.file)
+    if log.damage:
+        print(log.damage, file=sys.stderr)
+    names = tuple(name for text in options.signals for name in signal_names(text))
+    write_table(log, Path(options.output), TableRequest(names, options.rate or "", options.every or ""))
+    return 0
+
+
+def signal_names(text: str) -> list[str]:
+    """Return the names of signals in a text, divided by commas outside of brackets."""
+    names, depth = [""], 0
+    for letter in text:
+        depth += (letter == "[") - (letter == "]")
+        if letter == "," and not depth:
+            names.append("")
+        else:
+            names[-1] += letter
+    return [name for part in names if (name := part.strip())]
 
 
 def program(options: argparse.Namespace) -> int:

@@ -73,6 +73,16 @@ examples:
 Several logs are drawn over each other, two also with their difference. FILE of --figures is a diagram, or
 has only the key 'figures'; without it the figures are those of the first log's diagram."""
 EXPORT_HELP = """\
+examples:
+  quadvis export runs/hover.mcap -o hover.csv
+  quadvis export runs/hover.mcap --signals craft.position,craft.attitude --every '10 ms' -o hover.parquet
+  quadvis export diagrams/hover.yaml --fmu control
+
+Of a log: .csv and .parquet have one row for each time. A sampled signal holds its value until its next
+sample, a continuous one moves in straight lines; what is missing is empty or NaN. In .mat and .npz each
+signal has its own times; .ulg is for the viewers of PX4's logs, and has whole microseconds.
+
+Of a part, with --fmu:
 Inputs are the inputs of the part, or what its blocks read from outside; outputs are those of the part, or, of
 a whole diagram, what it logs; parameters are those that can be tuned. All are in SI units. The FMU has its
 source in C and its library for this machine, and needs nothing of quadvis. At each communication point it has
@@ -172,13 +182,23 @@ def parser() -> Parser:
         metavar="PATH",
         help="default NAME.svg, with the variant in it; '-' for standard output",
     )
-    export = add("export", commands.export, "pack a part of a diagram for other programs", EXPORT_HELP)
+    export = add(
+        "export", commands.export, "write a log's signals, or a part, for other programs", EXPORT_HELP
+    )
     _diagram_options(export)
     words = "as an FMU: a part or a block of the diagram, or '.' for all of it"
-    export.add_argument("--fmu", metavar="PART", required=True, help=words)
+    export.add_argument("--fmu", metavar="PART", help=words)
     words = "version of FMI, 2 or 3; default 2"
     export.add_argument("--fmi", type=int, choices=(2, 3), default=2, metavar="N", help=words)
-    export.add_argument("--output", "-o", metavar="PATH", help="default PART.fmu, or NAME.fmu for all of it")
+    words = "of a log: these signals, divided by commas; may be repeated"
+    export.add_argument("--signals", metavar="A,B", action="append", default=[], help=words)
+    export.add_argument("--rate", metavar="NAME", help="of a log: the signals of this rate alone")
+    words = "of a log: rows of this distance, such as '10 ms'; default: one for each time of a sample"
+    export.add_argument("--every", metavar="T", help=words)
+    words = (
+        "of a log: .csv, .parquet, .mat, .npz or .ulg; of a part: default PART.fmu, or NAME.fmu for all of it"
+    )
+    export.add_argument("--output", "-o", metavar="PATH", help=words)
     program = add("program", commands.program, "print what is called at which ticks, and in which order")
     _diagram_options(program)
     _diff_options(

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from quadvis.cli.commands import signal_names
 from quadvis.diagram.sections.figures import FIGURES, read_figures
 from quadvis.document import YamlMap, read_yaml
 from quadvis.errors import Faults, QuadvisError
@@ -44,7 +45,7 @@ def _figures(options: argparse.Namespace, logs: Sequence[Log], own_blocks: OwnBl
     """Return the figures that are asked for; [] means one for each block."""
     log = logs[0]
     if options.signals:
-        traces = [_trace(log, name) for text in options.signals for name in _names(text)]
+        traces = [_trace(log, name) for text in options.signals for name in signal_names(text)]
         against = _trace(log, options.against) if options.against else None
         return [signal_figure(traces, log.units, against)]
     if options.against:
@@ -56,18 +57,6 @@ def _figures(options: argparse.Namespace, logs: Sequence[Log], own_blocks: OwnBl
 
 def _trace(log: Log, name: str) -> Trace:
     return Trace(log.wire(name), name)
-
-
-def _names(text: str) -> list[str]:
-    """Return the names of signals, divided by commas outside of brackets."""
-    names, depth = [""], 0
-    for letter in text:
-        depth += (letter == "[") - (letter == "]")
-        if letter == "," and not depth:
-            names.append("")
-        else:
-            names[-1] += letter
-    return [name for part in names if (name := part.strip())]
 
 
 def _figures_of(path: Path, log: Log, own_blocks: OwnBlocks) -> list[Figure]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
 
@@ -255,6 +255,23 @@ class Recording:
             shape = f"the shape {list(port.shape)}, count from 0" if port.shape else "one element only"
             raise QuadvisError(f"there is no {quoted(name)}: {quoted(source)} has {shape}") from None
         return block, start, port, index
+
+    def frame(self, signals: Sequence[str] = (), *, rate: str = "", every: str | float = 0.0) -> Any:
+        """Return signals as a pandas.DataFrame, see `quadvis.output.tables.signal_table`.
+
+        Its index is the time (s), its columns are elements such as "craft.position[0]"; ``attrs["units"]``
+        has their units.
+        """
+        from quadvis.output.frames import as_frame
+        from quadvis.output.tables import signal_table
+
+        return as_frame(signal_table(self, signals, rate=rate, every=every))
+
+    def xarray(self, signals: Sequence[str] = ()) -> Any:
+        """Return signals as an xarray.Dataset, each at its own times (s)."""
+        from quadvis.output.frames import as_dataset
+
+        return as_dataset(self, signals)
 
     def wire(self, name: str) -> Wire:
         """Return what a name means here, a port of a block with an index; QuadvisError if there is none."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -66,6 +66,14 @@ class Result:
     def rate(self, name: str) -> str:
         """Return the name of the rate of a signal's block."""
         return self.signals.rate(name)
+
+    def frame(self, signals: Sequence[str] = (), *, rate: str = "", every: str | float = 0.0) -> Any:
+        """Return signals as a pandas.DataFrame; see `quadvis.output.recording.Recording.frame`."""
+        return self.signals.frame(signals, rate=rate, every=every)
+
+    def xarray(self, signals: Sequence[str] = ()) -> Any:
+        """Return signals as an xarray.Dataset, each at its own times (s)."""
+        return self.signals.xarray(signals)
 
     @property
     def units(self) -> Mapping[str, str]:
