@@ -29,7 +29,11 @@ stop_time: 1 s
 blocks:
   ramp: {block: sources.ramp, rate: slow, with: {slope: 1 m/s}}
   line: {block: signal.integrator, in: {u: 2 m/s}}
-  high: {block: logic.compare, rate: fast, with: {operator: ">"}, in: {a: {from: ramp.y, across: hold}, b: 0.5 m}}
+  high:
+    block: logic.compare
+    rate: fast
+    with: {operator: ">"}
+    in: {a: {from: ramp.y, across: hold}, b: 0.5 m}
   both:
     block: signal.concatenate
     rate: fast

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from quadvis.block import Block, Out, Param, ParameterError
 from quadvis.errors import QuadvisError
 from quadvis.machine.inputs import read_once
-from quadvis.output.log_reader import Log, read_log
+from quadvis.output.foreign_signals import Played, read_recording
 
 HOLD, LINEAR = range(2)
 MISSING, REPEAT = 1, 2  # of ``before`` and ``after``
@@ -19,7 +19,7 @@ SECOND = 1e9  # ns
 
 
 class Recording(Block, numeric=False):
-    """A signal of a run's log, by time: at time t the value that it had at ``begin`` + t.
+    """A signal of a run's log, or of a file of another program: at time t its value at ``begin`` + t.
 
     Shape, type and unit of the output are those of the signal. With ``between: hold`` the value is that of
     the last row up to this time, of several rows with one time the last; at the ticks of the recorded run it
@@ -27,7 +27,7 @@ class Recording(Block, numeric=False):
     element. Times count in whole nanoseconds. A log that is cut or damaged is played as far as it goes.
     """
 
-    file = Param(type="file", doc="log of a run (MCAP)")
+    file = Param(type="file", doc="log of a run (.mcap), or .csv, .parquet, .npz, .mat of any program")
     signal = Param(type="str", doc="its name, such as craft.position, or an element, craft.position[2]")
     begin = Param(0.0, unit="s", doc="time of the log that is played at time 0")
     between = Param("hold", choices=("hold", "linear"), doc="what happens between the rows")
@@ -43,7 +43,7 @@ class Recording(Block, numeric=False):
     @classmethod
     def ports(cls, file: str, signal: str, before: int, after: int) -> dict[str, Out]:
         """Return the output, like the signal."""
-        log = read_once(read_log, file)
+        log = read_once(read_recording, file)
         values = _played(log, signal).values
         missing = MISSING in (before, after) or bool(np.isnan(values.astype(float)).any())
         port = log.port(signal)
@@ -73,7 +73,7 @@ class Recording(Block, numeric=False):
 
     def doubts(self) -> list[ParameterError]:
         """Return the damage of the log."""
-        damage = self.read_file("file", read_log).damage
+        damage = self.read_file("file", read_recording).damage
         return [ParameterError("file", damage)] if damage else []
 
     def open(self) -> None:
@@ -81,7 +81,7 @@ class Recording(Block, numeric=False):
         self._played = self._rows()
 
     def _rows(self) -> _Played:
-        return _played(self.read_file("file", read_log), self.signal)
+        return _played(self.read_file("file", read_recording), self.signal)
 
     def output(self, time: float) -> Any:
         """Return the value at this time."""
@@ -108,7 +108,7 @@ class _Played(NamedTuple):
     values: NDArray[Any]
 
 
-def _played(log: Log, signal: str) -> _Played:
+def _played(log: Played, signal: str) -> _Played:
     """Return the rows of a signal; ParameterError if the log has no such signal."""
     try:
         return _Played(log.stamps(signal), log[signal])
