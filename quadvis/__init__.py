@@ -13,8 +13,20 @@ if TYPE_CHECKING:
     from quadvis.realtime.options import RealTime
     from quadvis.run.replay import replay
     from quadvis.sweeps.sweep import sweep
+    from quadvis.sweeps.tune import tune
 
-__all__ = ["Diagram", "Log", "RealTime", "Target", "__version__", "load", "read_log", "replay", "sweep"]
+__all__ = [
+    "Diagram",
+    "Log",
+    "RealTime",
+    "Target",
+    "__version__",
+    "load",
+    "read_log",
+    "replay",
+    "sweep",
+    "tune",
+]
 
 _HOMES = {
     "Diagram": "api",
@@ -25,6 +37,7 @@ _HOMES = {
     "RealTime": "realtime.options",
     "replay": "run.replay",
     "sweep": "sweeps.sweep",
+    "tune": "sweeps.tune",
 }
 
 

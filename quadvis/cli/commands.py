@@ -6,6 +6,7 @@ The file is long because it has all commands, each of a few lines.
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from quadvis.cli.default_places import default_name, log_path, runs_folder
 from quadvis.errors import Fault, QuadvisError, RunError, counted
-from quadvis.machine.files import SVG, Kind, file_name, write_output
+from quadvis.machine.files import SVG, Kind, check_output, file_name, write_output
 from quadvis.machine.garbage import collected_from_now_on
 from quadvis.machine.shipped import PREFIX, named_file
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from quadvis.realtime.options import RealTime
 
 SCHEMA = Kind("the schema", (b"{",), rb'"\$schema"')
+PARAMETERS = Kind("the parameter file", (b"#", b"quadvis:"), rb"^set:")
 FAILED = 1
 NO_VARIANT = "none"
 YAML = (".yaml", ".yml")
@@ -165,6 +167,38 @@ def sweep(options: argparse.Namespace) -> int:
     if options.plot != "":
         print(f"plot: {plot}")
     return 0 if table.passed else FAILED
+
+
+def tune(options: argparse.Namespace) -> int:
+    """Look for the best values of parameters; 1 if the best trial fails."""
+    from quadvis.sweeps.axes import SEED, read_axes
+    from quadvis.sweeps.tune import tune as search
+    from quadvis.sweeps.tune_lines import TuneLine, parameter_file, tune_lines
+
+    if options.output:
+        check_output(options.output, PARAMETERS)
+    seeds = read_axes([f"{SEED}={options.seeds}"])[0].values if options.seeds else ()
+    collected_from_now_on()
+    with TuneLine() as progress:
+        result = search(
+            options.file, options.minimise, _ranges(options.over),
+            variant=options.variant, settings=options.set, params=options.params,
+            stop_time=options.stop_time, seeds=tuple(map(int, seeds)), method=options.method,
+            most=options.trials, passing=options.passing, own_blocks=_own_blocks(options),
+            engine=options.engine, announce=progress.say, progress=progress,
+        )  # fmt: skip
+    print("\n".join(tune_lines(result)))
+    if options.output:
+        write_output(options.output, PARAMETERS, parameter_file(result))
+        print(f"parameters: {options.output}")
+    else:
+        print(" ".join(f"--set {shlex.quote(f'{name}={text}')}" for name, text in result.settings.items()))
+    return 0 if result.best.passed else FAILED
+
+
+def _ranges(texts: Sequence[str]) -> dict[str, str]:
+    """Return the ranges that ``--over`` gives, by parameter."""
+    return {name.strip(): span.strip() for name, _, span in (text.partition("=") for text in texts)}
 
 
 def _hold_ups(graph: Graph) -> list[str]:

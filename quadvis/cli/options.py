@@ -63,6 +63,15 @@ signals (null unless both are logs): {compared, different: [{signal, unit, eleme
 different_rows, time_s}], only_old, only_new, unlike: [{signal, what}]}. A kind is added, removed or changed.
 Exit code: 0 the same, 1 different, 2 bad input."""
 
+TUNE_HELP = """\
+examples:
+  quadvis tune diagrams/hover.yaml --variant geometric --minimise xy.rms --over bandwidth='1..6 rad/s'
+  quadvis tune motor.yaml --minimise error.rms --over kp=1..20 --over ki='0.1..10 1/s' -o best.yaml
+
+Each trial is a run, or one for each seed. The parameters' own values are tried first; then scipy's optimisers
+search in the ranges, by methods that need no derivative.
+Exit code: 0 the best trial meets all expectations, 1 it does not, 2 bad input."""
+
 PLOT_HELP = """\
 examples:
   quadvis plot runs/hover.mcap
@@ -144,6 +153,7 @@ def parser() -> Parser:
     run.add_argument("--json", action="store_true", help="print one JSON object instead of the summary")
     _replay_options(add("replay", commands.replay, "repeat a run from its log, to the bit", REPLAY_HELP))
     _sweep_options(add("sweep", commands.sweep, "run a diagram at every point of a grid", SWEEP_HELP))
+    _tune_options(add("tune", commands.tune, "look for the best values of parameters", TUNE_HELP))
     check = add("check", commands.check, "check a diagram and report all its faults")
     _diagram_options(check)
     check.add_argument("--json", action="store_true", help="print the faults and warnings as JSON")
@@ -324,6 +334,25 @@ def _plot_options(plot: Parser) -> None:
     words = "a file .svg, .pdf (all figures) or .png, or a folder for PNG files; default: beside the log"
     plot.add_argument("--output", "-o", metavar="PATH", help=words)
     _own_block_option(plot)
+
+
+def _tune_options(parser: Parser) -> None:
+    _diagram_options(parser)
+    words = "a number of the summary, such as xy.rms"
+    parser.add_argument("--minimise", metavar="NUMBER", required=True, help=words)
+    words = "a parameter and its range, such as bandwidth='1..6 rad/s'; may be repeated"
+    parser.add_argument("--over", action="append", required=True, metavar="NAME=FROM..TO", help=words)
+    words = "take the mean over runs with these seeds, such as 0..9; default: the diagram's seed"
+    parser.add_argument("--seeds", metavar="VALUES", help=words)
+    words = "bounded (of one parameter), nelder-mead (of several), powell, or evolution"
+    parser.add_argument("--method", metavar="METHOD", help=words)
+    parser.add_argument("--trials", type=positive, default=60, metavar="N", help="most trials; default 60")
+    words = "count only trials that meet all expectations"
+    parser.add_argument("--passing", action="store_true", help=words)
+    parser.add_argument("--stop-time", metavar="T", help="such as '20 s'; replaces the diagram's")
+    _engine_option(parser)
+    words = "write the values there, as a file for --params"
+    parser.add_argument("--output", "-o", metavar="FILE.yaml", help=words)
 
 
 def _sweep_options(parser: Parser) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import NamedTuple
 
@@ -21,13 +22,25 @@ NAME = re.compile(rf"(?:(?P<block>{PATH})\.)?(?P<parameter>{PORT})(?:\[(?P<eleme
 
 
 class Variable(NamedTuple):
-    """A parameter, or an element of one; ``parameter`` is its name for ``--set``, ``others`` all elements."""
+    """A parameter, or an element of one; ``parameter`` is its name for ``--set``, ``others`` all elements.
+
+    ``text`` is its own value as it is written.
+    """
 
     name: str
     parameter: str
     unit: Unit
     element: int | None = None
     others: tuple[str, ...] = ()
+    text: str = ""
+
+    @property
+    def value(self) -> float:
+        """Its own value (SI); NaN if it cannot be read."""
+        try:
+            return parse_quantity(self.text)[0]
+        except UnitError:
+            return math.nan
 
     def setting(self, value: float) -> str:
         """Return the setting for a value (SI): ``eyes/camera.latency=0.25 s``."""
@@ -51,11 +64,11 @@ def find_variable(wiring: Wiring, graph: Graph, node: YamlNode) -> Variable:
     if match["element"] is None:
         if len(texts) != 1:
             raise node.fault(f"'{text}' has {len(texts)} elements", f"vary one of them, such as {text}[0]")
-        return Variable(text, parameter, units[0])
+        return Variable(text, parameter, units[0], text=texts[0])
     element = int(match["element"])
     if element >= len(texts) or len(texts) == 1:
         raise node.fault(f"'{parameter}' has no element [{element}]", "count from 0")
-    return Variable(text, parameter, units[element], element, texts)
+    return Variable(text, parameter, units[element], element, texts, texts[element])
 
 
 def _values(

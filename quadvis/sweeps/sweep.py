@@ -72,7 +72,7 @@ def sweep(
     """
     axes, processes = read_axes(over), _workers(workers)
     _refuse_conflicts(axes, variant, settings, seed)
-    given = (str(path), variant, _texts(settings), _paths(params), stop_time, bool(own_blocks))
+    given = (str(path), variant, setting_texts(settings), setting_paths(params), stop_time, bool(own_blocks))
     places = points(axes)
     grid = Grid(axes, places, Configuration(*given), seed, own_blocks)
     diagram = grid.check()
@@ -151,13 +151,15 @@ class _Saving:
         return table.content(self.path.suffix, timings=self.timings, head=head)
 
 
-def _texts(settings: Given) -> tuple[str, ...]:
+def setting_texts(settings: Given) -> tuple[str, ...]:
+    """Return settings as the texts of ``--set``."""
     if isinstance(settings, Mapping):
         return tuple(f"{name}={value_text(value)}" for name, value in settings.items())
     return tuple(settings)
 
 
-def _paths(params: Files) -> tuple[str, ...]:
+def setting_paths(params: Files) -> tuple[str, ...]:
+    """Return the paths of parameter files."""
     return (str(params),) if isinstance(params, str | os.PathLike) else tuple(map(str, params))
 
 
@@ -179,7 +181,7 @@ def _folder(logs: str | Path | None) -> Path | None:
 
 def _refuse_conflicts(axes: Sequence[Axis], variant: str | None, settings: Given, seed: int | None) -> None:
     """Refuse an axis that also has a fixed value; an axis of parameter files is added to the given files."""
-    names = {text.partition("=")[0].strip() for text in _texts(settings)}
+    names = {text.partition("=")[0].strip() for text in setting_texts(settings)}
     names |= {SEED} if seed is not None else set()
     names |= {VARIANT} if variant is not None else set()
     for axis in axes:

@@ -76,6 +76,13 @@ class Questions(NamedTuple):
         self, cuts: Mapping[str, Any], limits: Mapping[str, tuple[str, str, str]]
     ) -> tuple[tuple[Cut, ...], tuple[Limit, ...]]:
         """Return the cuts and limits with others added; DiagramError reports their faults."""
+        added, sought = self.others(cuts, limits, as_given("--vary", "limits"))
+        return self.cuts + added, self.limits + sought
+
+    def others(
+        self, cuts: Mapping[str, Any], limits: Mapping[str, tuple[str, str, str]], place: str
+    ) -> tuple[tuple[Cut, ...], tuple[Limit, ...]]:
+        """Return other cuts and limits alone; ``place`` names in faults where the limits were given."""
         faults = Faults()
         wiring = Wiring(self.context.wiring.expansion, faults)
         context = replace(self.context, wiring=wiring, faults=faults)
@@ -84,10 +91,9 @@ class Questions(NamedTuple):
                 problem = f"the diagram has a cut '{label}' already"
                 faults.add(Place(as_given("--cut", "cuts")), problem, "choose another name")
         found = [_cut(label, _list(signals), context) for label, signals in cuts.items()]
-        sought = [_limit(label, _map(limit), context) for label, limit in limits.items()]
+        sought = [_limit(label, _map(limit, place), context) for label, limit in limits.items()]
         faults.check()
-        added = tuple(cut for cut in found if known(cut))
-        return self.cuts + added, self.limits + tuple(limit for limit in sought if known(limit))
+        return tuple(cut for cut in found if known(cut)), tuple(limit for limit in sought if known(limit))
 
 
 class Analyse(RunSection[Questions]):
@@ -154,8 +160,7 @@ def _list(signals: str | Sequence[str]) -> YamlNode:
     return YamlList([_text(text, place) for text in texts], place, 0, 0)
 
 
-def _map(limit: tuple[str, str, str]) -> YamlMap:
-    place = as_given("--vary", "limits")
+def _map(limit: tuple[str, str, str], place: str) -> YamlMap:
     values: dict[str, YamlNode] = {
         key: _text(text, place, key) for key, text in zip(LIMIT_KEYS, limit, strict=True)
     }
