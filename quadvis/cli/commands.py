@@ -470,6 +470,15 @@ def schema(options: argparse.Namespace) -> int:
     return _all_loaded(failures)
 
 
+def completion(options: argparse.Namespace) -> int:
+    """Print the script with which a shell completes words."""
+    from quadvis.cli.completion import completion as script
+    from quadvis.cli.options import parser
+
+    print(script(parser(), options.shell), end="")
+    return 0
+
+
 def cache(options: argparse.Namespace) -> int:
     """Print where machine code is kept, and how much; remove it if asked for."""
     from quadvis.native import cache as kept

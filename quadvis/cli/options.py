@@ -63,6 +63,12 @@ signals (null unless both are logs): {compared, different: [{signal, unit, eleme
 different_rows, time_s}], only_old, only_new, unlike: [{signal, what}]}. A kind is added, removed or changed.
 Exit code: 0 the same, 1 different, 2 bad input."""
 
+SHELL_HELP = """\
+examples:
+  quadvis completion bash > ~/.local/share/bash-completion/completions/quadvis
+  quadvis completion zsh > ~/.zfunc/_quadvis  # with 'fpath+=~/.zfunc' before compinit in ~/.zshrc
+  quadvis completion fish > ~/.config/fish/completions/quadvis.fish"""
+
 TUNE_HELP = """\
 examples:
   quadvis tune diagrams/hover.yaml --variant geometric --minimise xy.rms --over bandwidth='1..6 rad/s'
@@ -218,6 +224,12 @@ def parser() -> Parser:
     schema = add("schema", commands.schema, "print the JSON schema of diagrams, for editors")
     schema.add_argument("--output", "-o", metavar="PATH", help="default: standard output")
     _own_block_option(schema)
+    completion = add(
+        "completion", commands.completion, "print what a shell needs to complete words", SHELL_HELP
+    )
+    completion.add_argument(
+        "shell", choices=("bash", "zsh", "tcsh", "fish"), metavar="SHELL", help="bash, zsh, tcsh, fish"
+    )
     _camera_options(
         add("camera", commands.camera, "list cameras, show what one sees, or calibrate it", CAMERA_HELP)
     )

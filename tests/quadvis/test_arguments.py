@@ -16,8 +16,8 @@ from quadvis.errors import QuadvisError
 HELP = "see 'quadvis --help'"
 COMMANDS = (
     "run, replay, sweep, tune, check, list, describe, analyse, draw, export, program, diff, plot, schema, "
-    "camera, cache, target, load, start, stop, unload, status, get, set, scope, log, sets, profile, web, "
-    "console, new, keys, wire"
+    "completion, camera, cache, target, load, start, stop, unload, status, get, set, scope, log, sets, "
+    "profile, web, console, new, keys, wire"
 )
 
 
