@@ -91,11 +91,11 @@ class Diagram(Checked):
 
         return export_fmu(self, name, path, version=version)
 
-    def draw(self) -> str:
-        """Return a picture of the diagram as SVG."""
+    def draw(self, *, part: str = "", depth: int | None = None) -> str:
+        """Return a picture of the diagram, or of a part, as SVG; with ``depth`` deeper parts are one box."""
         from quadvis.diagram.picture import draw_diagram
 
-        return draw_diagram(self)
+        return draw_diagram(self, part=part, depth=depth)
 
 
 def _with_methods(diagram: Checked) -> Diagram:

@@ -392,8 +392,9 @@ def draw(options: argparse.Namespace) -> int:
     from quadvis.diagram.picture import draw_diagram
 
     diagram = _load(options)
-    output = options.output or f"{default_name(options, options.variant)}.svg"
-    return _write(draw_diagram(diagram), output, SVG, diagram.inputs)
+    name = default_name(options, options.variant) + (f"-{file_name(options.part)}" if options.part else "")
+    picture = draw_diagram(diagram, part=options.part or "", depth=options.depth)
+    return _write(picture, options.output or f"{name}.svg", SVG, diagram.inputs)
 
 
 def export(options: argparse.Namespace) -> int:

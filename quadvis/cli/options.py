@@ -192,12 +192,11 @@ def parser() -> Parser:
     analyse.add_argument("--output", "-o", metavar="FOLDER", help="write Bode plots there, as PNG")
     draw = add("draw", commands.draw, "draw a diagram as SVG")
     _diagram_options(draw)
-    draw.add_argument(
-        "--output",
-        "-o",
-        metavar="PATH",
-        help="default NAME.svg, with the variant in it; '-' for standard output",
-    )
+    draw.add_argument("--part", metavar="PART", help="draw the inside of this part, such as control")
+    words = "draw what lies deeper as one box each: with 1 the parts of the diagram itself"
+    draw.add_argument("--depth", type=positive, metavar="N", help=words)
+    words = "default NAME.svg, with the variant and the part in it; '-' for standard output"
+    draw.add_argument("--output", "-o", metavar="PATH", help=words)
     export = add(
         "export", commands.export, "write a log's signals, or a part, for other programs", EXPORT_HELP
     )

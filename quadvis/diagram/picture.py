@@ -10,10 +10,15 @@ from quadvis.graph.names import wire_text
 from quadvis.links.link import Link
 from quadvis.links.twin import ReceiverTwin
 from quadvis.output.draw import DrawnBlock, DrawnWire, draw
+from quadvis.output.folding import DrawnPicture, folded, part_alone
 
 
-def draw_diagram(diagram: Diagram) -> str:
-    """Return a picture of a diagram as SVG."""
+def draw_diagram(diagram: Diagram, *, part: str = "", depth: int | None = None) -> str:
+    """Return a picture of a diagram, or of one of its parts, as SVG.
+
+    With ``depth`` what lies deeper is drawn as one box each: with 1 the parts of the diagram itself.
+    QuadvisError if there is no such part.
+    """
     blocks, wires, constants = [], [], {}
     for path in diagram.listing:
         node = diagram.graph[path]
@@ -36,7 +41,11 @@ def draw_diagram(diagram: Diagram) -> str:
             else:
                 constants[node.path, port] = constant_text(node, port, source.value)
     tasks = {task.name: rate_text(task) for task in diagram.graph.tasks}
-    return draw(diagram.name, blocks, wires, constants, tasks)
+    picture = DrawnPicture(blocks, wires, constants, diagram.ports)
+    picture = part_alone(picture, part) if part else picture
+    picture = folded(picture, depth) if depth is not None else picture
+    title = f"{diagram.name}: {part}" if part else diagram.name
+    return draw(title, picture.blocks, picture.wires, picture.constants, tasks)
 
 
 def _kind(link: Link) -> str:
