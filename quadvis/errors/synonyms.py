@@ -113,6 +113,7 @@ _MEANT = {
     "sources.chirp": "chirpsignal sweep",
     "sources.prbs": "pseudorandombinarysequence",
     "sources.uniform_noise": "uniformrandomnumber random",
+    "systems.transfer_function": "transferfcn transferfunction tf ltisiso discretetransferfcn discretefilter",
 }  # fmt: skip
 _STANDS_FOR: dict[str, list[str]] = {}
 for _ours, _theirs in _MEANT.items():

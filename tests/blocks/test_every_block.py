@@ -71,6 +71,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
         "columns": [0.0, 0.5, 3.0],
         "values": [[1.0, 2.0, 0.0], [3.0, -1.0, 5.0]],
     },
+    "systems.transfer_function": {"numerator": [1.0, 3.0], "denominator": [0.5, 1.2, 4.0]},
     "sources.repeating_sequence": {"times": [0.0, 0.25, 0.7], "values": [1.0, -1.0, 2.0]},
 }
 INPUTS: dict[str, dict[str, list[Any]]] = {
