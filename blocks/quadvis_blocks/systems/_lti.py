@@ -8,16 +8,6 @@ import numpy as np
 
 from quadvis.block import Block, Derived, In, Out, Param, ParameterError, State, element
 from quadvis_blocks.systems._models import Model
-from quadvis_blocks.systems._sampling import (
-    CONTINUOUS,
-    DIRECT,
-    DISCRETE,
-    MATCHED,
-    METHODS,
-    TUSTIN,
-    WORDS,
-    sampled,
-)
 
 if TYPE_CHECKING:
     _Base = Block
@@ -29,8 +19,6 @@ class Lti(_Base):
     """Ports, states and methods; a block adds the parameters of its model, and `lti` to its ports."""
 
     gain = Param(1.0, unit="b/a", tune=True, doc="a factor, which brings the unit of the output")
-    method = Param("continuous", choices=METHODS, doc=WORDS)
-    prewarp = Param(0.0, unit="rad/s", min=0.0, doc="frequency that ``method: tustin`` keeps; 0 is none")
     initial_input = Param(
         0.0, type="float64[*?]", unit="a", doc="the input before the start, in whose steady state it begins"
     )
@@ -43,21 +31,13 @@ class Lti(_Base):
     d = Derived(doc="its D")
     rest = Derived("float64[1]", doc="its states in the steady state of an input of 1")
 
-    def take(self, model: Model, discrete: Model | None = None) -> None:
-        """Compute a model as ``method`` says; ``discrete`` is the one of ``MATCHED``, where that is known."""
-        refuse_prewarp(self)
-        found = discrete
-        if self.method in (CONTINUOUS, DISCRETE):
-            found = model
-        elif self.method != MATCHED and self.period == self.period:
-            found = sample(self, model)
-        if found is None:  # the period is not known yet
-            found = Model(*(np.zeros_like(matrix) for matrix in model))
-        elif not found.finite:
+    def take(self, model: Model, discrete: bool) -> None:
+        """Take the model as it is computed; ParameterError if it cannot be, or has no steady state."""
+        if not model.finite:
             raise ParameterError("gain", "gain must be such that all coefficients are finite")
-        self.a, self.d = found.a, float(found.d[0, 0])
-        self.b, self.c = found.b[:, 0].copy(), found.c[0].copy()
-        rest = found.rest(discrete=self.method != CONTINUOUS)
+        self.a, self.d = model.a, float(model.d[0, 0])
+        self.b, self.c = model.b[:, 0].copy(), model.c[0].copy()
+        rest = model.rest(discrete)
         if rest is None and np.any(self.initial_input):
             problem = "initial_input must be 0, since with a pole at 0 there is no steady state"
             raise ParameterError("initial_input", problem)
@@ -82,37 +62,15 @@ class Lti(_Base):
         self.x = _moved(self, u)
 
 
-def refuse_prewarp(block: Any) -> None:
-    """Raise ParameterError if the frequency to prewarp belongs to no method, or to no sampled signal."""
-    if block.prewarp and block.method != TUSTIN:
-        raise ParameterError("prewarp", "prewarp must be 0 unless method is tustin")
-    if block.prewarp * block.period >= np.pi:
-        half = np.pi / block.period
-        problem = (
-            f"prewarp must be below half the sample rate, {half:.6g} rad/s, got {block.prewarp:.6g} rad/s"
-        )
-        raise ParameterError("prewarp", problem)
-
-
-def sample(block: Any, model: Model) -> Model:
-    """Return the model sampled as the parameters say; ParameterError if it cannot be."""
-    try:
-        with np.errstate(all="ignore"):
-            return sampled(model, block.method, block.period, block.prewarp)
-    except (np.linalg.LinAlgError, ValueError, OverflowError):
-        problem = f"method must be another one than {METHODS[block.method]}, which has no solution here"
-        raise ParameterError("method", problem) from None
-
-
-def lti(order: int, method: int, direct: bool) -> dict[str, Any]:
+def lti(order: int, continuous: bool, direct: bool) -> dict[str, Any]:
     """Return states and methods for a model of this order, at least 1, in which D is not 0 if ``direct``."""
     members: dict[str, Any] = {
-        "x": State(f"float64[{order},*]", continuous=method == CONTINUOUS),
+        "x": State(f"float64[{order},*]", continuous=continuous),
         "a": Derived(f"float64[{order},{order}]", doc="A of the system as it is computed"),
     }
-    if not direct and method not in DIRECT:
+    if not direct:
         members["output"] = _output_of_states
-    if method == CONTINUOUS:
+    if continuous:
         members |= {"deriv": _deriv, "update": None}
     for name, doc in (("b", "its B"), ("c", "its C"), ("rest", Lti.rest.doc)):
         members[name] = Derived(f"float64[{order}]", doc=doc)

@@ -32,9 +32,16 @@ class Model(NamedTuple):
     def rest(self, discrete: bool) -> Matrix | None:
         """Return the states (n, m) in the steady state of inputs of 1; None if there is no such state."""
         a = np.eye(len(self.a)) - self.a if discrete else -self.a
-        if np.linalg.matrix_rank(a) < len(a):
-            return None if self.b.any() else np.zeros_like(self.b)
-        return np.asarray(np.linalg.solve(a, self.b))
+        found = np.zeros_like(self.b)
+        # Section by section: of a long chain with low corners, all of it at once loses ten digits.
+        ends = [end for end in range(1, len(a) + 1) if not a[:end, end:].any()]
+        for begin, end in zip([0, *ends], ends, strict=False):
+            section = a[begin:end, begin:end]
+            if np.linalg.matrix_rank(section) < end - begin:
+                return None if self.b.any() else found
+            driven = self.b[begin:end] - a[begin:end, :begin] @ found[:begin]
+            found[begin:end] = np.linalg.solve(section, driven)
+        return found
 
 
 def degree(polynomial: Any) -> int:

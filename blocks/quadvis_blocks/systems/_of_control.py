@@ -28,3 +28,23 @@ def method_of(system: Any) -> dict[str, Any]:
     if system.isctime(strict=False):
         return {}
     return {"method": "discrete"} | ({} if system.dt is True else {"period": float(system.dt)})
+
+
+def roots_text(roots: Any) -> str:
+    """Return zeros or poles as a text, to the bit."""
+    return ", ".join(
+        f"{root.real!r}{root.imag:+}j" if root.imag else repr(root.real) for root in map(complex, roots)
+    )
+
+
+def matrices_of(system: Any) -> dict[str, Any]:
+    """Return the parameters of a system as matrices."""
+    if not hasattr(system, "A"):
+        import control
+
+        system = control.tf2ss(system)
+    found = {name: np.asarray(getattr(system, name), float) for name in "ABCD"}
+    if not found["A"].size:  # a plain gain has no states: it gets one that nobody sees
+        inputs, outputs = found["D"].shape[1], found["D"].shape[0]
+        found |= {"A": np.zeros((1, 1)), "B": np.zeros((1, inputs)), "C": np.zeros((outputs, 1))}
+    return {name: matrix.tolist() for name, matrix in found.items()}

@@ -12,12 +12,13 @@ from quadvis_blocks.systems._files import polynomials, read_model
 from quadvis_blocks.systems._lti import Lti, lti
 from quadvis_blocks.systems._models import degree, of_polynomials
 from quadvis_blocks.systems._of_control import polynomials_of
-from quadvis_blocks.systems._sampling import MATCHED, matched, roots_of
+from quadvis_blocks.systems._sampled import Sampled
+from quadvis_blocks.systems._sampling import CONTINUOUS, DIRECT, MATCHED, matched, roots_of
 
 IMPROPER = "numerator must be of a degree that is not higher than the denominator's; add a filter, N/(s + N)"
 
 
-class TransferFunction(Lti, Block):
+class TransferFunction(Lti, Sampled, Block):
     """A linear system by its transfer function, for a scalar, or for each element of an array alike.
 
     ``Y = gain numerator(s) / denominator(s) U``, highest powers first: ``[1, 3]`` is s + 3, of plain numbers
@@ -59,7 +60,8 @@ class TransferFunction(Lti, Block):
         if file:
             numerator, denominator = polynomials(read_once(read_model, file))
         order = degree(denominator)
-        return lti(max(order, 1), method, direct=degree(numerator) == order)
+        direct = degree(numerator) == order or method in DIRECT
+        return lti(max(order, 1), method == CONTINUOUS, direct)
 
     def check(self) -> None:
         """Refuse a system that is none, and one that is not causal."""
@@ -76,7 +78,9 @@ class TransferFunction(Lti, Block):
         if degree(numerator) > degree(denominator):
             raise ParameterError("numerator", IMPROPER)
         with np.errstate(all="ignore"):
-            self.take(of_polynomials(numerator, denominator), self._matched(numerator, denominator))
+            exact = self._matched(numerator, denominator)
+            model = self.computed(of_polynomials(numerator, denominator), exact)
+        self.take(model, discrete=self.method != CONTINUOUS)
 
     def _matched(self, numerator: Any, denominator: Any) -> Any:
         if self.method != MATCHED or np.isnan(self.period):
