@@ -72,7 +72,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
         "values": [[1.0, 2.0, 0.0], [3.0, -1.0, 5.0]],
     },
     "systems.biquad": {"sections": [[0.25, -0.1, 0.05, 1.0, -1.2, 0.52], [1.0, 0.5, 0.0, 2.0, -0.4, 0.3]]},
-    "systems.butterworth": {"corner": [1.0]},
+    "systems.butterworth": {"corner": 1.0},
     "systems.fir": {"coefficients": [0.5, 0.3, 0.2]},
     "systems.kalman": {
         "A": [[1.0, 0.1], [0.0, 1.0]],
@@ -103,7 +103,6 @@ INPUTS: dict[str, dict[str, list[Any]]] = {
     "logic.multiport_switch": {"index": [0]},
     "math.function": {"u": [0.3, 0.5, 1.0, 0.75, 0.0625]},
     "math.modulo": {"divisor": [3.0, -2.0, 0.7]},
-    "rotation.rotate": {"attitude": [[0.6, 0.8, 0.0, 0.1], [-0.5, 0.2, 0.3, 0.9]]},
     "math.power": {"u": [0.3, 2.0, 7.5]},
     "signal.lookup_1d": {"u": [-1.0, 0.2, 2.0, 1.7]},
     "signal.lookup_2d": {"row": [0.0, 0.25, 1.0], "column": [3.0, 0.5, 1.1, 0.0]},

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from quadvis.block import Block, Param, ParameterError
+from quadvis_blocks.systems._files import Matrices
 from quadvis_blocks.systems._models import Model
 from quadvis_blocks.systems._sampling import CONTINUOUS, DISCRETE, MATCHED, METHODS, TUSTIN, WORDS, sampled
 
@@ -21,6 +22,20 @@ class Sampled(_Base):
 
     method = Param("continuous", choices=METHODS, doc=WORDS)
     prewarp = Param(0.0, unit="rad/s", min=0.0, doc="frequency that ``method: tustin`` keeps; 0 is none")
+
+    def suits(self, held: Matrices) -> None:
+        """Refuse a file with a sampled system, as its ``dt`` (s) says, unless it is one of this period."""
+        period = float(held["dt"].flat[0]) if "dt" in held else 0.0
+        if period <= 0.0:
+            return
+        if self.method != DISCRETE:
+            problem = (
+                f"method must be discrete, since the file has a system that is sampled every {period:g} s"
+            )
+            raise ParameterError("method", problem)
+        if abs(self.period - period) > 1e-9 * period:
+            problem = f"file must have a system that is sampled every {self.period:g} s, as the block is"
+            raise ParameterError("file", f"{problem}, got {period:g} s")
 
     def computed(self, model: Model, exact: Model | None = None) -> Model:
         """Return a model as ``method`` says, ``exact`` for `MATCHED`; zeros as long as the period is unknown.

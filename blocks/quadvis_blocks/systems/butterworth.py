@@ -26,13 +26,14 @@ class Butterworth(Lti, Block):
     """
 
     order = Param(2, type="int64", min=1, max=20, doc="order of the low-pass filter behind it")
-    corner = Param(type="float64[k]", unit="Hz", above=0.0, doc="the corner, or both of a band, rising")
+    corner = Param(unit="Hz", above=0.0, doc="the corner; of a band the lower one")
+    upper_corner = Param(0.0, unit="Hz", min=0.0, doc="the upper corner of a band; 0 is none")
     band = Param("low", choices=BANDS, doc="what passes: below the corner, above it, the band, or all else")
     method = Param("digital", choices=("digital", "continuous"), doc="how it is computed")
 
     example = """
-        wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
-        smooth: {block: systems.butterworth, rate: fast, with: {order: 4, corner: [5 Hz]}, in: {u: wave.y}}
+        wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 0.1 Hz}}
+        smooth: {block: systems.butterworth, rate: fast, with: {order: 4, corner: 0.3 Hz}, in: {u: wave.y}}
     """
 
     @classmethod
@@ -42,20 +43,24 @@ class Butterworth(Lti, Block):
         return lti(poles, method == CONTINUOUS, direct=method == DIGITAL or band not in (LOW, BAND))
 
     def check(self) -> None:
-        """Refuse corners of another number, that do not rise, or at half the sample rate."""
-        wanted = 1 if self.band in (LOW, HIGH) else 2
-        if len(self.corner) != wanted or np.any(np.diff(self.corner) <= 0.0):
-            words = "one frequency" if wanted == 1 else "two frequencies that rise"
-            raise ParameterError("corner", f"corner must be {words} for band {BANDS[self.band]}")
-        if self.method == DIGITAL and self.corner[-1] * self.period >= 0.5:
+        """Refuse corners that are too many or too few, or at half the sample rate."""
+        two = self.band not in (LOW, HIGH)
+        if two and self.upper_corner <= self.corner:
+            problem = f"upper_corner must be above corner, {self.corner:g} Hz, got {self.upper_corner:g} Hz"
+            raise ParameterError("upper_corner", problem)
+        if not two and self.upper_corner:
+            raise ParameterError("upper_corner", f"upper_corner must be 0 for band {BANDS[self.band]}")
+        name = "upper_corner" if two else "corner"
+        most = getattr(self, name)
+        if self.method == DIGITAL and most * self.period >= 0.5:
             half = 0.5 / self.period
-            problem = f"corner must be below half the sample rate, {half:g} Hz, got {self.corner[-1]:g} Hz"
-            raise ParameterError("corner", problem)
-        corners = 2.0 * np.pi * np.asarray(self.corner)
+            problem = f"{name} must be below half the sample rate, {half:g} Hz, got {most:g} Hz"
+            raise ParameterError(name, problem)
+        corners = 2.0 * np.pi * np.array([self.corner, self.upper_corner][: 1 + two])
         with np.errstate(all="ignore"):
             if self.method == CONTINUOUS:
                 model = of_roots(*analog(self.order, self.band, corners))
             else:
-                period = self.period if self.period == self.period else 0.1 / self.corner[-1]
+                period = self.period if self.period == self.period else 0.1 / most
                 model = of_roots(*digital(self.order, self.band, corners, period))
         self.take(model, discrete=self.method == DIGITAL)

@@ -29,7 +29,8 @@ class StateSpace(Sampled, Block):
     tustin, foh, impulse, backward. ``initial`` are the states at the start.
 
     ``file`` holds A, B, C and, unless it is 0, D: .yaml, .npz, .mat, or a text with the name on the line
-    above the rows. ``StateSpace.of(system)`` takes a system of python-control.
+    above the rows; with ``dt`` (s) it is a sampled system. ``StateSpace.of(system)`` takes a system of
+    python-control.
 
     Source: K. Ogata, Modern Control Engineering, section 2-5.
     """
@@ -92,7 +93,9 @@ class StateSpace(Sampled, Block):
         if self.file:
             if any(np.any(each) for each in given):
                 raise ParameterError("file", "file must be left out where A, B, C or D is given")
-            given = _matrices(self.read_file("file", read_model))
+            held = self.read_file("file", read_model)
+            self.suits(held)
+            given = _matrices(held)
         model = _fitting(*given)
         if self.method == MATCHED:
             problem = "method must be another one than matched, which is for zeros and poles"

@@ -27,11 +27,12 @@ class TransferFunction(Lti, Sampled, Block):
     are in z. It has direct feedthrough if both degrees are equal, or if the method makes it so: tustin, foh,
     impulse, backward. It begins at rest, or in the steady state of ``initial_input``.
 
-    ``file`` holds ``numerator`` and ``denominator`` (or ``num``, ``den``) in place of the parameters: .yaml,
-    .npz, .mat, or a text with the name on the line above the numbers. ``TransferFunction.of(system)`` takes a
-    system of python-control. A numerator of higher degree is refused.
+    ``file`` holds ``numerator`` and ``denominator`` (or ``num``, ``den``) in place of the parameters:
+    .yaml, .npz, .mat, or a text with the name on the line above the numbers; with ``dt`` (s) it is a
+    sampled system. ``TransferFunction.of(system)`` takes a system of python-control. A numerator of
+    higher degree is refused.
 
-    Sources: K. Ogata, Modern Control Engineering, section 9-2 (controllable canonical form); `Model`.
+    Source: K. Ogata, Modern Control Engineering, section 9-2 (controllable canonical form).
     """
 
     numerator = Param((1.0,), type="float64[k]", doc="coefficients, highest power first")
@@ -69,7 +70,9 @@ class TransferFunction(Lti, Sampled, Block):
         if self.file:
             if any(each.tolist() != [1.0] for each in given):
                 raise ParameterError("file", "file must be left out where numerator or denominator is given")
-            given = polynomials(self.read_file("file", read_model))
+            held = self.read_file("file", read_model)
+            self.suits(held)
+            given = polynomials(held)
         numerator, denominator = given
         if not np.isfinite(numerator).all():
             raise ParameterError("numerator", "numerator must be finite")

@@ -104,6 +104,21 @@ blocks:
     assert diagram.run()["cart.y"][-1] == pytest.approx([10.0 * (1.0 - speed), speed], abs=1e-9)
 
 
+def test_a_sampled_system_in_a_file_keeps_its_sample_time(tmp_path: Path) -> None:
+    path = tmp_path / "g.yaml"
+    path.write_text("A: [[0.5]]\nB: [[1]]\nC: [[1]]\ndt: 0.1\n")
+    assert drive(StateSpace(file=str(path), method="discrete"), u=[1.0, 0.0], rate="10 Hz").y.tolist() == [
+        0.0,
+        1.0,
+    ]
+    with pytest.raises(
+        ParameterError, match="method must be discrete, since the file has a system that is sampled"
+    ):
+        StateSpace(file=str(path))
+    with pytest.raises(ParameterError, match=r"sampled every 0.2 s, as the block is, got 0\.1 s"):
+        StateSpace(file=str(path), method="discrete", period=0.2)
+
+
 @pytest.mark.parametrize(
     ("wrong", "problem"),
     [
