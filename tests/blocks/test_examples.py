@@ -14,6 +14,7 @@ CATALOGUE = Catalogue()
 GENERAL = (
     "logic",
     "math",
+    "rotation",
     "signal",
     "sources",
     "systems",
