@@ -10,10 +10,7 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import ParameterError
-from quadvis_blocks.systems._products import row_times, times
 from quadvis_blocks.systems._riccati import lost_pole
-
-STEADY = 0
 
 
 def steady(a: Any, seen: Any, q: Any) -> tuple[Any, Any]:
@@ -39,57 +36,88 @@ def steady(a: Any, seen: Any, q: Any) -> tuple[Any, Any]:
     return gain, 0.5 * (after + after.T)
 
 
-def corrected(block: Any, y: Any, estimate: Any, covariance: Any) -> None:
-    """Take the measurements into the estimate and its covariance, in place."""
-    white = times(block.whitening, y)
-    if block.gain == STEADY:
-        for row in range(white.size):
-            white[row] -= row_times(block.seen, row, estimate)
-        estimate[:] = estimate + times(block.settled, white)
-        return
-    for number in range(white.size):
-        seen = block.seen[number]
-        across = times(covariance, seen)
-        scale = 1.0
-        for row in range(across.size):
-            scale += seen[row] * across[row]
-        gain = across / scale
-        estimate[:] = estimate + gain * (white[number] - row_times(block.seen, number, estimate))
-        _joseph(covariance, seen, across, gain)
+def corrected(block: Any, y: Any) -> None:
+    """Take the measurements into the estimate and its covariance."""
+    estimate, covariance = block.estimate, block.remaining
+    size = estimate.size
+    across, gain, left = np.empty(size), np.empty(size), np.empty((size, size))
+    for number in range(y.size):
+        miss, scale = _whitened(block, y, number), 1.0
+        for row in range(size):
+            total = 0.0
+            for column in range(size):
+                total += covariance[row, column] * block.seen[number, column]
+            across[row] = total
+            scale += block.seen[number, row] * total
+            miss -= block.seen[number, row] * estimate[row]
+        for row in range(size):
+            gain[row] = across[row] / scale
+            estimate[row] += gain[row] * miss
+            for column in range(size):
+                left[row, column] = covariance[row, column] - gain[row] * across[column]
+        # Joseph's form, (I - k c) P (I - k c)' + k k', symmetric to the bit; across is P c'.
+        for row in range(size):
+            rest = 0.0
+            for column in range(size):
+                rest += left[row, column] * block.seen[number, column]
+            for column in range(row, size):
+                value = left[row, column] - rest * gain[column] + gain[row] * gain[column]
+                covariance[row, column] = value
+                covariance[column, row] = value
 
 
-def _joseph(covariance: Any, seen: Any, across: Any, gain: Any) -> None:
-    """Replace P by (I - k c) P (I - k c)' + k k', symmetric to the bit; ``across`` is P c'."""
-    size = gain.size
-    left = np.empty((size, size))
-    for row in range(size):
-        for column in range(size):
-            left[row, column] = covariance[row, column] - gain[row] * across[column]
-    rest = times(left, seen)
-    for row in range(size):
-        for column in range(row, size):
-            value = left[row, column] - rest[row] * gain[column] + gain[row] * gain[column]
-            covariance[row, column] = value
-            covariance[column, row] = value
+def corrected_steadily(block: Any, y: Any) -> None:
+    """Take the measurements into the estimate by the steady gain."""
+    estimate = block.estimate
+    miss = np.empty(y.size)
+    for number in range(y.size):
+        total = _whitened(block, y, number)
+        for column in range(estimate.size):
+            total -= block.seen[number, column] * estimate[column]
+        miss[number] = total
+    for row in range(estimate.size):
+        for number in range(y.size):
+            estimate[row] += block.settled[row, number] * miss[number]
 
 
-def predicted(block: Any, estimate: Any, u: Any) -> Any:
-    """Return A x + B u."""
-    found = times(block.A, estimate)
+def _whitened(block: Any, y: Any, number: int) -> float:
+    """Return one measurement with noise of variance 1 that has nothing to do with that of the others."""
+    total = 0.0
+    for column in range(y.size):
+        total += block.whitening[number, column] * y[column]
+    return total
+
+
+def predicted(block: Any, u: Any) -> Any:
+    """Return A x + B u of the estimate."""
+    estimate = block.estimate
+    found = np.empty(estimate.size)
     for row in range(found.size):
-        found[row] += row_times(block.inputs, row, u)
+        total = 0.0
+        for column in range(found.size):
+            total += block.A[row, column] * estimate[column]
+        for column in range(u.size):
+            total += block.inputs[row, column] * u[column]
+        found[row] = total
     return found
 
 
-def spread(block: Any, covariance: Any) -> Any:
-    """Return A P A' + Q, symmetric to the bit."""
+def spread(block: Any) -> Any:
+    """Return A P A' + Q of the covariance that remains, symmetric to the bit."""
+    covariance = block.remaining
     size = covariance.shape[0]
     moved, found = np.empty((size, size)), np.empty((size, size))
     for row in range(size):
-        moved[row] = times(covariance, block.A[row])  # a row of A P, since P is symmetric
+        for column in range(size):
+            total = 0.0
+            for inner in range(size):
+                total += block.A[row, inner] * covariance[inner, column]
+            moved[row, column] = total
     for row in range(size):
         for column in range(row, size):
-            value = row_times(block.A, column, moved[row]) + block.Q[row, column]
-            found[row, column] = value
-            found[column, row] = value
+            total = block.Q[row, column]
+            for inner in range(size):
+                total += moved[row, inner] * block.A[column, inner]
+            found[row, column] = total
+            found[column, row] = total
     return found

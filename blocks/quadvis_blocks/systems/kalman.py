@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, Derived, In, Out, Param, ParameterError, State, Work
-from quadvis_blocks.systems._kalman import corrected, predicted, spread, steady
+from quadvis_blocks.systems._kalman import corrected, corrected_steadily, predicted, spread, steady
 from quadvis_blocks.systems._riccati import refuse_indefinite
 from quadvis_blocks.systems._units import units_for, vector
 
-STEADY, VARYING = range(2)
+STEADY = 0
 ZERO = ((0.0,),)
 
 
@@ -72,10 +72,11 @@ class Kalman(Block):
     """
 
     @classmethod
-    def ports(cls, A: Any, B: Any, C: Any, output_units: str) -> dict[str, Any]:
-        """Return ports for the sizes of the model."""
+    def ports(cls, A: Any, B: Any, C: Any, gain: int, output_units: str) -> dict[str, Any]:
+        """Return ports for the sizes of the model, and the methods of the gain."""
         states, inputs = len(A), B.shape[1]
-        return {
+        methods = {"output": _steady_output, "update": _steady_update} if gain == STEADY else {}
+        return methods | {
             "u": In(vector(inputs), unit="a", default=[0.0] * inputs if inputs > 1 else 0.0, doc=cls.u.doc),
             "y": In(vector(len(C)), unit="b", doc=cls.y.doc),
             "x": Out(f"float64[{states}]", unit=units_for(output_units, states), doc=cls.x.doc),
@@ -119,9 +120,9 @@ class Kalman(Block):
     def output(self, y: Any, valid: bool) -> Any:
         """Return the estimate, and its variances."""
         self.estimate = self.state
-        self.remaining = self.after if self.gain == STEADY else self.covariance
+        self.remaining = self.covariance
         if valid:
-            corrected(self, y, self.estimate, self.remaining)
+            corrected(self, y)
         variances = np.empty(self.state.size)
         for row in range(variances.size):
             variances[row] = self.remaining[row, row]
@@ -129,6 +130,21 @@ class Kalman(Block):
 
     def update(self, u: Any) -> None:
         """Go on by one sample of the model."""
-        self.state = predicted(self, self.estimate, u)
-        if self.gain == VARYING:
-            self.covariance = spread(self, self.remaining)
+        self.state = predicted(self, u)
+        self.covariance = spread(self)
+
+
+def _steady_output(self: Any, y: Any, valid: bool) -> Any:
+    """Return the estimate by the steady gain, and its variances."""
+    self.estimate = self.state
+    if valid:
+        corrected_steadily(self, y)
+    variances = np.empty(self.state.size)
+    for row in range(variances.size):
+        variances[row] = self.after[row, row]
+    return self.estimate, variances
+
+
+def _steady_update(self: Any, u: Any) -> None:
+    """Go on by one sample of the model."""
+    self.state = predicted(self, u)
