@@ -139,7 +139,11 @@ class Builder:
         if kind.interface.continuous:
             if own is not None and known(own) and own[0] != CONTINUOUS:
                 problem = f"{flat.spec.kind} has continuous states, rate '{own[0]}' cannot hold it"
-                self.faults.add(own[1], problem, "leave 'rate' out, or write 'continuous'")
+                sampled = (
+                    ", or choose a 'method' that samples it" if "method" in kind.interface.params else ""
+                )
+                remedy = "leave 'rate' out, or write 'continuous'"
+                self.faults.add(own[1], problem, remedy + sampled)
             return self._continuous
         if flat.rate is None:
             names = [*self.spec[RATES], CONTINUOUS]

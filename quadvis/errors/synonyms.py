@@ -113,6 +113,27 @@ _MEANT = {
     "sources.chirp": "chirpsignal sweep",
     "sources.prbs": "pseudorandombinarysequence",
     "sources.uniform_noise": "uniformrandomnumber random",
+    "systems.pid": "pidcontroller discretepidcontroller pi pd pidcontroller2dof pid2",
+    "systems.state_space": "ss ltiss discretestatespace statespacemodel",
+    "systems.zero_pole_gain": "zeropole zpk discretezeropole polezero",
+    "systems.butterworth": "butter analogfilterdesign lowpassfilter highpassfilter bandpassfilter",
+    "systems.biquad": "sos biquadfilter secondordersection notch iir",
+    "systems.fir": "firfilter discretefirfilter dfir",
+    "systems.moving_average": "movingmean runningmean runningaverage movavg",
+    "systems.lqr": "dlqr lq linearquadraticregulator statefeedbackcontroller fullstatefeedback",
+    "systems.kalman": "kalmanfilter observer luenberger luenbergerobserver stateestimator estimator lqe dlqe",
+    "systems.statistics": "rms runningrms movingrms peakdetector variance",
+    "systems.spectrum": "fft spectrumanalyzer spectrumanalyser fourier goertzel dft",
+    "rotation.representation": "quaternion dcm euler eulerangles rpy tr2rpy rpy2tr directioncosinematrix "
+    "quaterniontorotationangles quaternionstorotationangles rotationanglestoquaternion "
+    "rotationanglestodirectioncosinematrix directioncosinematrixtorotationangles "
+    "directioncosinematrixtoquaternions quaternionstodirectioncosinematrix",
+    "rotation.rotate": "quaternionrotation rotatevector transformvector",
+    "rotation.normalise": "normalize quaternionnormalize unitvector normalizevector",
+    "rotation.quaternion_product": "quaternionmultiplication quaternionmultiply quatmultiply",
+    "rotation.attitude_from_rates": "attitudeintegrator quaternionintegrator",
+    "plant.rigid_body": "6dof sixdof rigidbody 6dofquaternion 6dofeulerangles multirotor",
+    "systems.transfer_function": "transferfcn transferfunction tf ltisiso discretetransferfcn discretefilter",
 }  # fmt: skip
 _STANDS_FOR: dict[str, list[str]] = {}
 for _ours, _theirs in _MEANT.items():

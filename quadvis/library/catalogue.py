@@ -65,7 +65,7 @@ class Catalogue:
     def _find(self, name: str) -> type[Block]:
         match = NAME.fullmatch(name)
         if match is None:
-            remedy = "write group.block, such as signal.derivative"
+            remedy = suggestion(name, self.names()) or "write group.block, such as signal.derivative"
             raise CatalogueError(f"'{name}' is not a block name", remedy)
         if match["library"]:
             return self._in_library(match["library"], match["path"], name)

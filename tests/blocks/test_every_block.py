@@ -71,6 +71,32 @@ PARAMETERS: dict[str, dict[str, Any]] = {
         "columns": [0.0, 0.5, 3.0],
         "values": [[1.0, 2.0, 0.0], [3.0, -1.0, 5.0]],
     },
+    "systems.biquad": {"sections": [[0.25, -0.1, 0.05, 1.0, -1.2, 0.52], [1.0, 0.5, 0.0, 2.0, -0.4, 0.3]]},
+    "systems.butterworth": {"corner": 1.0},
+    "systems.fir": {"coefficients": [0.5, 0.3, 0.2]},
+    "systems.kalman": {
+        "A": [[1.0, 0.1], [0.0, 1.0]],
+        "B": [[0.005], [0.1]],
+        "C": [[1.0, 0.0], [0.5, 1.0]],
+        "Q": [[1e-3, 0.0], [0.0, 1e-2]],
+        "R": [[0.1, 0.01], [0.01, 0.2]],
+    },
+    "systems.lqr": {
+        "A": [[0.0, 1.0], [0.0, 0.0]],
+        "B": [[0.0], [1.0]],
+        "Q": [[1.0, 0.0], [0.0, 1.0]],
+        "R": [[0.5]],
+    },
+    "systems.spectrum": {"frequencies": [0.0, 1.0, 2.5], "samples": 4},
+    "systems.state_space": {
+        "A": [[0.0, 1.0], [-2.0, -0.5]],
+        "B": [[0.0, 0.3], [1.0, 0.0]],
+        "C": [[1.0, 0.0], [0.5, 1.0]],
+        "D": [[0.0, 0.1], [0.0, 0.0]],
+        "initial": [1.0, -1.0],
+    },
+    "systems.zero_pole_gain": {"zeros": "-1", "poles": "-2, -1+3j, -1-3j"},
+    "systems.transfer_function": {"numerator": [1.0, 3.0], "denominator": [0.5, 1.2, 4.0]},
     "sources.repeating_sequence": {"times": [0.0, 0.25, 0.7], "values": [1.0, -1.0, 2.0]},
 }
 INPUTS: dict[str, dict[str, list[Any]]] = {

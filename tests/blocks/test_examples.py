@@ -14,8 +14,10 @@ CATALOGUE = Catalogue()
 GENERAL = (
     "logic",
     "math",
+    "rotation",
     "signal",
     "sources",
+    "systems",
 )  # the groups for everyone: all of their blocks have an example
 WITHOUT = {"sources.recording": "it plays a log"}
 NAMES = [name for name in CATALOGUE.names() if CATALOGUE.find(name).example]

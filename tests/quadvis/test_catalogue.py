@@ -76,10 +76,9 @@ def test_all_names_can_be_found_and_none_is_shared_mathematics() -> None:
         ("signal", "there is no block 'signal'; "),
         ("signal.gain.more", "there is no block 'signal.gain.more'; "),
         ("no.such.thing_at_all", "there is no block 'no.such.thing_at_all'; quadvis list shows all"),
-        (
-            "signal._elements",
-            "'signal._elements' is not a block name; write group.block, such as signal.derivative",
-        ),
+        ("signal._elements", "'signal._elements' is not a block name; "),
+        ("_", "'_' is not a block name; write group.block, such as signal.derivative"),
+        ("TransferFcn", "'TransferFcn' is not a block name; did you mean 'systems.transfer_function'?"),
         ("../../etc/passwd", "'../../etc/passwd' is not a block name; "),
         ("Signal.Gain", "'Signal.Gain' is not a block name; "),
         ("", "'' is not a block name; "),

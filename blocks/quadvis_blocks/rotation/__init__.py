@@ -1,0 +1,1 @@
+"""Rotations: quaternions, direction cosine matrices, Euler angles, and vectors turned by them."""

@@ -1,0 +1,1 @@
+"""Linear systems, controllers and estimators for every plant: filters, PID, LQR, Kalman, statistics."""
