@@ -29,13 +29,15 @@ CLAIM = ".claim"
 class MachineCode:
     """An object file, the names of its functions by method, and the methods that can fail.
 
-    ``refusal`` says why a block type cannot be compiled; then there is no code.
+    ``refusal`` says why a block type cannot be compiled; then there is no code. If it is ``passing``, it
+    may be gone the next time, and is not kept.
     """
 
     content: bytes = b""
     names: Mapping[str, str] | None = None
     fallible: frozenset[str] = frozenset()
     refusal: str = ""
+    passing: bool = False
 
 
 def folder() -> Path:

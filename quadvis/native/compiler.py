@@ -37,7 +37,13 @@ def compile_block(kind: BlockType, prefix: str) -> MachineCode:
         return machine_code(compiled, prefix)
     except (Unreadable, Unlinkable, NotImplementedError, numba.core.errors.NumbaError) as error:
         failed = next((method.name for method in kind.methods if method.name not in compiled), "")
-        return MachineCode(refusal=f"method '{failed}': {_cause(error)}" if failed else str(error))
+        return _refused(f"method '{failed}'" if failed else "", error)
+
+
+def _refused(where: str, error: Exception) -> MachineCode:
+    """Return code that there is not; a source that cannot be read now may be there the next time."""
+    reason = f"{where}: {_cause(error)}" if where else str(error)
+    return MachineCode(refusal=reason, passing=isinstance(error, Unreadable))
 
 
 def compiled_methods(kind: BlockType) -> Iterator[tuple[str, Compiled]]:
@@ -71,7 +77,7 @@ def compile_functions(functions: Sequence[NativeFunction], prefix: str) -> Machi
         return machine_code(compiled, prefix)
     except (Unreadable, Unlinkable, NotImplementedError, numba.core.errors.NumbaError) as error:
         failed = next((each.__name__ for each in functions if each.__name__ not in compiled), "")
-        return MachineCode(refusal=f"function '{failed}': {_cause(error)}" if failed else str(error))
+        return _refused(f"function '{failed}'" if failed else "", error)
 
 
 def _entry(function: NativeFunction, body: Any) -> Any:

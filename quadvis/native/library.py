@@ -181,7 +181,8 @@ def block_types(program: Program, blocks: Sequence[Block]) -> dict[int, BlockTyp
 
 
 def _kept(key: str, code: MachineCode) -> MachineCode:
-    cache.keep(key, code)
+    if not code.passing:
+        cache.keep(key, code)
     return code
 
 

@@ -1,11 +1,15 @@
 """Plain functions as machine code: kinds, shapes, refusals, the cache."""
 
+import importlib.util
+import linecache
+
 import numpy as np
 import pytest
 
 from quadvis.block import Block, In, Out
 from quadvis.native import cache
 from quadvis.native.functions import compiled_as, load, native, prepare
+from quadvis.native.library import library
 from quadvis.testing import drive
 
 
@@ -89,3 +93,22 @@ class Looking(Block, numeric=False):
 def test_a_run_by_machine_code_compiles_what_blocks_call_where_that_pays(fresh, steps, engine, compiled):
     assert drive(Looking(), u=np.full(steps, 4.0), engine=engine, rate="10 Hz").y == pytest.approx(0.25)
     assert inverse.is_native == compiled
+
+
+def test_a_source_that_was_edited_is_refused_until_it_is_back(fresh, tmp_path):
+    path = tmp_path / "edited_source.py"
+    text = "def cube(x):\n    return x**3\n"
+    path.write_text(text)
+    spec = importlib.util.spec_from_file_location("edited_source", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    function = native(takes=("float64",), gives=("float64",))(module.cube)
+    path.write_text(text.replace("3", "4"))
+    linecache.checkcache()
+    library().compile_functions([function])
+    assert not library().load_functions([function])  # nothing is kept of a refusal that passes
+    path.write_text(text)
+    linecache.checkcache()
+    library().compile_functions([function])
+    assert library().load_functions([function])
+    assert function(2.0) == 8.0
