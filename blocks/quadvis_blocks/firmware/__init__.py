@@ -1,1 +1,1 @@
-"""Firmware of flight controllers in the loop, as processes of their own, and what stands in for it on the desk."""
+"""Firmware of flight controllers in the loop, as processes of their own."""

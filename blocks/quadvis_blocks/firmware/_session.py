@@ -142,7 +142,8 @@ class Session:
         if companion is None or not companion.wait(LOOK):
             return f"Betaflight: {problem}"
         said = companion.last_words
-        return f"Betaflight has ended with exit code {companion.code}{f', after {quoted(said)}' if said else ''}"
+        after = f", after {quoted(said)}" if said else ""
+        return f"Betaflight has ended with exit code {companion.code}{after}"
 
     def _begin(self, *, lasting: bool) -> None:
         """Start it, and wait until its configuration port answers."""

@@ -92,7 +92,7 @@ class Exchange:
         self._socket.sendto(packet, self._state)
 
     def motors(self, patience: float) -> tuple[float, ...] | None:
-        """Return the commands of the newest answer, after a wait of ``patience`` (s) at most; None if none."""
+        """Return the newest answer, after a wait of ``patience`` (s) at most; None if there is none."""
         return self._newest(patience)
 
     def close(self) -> None:

@@ -23,7 +23,7 @@ ARMS = 10.0  # s from the switch until it must have armed
 
 
 class Betaflight(Block, numeric=False):
-    """Betaflight's own code as a process of its own (software in the loop, SITL): a craft's flight controller.
+    """Betaflight's own code in a process of its own (software in the loop, SITL): the flight controller.
 
     It takes the state of the craft and the pulses of sticks and switches, and gives the commands of four
     motors in its own order. Its control loop runs once for each step of this block, and a step waits for it,
@@ -55,7 +55,7 @@ class Betaflight(Block, numeric=False):
     harmless = "the craft is simulated"
 
     firmware = Param("", type="file", doc="the program; none: that of the package betaflight")
-    settings = Param("", type="file", doc="lines of its command line, as `diff all` prints them; none: its own")
+    settings = Param("", type="file", doc="lines of its command line, as `diff` prints them; none: its own")
     priority = Param(
         1, "int64", min=0, max=98, doc="of its process under SCHED_FIFO, if the system grants it; 0: none"
     )
@@ -165,7 +165,7 @@ class Betaflight(Block, numeric=False):
 
 
 def _own_settings(denominator: int) -> tuple[str, ...]:
-    """Return the settings on which this block relies: gyro runs for each run of the control loop, and others."""
+    """Return the settings on which this block relies, with so many gyro runs for each control run."""
     return (
         f"set pid_process_denom = {denominator}",
         "set serial_update_rate_hz = 1000",
