@@ -3,7 +3,10 @@
  * The firmware's loop reads CLOCK_MONOTONIC and sleeps in between. Until the first state of a craft comes, both are
  * the system's. From then on each state lets the loop's clock go on by one step, and when that is used up the loop
  * stands still until the next state, after it has sent one byte to say so. Its sleeps take no time but that of
- * its clock. Other threads are left alone, but they see that clock.
+ * its clock. Other threads see that clock.
+ *
+ * The threads take turns: one runs until it sleeps or waits for a socket. On a flight controller there is one
+ * thread; here loop and sockets share buffers without a lock, and answers were lost and ports not opened.
  *
  * QUADVIS_STEP: length of a step (ns); QUADVIS_PORT: port of this machine to which the byte goes;
  * QUADVIS_STATE: bytes of a state. */
@@ -17,25 +20,46 @@
 #include <sys/select.h>
 #include <sys/socket.h>
 #include <time.h>
-#include <unistd.h>
 
 #define SECOND 1000000000LL
+#define MICROSECOND 1000
 #define LOOK 100 /* ns that the loop's clock goes on by each look at it, so that waiting for it ends */
+/* ns by which one sleep is longer than the one before, up to a microsecond: a loop that is late must meet its
+ * grid by chance, and with even sleeps may never do so. */
+#define UNEVEN 383
 
 static int (*system_clock)(clockid_t, struct timespec *);
 static int (*system_sleep)(const struct timespec *, struct timespec *);
 static int (*system_select)(int, fd_set *, fd_set *, fd_set *, struct timeval *);
+static int (*system_join)(pthread_t, void **);
 static ssize_t (*system_receive)(int, void *, size_t, int, struct sockaddr *, socklen_t *);
 
 static pthread_t loop;
-static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+static pthread_key_t end; /* of a thread, which gives its turn */
+static pthread_mutex_t turn = PTHREAD_MUTEX_INITIALIZER, lock = PTHREAD_MUTEX_INITIALIZER;
 static pthread_cond_t more = PTHREAD_COND_INITIALIZER;
 static atomic_llong now, allowed; /* ns: the loop's clock, and how far it may go; 0 before the first state */
 static long long step;
 static size_t state_size;
 static int done = -1;
 static struct sockaddr_in reader;
-static __thread int has_state; /* the thread that takes states has one that it has not put in place yet */
+static __thread int has_turn, has_state; /* a state that has come and is not in place yet */
+
+static void take_turn(void) {
+    if (!has_turn) pthread_mutex_lock(&turn);
+    has_turn = 1;
+    pthread_setspecific(end, &turn);
+}
+
+static void give_turn(void) {
+    if (has_turn) pthread_mutex_unlock(&turn);
+    has_turn = 0;
+}
+
+static void ended(void *unused) {
+    (void)unused;
+    give_turn();
+}
 
 static long long number(const char *name) {
     const char *text = getenv(name);
@@ -43,12 +67,12 @@ static long long number(const char *name) {
 }
 
 __attribute__((constructor)) static void begin(void) {
-    system_clock = (int (*)(clockid_t, struct timespec *))dlsym(RTLD_NEXT, "clock_gettime");
-    system_sleep = (int (*)(const struct timespec *, struct timespec *))dlsym(RTLD_NEXT, "nanosleep");
-    system_select =
-        (int (*)(int, fd_set *, fd_set *, fd_set *, struct timeval *))dlsym(RTLD_NEXT, "select");
-    system_receive = (ssize_t (*)(int, void *, size_t, int, struct sockaddr *, socklen_t *))dlsym(
-        RTLD_NEXT, "recvfrom");
+    *(void **)&system_clock = dlsym(RTLD_NEXT, "clock_gettime");
+    *(void **)&system_sleep = dlsym(RTLD_NEXT, "nanosleep");
+    *(void **)&system_select = dlsym(RTLD_NEXT, "select");
+    *(void **)&system_join = dlsym(RTLD_NEXT, "pthread_join");
+    *(void **)&system_receive = dlsym(RTLD_NEXT, "recvfrom");
+    pthread_key_create(&end, ended);
     loop = pthread_self();
     step = number("QUADVIS_STEP");
     state_size = (size_t)number("QUADVIS_STATE");
@@ -56,16 +80,22 @@ __attribute__((constructor)) static void begin(void) {
     reader.sin_port = htons((uint16_t)number("QUADVIS_PORT"));
     reader.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     done = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    take_turn();
 }
 
 /* Let the clock of the loop go on, which is the calling thread; stand still where it may not. */
 static void go_on(long long ns) {
     long long time = atomic_fetch_add(&now, ns) + ns;
     if (time <= atomic_load(&allowed)) return;
-    sendto(done, "", 1, 0, (struct sockaddr *)&reader, sizeof reader);
+    give_turn();
     pthread_mutex_lock(&lock);
-    while (time > atomic_load(&allowed)) pthread_cond_wait(&more, &lock);
+    while (time > atomic_load(&allowed)) {
+        long long used = atomic_load(&allowed);
+        sendto(done, "", 1, 0, (struct sockaddr *)&reader, sizeof reader);
+        while (atomic_load(&allowed) == used) pthread_cond_wait(&more, &lock);
+    }
     pthread_mutex_unlock(&lock);
+    take_turn();
 }
 
 /* A state is in place: let the loop go on by a step. */
@@ -92,15 +122,15 @@ int clock_gettime(clockid_t clock, struct timespec *t) {
 }
 
 int nanosleep(const struct timespec *wanted, struct timespec *rest) {
-    if (atomic_load(&allowed) == 0 || !pthread_equal(pthread_self(), loop)) return system_sleep(wanted, rest);
-    go_on(wanted->tv_sec * SECOND + wanted->tv_nsec);
-    return 0;
-}
-
-ssize_t recvfrom(int socket, void *to, size_t size, int flags, struct sockaddr *from, socklen_t *length) {
-    ssize_t count = system_receive(socket, to, size, flags, from, length);
-    if (count == (ssize_t)state_size) has_state = 1;
-    return count;
+    if (atomic_load(&allowed) != 0 && pthread_equal(pthread_self(), loop)) {
+        static long long sleeps;
+        go_on(wanted->tv_sec * SECOND + wanted->tv_nsec + ++sleeps * UNEVEN % MICROSECOND);
+        return 0;
+    }
+    give_turn();
+    int result = system_sleep(wanted, rest);
+    take_turn();
+    return result;
 }
 
 int select(int count, fd_set *readers, fd_set *writers, fd_set *others, struct timeval *patience) {
@@ -108,5 +138,21 @@ int select(int count, fd_set *readers, fd_set *writers, fd_set *others, struct t
         has_state = 0;
         allow();
     }
-    return system_select(count, readers, writers, others, patience);
+    give_turn();
+    int result = system_select(count, readers, writers, others, patience);
+    take_turn();
+    return result;
+}
+
+int pthread_join(pthread_t thread, void **result) {
+    give_turn();
+    int code = system_join(thread, result);
+    take_turn();
+    return code;
+}
+
+ssize_t recvfrom(int socket, void *to, size_t size, int flags, struct sockaddr *from, socklen_t *length) {
+    ssize_t count = system_receive(socket, to, size, flags, from, length);
+    if (count == (ssize_t)state_size) has_state = 1;
+    return count;
 }

@@ -81,10 +81,11 @@ class Session:
         self.arming: list[ModeRange] = []
         try:
             check_free(ports.state, ports.configuration)
-            self._begin([self._program])
+            command = in_lockstep(self._program, self.folder, step, ports.pulses)
+            self._begin(command)
             enter(self._connected, settings)
             self._saved()
-            self._begin(in_lockstep(self._program, self.folder, step, ports.pulses), lasting=True)
+            self._begin(command, lasting=True)
             self._make_ready()
         except FirmwareError as error:
             problem = self._said(str(error))
