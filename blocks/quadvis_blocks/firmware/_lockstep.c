@@ -1,9 +1,9 @@
 /* Lets the clock of Betaflight's software in the loop go with the steps of a simulation. Preloaded (LD_PRELOAD).
  *
- * The firmware's loop reads CLOCK_MONOTONIC and sleeps in between. Until the first state of a craft comes, both are
- * the system's. From then on each state lets the loop's clock go on by one step, and when that is used up the loop
- * stands still until the next state, after it has sent one byte to say so. Its sleeps take no time but that of
- * its clock. Other threads see that clock.
+ * The firmware's loop reads CLOCK_MONOTONIC and sleeps in between. Here that clock goes on by the loop's sleeps alone,
+ * so the loop is never late; once it is, its scheduler may never run the gyro again. From the first state of a craft
+ * on the sleeps take no time, and each state lets the clock go on by one step. When that is used up the loop stands
+ * still until the next state, after it has sent one byte to say so.
  *
  * The threads take turns: one runs until it sleeps or waits for a socket. On a flight controller there is one
  * thread; here loop and sockets share buffers without a lock, and answers were lost and ports not opened.
@@ -22,11 +22,7 @@
 #include <time.h>
 
 #define SECOND 1000000000LL
-#define MICROSECOND 1000
 #define LOOK 100 /* ns that the loop's clock goes on by each look at it, so that waiting for it ends */
-/* ns by which one sleep is longer than the one before, up to a microsecond: a loop that is late must meet its
- * grid by chance, and with even sleeps may never do so. */
-#define UNEVEN 383
 
 static int (*system_clock)(clockid_t, struct timespec *);
 static int (*system_sleep)(const struct timespec *, struct timespec *);
@@ -38,7 +34,7 @@ static pthread_t loop;
 static pthread_key_t end; /* of a thread, which gives its turn */
 static pthread_mutex_t turn = PTHREAD_MUTEX_INITIALIZER, lock = PTHREAD_MUTEX_INITIALIZER;
 static pthread_cond_t more = PTHREAD_COND_INITIALIZER;
-static atomic_llong now, allowed; /* ns: the loop's clock, and how far it may go; 0 before the first state */
+static atomic_llong now, allowed; /* ns: the loop's clock, and how far it may go, before the first state: 0 */
 static long long step;
 static size_t state_size;
 static int done = -1;
@@ -80,13 +76,16 @@ __attribute__((constructor)) static void begin(void) {
     reader.sin_port = htons((uint16_t)number("QUADVIS_PORT"));
     reader.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     done = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    struct timespec t;
+    system_clock(CLOCK_MONOTONIC, &t);
+    atomic_store(&now, t.tv_sec * SECOND + t.tv_nsec);
     take_turn();
 }
 
 /* Let the clock of the loop go on, which is the calling thread; stand still where it may not. */
 static void go_on(long long ns) {
-    long long time = atomic_fetch_add(&now, ns) + ns;
-    if (time <= atomic_load(&allowed)) return;
+    long long time = atomic_fetch_add(&now, ns) + ns, most = atomic_load(&allowed);
+    if (most == 0 || time <= most) return;
     give_turn();
     pthread_mutex_lock(&lock);
     while (time > atomic_load(&allowed)) {
@@ -101,19 +100,14 @@ static void go_on(long long ns) {
 /* A state is in place: let the loop go on by a step. */
 static void allow(void) {
     pthread_mutex_lock(&lock);
-    if (atomic_load(&allowed) == 0) {
-        struct timespec t;
-        system_clock(CLOCK_MONOTONIC, &t);
-        atomic_store(&now, t.tv_sec * SECOND + t.tv_nsec);
-        atomic_store(&allowed, t.tv_sec * SECOND + t.tv_nsec);
-    }
-    atomic_fetch_add(&allowed, step);
+    long long before = atomic_load(&allowed);
+    atomic_store(&allowed, step + (before != 0 ? before : atomic_load(&now)));
     pthread_cond_signal(&more);
     pthread_mutex_unlock(&lock);
 }
 
 int clock_gettime(clockid_t clock, struct timespec *t) {
-    if (clock != CLOCK_MONOTONIC || atomic_load(&allowed) == 0) return system_clock(clock, t);
+    if (clock != CLOCK_MONOTONIC) return system_clock(clock, t);
     if (pthread_equal(pthread_self(), loop)) go_on(LOOK);
     long long time = atomic_load(&now);
     t->tv_sec = time / SECOND;
@@ -122,14 +116,13 @@ int clock_gettime(clockid_t clock, struct timespec *t) {
 }
 
 int nanosleep(const struct timespec *wanted, struct timespec *rest) {
-    if (atomic_load(&allowed) != 0 && pthread_equal(pthread_self(), loop)) {
-        static long long sleeps;
-        go_on(wanted->tv_sec * SECOND + wanted->tv_nsec + ++sleeps * UNEVEN % MICROSECOND);
-        return 0;
+    int is_loop = pthread_equal(pthread_self(), loop), result = 0;
+    if (!is_loop || atomic_load(&allowed) == 0) {
+        give_turn();
+        result = system_sleep(wanted, rest);
+        take_turn();
     }
-    give_turn();
-    int result = system_sleep(wanted, rest);
-    take_turn();
+    if (is_loop) go_on(wanted->tv_sec * SECOND + wanted->tv_nsec);
     return result;
 }
 
