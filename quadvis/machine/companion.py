@@ -1,7 +1,7 @@
 """A companion: another program that runs beside this process, and ends with it, however this process ends.
 
- this process <--standard input of--> keeper --started--> the program
-                                       ^ ends the program when the pipe closes
+A keeper starts the program. Its standard input is a pipe from this process: when that closes, since this
+process says so or has ended, the keeper ends the program.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class Companion:
     """A program that has been started in a folder; what it prints goes into a file there.
 
     ``priority`` is one of SCHED_FIFO, which it gets if the system grants it; 0 for none. With ``removes`` the
-    folder is removed when the program has ended.
+    folder is removed if this process ends first.
     """
 
     def __init__(
@@ -30,9 +30,9 @@ class Companion:
     ) -> None:
         self._log = folder / "printed.txt"
         removed = str(folder) if removes else ""
-        keeper = [sys.executable, "-I", "-S", companion_keeper.__file__, str(priority), removed, str(self._log)]
+        keeper = [sys.executable, "-I", "-S", companion_keeper.__file__]
         self._process = subprocess.Popen(
-            [*keeper, *command],
+            [*keeper, str(priority), removed, str(self._log), *command],
             cwd=folder,
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,

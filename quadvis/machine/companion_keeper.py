@@ -3,8 +3,8 @@
     python -I -S companion_keeper.py PRIORITY FOLDER LOG PROGRAM [ARGUMENT ...]
 
 It runs the program until that ends, or until standard input closes, however the process at the other end has
-ended. It never returns while the program lives; if the keeper is killed, Linux kills the program. FOLDER, if
-it is not "", is removed at the end. The exit code is that of the program.
+ended; in that case FOLDER, if it is not "", is removed. It never returns while the program lives; if the
+keeper is killed, Linux kills the program. The exit code is that of the program.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def main(priority: int, folder: str, log: str, *command: str) -> int:
     if life not in ready:
         os.kill(program, signal.SIGKILL)
     status = os.waitpid(program, 0)[1]
-    if folder:
+    if life not in ready and folder:
         shutil.rmtree(folder, ignore_errors=True)
     return os.waitstatus_to_exitcode(status) & 0xFF
 

@@ -102,7 +102,7 @@ class Session:
     def motors(self) -> tuple[float, ...] | None:
         """Wait for the end of the step; return the motors' last commands in it, None without any."""
         try:
-            return self._exchange.motors()
+            return self._exchange.motors(self._lives)
         except FirmwareError as error:
             raise FirmwareError(self._said(str(error))) from None
 
@@ -141,6 +141,9 @@ class Session:
         assert self._connection is not None
         return self._connection
 
+    def _lives(self) -> bool:
+        return self._companion is not None and self._companion.code is None
+
     def _has(self, mode: int) -> bool:
         return mode in self._modes and bool(self.status.modes >> self._modes.index(mode) & 1)
 
@@ -171,6 +174,7 @@ class Session:
         if not self._companion.wait(SAVE):
             raise FirmwareError(f"it has not saved its settings within {SAVE:g} s")
         self._connected.close()
+        self._companion.end()
         self._connection = self._companion = None
 
     def _make_ready(self) -> None:

@@ -23,6 +23,9 @@ from __future__ import annotations
 import math
 import socket
 import struct
+import time
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from quadvis.errors import sentence
@@ -38,7 +41,7 @@ MOTORS = 4
 DONE = 1  # bytes of the packet that ends a step
 LARGEST = 1 << 12  # bytes
 LOOKS = 300  # of some microseconds each
-SILENT = 5.0  # s
+SILENT, LOOK = 5.0, 0.05  # s
 
 
 def state_packet(attitude: Any, rates: Any, specific_force: Any) -> bytes:
@@ -94,10 +97,13 @@ class Exchange:
         """Send a state, which begins a step."""
         self._socket.sendto(packet, self._state)
 
-    def motors(self) -> tuple[float, ...] | None:
-        """Wait for the end of the step; return the last commands in it, None if there were none."""
+    def motors(self, lives: Callable[[], bool]) -> tuple[float, ...] | None:
+        """Wait for the end of the step; return the last commands in it, None if there were none.
+
+        FirmwareError if it does not come, or cannot come since the firmware no longer ``lives``.
+        """
         found = None
-        while len(packet := self._packet()) > DONE:
+        while len(packet := self._packet(lives)) > DONE:
             found = motor_commands(packet) or found
         return found
 
@@ -105,19 +111,18 @@ class Exchange:
         """Give the address back."""
         self._socket.close()
 
-    def _packet(self) -> bytes:
+    def _packet(self, lives: Callable[[], bool]) -> bytes:
         """Return the next packet. It comes soon: whoever sleeps on a busy machine wakes up late."""
         self._socket.settimeout(0.0)
         for _ in range(LOOKS):
-            try:
+            with suppress(BlockingIOError):
                 return self._socket.recv(LARGEST)
-            except BlockingIOError:
-                continue
-        self._socket.settimeout(SILENT)
-        try:
-            return self._socket.recv(LARGEST)
-        except TimeoutError:
-            raise FirmwareError(f"it has not ended its step within {SILENT:g} s") from None
+        self._socket.settimeout(LOOK)
+        end = time.monotonic() + SILENT
+        while time.monotonic() < end and lives():
+            with suppress(TimeoutError):
+                return self._socket.recv(LARGEST)
+        raise FirmwareError(f"it has not ended its step within {SILENT:g} s")
 
 
 def check_free(udp: int, tcp: int) -> None:
