@@ -28,7 +28,7 @@ class LevelCorrection(Block):
     def output(self, wanted: float, measured: float) -> float:
         """Return the angle to ask for."""
         self.error = 0.0 if math.isnan(measured) else wanted - measured
-        return wanted + self.correction
+        return float(wanted + self.correction)
 
     def update(self, freeze: bool) -> None:
         """Let the correction grow."""
