@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from quadvis.block import ParameterError
 from quadvis.errors import quoted, sentence
-from quadvis_blocks.firmware._msp import FirmwareError, MspConnection
+from quadvis_blocks.firmware._connection import FirmwareError, MspConnection
 
 PROMPT = b"\n# "
 ANSWER = 3.0  # s that a line may take
@@ -20,14 +20,14 @@ ENDS = ("save", "exit", "bl", "reboot", "defaults", "batch")  # what ends the co
 REFUSAL = re.compile(r"###\s*ERROR(?:\s+IN\s+\w+)?:?\s*(.*?)\s*#*$", re.MULTILINE)
 
 
-class Setting(NamedTuple):
+class SettingLine(NamedTuple):
     """A line for the command line, and where it stands; 0 for one of ours."""
 
     text: str
     number: int = 0
 
 
-def read_settings(path: str) -> list[Setting]:
+def read_settings(path: str) -> list[SettingLine]:
     """Return the lines of a file of settings without comments; ParameterError if one cannot be sent."""
     lines = Path(path).read_text("utf-8").splitlines() if path else []
     if len(lines) > MOST:
@@ -42,11 +42,11 @@ def read_settings(path: str) -> list[Setting]:
             raise ParameterError("settings", f"{place} is no such line")
         if text.split()[0].lower() in ENDS:
             raise ParameterError("settings", sentence(f"{place} is {quoted(text)}", "leave it out"))
-        found.append(Setting(text, number))
+        found.append(SettingLine(text, number))
     return found
 
 
-def enter(connection: MspConnection, settings: Iterable[Setting]) -> None:
+def enter(connection: MspConnection, settings: Iterable[SettingLine]) -> None:
     """Enter settings and let the firmware save them, which ends it; FirmwareError names a line it refuses."""
     connection.write(b"#")
     _answer(connection, "the command line does not open")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from quadvis.errors import sentence
 from quadvis.machine.files import reason
-from quadvis_blocks.firmware._msp import FirmwareError
+from quadvis_blocks.firmware._connection import FirmwareError
 from quadvis_blocks.firmware._sitl import STATE
 
 SOURCE = Path(__file__).with_name("_lockstep.c")

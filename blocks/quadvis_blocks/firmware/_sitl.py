@@ -30,7 +30,7 @@ from typing import Any
 
 from quadvis.errors import sentence
 from quadvis.machine.files import reason
-from quadvis_blocks.firmware._msp import FirmwareError
+from quadvis_blocks.firmware._connection import FirmwareError
 
 HERE = "127.0.0.1"
 STATE = struct.Struct("<18d")  # time, rates, acceleration, attitude, velocity, position, pressure

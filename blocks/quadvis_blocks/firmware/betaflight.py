@@ -9,9 +9,9 @@ import numpy as np
 
 from quadvis.block import Block, In, Out, Param, ParameterError, passed, reached
 from quadvis.errors import sentence
-from quadvis_blocks.firmware._cli import Setting, read_settings
-from quadvis_blocks.firmware._msp import FirmwareError
-from quadvis_blocks.firmware._session import Ports, Session
+from quadvis_blocks.firmware._cli import SettingLine, read_settings
+from quadvis_blocks.firmware._connection import FirmwareError
+from quadvis_blocks.firmware._session import FirmwarePorts, FirmwareSession
 from quadvis_blocks.firmware._sitl import MOTORS, state_packet
 from quadvis_blocks.firmware._status import words
 
@@ -74,7 +74,7 @@ class Betaflight(Block, numeric=False):
     failsafe = Out("bool", doc="whether its failsafe is active")
     forbidden = Out("int64", doc="bits of the reasons why it does not arm; 0: it would")
 
-    endpoints: ClassVar[Ports] = Ports()
+    endpoints: ClassVar[FirmwarePorts] = FirmwarePorts()
 
     def check(self) -> None:
         """Refuse settings that are no lines for a command line."""
@@ -94,14 +94,14 @@ class Betaflight(Block, numeric=False):
         self._next_channels = self._next_status = 0.0
         self._wanted_since, self._has_armed = math.nan, False
         step = self.period if self.period == self.period else STEP
-        lines = [*self._lines(), *(Setting(text) for text in _own_settings(step))]
-        self._session = Session(self.firmware, lines, step, int(self.priority), self.endpoints)
+        lines = [*self._lines(), *(SettingLine(text) for text in _own_settings(step))]
+        self._session = FirmwareSession(self.firmware, lines, step, int(self.priority), self.endpoints)
 
     def read(self, time: float) -> None:
         """Wait for the end of the step before, and hear what else the firmware says."""
         self._session.listen()
         if self._sent:
-            self._motors = self._session.motors() or self._motors
+            self._motors, self._sent = self._session.motors() or self._motors, False
 
     def output(self) -> tuple[Any, bool, bool, int]:
         """Return the motors' commands and the firmware's state."""
@@ -132,7 +132,7 @@ class Betaflight(Block, numeric=False):
         if "_session" in self.__dict__:
             self.__dict__.pop("_session").end()
 
-    def _lines(self) -> list[Setting]:
+    def _lines(self) -> list[SettingLine]:
         return self.read_file("settings", read_settings) if self.settings else []
 
     def _check_arming(self, wanted: bool, time: float) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from quadvis_blocks.firmware._session import Ports
+from quadvis_blocks.firmware._session import FirmwarePorts
 from quadvis_blocks.firmware.betaflight import Betaflight
 
 SOURCE = Path(__file__).with_name("fake_betaflight.py")
@@ -16,7 +16,7 @@ SOURCE = Path(__file__).with_name("fake_betaflight.py")
 
 def faked(patch: pytest.MonkeyPatch, folder: Path, faults: str = "") -> str:
     """Return the path of a fake firmware with faults, which the block finds at ports of its own."""
-    ports = Ports(free(socket.SOCK_DGRAM), free(socket.SOCK_DGRAM), free(socket.SOCK_STREAM))
+    ports = FirmwarePorts(free(socket.SOCK_DGRAM), free(socket.SOCK_DGRAM), free(socket.SOCK_STREAM))
     patch.setattr(Betaflight, "endpoints", ports)
     patch.setenv("FAKE_PORTS", f"{ports.state},{ports.configuration}")
     patch.setenv("FAKE_FAULTS", faults)

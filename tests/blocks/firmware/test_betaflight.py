@@ -178,7 +178,7 @@ def test_it_ends_with_the_run_however_that_ends(
     diagram.write_text(DIAGRAM.format(firmware=firmware, settings='""'))
     code = (
         "import sys, tempfile; from quadvis_blocks.firmware.betaflight import Betaflight; from"
-        f" quadvis_blocks.firmware._session import Ports; tempfile.tempdir = {str(folders)!r};"
+        f" quadvis_blocks.firmware._session import FirmwarePorts; tempfile.tempdir = {str(folders)!r};"
         f" Betaflight.endpoints = {Betaflight.endpoints!r}; from quadvis.cli import main;"
         f" sys.exit(main(['run', {str(diagram)!r}, '--log', '', '--engine', 'python']))"
     )
