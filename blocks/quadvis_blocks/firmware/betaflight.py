@@ -27,7 +27,8 @@ class Betaflight(Block, numeric=False):
     It takes the state of the craft and the pulses of sticks and switches, and gives the commands of four
     motors in its own order. Its clock is that of the run: each step of this block lets its control loop run
     once, and the next step waits for that. So a flight is as fast as the machine, in real time or not, and
-    the same on a slow one. The rate of the block is that of the control loop: 8 kHz divided by 1 to 16.
+    as good on a slow one; not the same to the bit, since the sockets of the firmware are read when the
+    machine has time for them. The rate of the block is that of the control loop: 8 kHz divided by 1 to 16.
 
     Sticks go over its protocol MSP, ``spacing`` apart, as from a receiver: the first four channels are roll,
     pitch, throttle and yaw (AETR), the others switches. A high pulse means right side down, nose *down*,

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import quadvis
 from quadvis.block import ParameterError
 from quadvis.cli import main
 from quadvis.errors import QuadvisError
@@ -44,6 +45,13 @@ blocks:
       attitude: {{value: [0, 0, 0], unit: rad}}
       rates: {{value: [0, 0, 0], unit: rad/s}}
       channels: {{value: [1500, 1500, 1000, 1500, 2000], unit: us}}
+"""
+
+# Of every 20th step alone is a row; the integral follows from all of them.
+AFTER = """\
+  craft: {block: plant.motor_thrust, rate: inner, in: {command: controller.motors}}
+  impulse: {block: signal.discrete_integrator, rate: inner, in: {u: "craft.thrust[0]"}}
+log: {every: {inner: 20}}
 """
 
 
@@ -143,6 +151,17 @@ def test_without_arming_the_run_ends_with_the_reasons_in_words(
     said = capsys.readouterr().err
     assert "has not armed within 1 s of its switch: the arm switch is on" in said
     assert living(firmware) == []
+
+
+@pytest.mark.slow
+def test_a_replay_takes_the_firmware_from_the_log(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    diagram = tmp_path / "bench.yaml"
+    text = DIAGRAM.format(firmware=faked(monkeypatch, tmp_path), settings='""')
+    diagram.write_text(text + AFTER)
+    quadvis.load(diagram, stop_time="1.5 s").run(log=tmp_path / "run.mcap")
+    monkeypatch.setattr(Betaflight, "open", lambda block: pytest.fail("a replay starts no firmware"))
+    again = quadvis.replay(tmp_path / "run.mcap")
+    assert again.same and again.rows > 100
 
 
 def test_two_at_once_are_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
