@@ -18,6 +18,7 @@ from quadvis.testing import drive
 from quadvis.testing.conformance import CHECKS, Subject
 from quadvis_blocks.vision.rendered_camera import RenderedCamera
 from quadvis_vision.camera.calibration import CameraCalibration
+from tests.blocks.firmware.faked import faked
 from tests.blocks.hardware.can_frames import written
 from tests.fmus import models
 from tests.fmus.builder import fmu
@@ -148,6 +149,10 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
         if shutil.which("gcc") is None:
             pytest.skip("compiles an FMU, with gcc")
         told = {"file": fmu(models.VAN_DER_POL)}
+    if name == "firmware.betaflight":
+        if shutil.which("gcc") is None:
+            pytest.skip("compiles the clock of the firmware, with gcc")
+        told = {"firmware": faked(*map(request.getfixturevalue, ("monkeypatch", "tmp_path")))}
     block = block.with_ports(told) if told else block
     if name == "hardware.digital_out":
         values["initial"] = [0, 1, 0]

@@ -32,20 +32,29 @@ DIAGRAMS = Path(__file__).parents[2] / "diagrams"
 FILE = Path(__file__).with_name("golden.json")
 DURATION = 1.5  # s; all tasks, transitions and cameras have worked by then
 MISSING = 0.123  # stands for NaN
+DEVICES, PROGRAM = "devices", "program"
 
 
-def every_case() -> Iterator[tuple[str, str | None, bool]]:
-    """Yield every diagram by itself and with each of its variants, and whether that reaches devices."""
-    catalogue = Catalogue()
+def every_case() -> Iterator[tuple[str, str | None, str]]:
+    """Yield every diagram by itself and with each of its variants, and what it needs that tests may lack."""
     for path in sorted(DIAGRAMS.glob("*.yaml")):
-        variants = yaml.load(path.read_text(), yaml.CSafeLoader).get("variants", {})
-        yield path.name, None, False
+        data = yaml.load(path.read_text(), yaml.CSafeLoader)
+        variants, blocks = data.get("variants", {}), data.get("blocks", {})
+        yield path.name, None, need(blocks.values())
         for name, variant in variants.items():
             lineage = [variant]
             while base := lineage[-1].get("base"):
                 lineage.append(variants[base])
-            slots = [block for each in lineage for block in each.get("slots", {}).values()]
-            yield path.name, name, any(issubclass(catalogue.find(kind), Device) for kind in kinds(slots))
+            slots = {key: block for each in reversed(lineage) for key, block in each.get("slots", {}).items()}
+            yield path.name, name, need((blocks | slots).values())
+
+
+def need(blocks: Iterable[dict[str, Any]]) -> str:
+    """Return what blocks need: DEVICES, or a PROGRAM of somebody else in a process of its own; or nothing."""
+    classes = [Catalogue().find(kind) for kind in kinds(blocks)]
+    if any(issubclass(found, Device) for found in classes):
+        return DEVICES
+    return PROGRAM if any(found.not_replayable and found.not_restorable for found in classes) else ""
 
 
 def kinds(blocks: Iterable[dict[str, Any]], folder: Path = DIAGRAMS) -> Iterator[str]:
@@ -61,14 +70,25 @@ def kinds(blocks: Iterable[dict[str, Any]], folder: Path = DIAGRAMS) -> Iterator
 
 @cache
 def cases() -> tuple[tuple[str, str | None], ...]:
-    """Return every diagram that can be simulated, by itself and with each of its variants."""
-    return tuple((name, variant) for name, variant, has_devices in every_case() if not has_devices)
+    """Return every diagram that can be simulated anywhere, by itself and with each of its variants."""
+    return needing("")
+
+
+@cache
+def with_programs() -> tuple[tuple[str, str | None], ...]:
+    """Return those that fly with a program of somebody else; the golden file has their hashes alone."""
+    return needing(PROGRAM)
 
 
 @cache
 def on_devices() -> tuple[tuple[str, str | None], ...]:
     """Return the variants with devices, which run in real time alone."""
-    return tuple((name, variant) for name, variant, has_devices in every_case() if has_devices)
+    return needing(DEVICES)
+
+
+def needing(wanted: str) -> tuple[tuple[str, str | None], ...]:
+    """Return every diagram and variant that needs this."""
+    return tuple((name, variant) for name, variant, found in every_case() if found == wanted)
 
 
 def loaded(folder: Path, name: str, variant: str | None) -> Diagram:
@@ -90,8 +110,8 @@ def digest(result: Any) -> dict[str, float]:
 
 def facts(folder: Path, name: str, variant: str | None) -> dict[str, Any]:
     """Return what the golden file holds of one diagram."""
-    hashed = quadvis.load(DIAGRAMS / name, variant=variant).hash
-    return {"hash": hashed, "signals": digest(loaded(folder, name, variant).run())}
+    flown = {} if (name, variant) in with_programs() else digest(loaded(folder, name, variant).run())
+    return {"hash": quadvis.load(DIAGRAMS / name, variant=variant).hash, "signals": flown}
 
 
 def bits(folder: Path, name: str, variant: str | None) -> str:
@@ -120,7 +140,7 @@ def main() -> int:
             for case in cases():
                 print(bits(folder, *case), title(*case))
         else:
-            found = {title(*case): facts(folder, *case) for case in cases()}
+            found = {title(*case): facts(folder, *case) for case in (*cases(), *with_programs())}
             FILE.write_text(json.dumps(found, indent=0) + "\n")
     return 0
 

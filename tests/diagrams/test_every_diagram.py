@@ -1,5 +1,6 @@
 """Every diagram of the repository, by itself and with each of its variants, is flown for a second and a half.
 
+Those that need devices or another program are flown by tests of their own.
 See golden.py for how to renew the golden file.
 """
 
@@ -16,7 +17,7 @@ import pytest
 import quadvis
 from quadvis.api import Diagram
 from quadvis.engine.engine import Engine, Snapshot
-from tests.diagrams.golden import DIAGRAMS, FILE, cases, digest, loaded, title
+from tests.diagrams.golden import DIAGRAMS, FILE, cases, digest, loaded, title, with_programs
 
 GOLDEN = json.loads(FILE.read_text())
 CASES = cases()
@@ -46,7 +47,14 @@ def flight(diagram: Diagram) -> Any:
 
 
 def test_the_golden_file_knows_every_diagram_and_variant() -> None:
-    assert list(GOLDEN) == [title(*case) for case in CASES]
+    assert list(GOLDEN) == [title(*case) for case in (*CASES, *with_programs())]
+
+
+def test_what_flies_with_another_program_is_known_by_its_hash() -> None:
+    found = with_programs()
+    assert found == (("betaflight.yaml", None), ("betaflight.yaml", "failsafe"))
+    for name, variant in found:
+        assert quadvis.load(DIAGRAMS / name, variant=variant).hash == GOLDEN[title(name, variant)]["hash"]
 
 
 def test_the_hover_is_among_them_with_a_variant_for_the_second_method() -> None:

@@ -26,7 +26,7 @@ def choices(rounds: int, options: Sequence[str] = ("--log", "")) -> Iterator[Row
         shutil.copytree(ROOT / "diagrams", folder)  # some diagrams write files beside themselves
         for path in sorted(folder.glob("*.yaml")):
             variants = yaml.safe_load(path.read_text()).get("variants", {})
-            for variant in ("", *(name for name in variants if not _has_devices(path, name))):
+            for variant in (name for name in ("", *variants) if not _needs_more(path, name)):
                 of = ("--variant", variant) if variant else ()
                 command = (*QUADVIS, "run", str(path), *of, *options, "--engine")
                 works: dict[str, Callable[[], float]] = {
@@ -41,6 +41,7 @@ def choices(rounds: int, options: Sequence[str] = ("--log", "")) -> Iterator[Row
                 yield Row(what, auto - min(python, native), "s of CPU", None, "<= 0.3")
 
 
-def _has_devices(path: Path, variant: str) -> bool:
-    """Return whether blocks of a variant reach a port, which only a real-time run may do."""
-    return any(devices(quadvis.load(path, variant=variant).graph))
+def _needs_more(path: Path, variant: str) -> bool:
+    """Return whether blocks reach a port, which only a real-time run may do, or run another program."""
+    graph = quadvis.load(path, variant=variant or None).graph
+    return any(devices(graph)) or any(node.block.not_restorable for node in graph.nodes)

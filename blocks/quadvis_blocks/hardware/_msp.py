@@ -15,7 +15,9 @@ from typing import NamedTuple
 
 from quadvis_blocks.hardware._protocol.checksums import algorithm, xor
 
-STATUS, RAW_IMU, ATTITUDE, ANALOG, SET_RAW_RC = 101, 102, 108, 110, 200
+VARIANT, MODE_RANGES = 2, 34
+STATUS, RAW_IMU, ATTITUDE, ANALOG = 101, 102, 108, 110
+BOX_IDS, STATUS_EX, SET_RAW_RC = 119, 150, 200
 V1, V2 = 1, 2
 REQUEST, ANSWER, REFUSAL = b"<>!"
 HEADS = {b"$M": V1, b"$X": V2}

@@ -1,0 +1,1 @@
+"""Firmware of flight controllers in the loop, as processes of their own."""
