@@ -49,7 +49,7 @@ def library(rig: Rig, folder: Path) -> tuple[dict[str, Any], dict[str, Op]]:
         name = code.names[0, method]
         lines.append(
             f'__attribute__((visibility("default"))) int call_{method}(char **p) '
-            f"{{ return {name}({listed}); }}"
+            f"{{ char *error = 0; return {name}((char *)&error, {listed}); }}"
         )
     (folder / "blocks.c").write_text("\n".join(lines))
     made = folder / "blocks.so"
