@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from quadvis.block import Block
 from quadvis.engine.program import COPY, Op, Program
 from quadvis.errors import QuadvisError
-from quadvis.export.c_functions import translated
+from quadvis.export.c_functions import SENTENCE, translated
 from quadvis.export.c_types import Unexportable
 from quadvis.export.selection import INPUT
 from quadvis.native import cache
@@ -30,7 +30,11 @@ Announce = Callable[[str], None]
 
 
 class BlockCode(NamedTuple):
-    """The C of all blocks, and the functions of it by the number of the block and the method."""
+    """The C of all blocks, and the functions of it by the number of the block and the method.
+
+    Each takes first where it may leave the address of a sentence, as `why` in the text reads it. It returns 0
+    unless it failed.
+    """
 
     text: str
     names: Mapping[tuple[int, str], str]
@@ -46,8 +50,21 @@ def block_code(program: Program, blocks: Sequence[Block], announce: Announce | N
             if prefix not in texts:
                 texts[prefix] = _translated(kind, prefix, program.blocks[number].path, announce)
             names |= {(number, method.name): f"{prefix}_{method.name}" for method in kind.methods}
-    parts = [PRELUDE.read_text(encoding="utf-8"), *texts.values()]
+    parts = [PRELUDE.read_text(encoding="utf-8"), *texts.values(), *_sentences("\n".join(texts.values()))]
     return BlockCode("\n".join(parts), names)
+
+
+def _sentences(text: str) -> list[str]:
+    """Return the C that tells a sentence of the blocks from another address that numba has left."""
+    names = ", ".join([*SENTENCE.findall(text), "0"])
+    return [
+        f"static const char *const sentences[] = {{{names}}};",
+        "static const char *why(const char *p) {",
+        "    for (int k = 0; sentences[k]; k++)",
+        "        if (sentences[k] == p) return p;",
+        "    return 0;",
+        "}",
+    ]
 
 
 def _kinds(program: Program, blocks: Sequence[Block]) -> Iterator[tuple[int, list[BlockType]]]:
@@ -121,14 +138,16 @@ def _linked(compiled: Mapping[str, Compiled], prefix: str) -> str:
 
 
 def _entry(name: str, function: Compiled) -> str:
-    """Return LLVM's text of a function of pointers that returns numba's status."""
-    numbers = range(function.pointers)
-    taken = ", ".join(f"ptr %p{number}" for number in numbers)
+    """Return LLVM's text of a function of pointers that returns numba's status.
+
+    The first one is where numba leaves the address of its exception.
+    """
+    pointers = [f"ptr %p{number}" for number in range(function.pointers)]
+    taken, types = ", ".join(("ptr %error", *pointers)), ", ".join(["ptr"] * (2 + len(pointers)))
     return (
-        f'declare i32 @"{function.name}"(ptr, ptr{", ptr" * function.pointers})\n'
-        f"define i32 @{name}({taken}) {{\n"
-        f"  %result = alloca i64\n  %error = alloca ptr\n"
-        f'  %status = call i32 @"{function.name}"(ptr %result, ptr %error, {taken})\n  ret i32 %status\n}}\n'
+        f'declare i32 @"{function.name}"({types})\n'
+        f"define i32 @{name}({taken}) {{\n  %result = alloca i64\n"
+        f'  %status = call i32 @"{function.name}"(ptr %result, {taken})\n  ret i32 %status\n}}\n'
     )
 
 

@@ -6,6 +6,7 @@ the operations of the machine code in their order, and gives its bits. It can be
 
 from __future__ import annotations
 
+import pickle
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
@@ -37,6 +38,7 @@ from quadvis.export.c_types import (
     suffix,
     typed,
 )
+from quadvis.machine import failures
 
 _NOTHING = (
     "llvm.lifetime", "llvm.assume", "llvm.dbg", "llvm.experimental.noalias", "llvm.prefetch",
@@ -46,6 +48,8 @@ _OVERFLOW = re.compile(r"llvm\.([su](?:add|sub|mul))\.with\.overflow\.i64")
 _CALL = re.compile(r'^(?:(?:tail|musttail|notail) )?call (.*?)([@%])("(?:[^"\\]|\\.)*"|[\w.$-]+)\((.*)\)$')
 _PYTHON = re.compile(r"call [^@]*@(?:_?Py\w|numba_(?:un)?pickle|numba_runtime)")
 _RESULT = re.compile(r'^%("(?:[^"\\]|\\.)*"|[\w.$-]+) = (.*)$')
+SENTENCE = re.compile(r"^static const char (\w+)\[\]", re.MULTILINE)  # of an exception
+_PICKLED = re.compile(r"@([\w.]*pickledata[\w.]*)")
 _PHI = re.compile(r"\[ (.*?), %(\"[^\"]*\"|[\w.$-]+) \]")
 
 
@@ -89,8 +93,10 @@ class _Constants:
         self.lines: list[str] = []
 
     def address(self, name: str) -> str:
-        """Return an expression for a constant's address; exceptions, which only Python reads, have none."""
-        if "picklebuf" in name or "pickledata" in name:
+        """Return an expression for a constant's address; that of an exception is its sentence, or none."""
+        if "picklebuf" in name:
+            return self._exception(name)
+        if "pickledata" in name:
             return "(char *)0"
         if name not in self._known:
             raise Unexportable(f"'{name}' is no constant")
@@ -103,6 +109,34 @@ class _Constants:
             self._names[name] = f"{self._prefix}_constant{len(self._names)}"
             self.lines.append(f"static const uint64_t {self._names[name]}[] = {{{words}}};")
         return f"(char *){self._names[name]}"
+
+    def _exception(self, name: str) -> str:
+        """Return an expression for the address of what a person reads of an exception."""
+        if name not in self._names:
+            match = _PICKLED.search(self._known.get(name, ""))
+            sentence = _sentence(content(*typed(self._known[match[1]]))) if match else ""
+            self._names[name] = f"{self._prefix}_sentence{len(self._names)}" if sentence else "0"
+            if sentence:
+                self.lines.append(f"static const char {self._names[name]}[] = {_text(sentence)};")
+        return f"(char *){self._names[name]}"
+
+
+def _sentence(pickled: bytes) -> str:
+    """Return what a person reads of an exception: numba keeps its class and its arguments; "" if of a bug."""
+    kind, arguments, _place = pickle.loads(pickled)
+    try:
+        return failures.arithmetic(kind(*(arguments or ())))
+    except TypeError:  # a class of somebody else's, which takes other arguments
+        return ""
+
+
+def _text(sentence: str) -> str:
+    """Return a sentence as a text of C."""
+    letters = (
+        chr(byte) if 32 <= byte < 127 and chr(byte) not in '"\\?' else f"\\{byte:03o}"
+        for byte in sentence.encode()
+    )
+    return f'"{"".join(letters)}"'
 
 
 class _Writer:

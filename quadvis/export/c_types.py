@@ -11,7 +11,7 @@ from quadvis.export.assembly_text import split
 INTEGER = re.compile(r"i(1|8|16|32|64)")
 _ARRAY = re.compile(r"\[(\d+) x (.*)\]", re.DOTALL)
 _DOUBLE = re.compile(r"0x([0-9A-Fa-f]{16})")
-_ESCAPE = re.compile(rb"\\([0-9A-Fa-f]{2})")
+_ESCAPE = re.compile(rb"\\(\\|[0-9A-Fa-f]{2})")
 POINTER = 8  # bytes that an address takes in the memory of the code, on every machine
 
 
@@ -153,12 +153,16 @@ def place_of(kind: str, path: tuple[int, ...]) -> int:
     return place
 
 
+def _escaped(match: re.Match[bytes]) -> bytes:
+    return b"\\" if match[1] == b"\\" else bytes((int(match[1], 16),))
+
+
 def content(kind: str, text: str) -> bytes:
     """Return the bytes of a constant; Unexportable if it holds addresses."""
     if text in ("zeroinitializer", "undef", "poison"):
         return bytes(size(kind))
     if text.startswith('c"'):
-        return _ESCAPE.sub(lambda match: bytes((int(match[1], 16),)), text[2:-1].encode("latin-1"))
+        return _ESCAPE.sub(_escaped, text[2:-1].encode("latin-1"))
     if kind in ("double", "float"):
         found = _DOUBLE.fullmatch(text)
         value = struct.unpack(">d", bytes.fromhex(found[1]))[0] if found else float(text)

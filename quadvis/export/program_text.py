@@ -121,7 +121,7 @@ class _Calls:
     def _start(self, number: int) -> str:
         name = self._names.get((number, "start"))
         block = self._program.blocks[number]
-        return f'CALL({_text(block.path)}, "start", {name}(at(m, {block.position})));' if name else ""
+        return f'CALL({_text(block.path)}, "start", {name}, at(m, {block.position}));' if name else ""
 
     def _op(self, op: Op) -> str:
         block = self._program.blocks[op.block]
@@ -129,7 +129,7 @@ class _Calls:
             return self._copy(op._replace(sources=(block.field(HELD),)))
         places = [block.position, *(slot.position for slot in (*op.sources, *op.targets))]
         arguments = ", ".join(f"at(m, {place})" for place in places)
-        return f'CALL({_text(block.path)}, "{op.method}", {self._names[op.block, op.method]}({arguments}));'
+        return f'CALL({_text(block.path)}, "{op.method}", {self._names[op.block, op.method]}, {arguments});'
 
     @staticmethod
     def _copy(op: Op) -> str:

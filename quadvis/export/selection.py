@@ -160,9 +160,9 @@ class _Inputs:
             yield self._terminal(label, pair, numbers)
 
     def _entries(self, name: str) -> Iterator[tuple[str, Wire]]:
-        """Yield the inputs of the part, or of the block, with what feeds them."""
+        """Yield the inputs of the part, or of the block, with what feeds them; ``u[0]`` is ``u_0``."""
         if name in self._inside:
-            yield from self._diagram.graph[name].wires()
+            yield from ((plain_name(port, ()), wire) for port, wire in self._diagram.graph[name].wires())
         for label, text in self._diagram.entries.items():
             part, _, port = label.rpartition(".")
             wire = read_name(text)

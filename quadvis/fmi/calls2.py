@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from typing import Any
 
+from quadvis.fmi.bound import Call, bound, listed
 from quadvis.fmi.exchange import DISCARD, ENDING, EVENT, OK, UnitSetup
 from quadvis.fmi.messages import Messages
 
-Call = Callable[[], int]
 EXCHANGE, COSIMULATION = 0, 1
 LAST_TIME, TERMINATED = 2, 3
 NEAR = 1e-9  # s
@@ -77,7 +76,7 @@ class Calls2:
         return self._library[f"fmi2{name}"]  # a function of its own each time: its types belong to the caller
 
     def _bound(self, name: str, *arguments: Any) -> Call:
-        return partial(self._function(name), self._component, *arguments)
+        return bound(self._function(name), self._component, *arguments)
 
     def instantiate(self) -> bool:
         """Make the instance; False if the FMU refuses."""
@@ -102,11 +101,11 @@ class Calls2:
 
     def setter(self, kind: str, references: Sequence[int], values: Any) -> Call:
         """Return a call that sets variables to the values of an array."""
-        return self._bound(f"Set{VALUES[kind]}", *_listed(references), values)
+        return self._bound(f"Set{VALUES[kind]}", *listed(references), values)
 
     def getter(self, kind: str, references: Sequence[int], values: Any) -> Call:
         """Return a call that writes the values of variables into an array."""
-        return self._bound(f"Get{VALUES[kind]}", *_listed(references), values)
+        return self._bound(f"Get{VALUES[kind]}", *listed(references), values)
 
     def stepper(self, time: ctypes.c_double, step: ctypes.c_double) -> Call:
         """Return a call that steps on from a time, both of which lie in the buffer."""
@@ -196,7 +195,3 @@ class Calls2:
             self._bound("FreeInstance")()
             self._component.value = None
         _heard.pop(self._environment, None)
-
-
-def _listed(references: Sequence[int]) -> tuple[Any, ctypes.c_size_t]:
-    return (ctypes.c_uint32 * len(references))(*references), ctypes.c_size_t(len(references))

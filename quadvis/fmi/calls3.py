@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from typing import Any
 
+from quadvis.fmi.bound import Call, bound, listed
 from quadvis.fmi.exchange import DISCARD, ENDING, EVENT, OK, UnitSetup
 from quadvis.fmi.messages import Messages
 
-Call = Callable[[], int]
 Logger = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
 _FALSE, _TRUE = ctypes.c_bool(False), ctypes.c_bool(True)
 
@@ -27,7 +26,7 @@ class Calls3:
         return self._library[f"fmi3{name}"]
 
     def _bound(self, name: str, *arguments: Any) -> Call:
-        return partial(self._function(name), self._component, *arguments)
+        return bound(self._function(name), self._component, *arguments)
 
     def instantiate(self) -> bool:
         """Make the instance; False if the FMU refuses."""
@@ -54,11 +53,11 @@ class Calls3:
 
     def setter(self, kind: str, references: Sequence[int], values: Any) -> Call:
         """Return a call that sets variables to the values of an array."""
-        return self._bound(f"Set{_named(kind)}", *_listed(references), values, ctypes.c_size_t(len(values)))
+        return self._bound(f"Set{_named(kind)}", *listed(references), values, ctypes.c_size_t(len(values)))
 
     def getter(self, kind: str, references: Sequence[int], values: Any) -> Call:
         """Return a call that writes the values of variables into an array."""
-        return self._bound(f"Get{_named(kind)}", *_listed(references), values, ctypes.c_size_t(len(values)))
+        return self._bound(f"Get{_named(kind)}", *listed(references), values, ctypes.c_size_t(len(values)))
 
     def stepper(self, time: ctypes.c_double, step: ctypes.c_double) -> Call:
         """Return a call that steps on from a time, both of which lie in the buffer."""
@@ -157,7 +156,3 @@ class Calls3:
 
 def _named(kind: str) -> str:
     return "Int64" if kind == "Enumeration" else kind
-
-
-def _listed(references: Sequence[int]) -> tuple[Any, ctypes.c_size_t]:
-    return (ctypes.c_uint32 * len(references))(*references), ctypes.c_size_t(len(references))

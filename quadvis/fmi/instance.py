@@ -54,7 +54,7 @@ NEVER = "the library has not what its description promises: "
 
 
 class FmuInstance:
-    """An FMU, run by one thread. `open` loads and initialises it; `perform` does a request.
+    """An FMU, run by one thread. `open` loads and initialises it; `perform` does one of its ``requests``.
 
     Each returns a status as in ``quadvis.fmi.exchange``; what the FMU says about it is in the buffer.
     """
@@ -64,7 +64,7 @@ class FmuInstance:
         self._messages = Messages()
         self._calls: Calls2 | Calls3 | None = None
         self._ready = False
-        self._requests: dict[int, Call] = {}
+        self.requests: dict[int, Call] = {}
         self._kept: dict[int, ctypes.c_void_p] = {}
         self._counted = 0
 
@@ -95,12 +95,12 @@ class FmuInstance:
 
     def perform(self, request: int) -> int:
         """Do a request."""
-        status = self._requests[request]()
-        if not status:
-            return OK
-        if status == DISCARD and request == STEP_ON:
-            return self._discarded()
-        return self._judged(status)
+        status = self.requests[request]()
+        return self.judged(request, status) if status else OK
+
+    def judged(self, request: int, status: int) -> int:
+        """Return what the status of a request means."""
+        return self._discarded() if status == DISCARD and request == STEP_ON else self._judged(status)
 
     def end(self) -> None:
         """End the instance; what an FMU does then is its own business."""
@@ -117,7 +117,7 @@ class FmuInstance:
         time, step = struct.unpack_from("2d", self._buffer, TIME)
         if status := self._calls.discarded(time + step):
             return self._judged(status)
-        self._requests[STEP_ON] = lambda: ENDING
+        self.requests[STEP_ON] = lambda: ENDING
         return self.perform(GET)
 
     def _judged(self, status: int) -> int:
@@ -216,7 +216,7 @@ class FmuInstance:
             RESTORE: self._restore,
             FORGET: self._forget,
         }
-        self._requests = found
+        self.requests = found
 
     def _save(self) -> int:
         """Keep the state: as bytes in a file if the FMU can, else in memory of the FMU, by a number."""

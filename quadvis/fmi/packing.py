@@ -121,7 +121,10 @@ def packer(
 def unpacker(
     version: int, signals: Sequence[FmuSignal], places: Sequence[int], buffer: Any
 ) -> Callable[[], Any]:
-    """Return the function that gives the values of signals (SI units): one, or a tuple of several."""
+    """Return the function that gives the values of signals (SI units): one, or a tuple of several.
+
+    An array may be one over the buffer, with its values until the next request: the engine copies it.
+    """
     writer = _Writer(version, signals, places, buffer)
     results = dict[int, str]()
     for run in writer.runs():
@@ -132,8 +135,7 @@ def unpacker(
         code = writer.code(number)
         if signal.shape:
             writer.names["wide"] = np.float64
-            copied = "astype(wide)" if code == "f" else "copy()"
-            results[number] = f"{writer.array(number)}.{copied}"
+            results[number] = writer.array(number) + (".astype(wide)" if code == "f" else "")
         if signal.scalar == "bool" and code != "?":
             results[number] = f"({results[number]} != 0)"
         elif code == "Q":

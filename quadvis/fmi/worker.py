@@ -2,6 +2,8 @@
 
     python -I -S -c '...main(...)' buffer asked answered life    (descriptors), the setup on standard input
 
+in the folder of the unpacked copy.
+
 If the FMU crashes, hangs or ends this process, the other one goes on. If the other one ends, however it does,
 this process removes the unpacked copy and ends, even while the FMU hangs.
 """
@@ -20,23 +22,35 @@ from contextlib import suppress
 from quadvis.fmi.exchange import ANSWERED, DATA, END, SLEEPS, SLOT, STATUS, UnitSetup
 from quadvis.fmi.instance import FmuInstance
 
+WHOLE = "}\n"  # the end of a setup
+
 
 def main() -> None:
     """Be that process: its whole life."""
     buffer_file, asked, answered, life = map(int, sys.argv[1:5])
-    given = json.load(sys.stdin)
-    folder = given.pop("folder")
-    setup = UnitSetup.read(given)
-    threading.Thread(target=_end_with_caller, args=(life, folder), daemon=True).start()
+    folder = os.getcwd()
+    end = threading.Thread(target=_end_with_caller, args=(life, folder), daemon=True)
+    end.start()
+    text = sys.stdin.read()
+    if not text.endswith(WHOLE):
+        end.join()  # the caller was killed while it wrote, and this process ends there
+    setup = UnitSetup.read(json.loads(text))
     _keep_quiet()
     buffer = mmap.mmap(buffer_file, setup.size)
     instance = FmuInstance(setup, buffer, folder)
-    _answer(instance, buffer, asked, answered)
+    asked_to_end = False
+    with suppress(BrokenPipeError):
+        asked_to_end = _answer(instance, buffer, asked, answered)
+    if not asked_to_end:
+        end.join()  # the caller has ended, and the copy is not removed yet
     os._exit(0)  # what the library has registered for the end has no say here
 
 
-def _answer(instance: FmuInstance, buffer: mmap.mmap, asked: int, answered: int) -> None:
-    """Do one request after the other. A caller that sleeps is woken by a byte."""
+def _answer(instance: FmuInstance, buffer: mmap.mmap, asked: int, answered: int) -> bool:
+    """Do one request after the other; return whether the last one was to end.
+
+    A caller that sleeps is woken by a byte.
+    """
     words = memoryview(buffer).cast("B")[:DATA].cast("q")
     count, sleeps, status = (place // SLOT for place in (ANSWERED, SLEEPS, STATUS))
     words[status] = instance.open()
@@ -45,11 +59,12 @@ def _answer(instance: FmuInstance, buffer: mmap.mmap, asked: int, answered: int)
     while request := os.read(asked, 1):
         if request[0] == END:
             instance.end()
-            return
+            return True
         words[status] = instance.perform(request[0])
         words[count] += 1
         if words[sleeps]:
             os.write(answered, request)
+    return False
 
 
 def _keep_quiet() -> None:

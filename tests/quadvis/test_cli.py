@@ -348,7 +348,7 @@ def test_own_blocks_are_listed_and_broken_ones_told(project: Path, capsys: Captu
 
 def test_a_block_is_described(capsys: Captured) -> None:
     assert done("describe", "signal.gain") == 0
-    assert "factor  b/a  = 1  tunable  the factor" in capsys.readouterr().out
+    assert "factor  [*?] b/a  = 1  tunable  the factor" in capsys.readouterr().out
     assert done("describe", "signal.gain", "--json") == 0
     assert json.loads(capsys.readouterr().out)["params"]["factor"]["unit"] == "b/a"
 

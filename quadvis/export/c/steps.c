@@ -32,7 +32,16 @@ static int finite_at(const Model *m, int32_t first, int32_t count) {
     return 1;
 }
 
-#define CALL(block, method, status) if (status) return failed(m, block, "'" method "' failed")
+static int fell(Model *m, const char *block, const char *fallback, const char *error) {
+    const char *sentence = why(error);
+    return failed(m, block, sentence ? sentence : fallback);
+}
+
+#define CALL(block, method, function, ...) \
+    do { \
+        char *error = 0; \
+        if (function((char *)&error, __VA_ARGS__)) return fell(m, block, "'" method "' failed", error); \
+    } while (0)
 #define CHECK(block, port, first, count) \
     if (!finite_at(m, first, count)) return failed(m, block, "port '" port "': the output is not finite")
 #include "calls.h"

@@ -25,6 +25,7 @@ from quadvis.testing import check_block, drive
 from quadvis_blocks.fmi.fmu import Fmu
 from tests.fmus import models
 from tests.fmus.builder import Model, Var, fmu, needs_gcc
+from tests.processes import gone, wait_for
 
 pytestmark = needs_gcc
 BOTH = pytest.mark.parametrize("version", [2, 3])
@@ -287,28 +288,18 @@ def test_the_copy_is_removed_after_ctrl_c_and_after_a_kill(number: signal.Signal
     process = subprocess.Popen(
         [sys.executable, "-c", program], stderr=subprocess.PIPE, env={**os.environ, "TMPDIR": str(tmp_path)}
     )
-    wait_until(lambda: list(tmp_path.glob(f"{PREFIX}*")))
-    if number == signal.SIGKILL:
-        wait_until(lambda: list(Path(f"/proc/{process.pid}/task").iterdir()) and children(process.pid))
-    (worker, *_) = wait_until(lambda: children(process.pid))
-    time.sleep(0.2)
+    wait_for(lambda: list(tmp_path.glob(f"{PREFIX}*")))
+    (worker, *_) = wait_for(lambda: children(process.pid))
+    if number == signal.SIGINT:
+        time.sleep(0.2)
     process.send_signal(number)
     process.communicate(timeout=60)
-    wait_until(lambda: not list(tmp_path.iterdir()))
-    wait_until(lambda: not Path(f"/proc/{worker}").exists())
+    wait_for(lambda: not list(tmp_path.iterdir()))
+    wait_for(lambda: gone(worker))
 
 
 def children(process: int) -> list[int]:
     return [int(each) for each in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
-
-
-def wait_until(condition: Any) -> Any:
-    end = time.monotonic() + 60
-    while time.monotonic() < end:
-        if found := condition():
-            return found
-        time.sleep(0.02)
-    raise AssertionError("it did not happen")
 
 
 # D35

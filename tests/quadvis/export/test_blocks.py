@@ -18,7 +18,7 @@ from quadvis.export.package import OPTIONS
 from quadvis.library.catalogue import Catalogue
 from quadvis.testing.checks.compiled import _same
 from quadvis.testing.rig import PERIOD, STEPS, Rig, Subject, rigs, sources, targets
-from tests.blocks.test_every_block import CAMERA
+from tests.blocks.test_every_block import CAMERA, INPUTS, PARAMETERS
 from tests.fmus.builder import needs_gcc
 
 pytestmark = needs_gcc
@@ -27,10 +27,11 @@ GIVEN: dict[str, Any] = {
     "during": [[0.3, 0.6]],
 }  # fmt: skip
 # To compile takes seconds: a few stand for the others, with arrays that are allocated, noise, powers, loops.
-FIRST = ("signal.gain",)
+FIRST = ("control.trim",)
 SOME = (
     "plant.rotorcraft", "sources.noise", "sources.table", "signal.transport_delay",
     "estimation.position_filter", "control.nested_saturation", "supervision.failsafe", "sensors.imu",
+    "signal.gain", "signal.lookup_2d", "logic.multiport_switch", "math.function",
 )  # fmt: skip
 
 
@@ -49,7 +50,7 @@ def library(rig: Rig, folder: Path) -> tuple[dict[str, Any], dict[str, Op]]:
         name = code.names[0, method]
         lines.append(
             f'__attribute__((visibility("default"))) int call_{method}(char **p) '
-            f"{{ return {name}({listed}); }}"
+            f"{{ char *error = 0; return {name}((char *)&error, {listed}); }}"
         )
     (folder / "blocks.c").write_text("\n".join(lines))
     made = folder / "blocks.so"
@@ -103,11 +104,12 @@ def test_a_block_does_the_same_in_c(name: str, tmp_path: Path) -> None:
 
 
 def check(name: str, folder: Path) -> None:
-    kind = Catalogue().find(name)
+    kind, known = Catalogue().find(name), GIVEN | PARAMETERS.get(name, {})
     given = {
-        key: GIVEN[key] for key, param in kind.interface.params.items() if param.required and key in GIVEN
+        key: known[key] for key, param in kind.interface.params.items() if param.required and key in known
     }
-    for number, rig in enumerate(rigs(Subject(kind, given), missing=True)):
+    (subject,) = Subject(kind, given, INPUTS.get(name, {})).of_any_number((3,))
+    for number, rig in enumerate(rigs(subject, missing=True)):
         place = folder / str(number)
         place.mkdir()
         functions, ops = library(rig, place)
@@ -117,10 +119,11 @@ def check(name: str, folder: Path) -> None:
                 agree(rig, functions, ops, step)
 
 
-if __name__ == "__main__":  # all of the library: python -m tests.quadvis.export.test_blocks
+if __name__ == "__main__":  # all of the library, or some: python -m tests.quadvis.export.test_blocks
+    import sys
     import tempfile
 
-    for each in NAMES:
+    for each in sys.argv[1:] or NAMES:
         with tempfile.TemporaryDirectory() as made:
             check(each, Path(made))
         print(each, "the same", flush=True)

@@ -15,7 +15,7 @@ import quadvis
 from quadvis.api import Diagram, load_text
 from quadvis.block import ParameterError
 from quadvis.cli import main
-from quadvis.errors import QuadvisError
+from quadvis.errors import QuadvisError, RunError
 from quadvis.export.package import OPTIONS
 from quadvis.testing import check_block, drive
 from quadvis_blocks.fmi.fmu import Fmu
@@ -186,10 +186,82 @@ blocks: {{law: {{block: fmi.fmu, rate: slow, with: {{file: law.fmu, isolation: {
         assert np.array_equal(ours[name], other[name]), name
 
 
+GENERAL = """\
+quadvis: 1
+name: general
+ports:
+  in: [wave, ramp, at]
+  out: {chosen: chosen.y, shaped: shaped.y, count: count.y, heat: heat.y, row: row.y}
+blocks:
+  error: {block: signal.sum, with: {signs: "+-+"}, in: {u: [in.wave, in.ramp, 20 cm]}}
+  row: {block: signal.concatenate, in: {u: [in.wave, error.y, 1.5 m]}}
+  largest: {block: math.min_max, with: {function: max}, in: {u: [in.wave, in.ramp, error.y]}}
+  area: {block: math.product, in: {u: [largest.y, in.wave]}}
+  size: {block: math.function, with: {function: abs}, in: {u: area.y}}
+  side: {block: math.function, with: {function: sqrt}, in: {u: size.y}}
+  rest: {block: math.modulo, in: {u: in.ramp, divisor: 30 cm}}
+  picked: {block: signal.select, in: {index: [2, 0, 1], u: row.y}}
+  high: {block: logic.compare, with: {operator: ">"}, in: {a: in.wave, b: rest.y}}
+  low: {block: logic.compare, with: {operator: "<"}, in: {a: in.wave, b: side.y}}
+  both: {block: logic.gate, with: {operator: xor}, in: {u: [high.y, low.y]}}
+  count: {block: logic.counter, with: {upper: 3, at_limit: wrap}, in: {u: both.y}}
+  chosen:
+    block: logic.multiport_switch
+    with: {outside: refuse}
+    in: {index: in.at, u: ["picked.y[0]", side.y, rest.y, largest.y]}
+  shaped:
+    block: signal.lookup_1d
+    with: {breakpoints: {value: [-1, 0, 2], unit: m}, values: {value: [0, 1, 4], unit: N}, outside: linear}
+    in: {u: chosen.y}
+  either: {block: logic.switch, in: {condition: both.y, then: error.y, otherwise: in.wave}}
+  heat: {block: signal.relay, with: {on_at: 50 cm, off_at: 0 m, on: 2 W, off: 1 W}, in: {u: either.y}}
+"""
+FED = """\
+quadvis: 1
+name: fed
+rates: {fast: 100 Hz}
+stop_time: 1 s
+params: {most: 3}
+blocks:
+  wave: {block: sources.sine, rate: fast, with: {amplitude: 1 m, frequency: 2 Hz}}
+  ramp: {block: sources.ramp, rate: fast, with: {slope: 2 m/s}}
+  pulse: {block: sources.pulse, rate: fast, with: {interval: 0.2 s, width: 0.1 s, begin: 0.1 s}}
+  up: {block: logic.compare, rate: fast, with: {operator: ">"}, in: {a: pulse.y, b: 0.5}}
+  at: {block: logic.counter, rate: fast, with: {upper: $most, at_limit: wrap}, in: {u: up.y}}
+  part: {slot: true, part: general.yaml, rate: fast, in: {wave: wave.y, ramp: ramp.y, at: at.y}}
+"""
+
+
 @pytest.mark.slow
-def test_the_controller_of_hover_flies_as_an_fmu_to_the_bit(tmp_path: Path) -> None:
+@BOTH
+def test_blocks_of_the_general_library_do_the_same_together(version: int, tmp_path: Path) -> None:
+    """Inputs of any number, whole numbers, truth values, tables; what a block refuses, it refuses in C."""
+    (tmp_path / "general.yaml").write_text(GENERAL)
+    (tmp_path / "fed.yaml").write_text(FED)
+    (tmp_path / "other.yaml").write_text(
+        "quadvis: 1\nname: other\nbase: fed.yaml\n"
+        "blocks: {part: {block: fmi.fmu, rate: fast, with: {file: part.fmu, isolation: none}}}\n"
+    )
+    fed = quadvis.load(tmp_path / "fed.yaml")
+    made = fed.export_fmu("part", tmp_path / "part.fmu", version=version)
+    assert made.inputs == ("wave", "ramp", "at")
+    ours, other = fed.run(), quadvis.load(tmp_path / "other.yaml").run()
+    for name in made.outputs:
+        assert np.array_equal(ours[f"part.{name}"], other[f"part.{name}"]), name
+    one = fed.export_fmu("part/chosen", tmp_path / "one.fmu", version=version)
+    assert one.inputs == ("index", "u_0", "u_1", "u_2", "u_3")
+    words = "the index is no place of the list, which counts from 0"
+    with pytest.raises(RunError, match=words):
+        quadvis.load(tmp_path / "fed.yaml", settings={"most": "5"}).run()
+    with pytest.raises(RunError, match=f"Error: block 'part/chosen', t = 0.7 s: {words}"):
+        quadvis.load(tmp_path / "other.yaml", settings={"most": "5"}).run()
+
+
+@pytest.mark.slow
+@BOTH
+def test_the_controller_of_hover_flies_as_an_fmu_to_the_bit(version: int, tmp_path: Path) -> None:
     hover = quadvis.load(HOVER, variant="geometric", stop_time="10 s")
-    hover.export_fmu("control", tmp_path / "control.fmu")
+    hover.export_fmu("control", tmp_path / "control.fmu", version=version)
     (tmp_path / "hover.yaml").write_text(
         f"""\
 quadvis: 1
@@ -281,8 +353,6 @@ def test_without_a_compiler_a_sentence_says_so(
 def test_an_output_out_of_the_finite_numbers_is_an_error_with_its_block(tmp_path: Path) -> None:
     text = LOOP.replace("factor: 3 1/s", "factor: 1e200 1/s")
     load_text(text).export_fmu("law", tmp_path / "law.fmu")
-    from quadvis.errors import RunError
-
     with pytest.raises(RunError, match="block 'law', t = 0 s: port 'y': the output is not finite"):
         block = Fmu(file=str(tmp_path / "law.fmu"), isolation="none", direct="never")
         drive(block, rate="20 Hz", u=[1e200, 0.0, 0.0])
