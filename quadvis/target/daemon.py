@@ -78,7 +78,7 @@ class Daemon:
             name, self._handle, hosts=AuthorizedHosts(), pair=pair, audit=Audit(folder / "audit.jsonl"),
             on_lost=lambda who: self.kernel.lose_host(), say=say,
         )  # fmt: skip
-        self.kernel = Kernel(name, Store(folder), self._server.publish)
+        self.kernel = Kernel(name, Store(folder), self._server.publish, self._server.wants)
         self._notifier = Notifier()
 
     def __enter__(self) -> Daemon:
