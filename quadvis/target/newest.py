@@ -14,9 +14,13 @@ from quadvis.output.recording import RecordedBlock, RecordedPort, Recording, por
 
 
 class SignalPlace(NamedTuple):
-    """The slots of a signal in the rows of its block, and its type ("float64", "int64" or "bool")."""
+    """The slots of a signal in the rows of its block, and its type ("float64", "int64" or "bool").
+
+    ``width`` is how many slots a row has.
+    """
 
     block: str
+    width: int
     slots: NDArray[np.intp]
     type: str
 
@@ -62,7 +66,8 @@ class NewestValues:
         """Return where a signal, or a part of it, is in a row; QuadvisError if there is none of this name."""
         block, start, port, index = self._signals.find(name)
         slots = np.arange(start, start + port.size).reshape(port.shape)[index].ravel()
-        return SignalPlace(self._paths[block], slots, port.type)
+        path = self._paths[block]
+        return SignalPlace(path, sum(each.size for each in self.ports[path]), slots, port.type)
 
     def row(self, block: str) -> NDArray[np.int64] | None:
         """Return the newest row of a block (slots); None before the first one."""

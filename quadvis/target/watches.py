@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
+from operator import is_
 from typing import Any
 
 import numpy as np
@@ -68,27 +69,29 @@ class _WatchedSet:
         self.sizes = [len(place.slots) for place in found]
         facts = [(name, len(place.slots), place.type) for name, place in zip(names, found, strict=True)]
         self.mark = hashlib.sha256(repr(facts).encode()).hexdigest()[:12]
-        ends = np.cumsum([0, *self.sizes])
-        self._pieces = [(each.block, each.slots, slice(*ends[at : at + 2])) for at, each in enumerate(found)]
-        kinds = np.repeat([each.type for each in found], self.sizes)
-        self._whole, self._logical = kinds == "int64", kinds == "bool"
-        self._rows: list[Any] = []
+        widths = {place.block: place.width for place in found}
+        firsts = dict(zip(widths, np.cumsum([0, *widths.values()]), strict=False))
+        self._empty = {block: np.zeros(width, np.int64) for block, width in widths.items()}
+        self._blocks = [place.block for place in found]
+        # Where the numbers are once the rows of all blocks lie one after another.
+        self._slots = np.concatenate([firsts[place.block] + place.slots for place in found])
+        kinds = np.repeat([place.type for place in found], self.sizes)
+        self._whole, self._logical = np.flatnonzero(kinds == "int64"), np.flatnonzero(kinds == "bool")
+        self._rows: list[Any] = [None] * len(widths)
 
     def news(self) -> tuple[Any, list[int]] | None:
         """Return all numbers (N,) and the places of signals that have none yet; None if nothing is new."""
-        rows = [self._newest.row(block) for block, _, _ in self._pieces]
-        if len(rows) == len(self._rows) and all(map(_same, rows, self._rows)):
+        rows = [self._newest.row(block) for block in self._empty]
+        if all(map(is_, rows, self._rows)):
             return None
         self._rows = rows
-        words = np.zeros(len(self._whole), np.int64)
-        for row, (_, slots, at) in zip(rows, self._pieces, strict=True):
-            if row is not None:
-                words[at] = row[slots]
-        numbers = words.view(np.float64).copy()
-        numbers[self._whole] = words[self._whole]
-        numbers[self._logical] = words[self._logical] != 0
-        return numbers, [place for place, row in enumerate(rows) if row is None]
-
-
-def _same(one: object, other: object) -> bool:
-    return one is other
+        lacking = {block for block, row in zip(self._empty, rows, strict=True) if row is None}
+        whole = [empty if row is None else row for empty, row in zip(self._empty.values(), rows, strict=True)]
+        words = np.concatenate(whole)[self._slots]
+        numbers = words.view(np.float64)
+        if len(self._whole) or len(self._logical):
+            numbers = numbers.copy()
+            numbers[self._whole] = words[self._whole]
+            numbers[self._logical] = words[self._logical] != 0
+        without = [place for place, block in enumerate(self._blocks) if block in lacking] if lacking else []
+        return numbers, without

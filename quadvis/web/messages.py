@@ -24,6 +24,9 @@ MOST_HEADS = 64  # topics whose headers are kept
 MOST_NAMES = 1000  # signals that one page watches
 
 
+_ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
+
+
 class PageRequest(NamedTuple):
     """What a page asks for: its number, the verb and its arguments."""
 
@@ -35,7 +38,7 @@ class PageRequest(NamedTuple):
 def text(value: Mapping[str, Any]) -> str:
     """Return plain data as JSON."""
     try:
-        return json.dumps(value, separators=(",", ":"), allow_nan=False)
+        return _ENCODER.encode(value)
     except ValueError:
         return json.dumps(_plain(value), separators=(",", ":"))
     except TypeError:
