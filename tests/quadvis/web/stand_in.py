@@ -168,8 +168,10 @@ class StandIn:
             return {name: None if run is None else _plain(run[name]) for name in names}
 
     def do_watch(self, names: list[str]) -> dict[str, Any]:
-        self.do_getsignal(names)
         ports = {each["name"]: each for each in self.do_signals()}
+        for name in names:
+            if name not in ports:
+                raise QuadvisError(f"there is no signal {quoted(name)}")
         self.watched = names, hashlib.sha256(f"{self.diagram.hash} {names}".encode()).hexdigest()[:12]
         return {
             "topic": "values/1", "set": self.watched[1],
