@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import time
 from collections.abc import Callable, Mapping, Sequence
 from operator import is_
 from typing import Any
@@ -14,6 +15,7 @@ from quadvis.target.newest import NewestValues
 
 SETS = 16
 SIGNALS = 2000  # of all sets
+MANY, REST = 500, 0.1  # a set of so many numbers is published so seldom (s): nobody reads all that at once
 
 Publish = Callable[[str, Mapping[str, Any], Any], None]
 
@@ -53,8 +55,10 @@ class Watches:
 
     def tell(self) -> None:
         """Publish the newest numbers of all sets that somebody listens to, if there are new ones."""
+        now = time.monotonic()
         for one in self._sets.values():
-            if self._wants(one.topic) and (found := one.news()) is not None:
+            if self._wants(one.topic) and now >= one.due and (found := one.news()) is not None:
+                one.due = now + one.rest
                 numbers, without = found
                 self._publish(one.topic, {"set": one.mark, "without": without}, numbers)
 
@@ -67,6 +71,7 @@ class _WatchedSet:
         self._newest = newest
         found = [newest.place(name) for name in names]
         self.sizes = [len(place.slots) for place in found]
+        self.rest, self.due = REST if sum(self.sizes) >= MANY else 0.0, 0.0  # s; the clock's time (s)
         facts = [(name, len(place.slots), place.type) for name, place in zip(names, found, strict=True)]
         self.mark = hashlib.sha256(repr(facts).encode()).hexdigest()[:12]
         widths = {place.block: place.width for place in found}

@@ -89,6 +89,25 @@ def test_nothing_is_sent_twice_and_nothing_that_nobody_wants(host: Host) -> None
     assert len(host.heard) == 2
 
 
+def test_a_large_set_comes_seldom_and_its_last_numbers_come_all_the_same(
+    host: Host, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "MANY", 3)
+    monkeypatch.setattr(module.time, "monotonic", lambda: clock)
+    clock = 100.0
+    host.watch("wave.y")
+    large = host.watch("force.y")
+    for value in (1.0, 2.0):
+        host.row("wave", value)
+        host.row("force", value, value, value)
+        host.watches.tell()
+    assert [topic for topic, _, _ in host.heard].count(large["topic"]) == 1 and len(host.heard) == 3
+    clock = 100.0 + module.REST
+    host.watches.tell()
+    topic, _, numbers = host.heard[-1]
+    assert topic == large["topic"] and numbers.tolist() == [2.0, 2.0, 2.0]
+
+
 def test_hosts_that_watch_the_same_share_a_topic_and_a_mark_tells_sets_apart(host: Host) -> None:
     first, second = host.watch("wave.y", "force.y"), host.watch("wave.y", "force.y", "wave.y")
     assert first == second
