@@ -31,6 +31,10 @@ def acquire(tg: Target, signals: Sequence[str], settings: Mapping[str, Any], tim
     scope = tg.addscope("host", signals=signals, **settings)
     try:
         scope.start()
+        if tg.status()["Status"] != "running":
+            print(
+                f"{tg.name} runs no application: waiting {timeout:g} s for one", file=sys.stderr, flush=True
+            )
         for package in scope.packages(timeout):
             return package
         raise QuadvisError(_why(tg, scope.facts(), timeout))

@@ -117,7 +117,7 @@ def set_parameters(options: argparse.Namespace) -> int:
             raise QuadvisError(f"{quoted(text)} gives no value; write NAME=VALUE")
         values[name.strip()] = value.strip()
     with _target(options) as tg:
-        _print_changes(tg.tune(values))
+        _print_changes(tg, tg.tune(values))
     return 0
 
 
@@ -163,8 +163,8 @@ def profile(options: argparse.Namespace) -> int:
     """Start or stop the profiler, or print what it has found, and write it as a trace."""
     with _target(options) as tg:
         if options.action == "start":
-            when = "this run" if tg.startProfiler() else "the next run"
-            print(f"{tg.name}: the profiler is on; the times of blocks come from {when}")
+            when = "" if tg.startProfiler() else ", those of blocks in the next run"
+            print(f"{tg.name}: the profiler is on; the times of tasks are taken from now on{when}")
         elif options.action == "stop":
             tg.stopProfiler()
             print(f"{tg.name}: the profiler is off")
@@ -212,10 +212,12 @@ def _value(tg: Target, name: str, parameters: set[str]) -> Any:
     return tg.getparam(name) if name in parameters else tg.getsignal(name)
 
 
-def _print_changes(found: Mapping[str, Any]) -> None:
+def _print_changes(tg: Target, found: Mapping[str, Any]) -> None:
+    when = f"at tick {found['tick']} ({found['time']:.9g} s)"
+    if not found["tick"] and tg.status()["Status"] != "running":
+        when = "from the next start on"
     for change in found["changes"]:
-        old, new = _text(change["old"]), _text(change["new"])
-        print(f"{change['name']}: {old} -> {new} at tick {found['tick']} ({found['time']:.9g} s)")
+        print(f"{change['name']}: {_text(change['old'])} -> {_text(change['new'])} {when}")
 
 
 def _text(value: Any) -> str:

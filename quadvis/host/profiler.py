@@ -53,13 +53,13 @@ class ProfilerData:
     def report(self) -> str:
         """Return tables: the steps of each task, the times of each block."""
         from quadvis.machine.columns import table
-        from quadvis.run.report import profile_lines
+        from quadvis.run.report import microseconds, profile_lines
 
         head = ("task", "steps", "overruns", "execution min", "mean", "max", "lateness max")
         rows: list[tuple[str, ...]] = [head]
         for each in self.tasks:
             taken, late = each.execution, each.lateness
-            shown = [f"{1e6 * time:.3g} us" for time in (taken.min(), taken.mean(), taken.max(), late.max())]
+            shown = [microseconds(time) for time in (taken.min(), taken.mean(), taken.max(), late.max())]
             name = f"{each.computer} {each.task}".strip()
             rows.append((name, str(len(each.ticks)), str(each.overruns), *shown))
         lines = list(table(rows)) if self.tasks else ["no steps"]

@@ -295,7 +295,8 @@ def guard(setup: GuardianSetup) -> None:
     def end(*_: object) -> None:
         guardian.told_to_end = True
 
-    signal.signal(signal.SIGTERM, end)
+    for number in (signal.SIGTERM, signal.SIGABRT):  # systemd's watchdog sends SIGABRT to all of a service
+        signal.signal(number, end)
     if others := os.sched_getaffinity(0) - setup.standing.avoided:
         os.sched_setaffinity(0, others)
     grants = ask_all(RealTime(priority=setup.standing.priority))

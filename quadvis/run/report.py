@@ -65,6 +65,12 @@ def task_lines(tasks: Sequence[Mapping[str, Any]]) -> list[str]:
     return [f"  {line}" for line in table(list(map(_task_row, tasks)))]
 
 
+def microseconds(seconds: float) -> str:
+    """Return a time in microseconds, with at least three digits: "0.512 us", "12.3 us", "8604 us"."""
+    micro = 1e6 * seconds
+    return f"{micro:.0f} us" if micro >= 100 else f"{micro:.3g} us"
+
+
 def profile_lines(computer: str, profile: ProfileReport) -> list[str]:
     """Return the times of blocks as a table, the block with the largest share first."""
     blocks: dict[str, list[Timed]] = {}
@@ -77,7 +83,7 @@ def profile_lines(computer: str, profile: ProfileReport) -> list[str]:
         methods = blocks[block]
         count = sum(method.calls for method in methods)
         least, most = min(method.least for method in methods), max(method.most for method in methods)
-        shown = [f"{1e6 * time:.3g} us" for time in (least, totals[block] / count, most)]
+        shown = [microseconds(time) for time in (least, totals[block] / count, most)]
         rows.append((block, str(count), *shown, f"{100 * totals[block] / whole:.1f} %"))
     cost = f"{1e6 * profile.cost:.2g} us"
     title = f"{_with('profile', computer)}: every call timed, which costs about {cost} more a call in Python"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from functools import partial
 from pathlib import Path
@@ -23,6 +23,7 @@ from quadvis.target.profiler import Profiler
 from quadvis.target.scopes import ApplicationScopes
 from quadvis.target.session import Session
 from quadvis.target.store import Store
+from quadvis.target.watches import Watches
 from quadvis.wire.desk import Done
 
 if TYPE_CHECKING:
@@ -39,11 +40,19 @@ class Application:
     were tuned stay. ``problem`` says why the last run came to an early end, ``result`` is its result.
     """
 
-    def __init__(self, bundle: ApplicationBundle, diagram: Diagram, store: Store, publish: Publish) -> None:
+    def __init__(
+        self,
+        bundle: ApplicationBundle,
+        diagram: Diagram,
+        store: Store,
+        publish: Publish,
+        wants: Callable[[str], bool],
+    ) -> None:
         self.bundle, self.diagram = bundle, diagram
         self.parameters = Parameters(diagram)
         self.newest = NewestValues(diagram)
         self.scopes = ApplicationScopes(diagram, store.scope_folder(bundle.name), publish)
+        self.watches = Watches(self.newest, publish, wants)
         self.profiler = Profiler()
         self.result: Result | None = None
         self.problem = ""
@@ -125,7 +134,7 @@ class Application:
         self._session = Session(
             self.diagram, self.bundle.engine, self._store.next_log(self.name), self.log_samples,
             self.profiler, [*self.newest.taps, *self.scopes.taps], self._stop_time, self._say,
-            self.scopes.settle, self._ended,
+            self._settle, self._ended,
         )  # fmt: skip
         if self.parameters.tuned:
             self._session.helm.tune(self.parameters.tuned)
@@ -224,6 +233,11 @@ class Application:
     def _say(self, sentence: str) -> None:
         self.said.append(sentence)
         self._event("said", text=sentence)
+
+    def _settle(self, tick: int) -> None:
+        """Hand on what is known of all ticks before one."""
+        self.scopes.settle(tick)
+        self.watches.tell()
 
     def _ended(self) -> None:
         session = self._session

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future, wait
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -56,6 +57,14 @@ def state_folder(name: str) -> Path:
     return Path(base) / "quadvis" / name
 
 
+def _service_path(name: str) -> str | None:
+    """Return where a target listens for this machine's user if systemd has started it."""
+    from quadvis.wire.address import service_path
+
+    given = os.environ.get("RUNTIME_DIRECTORY")
+    return str(service_path(name, given.split(":")[0])) if given else None
+
+
 class Daemon:
     """A target as a process: its kernel, its sockets, its files."""
 
@@ -78,8 +87,9 @@ class Daemon:
             name, self._handle, hosts=AuthorizedHosts(), pair=pair, audit=Audit(folder / "audit.jsonl"),
             on_lost=lambda who: self.kernel.lose_host(), say=say,
         )  # fmt: skip
-        self.kernel = Kernel(name, Store(folder), self._server.publish)
+        self.kernel = Kernel(name, Store(folder), self._server.publish, self._server.wants)
         self._notifier = Notifier()
+        self._alive = 0.0  # when it is to be said next that this process lives
 
     def __enter__(self) -> Daemon:
         return self
@@ -94,7 +104,7 @@ class Daemon:
 
     def open(self, listen: str | None) -> None:
         """Open the sockets: for this machine's user, and for hosts with keys if there is an address."""
-        path = self._server.listen_here()
+        path = self._server.listen_here(_service_path(self.kernel.name))
         self._say(f"target {self.kernel.name}: this machine's user, at {path}")
         if listen:
             from quadvis.wire.address import read_address
@@ -106,13 +116,24 @@ class Daemon:
         self._notifier.say(READY)
 
     def start(self, application: str) -> None:
-        """Load and start an application."""
-        self.kernel.load(application).result()
-        self.kernel.start(None).result()
+        """Load and start an application; meanwhile systemd hears that this process lives."""
+        self._wait(self.kernel.load(application))
+        self._wait(self.kernel.start(None))
+
+    def _wait(self, work: Future[Any]) -> None:
+        while not wait([work], LOOK).done:
+            self._live()
+        work.result()
+
+    def _live(self) -> None:
+        """Say that this process lives, when it is time to."""
+        if self._notifier.period is not None and time.monotonic() >= self._alive:
+            self._alive = time.monotonic() + self._notifier.period
+            self._notifier.say(ALIVE)
 
     def run(self, idle: float | None) -> None:
         """Serve until SIGTERM, SIGHUP or Ctrl-C."""
-        due = alive = shown = 0.0
+        due = shown = 0.0
         while True:
             time.sleep(LOOK)
             now = time.monotonic()
@@ -122,9 +143,7 @@ class Daemon:
             if self._display is not None and now >= shown:
                 shown = now + SHOWN
                 self._display.show(self._head(), self.kernel.shown(), self.kernel.view)
-            if self._notifier.period is not None and now >= alive:
-                alive = now + self._notifier.period
-                self._notifier.say(ALIVE)
+            self._live()
             if idle is not None and self.kernel.is_idle and now - self._asked > idle:
                 return
 

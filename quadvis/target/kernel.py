@@ -24,15 +24,17 @@ Publish = Callable[[str, Mapping[str, Any], Any], None]  # takes a topic, a head
 
 
 class Kernel:
-    """What a target does; ``publish`` takes what its streams carry.
+    """What a target does.
+
+    ``publish`` takes what its streams carry, ``wants(topic)`` says whether anybody listens.
 
     The verbs are methods. Each returns plain data, or a Future of it where this takes long. They are called
     from one thread. QuadvisError says in a sentence why one is refused.
     """
 
-    def __init__(self, name: str, store: Store, publish: Publish) -> None:
+    def __init__(self, name: str, store: Store, publish: Publish, wants: Callable[[str], bool]) -> None:
         self.name, self.store = name, store
-        self._publish = publish
+        self._publish, self._wants = publish, wants
         self._born = time.monotonic()
         self._application: Application | None = None
         self.view: int | None = None  # the target scope that is shown alone
@@ -97,7 +99,7 @@ class Kernel:
         bundle = self._bundle(application)
         diagram = admit(bundle, self.store.place(bundle))
         self._unload()
-        made = Application(bundle, diagram, self.store, self._publish)
+        made = Application(bundle, diagram, self.store, self._publish, self._wants)
         made.take_default()
         self._application = made
         self._event("loaded", application=bundle.name)
@@ -203,6 +205,10 @@ class Kernel:
     def getsignal(self, names: Sequence[str]) -> dict[str, Any]:
         """Return the newest values of signals; all of them if none is named."""
         return self._loaded.values(names)
+
+    def watch(self, names: Sequence[str]) -> dict[str, Any]:
+        """Return the topic on which the newest numbers of signals are published from now on."""
+        return self._loaded.watches.add(names)
 
     def parameters(self, first: int, count: int) -> list[dict[str, Any]]:
         """Return what there is to know of each parameter."""

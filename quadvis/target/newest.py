@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,18 @@ from numpy.typing import NDArray
 from quadvis.diagram.diagram import Diagram
 from quadvis.engine.taps import Tap
 from quadvis.output.recording import RecordedBlock, RecordedPort, Recording, ports
+
+
+class SignalPlace(NamedTuple):
+    """The slots of a signal in the rows of its block, and its type ("float64", "int64" or "bool").
+
+    ``width`` is how many slots a row has.
+    """
+
+    block: str
+    width: int
+    slots: NDArray[np.intp]
+    type: str
 
 
 class NewestValues:
@@ -49,6 +61,17 @@ class NewestValues:
     def clear(self) -> None:
         """Forget all values, before another run."""
         self._rows.clear()
+
+    def place(self, name: str) -> SignalPlace:
+        """Return where a signal, or a part of it, is in a row; QuadvisError if there is none of this name."""
+        block, start, port, index = self._signals.find(name)
+        slots = np.arange(start, start + port.size).reshape(port.shape)[index].ravel()
+        path = self._paths[block]
+        return SignalPlace(path, sum(each.size for each in self.ports[path]), slots, port.type)
+
+    def row(self, block: str) -> NDArray[np.int64] | None:
+        """Return the newest row of a block (slots); None before the first one."""
+        return self._rows.get(block)
 
     def value(self, name: str) -> Any:
         """Return the newest value of a signal, or of a part of it, in SI units; None before its first row.

@@ -39,7 +39,8 @@ def unit_text(
         f"ExecStart={shlex.join(command)}",
         "Restart=on-failure",
         f"WatchdogSec={WATCHDOG}",
-        "KillMode=mixed",
+        "KillMode=control-group",  # "mixed" kills the guardian at once when the target has died
+        "SuccessExitStatus=143",  # what `quadvis target` ends with when it is stopped
         "TimeoutStopSec=10",
         "LimitRTPRIO=99",
         "LimitMEMLOCK=infinity",

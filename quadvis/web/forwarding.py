@@ -17,7 +17,7 @@ FORWARDED = (
     "applications", "signals", "getsignal", "drawing", "picture", "scopes", "setscope", "startscope",
     "stopscope", "trigger", "status",
 )  # fmt: skip
-OWN: Mapping[str, str] = {"describe": "signals", "watch": "getsignal", "listen": "scopes"}
+OWN: Mapping[str, str] = {"describe": "signals", "watch": "watch", "listen": "scopes"}
 """The gateway's own verbs, each with the verb of the target whose level it has."""
 
 COMMANDS = frozenset(("load", "setparam", "start"))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections import deque
 from collections.abc import AsyncIterator, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
@@ -20,6 +21,7 @@ from quadvis.web import messages
 from quadvis.web.access import LOOPBACK, Access
 from quadvis.web.described import described
 from quadvis.web.forwarding import COMMANDS, PATIENCE, SCOPE, check_verb, permitted
+from quadvis.web.line import DirectLine
 from quadvis.web.listener import Listener
 from quadvis.web.rate import Allowance
 from quadvis.web.viewed import ViewedTarget
@@ -42,11 +44,13 @@ class Gateway:
         self.target = target
         self.lost = 0  # messages of the target that the event loop was too slow for
         self._announce = announce
-        self._watch = SignalWatch(target, self._found, self._state)
+        self._watch = SignalWatch(target, self._forward)
         self._streams: dict[str, Callable[[], None]] = {}  # by topic: what ends it
-        self._last: dict[str, str] = {}  # the newest status
+        self._last: dict[str, str | bytes] = {}  # the newest status, and what is watched
         self._workers = ThreadPoolExecutor(PENDING // 2, "request")
-        self._waiting = 0
+        self._heads = messages.Heads()
+        self._waiting: deque[tuple[str, str | bytes]] = deque()
+        self._woken = False
         self._loop: asyncio.AbstractEventLoop
         self._listener: Listener
 
@@ -95,12 +99,14 @@ class Gateway:
         if len(self.viewers) >= VIEWERS:
             await socket.close(1013, "too many pages are open")
             return
-        viewer = Viewer(socket.transport.abort)
+        viewer = Viewer(DirectLine(socket))
         viewer.tell(self._hello())
+        if "watched" in self._last:
+            viewer.tell(self._last["watched"])
         if "state" in self._last:
             viewer.newest("state", self._last["state"])
         self.viewers.add(viewer)
-        sending = asyncio.create_task(self._send(viewer, socket))
+        sending = asyncio.create_task(self._deliver(viewer, socket))
         try:
             await self._receive(viewer, socket)
         finally:
@@ -116,9 +122,9 @@ class Gateway:
         return messages.text({"hello": facts | {"old": FRESH}})
 
     @staticmethod
-    async def _send(viewer: Viewer, socket: Any) -> None:
+    async def _deliver(viewer: Viewer, socket: Any) -> None:
         with suppress(Exception):  # the page is gone: whoever receives from it sees so, too
-            await viewer.deliver(socket.send)
+            await viewer.deliver()
         await socket.close(1013, "this page is too slow")
 
     async def _receive(self, viewer: Viewer, socket: Any) -> None:
@@ -210,41 +216,46 @@ class Gateway:
     def _take(self, topic: str, header: Mapping[str, Any], array: Any) -> None:
         """Take stream data, in a thread of the target's."""
         self._watch.heard = time.monotonic()
+        self._forward(topic, header, array)
+
+    def _forward(self, topic: str, header: Mapping[str, Any], array: Any) -> None:
+        """Pack what is for pages, once for all of them, in any thread."""
         if array is None:
-            self._hand_over(topic, messages.text({"topic": topic, "data": dict(header)}))
+            self._hand_over(topic, messages.text({"topic": topic, "data": header}))
         else:
-            self._hand_over(topic, messages.samples(topic, header, array))
-
-    def _found(self, values: Mapping[str, Any]) -> None:
-        self._hand_over("values", messages.text({"topic": "values", "data": values}))
-
-    def _state(self, status: Mapping[str, Any]) -> None:
-        self._hand_over("state", messages.text({"topic": "state", "data": status}))
+            self._hand_over(topic, self._heads.packed(topic, header, array))
 
     def _hand_over(self, topic: str, message: str | bytes) -> None:
-        """Hand a message to the event loop, in any thread; drop it if too many wait there."""
-        if self._waiting >= WAITING:
+        """Hand a message to the event loop, in any thread; drop it if too many wait there.
+
+        The loop is woken for the first of those that wait: it takes them all.
+        """
+        if len(self._waiting) >= WAITING:
             self.lost += 1
             return
-        self._waiting += 1
-        with suppress(RuntimeError):  # the loop is closed
-            self._loop.call_soon_threadsafe(self._pass_on, topic, message)
+        self._waiting.append((topic, message))
+        if not self._woken:
+            self._woken = True
+            with suppress(RuntimeError):  # the loop is closed
+                self._loop.call_soon_threadsafe(self._take_waiting)
+
+    def _take_waiting(self) -> None:
+        self._woken = False  # before the first one is taken, so that none is left behind
+        while self._waiting:
+            self._pass_on(*self._waiting.popleft())
+        for viewer in self.viewers:
+            viewer.send()
 
     def _pass_on(self, topic: str, message: str | bytes) -> None:
-        self._waiting -= 1
-        if topic == "state":
-            assert isinstance(message, str)
+        if topic in ("state", "watched"):
             self._last[topic] = message
         for viewer in self.viewers:
-            if isinstance(message, bytes):
-                if topic in viewer.listens:
-                    viewer.samples(message)
-            elif topic == "event":
-                viewer.tell(message)
-            elif topic in ("state", "values"):
+            if topic in ("state", "values"):
                 viewer.newest(topic, message)
-            elif topic in viewer.listens:
+            elif topic in ("event", "watched"):
                 viewer.tell(message)
+            elif topic in viewer.listens:
+                viewer.samples(message)
 
     async def _beat(self) -> None:
         """Tell each page now and then that the gateway is there, and how long ago the target was heard of."""
@@ -255,6 +266,7 @@ class Gateway:
             for viewer in self.viewers:
                 facts = {"beat": number, "heard": heard, "dropped": viewer.dropped + self.lost}
                 viewer.beat(number, messages.text(facts))
+                viewer.send()
                 if viewer.gone or viewer.silent > LOST:
                     viewer.give_up()
             await asyncio.sleep(BEAT)

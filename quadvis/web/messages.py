@@ -2,6 +2,7 @@
 
  page to gateway    {"token"} first; then {"id", "verb", "args"} or {"beat"}
  gateway to page    {"hello"}, {"reply", "ok", "result" | "error"}, {"topic", "data"}, {"beat", "heard", ...}
+                    the topic "watched" says which signals the numbers of "values" are of
  bytes              length of the head (uint32, little-endian), the head as JSON, spaces up to a multiple
                     of 8, then the numbers (float64, little-endian, row by row) or the bytes of a file
 
@@ -19,7 +20,11 @@ from typing import Any, NamedTuple
 from quadvis.errors import QuadvisError
 
 MOST_TEXT = 64_000  # bytes of a message from a page
+MOST_HEADS = 64  # topics whose headers are kept
 MOST_NAMES = 1000  # signals that one page watches
+
+
+_ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
 
 
 class PageRequest(NamedTuple):
@@ -33,7 +38,7 @@ class PageRequest(NamedTuple):
 def text(value: Mapping[str, Any]) -> str:
     """Return plain data as JSON."""
     try:
-        return json.dumps(value, separators=(",", ":"), allow_nan=False)
+        return _ENCODER.encode(value)
     except ValueError:
         return json.dumps(_plain(value), separators=(",", ":"))
     except TypeError:
@@ -54,17 +59,42 @@ def _plain(value: Any) -> Any:
 
 def packed(head: Mapping[str, Any], data: bytes) -> bytes:
     """Return a message of bytes."""
-    front = text(head).encode()
+    return _joined(text(head), data)
+
+
+def _joined(head: str, data: bytes) -> bytes:
+    front = head.encode()
     front += b" " * (-(len(front) + 4) % 8)
     return struct.pack("<I", len(front)) + front + data
 
 
-def samples(topic: str, header: Mapping[str, Any], array: Any) -> bytes:
-    """Return stream data with an array of two dimensions."""
-    import numpy as np
+class Heads:
+    """Packs stream data with arrays. What many headers of a topic have in common is made JSON of once."""
 
-    rows = np.ascontiguousarray(array, "<f8")
-    return packed({"topic": topic, "data": dict(header), "shape": rows.shape}, rows.tobytes())
+    CHANGING = ("sequence", "trigger", "lost")  # what is another one in each message
+
+    def __init__(self) -> None:
+        self._known: dict[str, tuple[Mapping[str, Any], tuple[int, ...], str]] = {}
+
+    def packed(self, topic: str, header: Mapping[str, Any], array: Any) -> bytes:
+        """Return a header and an array as a message."""
+        import numpy as np
+
+        rows = np.ascontiguousarray(array, "<f8")
+        return _joined(self._head(topic, header, rows.shape), rows.tobytes())
+
+    def _head(self, topic: str, header: Mapping[str, Any], shape: tuple[int, ...]) -> str:
+        lasting = {key: value for key, value in header.items() if key not in self.CHANGING}
+        known = self._known.get(topic)
+        if known is None or known[0] != lasting or known[1] != shape:
+            if len(self._known) >= MOST_HEADS:
+                self._known.clear()
+            head = text({"topic": topic, "shape": shape, "data": lasting})
+            known = self._known[topic] = lasting, shape, head
+        changing = {key: header[key] for key in self.CHANGING if key in header}
+        if not changing:
+            return known[2]
+        return known[2][:-2] + "," * bool(lasting) + text(changing)[1:] + "}"
 
 
 def reply(number: int, result: Any) -> str | bytes:

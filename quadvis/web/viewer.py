@@ -5,13 +5,14 @@ from __future__ import annotations
 import asyncio
 import time
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
+
+from quadvis.web.line import PageLine
 
 FRESH = 1.0  # s; a page that has not answered a beat for so long sees old data
 WAITING = 1_000_000  # bytes of samples that wait for a page
+AT_ONCE = 32_000  # bytes that are written together
 REPLIES = 16_000_000  # bytes of replies and events that wait for a page: more, and it is given up
-
-Send = Callable[[str | bytes], Awaitable[None]]
 
 
 class Viewer:
@@ -22,8 +23,8 @@ class Viewer:
     samples, so that it begins with new ones when it is back, and never works off old ones.
     """
 
-    def __init__(self, give_up: Callable[[], None], now: Callable[[], float] = time.monotonic) -> None:
-        self.give_up = give_up  # cuts the connection
+    def __init__(self, line: PageLine, now: Callable[[], float] = time.monotonic) -> None:
+        self._line = line
         self.dropped = 0  # messages of values and samples
         self.watched: frozenset[str] = frozenset()
         self.listens: frozenset[str] = frozenset()
@@ -32,8 +33,8 @@ class Viewer:
         self._now = now
         self._seen = now()
         self._beats: deque[tuple[int, float]] = deque(maxlen=64)
-        self._newest: dict[str, str] = {}
-        self._samples: deque[bytes] = deque()
+        self._newest: dict[str, str | bytes] = {}
+        self._samples: deque[str | bytes] = deque()
         self._size = self._owed = 0
         self._told: deque[str | bytes] = deque()
         self._wake = asyncio.Event()
@@ -51,7 +52,7 @@ class Viewer:
     def beat(self, number: int, message: str) -> None:
         """Send a beat; the page is to answer it once it shows what came before."""
         self._beats.append((number, self._now()))
-        self._put_newest("beat", message)
+        self._newest["beat"] = message
 
     def answered(self, number: object) -> None:
         """Note that the page has answered a beat."""
@@ -59,15 +60,15 @@ class Viewer:
             if known == number:
                 self._seen = max(self._seen, sent)
 
-    def newest(self, topic: str, message: str) -> None:
-        """Send the newest of a topic, in the place of an older one that still waits."""
+    def newest(self, topic: str, message: str | bytes) -> None:
+        """Let the newest of a topic wait to be sent, in the place of an older one."""
         if not self.fresh:
             self.dropped += 1
             return
-        self._put_newest(topic, message)
+        self._newest[topic] = message
 
-    def samples(self, message: bytes) -> None:
-        """Send samples."""
+    def samples(self, message: str | bytes) -> None:
+        """Let samples wait to be sent."""
         if not self.fresh:
             self.dropped += 1
             return
@@ -76,7 +77,6 @@ class Viewer:
         while self._size > WAITING:
             self._size -= len(self._samples.popleft())
             self.dropped += 1
-        self._wake.set()
 
     def tell(self, message: str | bytes) -> None:
         """Send a reply or an event, which is never dropped."""
@@ -88,17 +88,29 @@ class Viewer:
             self._told.append(message)
         self._wake.set()
 
-    def _put_newest(self, topic: str, message: str) -> None:
-        self._newest[topic] = message
+    def send(self) -> None:
+        """Send what waits: at once, as far as the line is free for it."""
+        while self._line.free():
+            messages, size = [], 0
+            while size < AT_ONCE and (message := self._next()) is not None:
+                messages.append(message)
+                size += len(message)
+            if not messages:
+                return
+            self._line.write(messages)
         self._wake.set()
 
-    async def deliver(self, send: Send) -> None:
-        """Send what waits, one message after another, until the page is gone."""
+    async def deliver(self) -> None:
+        """Send what has to wait, one message after another, until the page is gone."""
         while not self.gone:
             await self._wake.wait()
             self._wake.clear()
             while (message := self._next()) is not None:
-                await send(message)
+                await self._line.send(message)
+
+    def give_up(self) -> None:
+        """Cut the connection."""
+        self._line.cut()
 
     def _next(self) -> str | bytes | None:
         if self._told:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from quadvis.wire.home import home
 from quadvis.wire.keys import checked_name
 from quadvis.wire.limits import PORT
 
+SERVICES = Path("/run/quadvis")  # the folders of the units of `quadvis target install`
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 _LONGEST_PATH = 100  # bytes; the system takes 107, and the second socket has a longer name
 _TCP = re.compile(
@@ -60,6 +62,20 @@ def local_path(target: str) -> Path:
     """Return the path at which a target of this computer's user listens."""
     base = os.environ.get("XDG_RUNTIME_DIR")
     return (Path(base) / "quadvis" if base else home() / "run") / checked_name(target)
+
+
+def service_path(target: str, folder: str | Path | None = None) -> Path:
+    """Return the path at which a target listens that systemd has started, in its folder of `/run/quadvis`."""
+    return Path(folder or SERVICES / checked_name(target)) / checked_name(target)
+
+
+def found_path(target: str) -> Path | None:
+    """Return the path at which a target of this computer is found; None if there is none for this user."""
+    for path in (local_path(target), service_path(target)):
+        with suppress(OSError):  # the folder of another user's target
+            if path.exists():
+                return path
+    return None
 
 
 def checked_path(path: str) -> str:

@@ -118,7 +118,7 @@ class Courier:
         self._ends: dict[str, _End] = {}
         self._calls: deque[Callable[[], object]] = deque()
         self._waker = Waker()
-        self._poller.register(self._waker, zmq.POLLIN)
+        self._poller.register(self._waker.fileno(), zmq.POLLIN)
         self._add(CONTROL, address)
         self._changed = threading.Condition()
         self._closing = False
@@ -195,7 +195,8 @@ class Courier:
         if any(end.outgoing for end in self._ends.values()):
             pause = min(pause, 0.02)
         ready = dict(self._poller.poll(int(pause * 1000) + 1))
-        self._waker.drain()
+        if self._waker.fileno() in ready:
+            self._waker.drain()
         while self._calls:
             self._calls.popleft()()
         for name, end in list(self._ends.items()):
@@ -209,10 +210,9 @@ class Courier:
 
     def _receive(self, name: str, end: _End) -> None:
         for _ in range(_WAITING):
-            try:
-                frames = end.socket.recv_multipart(zmq.NOBLOCK)
-            except zmq.Again:
+            if not end.socket.get(zmq.EVENTS) & zmq.POLLIN:  # cheaper than an exception
                 return
+            frames = end.socket.recv_multipart(zmq.NOBLOCK)
             if name == CONTROL:
                 self._on_reply(frames[0])
             elif len(frames) == 3 and not frames[0]:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from quadvis.errors import QuadvisError, quoted, sentence, suggestion
-from quadvis.wire.address import WireAddress, local_path, read_address
+from quadvis.wire.address import WireAddress, found_path, local_path, read_address
 from quadvis.wire.client import PATIENCE, Client
 from quadvis.wire.introduction import introduced
 from quadvis.wire.keys import fingerprint, own_key
@@ -31,7 +31,9 @@ def meet(
     known = KnownTargets(folder)
     found = known.find(target)
     if found is None and _is_local(target):
-        path = target.removeprefix("ipc://") if "/" in target else str(local_path(target))
+        path = (
+            target.removeprefix("ipc://") if "/" in target else str(found_path(target) or local_path(target))
+        )
         return _connected(Client(read_address(path), target), timeout)
     pair = own_key(key, folder)
     found = _introduced(target, found, known, say, timeout / 3)
@@ -42,7 +44,7 @@ def _is_local(target: str) -> bool:
     if "/" in target and not target.startswith("tcp://"):
         return True
     try:
-        return local_path(target).exists()
+        return found_path(target) is not None
     except QuadvisError:  # an address is no name
         return False
 

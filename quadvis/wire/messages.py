@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgpack
 
@@ -40,8 +40,7 @@ class Reply:
     error: WireError | None = None
 
 
-@dataclass(frozen=True)
-class StreamData:
+class StreamData(NamedTuple):
     """Data of a topic: its number among all of this topic, what is said about it, and an array or None."""
 
     topic: str

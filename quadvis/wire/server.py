@@ -104,7 +104,7 @@ class Server:
             raise QuadvisError(f"without keys a target listens at 127.0.0.1 alone, not at {host}")
         if not insecure and (self._pair is None or self._hosts is None):
             raise QuadvisError(
-                "a target needs a key to listen at a port; make one with 'quadvis keys new NAME'"
+                f"a target needs a key of its name to listen at a port; run 'quadvis keys new {self.name}'"
             )
         control, introductions, stream = listeners(host, port)
         first = int(control.getsockname()[1])

@@ -46,19 +46,19 @@ class Subscription:
 
     def put(self, data: StreamData) -> None:
         """Take data from the wire; a number that is not the next one is a gap."""
-        with self._arrived:
-            last = self._last.get(data.topic)
-            self._last[data.topic] = data.number
-            if last is not None and data.number > last + 1:
-                self.missed += data.number - last - 1  # a smaller number is that of a target that began anew
-            if self._callback is None:
-                self._kept.append(data)
-                if len(self._kept) > self._size:
-                    self._kept.popleft()
-                    self.missed += 1
-                self._arrived.notify()
+        last = self._last.get(data.topic)
+        self._last[data.topic] = data.number
+        if last is not None and data.number > last + 1:
+            self.missed += data.number - last - 1  # a smaller number is that of a target that began anew
         if self._callback is not None:
             self._callback(data)
+            return
+        with self._arrived:
+            self._kept.append(data)
+            if len(self._kept) > self._size:
+                self._kept.popleft()
+                self.missed += 1
+            self._arrived.notify()
 
     def end(self, error: WireError) -> None:
         """Let `take` raise an error once nothing is kept any more."""

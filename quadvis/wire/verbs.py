@@ -106,6 +106,9 @@ _DECLARED = (
           _FIRST, _some(10_000))),
     Verb("signals", 3, "the signals of the application", "a list of maps", (_FIRST, _some(4000))),
     Verb("getsignal", 3, "present values of signals", "a map of name to value", (_NAMES,)),
+    Verb("watch", 3, "have the newest numbers of signals published as they come, for whoever subscribes",
+         "a map: topic, set (its mark, which comes with the numbers), sizes (how many of each signal)",
+         (Argument("names", argument.list_of(_NAME, 1000), "their names"),)),
     Verb("parameters", 2, "the parameters of the application", "a list of maps", (_FIRST, _some(4000))),
     Verb("getparam", 2, "present values of parameters", "a map of name to value", (_NAMES,)),
     Verb("setparam", 0, "tune parameters, all between the same two ticks, or none", "nil, with the tick",
@@ -167,6 +170,12 @@ VERBS: Mapping[str, Verb] = {verb.name: verb for verb in _DECLARED}
 TOPICS = (
     Topic("state", 4, "the status, when it changes and at least once a second"),
     Topic("event", 4, "what happened: started, stopped, overloaded, lease lost"),
+    Topic(
+        "values/",
+        3,
+        "the newest numbers of the signals of a 'watch' as an array, when there are new ones; `set` is its "
+        "mark, `without` has the places of signals that have no numbers yet",
+    ),
     Topic("scope/", 3, "packages of samples of a scope, by its number"),
 )
 

@@ -9,7 +9,7 @@ import struct
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -97,6 +97,7 @@ class PageClient:
         self.values, self.samples = Ages(), Ages()
         self.missing = 0  # samples
         self._last = -1.0
+        self._watched: Mapping[str, Any] = {}
 
     def request(self, verb: str, **arguments: Any) -> Any:
         """Return the result of a request; QuadvisError if it is refused."""
@@ -123,6 +124,9 @@ class PageClient:
         if isinstance(message, bytes):
             (length,) = struct.unpack_from("<I", message)
             found: dict[str, Any] = json.loads(message[4 : 4 + length])
+            if found["topic"] == "values":
+                self._take_values(found["data"], np.frombuffer(message[4 + length :]))
+                return found
             times = np.frombuffer(message[4 + length :]).reshape(found["shape"])[:, 0]
             self.samples.add(self._start + times[-1])
             if self._last >= 0:
@@ -132,9 +136,14 @@ class PageClient:
         found = json.loads(message)
         if "beat" in found:
             self._line.send(json.dumps({"beat": found["beat"]}))
-        elif found.get("topic") == "values" and found["data"][NAMES[0]] is not None:
-            self.values.add(self._start + found["data"][NAMES[0]])
+        elif found.get("topic") == "watched":
+            self._watched = found["data"]
         return found
+
+    def _take_values(self, header: Mapping[str, Any], numbers: NDArray[np.float64]) -> None:
+        place = self._watched["names"].index(NAMES[0])
+        if header["set"] == self._watched["set"] and place not in header["without"]:
+            self.values.add(self._start + numbers[sum(self._watched["sizes"][:place])])
 
     def watch(self, seconds: float) -> None:
         """Take what comes for so long."""

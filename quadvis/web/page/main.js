@@ -131,13 +131,23 @@ function clock({ Application, ExecTime, StopTime }) {
   return `${(ExecTime ?? 0).toFixed(1)}${end}`;
 }
 
-connection.on("values", ({ data }) => {
-  model.take(data);
+connection.on("watched", ({ data }) => (model.watched = data));
+
+connection.on("values", ({ data, samples }) => {
+  if (!model.take(data, samples)) return;
+  scope.takeValues();
+  if (frame === null) frame = requestAnimationFrame(showValues);
+});
+
+let frame = null; // in which the newest values are shown
+
+function showValues() {
+  frame = null;
   model.shown = performance.now();
   drawing.update();
   status.values();
   block.update();
-});
+}
 
 connection.on("event", ({ data }) => {
   events.add(data);

@@ -1,6 +1,7 @@
 // What the target is and what its signals were a short while ago.
 
 const PAST = 200; // values of each signal that are kept, some 20 s
+const APART = 95; // ms between two of them
 
 /** The newest numbers of a signal, in a ring. */
 class Past {
@@ -24,6 +25,14 @@ class Past {
   }
 }
 
+/** Return numbers in the shape of a signal; what is no number becomes a text, such as "NaN". */
+function shaped(numbers, shape) {
+  if (!shape.length) return Number.isFinite(numbers[0]) ? numbers[0] : String(numbers[0]);
+  const [count, ...inner] = shape;
+  const size = numbers.length / count;
+  return Array.from({ length: count }, (_, at) => shaped(numbers.subarray(at * size, (at + 1) * size), inner));
+}
+
 export class Model {
   signals = new Map(); // by name
   parameters = new Map(); // lists by block
@@ -32,6 +41,8 @@ export class Model {
   kinds = new Map(); // the name of the block type, by block
   tasks = new Map(); // the task, by block
   status = {};
+  watched = { set: null, names: [], sizes: [] };
+  #kept = -Infinity; // when the past was added to
   #docs = new Map();
 
   constructor(connection) {
@@ -78,17 +89,25 @@ export class Model {
     return this.#docs.get(kind);
   }
 
-  take(values) {
-    const runs = this.status.Status === "running";
-    for (const [name, found] of Object.entries(values)) {
+  /** Take the numbers of all that is watched; return false if they are of another set. */
+  take({ set, without }, numbers) {
+    if (set !== this.watched.set) return false;
+    const now = performance.now();
+    const kept = this.status.Status === "running" && now - this.#kept >= APART;
+    if (kept) this.#kept = now;
+    const lacks = new Set(without);
+    let at = 0;
+    this.watched.names.forEach((name, place) => {
+      const size = this.watched.sizes[place];
+      const shape = this.signals.get(name)?.shape ?? [];
+      const found = lacks.has(place) ? null : shaped(numbers.subarray(at, at + size), shape);
+      at += size;
       this.values.set(name, found);
-      if (found === null || !runs) continue;
-      if (!this.past.has(name)) {
-        const shape = this.signals.get(name)?.shape ?? [];
-        this.past.set(name, new Past(shape.reduce((product, size) => product * size, 1)));
-      }
+      if (found === null || !kept) return;
+      if (!this.past.has(name)) this.past.set(name, new Past(size));
       this.past.get(name).add(found);
-    }
+    });
+    return true;
   }
 
   /** Return the signal that a wire takes: "craft.position[0]" takes from "craft.position". */

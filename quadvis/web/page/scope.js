@@ -36,7 +36,6 @@ export class Scope {
     this.plot.addEventListener("dblclick", () => this.#setZoom(null));
     onScheme(() => this.#plotAgain());
     connection.on("scope", ({ data, samples, topic }) => topic === this.#topic && this.#take(data, samples));
-    connection.on("values", () => this.#takeValues());
   }
 
   get isOpen() {
@@ -160,7 +159,8 @@ export class Scope {
     this.#draw();
   }
 
-  #takeValues() {
+  /** Draw the newest values, if the target does not sample for this page. */
+  takeValues() {
     if (this.samples || !this.isOpen) return;
     const row = [this.model.status.ExecTime];
     if (!(row[0] > this.data.end || Number.isNaN(this.data.end))) return;

@@ -499,6 +499,12 @@ def quadvis_says(lab: Running, *words: str, input: str = "") -> tuple[int, str, 
 def test_the_shell_has_the_same_verbs(tg: Target, lab: Running, diagram: Path, tmp_path: Path) -> None:
     to = ("--target", "lab")
     assert quadvis_says(lab, "load", str(diagram), *to) == (0, "lab: loop is loaded, ready\n", "")
+    _, out, _ = quadvis_says(lab, "set", "law.factor=3", *to)
+    assert out == "law.factor: 2.0 -> 3.0 from the next start on\n"
+    code, _, told = quadvis_says(lab, "scope", "wave.y", "--timeout", "0.1", *to)
+    assert code == 2 and told.startswith("lab runs no application: waiting 0.1 s for one\n")
+    assert "start it first" in told
+    quadvis_says(lab, "set", "law.factor=2", *to)
     assert quadvis_says(lab, "start", *to) == (0, "lab: loop runs\n", "")
     code, out, _ = quadvis_says(lab, "set", "law.factor=4", *to)
     assert code == 0

@@ -146,6 +146,7 @@ ENDS = [
     (send(signal.SIGHUP, "command"), "pass", 129, ".*"),
     (send(signal.SIGKILL, "command"), "pass", -9, ".*"),
     (send(signal.SIGTERM, "guardian"), "pass", 1, r"t = \S+ s: the guardian was told to end"),
+    (send(signal.SIGABRT, "guardian"), "pass", 1, r"t = \S+ s: the guardian was told to end"),
 ]
 
 

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import socket
 import tempfile
+import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 import pytest
 
+from quadvis.errors import QuadvisError
 from quadvis.host.target import Target
+from quadvis.target.daemon import Daemon
 from quadvis.target.notify import Notifier
+from quadvis.wire import address
 from tests.processes import linux, wait_for
 from tests.quadvis.host.targets import LOOP, running_target
 
@@ -49,6 +54,49 @@ def test_without_systemd_nothing_is_said(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setenv("WATCHDOG_USEC", "10000000")
     monkeypatch.setenv("WATCHDOG_PID", "1")  # it is for another process
     assert Notifier().period is None
+
+
+def test_systemd_hears_of_a_target_that_takes_long_to_load_its_application(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with systemd(monkeypatch, 0.02) as heard:
+        daemon = Daemon("lab", tmp_path, lambda words: None)
+        loaded: Future[None] = Future()
+        done: Future[None] = Future()
+        done.set_result(None)
+        monkeypatch.setattr(daemon.kernel, "load", lambda application: loaded)
+        monkeypatch.setattr(daemon.kernel, "start", lambda at: done)
+        thread = threading.Thread(target=daemon.start, args=["loop"])
+        thread.start()
+        wait_for(lambda: heard().count("WATCHDOG=1") >= 3)
+        assert thread.is_alive()
+        loaded.set_result(None)
+        thread.join(20)
+        with daemon:
+            pass
+
+
+def test_an_application_that_cannot_be_loaded_at_boot_is_a_sentence(tmp_path: Path) -> None:
+    with (
+        Daemon("lab", tmp_path, lambda words: None) as daemon,
+        pytest.raises(QuadvisError, match="no application 'loop'"),
+    ):
+        daemon.start("loop")
+
+
+def test_a_target_of_systemd_is_found_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with tempfile.TemporaryDirectory(prefix="q") as short:
+        services = Path(short) / "services"
+        monkeypatch.setattr(address, "SERVICES", services)
+        monkeypatch.setenv("XDG_RUNTIME_DIR", f"{short}/user")
+        monkeypatch.setenv("QUADVIS_HOME", f"{short}/home")
+        monkeypatch.setenv("RUNTIME_DIRECTORY", f"{services}/lab:{short}/more")
+        (services / "lab").mkdir(0o700, parents=True)
+        with Daemon("lab", tmp_path, lambda words: None) as daemon:
+            daemon.open(None)
+            assert (services / "lab" / "lab").exists() and not (Path(short) / "user").exists()
+            with Target("lab") as tg:
+                assert tg.Status == "stopped"
 
 
 @pytest.mark.slow

@@ -32,8 +32,10 @@ def test_a_unit_starts_at_boot_is_watched_and_may_use_real_time() -> None:
     made = entries(unit_text("lab1", listen="0.0.0.0", startup="hover", cpu="1, 2"))
     service = made["Service"]
     expected = {
-        "Type": "notify", "LimitRTPRIO": "99", "LimitMEMLOCK": "infinity", "CPUAffinity": "1 2",
+        "LimitRTPRIO": "99", "LimitMEMLOCK": "infinity", "CPUAffinity": "1 2",
         "Restart": "on-failure", "StateDirectory": "quadvis/lab1",
+        "RuntimeDirectory": "quadvis/lab1", "Type": "notify", "KillMode": "control-group",
+        "SuccessExitStatus": "143",
     }  # fmt: skip
     assert expected.items() <= service.items()
     assert int(service["WatchdogSec"]) > 0 and made["Install"]["WantedBy"] == "multi-user.target"

@@ -92,13 +92,32 @@ class Page:
 
     def __init__(self, line: ClientConnection) -> None:
         self.line, self.answers = line, True
+        self.watched: dict[str, Any] = {"set": None}
         self._number = 0
 
     def take(self) -> dict[str, Any]:
         message = unpack(self.line.recv(20))
+        if message.get("topic") == "watched":
+            self.watched = message["data"]
+        elif message.get("topic") == "values" and message["data"]["set"] == self.watched["set"]:
+            message["values"] = self._by_name(message["data"]["without"], message["samples"])
         if "beat" in message and self.answers:
             self.line.send(json.dumps({"beat": message["beat"]}))
         return message
+
+    def _by_name(self, without: list[int], numbers: Any) -> dict[str, Any]:
+        parts = np.split(numbers, np.cumsum(self.watched["sizes"])[:-1])
+        names = self.watched["names"]
+        assert len(numbers) == sum(self.watched["sizes"]) and len(names) == len(self.watched["sizes"])
+        return {
+            name: None if place in without else part.tolist()
+            for place, (name, part) in enumerate(zip(names, parts, strict=True))
+        }
+
+    def values(self) -> dict[str, Any]:
+        """Return the next values, each as a list of numbers, by the names of their signals."""
+        found: dict[str, Any] = self.next(lambda message: "values" in message)["values"]
+        return found
 
     def next(self, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
         end = time.monotonic() + 20

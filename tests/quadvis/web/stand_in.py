@@ -5,6 +5,8 @@ It answers the verbs in the words of `quadvis.target.kernel`. Its scopes sample 
 
 from __future__ import annotations
 
+import hashlib
+import math
 import threading
 import time
 from collections import defaultdict, deque
@@ -33,6 +35,7 @@ from quadvis.run.live import LiveRun
 from quadvis.run.tuned import find_value
 from quadvis.target.parameters import Parameters
 
+VALUES = 0.02  # s between two tellings of what is watched
 PIECE = 200_000  # bytes of a log in one reply
 
 
@@ -64,6 +67,7 @@ class StandIn:
         self._flight: Flight | None = None
         self._number = 0
         self.scopes: dict[int, Scope] = {}
+        self.watched: tuple[list[str], str] = [], ""
         self._load(diagram)
         self._closed = threading.Event()
         threading.Thread(target=self._tell_state, daemon=True).start()
@@ -73,6 +77,7 @@ class StandIn:
         self.state, self.problem, self.verdicts = "stopped", "", None
         self.picture = ""  # another drawing than that of the diagram
         self.scopes.clear()
+        self.watched = [], ""
 
     # the interface
 
@@ -161,6 +166,24 @@ class StandIn:
         with self._lock:
             run = self._flight.run if self._flight else None
             return {name: None if run is None else _plain(run[name]) for name in names}
+
+    def do_watch(self, names: list[str]) -> dict[str, Any]:
+        ports = {each["name"]: each for each in self.do_signals()}
+        for name in names:
+            if name not in ports:
+                raise QuadvisError(f"there is no signal {quoted(name)}")
+        self.watched = names, hashlib.sha256(f"{self.diagram.hash} {names}".encode()).hexdigest()[:12]
+        return {
+            "topic": "values/1", "set": self.watched[1],
+            "sizes": [math.prod(ports[name]["shape"]) for name in names],
+        }  # fmt: skip
+
+    def tell_values(self) -> None:
+        """Publish what is watched."""
+        names, mark = self.watched
+        if names and self._takers["values/1"]:
+            numbers = [np.ravel(value) for value in self.do_getsignal(names).values()]
+            self.publish("values/1", {"set": mark, "without": []}, np.concatenate(numbers).astype(float))
 
     def do_parameters(self, first: int = 0) -> list[dict[str, Any]]:
         return self.parameters.facts()
@@ -388,7 +411,7 @@ class Flight:
         problem = ""
         with self.run as run:
             self._opened.set()
-            began = time.monotonic()
+            began = told = time.monotonic()
             target.began = time.time()
             try:
                 for number in range(diagram.ticks):
@@ -403,6 +426,9 @@ class Flight:
                         self.time = number * tick
                         for scope in list(target.scopes.values()):
                             scope.take(number, self.time, self._read)
+                        if begin - told >= VALUES:
+                            told = begin
+                            target.tell_values()
                     for task in tasks:
                         if number % every[task.name] == 0:
                             self._count(self._times[task.name], late, taken, late > every[task.name] * tick)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import math
 import socket
+import threading
 import time
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -342,12 +344,37 @@ def test_values_come_again_and_again_and_belong_to_one_tick(running: Running, ta
     target.do_start()
     with running.page() as page:
         page.request("watch", names=["gain.y", "wave.y"])
-        first, second = (page.topic("values")["data"] for _ in range(2))
+        while (first := page.values())["wave.y"] is None:
+            pass
+        second = page.values()
         assert first["wave.y"] != second["wave.y"]
-        assert second["gain.y"] == pytest.approx(2 * second["wave.y"])
+        assert second["gain.y"] == pytest.approx(2 * np.array(second["wave.y"]))
     assert json.loads(messages.text({"a": [math.nan, math.inf, np.float64(1)]})) == {
         "a": ["NaN", "Infinity", 1.0]
     }
+
+
+def test_what_is_watched_while_the_target_answers_for_something_else_comes_too(
+    running: Running, target: StandIn, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target.do_start()
+    asked, go_on = threading.Event(), threading.Event()
+    answer = target.do_getsignal
+
+    def slow(names: list[str]) -> dict[str, Any]:
+        if names == ["wave.y"] and not asked.is_set():
+            asked.set()
+            assert go_on.wait(20)
+        return answer(names)
+
+    monkeypatch.setattr(target, "do_getsignal", slow)
+    with running.page() as page:
+        page.request("watch", names=["wave.y"])
+        assert asked.wait(20)
+        page.request("watch", names=["gain.y"])
+        go_on.set()
+        while "gain.y" not in page.values():
+            pass
 
 
 def test_a_scope_gives_every_sample_once(running: Running, target: StandIn) -> None:

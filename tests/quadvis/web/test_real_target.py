@@ -39,7 +39,7 @@ def test_a_page_has_all_that_it_asks_for(tmp_path: Path, monkeypatch: pytest.Mon
                     signals = {each["name"]: each for each in page.request("signals")}
                     assert signals["wave.y"]["unit"] == "m" and signals["wave.y"]["task"] == "fast"
                     page.request("watch", names=["wave.y", "law.y"])
-                    first, second = (page.topic("values")["data"]["wave.y"] for _ in range(2))
+                    first, second = (page.values()["wave.y"] for _ in range(2))
                     assert first != second
                     number = page.request("addscope")
                     page.request("setscope", id=number, values={"Signals": ["wave.y"], "NumSamples": 5})

@@ -31,7 +31,8 @@ DIGEST = "0" * 64
 RIGHT: dict[str, dict[str, Any]] = {
     "align": {"shift": 5},
     "renew": {"token": "0" * 32}, "release": {"token": "0" * 32}, "load": {"application": "hover"},
-    "getsignal": {"names": ["craft.position"]}, "getparam": {"names": ["roll.gain"]},
+    "getsignal": {"names": ["craft.position"]}, "watch": {"names": ["craft.position"]},
+    "getparam": {"names": ["roll.gain"]},
     "setparam": {"values": {"roll.gain": 2.0}}, "settime": {"StopTime": 5.0}, "setlog": {"MaxLogSamples": 5},
     "remscope": {"ids": [1]}, "setscope": {"id": 1, "values": {"NumSamples": 100}},
     "startscope": {"ids": [1]}, "stopscope": {"ids": [1]}, "trigger": {"ids": [1]}, "setview": {"id": 1},
