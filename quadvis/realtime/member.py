@@ -198,7 +198,7 @@ class Member:
         """True if the application has ended before its stop time, or is about to."""
         if self.ending is None:
             return not self.process.is_alive()
-        return bool(self.ending.reason)
+        return bool(self.ending.reason) and not self.ending.through
 
     @property
     def stopped(self) -> bool:
@@ -293,6 +293,7 @@ class Member:
             self.ending.unsafe,
             self.ending.profile,
             int(self._control[control.START]),
+            self.ending.problem if self.ending.through else "",
         )
 
     def error(self) -> QuadvisError:
