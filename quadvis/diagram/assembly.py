@@ -10,7 +10,7 @@ from quadvis.block import Out
 from quadvis.diagram.ages import read_routes
 from quadvis.diagram.build import Builder, Made
 from quadvis.diagram.check import WireCheck
-from quadvis.diagram.devices import check_devices
+from quadvis.diagram.devices import check_devices, check_losses
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.doubts import warn_network, warn_parameters, warn_rates
 from quadvis.diagram.expand import Expansion, Kept
@@ -124,6 +124,7 @@ class Assembly:
         sources = (*spec.paths, *self.parts.files, *self.groups.files, *self._params)
         check_writers(drafts, sources, faults)
         check_devices(drafts, faults)
+        check_losses(spec[COMPUTERS], drafts, faults)
         check_code(drafts, self.catalogue.own_blocks, faults)
         ports = {name: wire_text(source) for name, source in wiring.ports()}
         entries = {name: wire_text(source) for name, source in wiring.entries()}

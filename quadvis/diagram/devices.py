@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from quadvis.block import CABLE, Card, Device, Input, LineDevice, NewsDevice, Output
+from quadvis.block import CABLE, Block, Card, Device, Input, LineDevice, NewsDevice, Output
 from quadvis.diagram.draft import Draft
-from quadvis.errors import Faults, Place
+from quadvis.diagram.sections.computers import Computers
+from quadvis.errors import Faults, Place, known
 from quadvis.machine.files import file_key
 from quadvis.machine.serial_port import Line
 
@@ -33,6 +34,25 @@ def check_devices(drafts: Sequence[Draft], faults: Faults) -> None:
         others.append(draft)
         for key in _keys(device):
             taken.setdefault(key, draft)
+
+
+def check_losses(computers: Computers, drafts: Sequence[Draft], faults: Faults) -> None:
+    """Report computers whose loss the others are to survive, though outputs would be without their values."""
+    for draft in drafts:
+        spec = computers.get(draft.computer) if known(draft.computer) else None
+        if spec is None or not known(spec) or not spec.is_dispensable or not commands(draft.block):
+            continue
+        problem = f"the outputs of block '{draft.path}' are on the computer '{draft.computer}'"
+        faults.add(
+            spec.place, f"{problem}, so nothing can continue without it", "leave out 'on_loss: continue'"
+        )
+
+
+def commands(block: object) -> bool:
+    """Return whether a block has outputs for which the loss of its computer is unsafe."""
+    if not isinstance(block, Block) or block.harmless:
+        return False
+    return "write" in block.interface.arguments or type(block).write_safe is not Block.write_safe
 
 
 def _sends(device: Device) -> bool:

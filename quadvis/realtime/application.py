@@ -111,7 +111,8 @@ class Ending:
     """How an application has ended: at its stop time if ``reason`` is "", else why.
 
     ``exit_code`` is that of the error, ``asked`` says that somebody has asked for the end, ``unsafe``
-    why the outputs have held their safe values before the end, if they have.
+    why the outputs have held their safe values before the end, if they have. ``through`` says that all ticks
+    have run, and that the reason came up at the end, such as a device that was gone then.
     """
 
     reason: str = ""
@@ -123,6 +124,7 @@ class Ending:
     asked: bool = False
     unsafe: str = ""
     profile: ProfileReport | None = None
+    through: bool = False
 
     @staticmethod
     def of(error: BaseException) -> Ending:
@@ -134,6 +136,11 @@ class Ending:
             return Ending(str(error), notes=notes, exit_code=error.exit_code)
         words = surroundings(error) or "".join(traceback.format_exception(error))
         return Ending(words, notes=notes)
+
+    @property
+    def problem(self) -> str:
+        """What went wrong, in a sentence with its place; "" if nothing did."""
+        return "; ".join([str(self.error()), *self.notes]) if self.reason else ""
 
     def error(self) -> QuadvisError:
         """Return the error, to be raised."""
@@ -182,6 +189,7 @@ class _Application:
         self._pacer: Pacer | None = None
         self._start = 0
         self.goes_on_alone = False  # true from the start of a run that may lose its supervisor
+        self._through = False
 
     def run(self) -> Ending:
         """Run to the stop time."""
@@ -247,6 +255,7 @@ class _Application:
             setup.last_ticks.stay(remaining / NANOSECONDS, schedule.interval / NANOSECONDS, pacer.live)
             if shared.control[control.END]:
                 raise Ended
+            self._through = True
         return self._ending()
 
     def _crew(self, part: Graph, choice: Choice, pacer: Pacer) -> Crew | None:
@@ -278,6 +287,14 @@ class _Application:
         told = "the application was told to end"
         return replace(self._ending(), reason=told, block=block, time=engine.time, asked=True)
 
+    def failed(self, error: Exception) -> Ending:
+        """Return the ending of a run in which something went wrong, perhaps only after its last tick."""
+        ending = Ending.of(error)
+        if not self._through:
+            return ending
+        usual = self._ending()
+        return replace(ending, unsafe=usual.unsafe, profile=usual.profile, through=True)
+
     def _ending(self) -> Ending:
         """Return how a run ends that has begun."""
         assert self._engine is not None and self._pacer is not None
@@ -297,7 +314,7 @@ def perform(setup: Setup) -> None:
     except (Ended, Interrupted) as error:
         ending = application.ended_early(error)
     except Exception as error:
-        ending = Ending.of(error)
+        ending = application.failed(error)
     with suppress(OSError):  # the supervisor may have ended
         setup.link.send(ending)
 

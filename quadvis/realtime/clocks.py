@@ -36,6 +36,9 @@ class Timekeeper(Protocol):
     def follow(self, shift: int) -> None:
         """Let the instant 0 be so much (ns) after the start that was given."""
 
+    def unshifted(self) -> int:
+        """Return the time (ns) since the start that was given: durations are differences of such times."""
+
 
 class MonotonicClock:
     """Linux's monotonic clock, which nobody can set; a wait sleeps at first and polls at its end.
@@ -63,6 +66,10 @@ class MonotonicClock:
     def follow(self, shift: int) -> None:
         """Let the instant 0 be so much (ns) after the start that was given."""
         self.words[START] = self.words[BASE] + shift
+
+    def unshifted(self) -> int:
+        """Return the time (ns) since the start that was given."""
+        return time.monotonic_ns() - int(self.words[BASE])
 
     @property
     def polled(self) -> int:
@@ -127,6 +134,11 @@ def follow(clock: Any, shift: int) -> None:
     clock.follow(shift)
 
 
+def unshifted(clock: Any) -> int:
+    """Return the time (ns) since the start that was given."""
+    return int(clock.unshifted())
+
+
 def signalled(_: Any) -> bool:
     """Return whether a signal waits for Python: never while Python runs."""
     return False
@@ -153,13 +165,19 @@ def _machine_follow(words: Any, shift: int) -> None:
     words[START] = words[BASE] + shift
 
 
+def _machine_unshifted(words: Any) -> int:
+    found: int = _machine_now(words) + words[START] - words[BASE]
+    return found
+
+
 def _machine_signalled(words: Any) -> bool:
     if words[PIPE] < 0:
         return False
     return system(words[READ], words[PIPE], words[BUFFER], 1, 0) == 1
 
 
-# What stands for the three functions in machine code.
+# What stands for these functions in machine code.
 MACHINE: Mapping[Any, Any] = {
-    now: _machine_now, sleep: _machine_sleep, follow: _machine_follow, signalled: _machine_signalled,
+    now: _machine_now, sleep: _machine_sleep, follow: _machine_follow, unshifted: _machine_unshifted,
+    signalled: _machine_signalled,
 }  # fmt: skip

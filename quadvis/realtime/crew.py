@@ -19,7 +19,7 @@ from quadvis.native.choice import NATIVE, Choice
 from quadvis.native.clock import GO, MachineClock
 from quadvis.native.task_executors import TaskExecutors
 from quadvis.realtime import dispatch
-from quadvis.realtime.clocks import START, for_thread
+from quadvis.realtime.clocks import BASE, for_thread
 from quadvis.realtime.crew_words import crew_words
 from quadvis.realtime.dispatch import AT_ONCE, AT_REST, HEAD, IDLE, ROW
 from quadvis.realtime.pacer import Pacer
@@ -185,7 +185,7 @@ class _Gate:
 
     def start(self) -> None:
         """Take the start of the run, which is known now."""
-        self._clock[START] = self._pacer.clock.words[START]
+        self._clock[BASE] = self._pacer.clock.words[BASE]
 
     def enter(self) -> int:
         """Count the step that has ended, and wait; return GO, or another number for the end."""

@@ -117,10 +117,10 @@ class Devices:
             if words := device.missing():
                 yield str(RunError(words, block=path))
 
-    def watch(self, process: int) -> None:
-        """Let the guardian watch an application."""
+    def watch(self, process: int, vital: bool) -> None:
+        """Let the guardian watch an application, whose end makes the outputs safe if it is vital."""
         if self._guard is not None:
-            self._guard.watch(process)
+            self._guard.watch(process, vital)
 
     @property
     def sources(self) -> list[Connection | int]:

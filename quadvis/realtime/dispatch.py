@@ -21,21 +21,22 @@ from quadvis.native import loop
 from quadvis.native.clock import GO
 from quadvis.native.foreign import system
 from quadvis.native.routine import Routine
-from quadvis.realtime import clocks, times
+from quadvis.realtime import clocks, control, times
 from quadvis.realtime import plan as plans
-from quadvis.realtime.clocks import now
+from quadvis.realtime.clocks import unshifted
 from quadvis.realtime.grid import deadline, due_in, first_from
 from quadvis.realtime.notes import put_release, put_times
 from quadvis.realtime.overload import ENDING, missed, worse
 from quadvis.realtime.times import bin_of, count
 
-# Words of the head: how many tasks; how the threads are to end; that one has failed; a mutex, functions of C.
-COUNT, QUIT, FAULT = range(3)
-MUTEX, LOCK, UNLOCK, POST, REST = range(3, 8)
-HEAD = 8
+# Words of the head: how many tasks; how the threads are to end; that one has failed; by how much (ns) ticks
+# are due later than by the start; a mutex, functions of C.
+COUNT, QUIT, FAULT, SHIFT = range(4)
+MUTEX, LOCK, UNLOCK, POST, REST = range(4, 9)
+HEAD = 9
 # Words of a task's row, which the fastest does not use: what it does; its tick, and up to which tick it was
-# dispatched; begin and lateness of its step; for how many tasks its start waits; that it was released at this
-# tick; its semaphore; where its delays stand.
+# dispatched; begin of its step, after the unshifted start, and its lateness; for how many tasks its start
+# waits; that it was released at this tick; its semaphore; where its delays stand.
 STATE, TICK, SEEN, BEGUN, LATE, WAITS, FRESH, SEMAPHORE, DELAYS = range(9)
 ROW = 9
 # Behind the rows two tables by giver and reader: whether the giver has to latch, and where the copies stand.
@@ -53,6 +54,7 @@ def release(plan: Any, shared: Any, tasks: Any, noted: Any, crew: Any, memory: A
     """
     answer = GO
     lock(crew)
+    crew[SHIFT] = shared[control.SHIFT]
     for task in range(1, crew[COUNT]):
         row, rhythm = HEAD + ROW * task, plans.HEAD + plans.ROW * task
         every, offset, start = plan[rhythm + plans.EVERY], plan[rhythm + plans.OFFSET], crew[row + SEEN]
@@ -165,7 +167,7 @@ def enter(plan: Any, tasks: Any, noted: Any, clock: Any, crew: Any, own: Any) ->
     """
     row = HEAD + ROW * own[0]
     if crew[row + BEGUN] != 0:
-        _leave(plan, tasks, noted, crew, own[0], now(clock))
+        _leave(plan, tasks, noted, crew, own[0], unshifted(clock))
     while True:
         lock(crew)
         runs, quits = crew[row + STATE] != IDLE, crew[QUIT]
@@ -176,9 +178,9 @@ def enter(plan: Any, tasks: Any, noted: Any, clock: Any, crew: Any, own: Any) ->
         if ready:
             break
         rest(crew, crew[row + SEMAPHORE])
-    instant = now(clock)
+    instant = unshifted(clock)
     crew[row + BEGUN] = max(1, instant)
-    crew[row + LATE] = instant - deadline(plan, crew[row + TICK])
+    crew[row + LATE] = instant - crew[SHIFT] - deadline(plan, crew[row + TICK])
     return GO
 
 

@@ -18,7 +18,8 @@ class Share:
 
     ``ticks`` is the number of its ticks, those left out included. ``unsafe`` says why its outputs have held
     their safe values before the end, if they have. ``profile`` is that of its blocks, if it was asked for,
-    ``start`` the instant of the start on the monotonic clock (ns).
+    ``start`` the instant of the start on the monotonic clock (ns). ``problem`` says what has failed without
+    an end to the flight, such as a device that was gone at the stop time; "" if nothing did.
     """
 
     computer: str
@@ -29,6 +30,7 @@ class Share:
     unsafe: str = ""
     profile: ProfileReport | None = None
     start: int = 0
+    problem: str = ""
 
     def facts(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -39,6 +41,7 @@ class Share:
             "not_granted": list(self.grants.refused),
             "tasks": {task.task: task.facts() for task in self.tasks},
             "unsafe": self.unsafe or None,
+            "problem": self.problem or None,
         }
 
 
@@ -71,9 +74,14 @@ class Flight:
         return f"{found} found no room on the way to the log and the verdicts" if self.lost else ""
 
     @property
+    def problems(self) -> list[str]:
+        """What has failed on its computers without an end to the flight, in sentences."""
+        return [share.problem for share in self.shares if share.problem]
+
+    @property
     def passed(self) -> bool:
-        """True if no row was lost, and no outputs had to be made safe."""
-        return not self.lost and not any(share.unsafe for share in self.shares)
+        """True if nothing has failed, no row was lost, and no outputs had to be made safe."""
+        return not (self.problems or self.lost or any(share.unsafe for share in self.shares))
 
     @property
     def complaints(self) -> list[str]:
@@ -83,7 +91,7 @@ class Flight:
             for share in self.shares
             if share.unsafe
         ]
-        return [*unsafe, *([self.loss] if self.loss else [])]
+        return [*self.problems, *unsafe, *([self.loss] if self.loss else [])]
 
     def facts(self) -> dict[str, Any]:
         """Return it as plain data."""

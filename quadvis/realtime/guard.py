@@ -90,9 +90,9 @@ class Guard:
                 raise RunError(said.reason, block=said.block)
         raise RunError(f"the guardian was not ready after {START:g} s")
 
-    def watch(self, process: int) -> None:
-        """Let it watch an application: when that ends, safe frames are sent."""
-        self._say(Watch(process))
+    def watch(self, process: int, vital: bool = True) -> None:
+        """Let it watch an application: when a vital one ends, safe frames are sent."""
+        self._say(Watch(process, vital))
 
     def make_safe(self) -> None:
         """Let it send safe frames at once, and from now on."""

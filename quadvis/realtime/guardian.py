@@ -2,8 +2,9 @@
 
 It knows no block, only a table of ports and frames. It sends the initial frames as soon as the ports are
 open, then the newest frame that each outbox holds. Once something ends (an application that dies or hangs,
-the request to end, an order of the supervisor, the supervisor's death, a port that is lost) it sends the safe
-frames and nothing else, until the supervisor has ended everything, or until nobody lives whom it works for.
+unless the others can do without it, the request to end, an order of the supervisor, the supervisor's death, a
+port that is lost) it sends the safe frames and nothing else, until the supervisor has ended everything, or
+until nobody lives whom it works for.
 """
 
 from __future__ import annotations
@@ -64,9 +65,9 @@ class Standing(NamedTuple):
 class GuardianSetup:
     """What the guardian needs: ``words`` has an outbox for each of the ``ports``, in their order.
 
-    Its process starts without ports, and takes them from the ``link``. ``supervisor`` is the process that
-    started it, ``on_host_loss`` what its death means. ``readers`` get the descriptors of shared ports, by
-    path.
+    Its process starts without ports, and takes them from the ``link``. ``patiences`` are those with vital
+    loops. ``supervisor`` is the process that started it, ``on_host_loss`` what its death means. ``readers``
+    get the descriptors of shared ports, by path.
     """
 
     ports: tuple[OutputPort, ...]
@@ -88,9 +89,10 @@ class Order(Enum):
 
 @dataclass(frozen=True)
 class Watch:
-    """The supervisor names the process of an application."""
+    """The supervisor names the process of an application; a ``vital`` one must not end."""
 
     process: int
+    vital: bool = True
 
 
 @dataclass(frozen=True)
@@ -140,7 +142,7 @@ class Guardian:
         self._outlets = [self._outlet(port, box) for port, box in boxes]
         self._looked = looked(setup.words)
         self._hearts = [Heartbeat(patience, time.monotonic_ns) for patience in setup.patiences]
-        self._supervisor, self._applications = Lives(), Lives()
+        self._supervisor, self._applications, self._vital = Lives(), Lives(), Lives()
         self._supervisor.watch(setup.supervisor)
         shortest = min([patience.allowed // LOOKS for patience in setup.patiences], default=LONGEST_LOOK)
         self._look_every = min(max(shortest, SHORTEST_LOOK), LONGEST_LOOK)
@@ -210,8 +212,9 @@ class Guardian:
         """Look at the loops and at the lives of everybody."""
         self._supervisor.look()
         self._applications.look()
+        self._vital.look()
         host_lost = self._supervisor.any_ended and self._setup.on_host_loss == SAFE
-        if host_lost or self._applications.any_ended:
+        if host_lost or self._vital.any_ended:
             self._make_safe()
         if self.told_to_end and not self.safe:
             self._make_safe(Alarm("the guardian was told to end"))
@@ -236,6 +239,8 @@ class Guardian:
                 said = self._link.recv()
                 if isinstance(said, Watch):
                     self._applications.watch(said.process)
+                    if said.vital:
+                        self._vital.watch(said.process)
                 else:
                     self._make_safe()
                     if said is Order.CLOSE:

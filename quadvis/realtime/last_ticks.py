@@ -23,13 +23,17 @@ class LastTicks(NamedTuple):
     words: Any
     place: int
 
+    def leave(self) -> None:
+        """Let nobody wait for this application."""
+        self.words[self.place] = 1
+
     def stay(self, remaining: float, interval: float, live: Callable[[], bool]) -> None:
         """Note that this application has run its last tick, and wait for the others.
 
         ``remaining`` is the time to the stop time (s). ``live`` is called more than once in an ``interval``
         (s): it gives a sign of life, and returns False if the run is to end; then nobody waits any more.
         """
-        self.words[self.place] = 1
+        self.leave()
         end = time.monotonic() + max(0.0, remaining) + LONGEST_STAY
         while live() and not all(self.words) and time.monotonic() < end:
             time.sleep(min(interval / 2, LONGEST_PAUSE))

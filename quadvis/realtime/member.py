@@ -18,11 +18,11 @@ from quadvis.errors.caller import IS_COMMAND
 from quadvis.graph.graph import Graph
 from quadvis.native.choice import Announce
 from quadvis.realtime import control, times
-from quadvis.realtime.application import Ending, Ready, Setup, Supply, perform
+from quadvis.realtime.application import GRACE, Ending, Ready, Setup, Supply, perform
 from quadvis.realtime.control import SharedMemory
 from quadvis.realtime.devices import PortBindings, guards_all
 from quadvis.realtime.flight import Share
-from quadvis.realtime.heartbeat import Patience
+from quadvis.realtime.heartbeat import Heartbeat, Patience, Sign
 from quadvis.realtime.last_ticks import LastTicks
 from quadvis.realtime.lifeline import Lifeline
 from quadvis.realtime.note_taker import NoteTaker
@@ -45,7 +45,8 @@ class Member:
 
     ``part`` is the graph of the computer, with the base tick of the whole; ``lines`` has the words of its
     links in memory, ``ladder`` the priorities of its tasks. ``ready`` is what the application said before
-    its run, ``ending`` what it said after it.
+    its run, ``ending`` what it said after it. ``loss`` says why the others fly on without it; "" if they do
+    not.
     """
 
     def __init__(
@@ -80,6 +81,7 @@ class Member:
         self._control[control.TICKS] = diagram.ticks
         Lifeline(self._control[control.LIFELINE]).make()
         self._link, self._theirs = context.Pipe()
+        self._last_ticks = last_ticks
         self._picture_signals = picture_signals(part) if watched else []
         pictures = context.RawArray("q", PictureBox.size()) if self._picture_signals else None
         setup = Setup(
@@ -90,11 +92,15 @@ class Member:
         self._pictures = PictureBox(pictures) if pictures is not None else None
         self._schedule = Schedule.of(part)
         self.patience = Patience.of(computer, words, self._schedule, self._limits)
+        self._heart = Heartbeat(self.patience, time.monotonic_ns)
+        spec = diagram.computer(computer)
+        self.is_dispensable = spec is not None and spec.is_dispensable
         name = f"application {computer}".rstrip()
         self.process: BaseProcess = context.Process(target=perform, args=(setup,), name=name)
         self._listening, self._supplied = True, False
         self.ready: Ready | None = None
         self.ending: Ending | None = None
+        self.loss = ""
         self._warned, self._overruns = 0.0, [0] * len(rooms)
 
     def start(self) -> None:
@@ -162,7 +168,7 @@ class Member:
     @property
     def ticks(self) -> int:
         """How many ticks the run had, those left out included, now that it has ended."""
-        if not self.stopped:
+        if not (self.stopped or self.loss):
             return int(self._control[control.TICKS])
         return self.tick + 1 if self.running else 0
 
@@ -195,10 +201,12 @@ class Member:
 
     @property
     def failed(self) -> bool:
-        """True if the application has ended before its stop time, or is about to."""
+        """True if the application has ended before its stop time, or is about to, and others need it."""
+        if self.loss:
+            return False
         if self.ending is None:
             return not self.process.is_alive()
-        return bool(self.ending.reason)
+        return bool(self.ending.reason) and not self.ending.through
 
     @property
     def stopped(self) -> bool:
@@ -214,6 +222,24 @@ class Member:
     def is_guarded(self) -> bool:
         """True if the guardian has all outputs of the application."""
         return guards_all(self._part)
+
+    @property
+    def is_lasting(self) -> bool:
+        """True if it runs, and has not been given up."""
+        return self.running and not self.loss
+
+    def give_up(self, reason: str = "") -> None:
+        """Let the others fly on without it, for a reason, or because of what has ended it: kill it."""
+        self.process.join(0 if reason else GRACE)
+        self.loss = str(RunError(reason, time=self.moment) if reason else self.error())
+        self.process.kill()
+        self.process.join()
+        self._last_ticks.leave()
+        self._announce(f"{self.loss}; the other computers fly on without '{self.computer}'")
+
+    def lost_heart(self) -> str:
+        """Return a sentence if its loop hangs; else ""."""
+        return self._heart.complaint if self._heart.look() is Sign.HANGS else ""
 
     def ask(self) -> None:
         """Ask for the end of the run before its next step."""
@@ -283,16 +309,17 @@ class Member:
     def share(self) -> Share:
         """Return what the computer did, after the run."""
         assert self.ready is not None
-        assert self.ending is not None
+        ending = self.ending or Ending()
         return Share(
             self.computer,
             self.ready.engine,
             self.ready.grants,
             self.times(),
             self.ticks,
-            self.ending.unsafe,
-            self.ending.profile,
+            ending.unsafe,
+            ending.profile,
             int(self._control[control.START]),
+            self.loss or (ending.problem if ending.through else ""),
         )
 
     def error(self) -> QuadvisError:

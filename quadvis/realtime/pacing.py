@@ -57,9 +57,9 @@ def wait(
     Return `GO`, and the step has begun; or why it has not: then the wait goes on when it is called again.
     """
     if plan[WAITING] < 0:
+        finish(plan, shared, tasks, noted, now(clock))  # by the clock by which the step began
         follow(clock, shared[control.SHIFT])
         instant = now(clock)
-        finish(plan, shared, tasks, noted, instant)
         plan[WAITING], plan[INSTANT], plan[COUNTED_TO] = following(plan, tick, instant), instant, tick
     chosen, instant = plan[WAITING], plan[INSTANT]
     if chosen < end:

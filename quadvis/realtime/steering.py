@@ -172,6 +172,11 @@ class Steering:
         if self._tuner is not None:
             self._tuner.noted(computer, records)
 
+    def lose(self, computer: str) -> None:
+        """Wait no more for a computer without which the others fly on."""
+        if self._tuner is not None:
+            self._tuner.lose(computer)
+
     def end(self) -> None:
         """End the steering; the members have ended."""
         if self._tuner is not None:

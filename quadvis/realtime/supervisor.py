@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
 
 LEAD = 20_000_000  # ns from the moment when all are ready to the start
-HANG = 5.0  # s after which a step that has not ended is ended
+HANG = 5.0  # s after which a step that has not ended is ended, and who has not ended with the others
 LOOK = 0.02  # s between two looks at the rings
 SHORTEST = 0.002  # s; a wait for something to come is longer, since it may last one millisecond too long
 
@@ -58,7 +58,8 @@ def supervise(
     parameter that it tunes, before the rows of the tick from which it holds.
 
     RunError if a block fails, if the tasks have too many overruns, if a step does not end, or if a process is
-    killed. However this ends, all processes have ended then, and all rows have been handed on.
+    killed. A computer that the others can do without does not end the run: it is given up, and its share says
+    why. However this ends, all processes have ended then, and all rows have been handed on.
     """
     steering = Steering(helm, diagram, changed or _nothing)
     try:
@@ -128,6 +129,9 @@ class _Supervisor:
                     steering.is_watched,
                 )
             )
+        needed = [member for member in self._members if not member.is_dispensable] or self._members
+        self._spare = [member for member in self._members if member not in needed]
+        self._last_need = time.monotonic()  # when a process was last seen that is needed
         steering.take_over(self._members)
         self._begun = self._stopping = False
         self._unsafe: list[str] = []  # what may be without its safe values, in sentences
@@ -149,18 +153,19 @@ class _Supervisor:
             self._steering.look()
             if self._steering.is_stopped and not self._stopping:
                 self._stop()
-            running = [member for member in self._members if member.running]
+            running = [member for member in self._members if member.is_lasting]
             if running:
                 tend(min(member.time for member in running), running[0].now)
             for member in running:
                 member.warn()
                 self._check_step(member)
+            self._check_rest()
         self._look(last=True)
         self._steering.settle(max(member.tick for member in self._members), last=True)
         if unsafe := self._close():
             raise RunError("; ".join(unsafe))
         first = self._members[0]
-        tend(min(member.time for member in self._members), first.now)
+        tend(min(member.time for member in self._members if not member.loss), first.now)
         for member in self._members:
             member.warn(last=True)
         return Flight(
@@ -203,13 +208,14 @@ class _Supervisor:
                 member.listen()
                 member.take(last=True)
             self._unsafe += self._close()
-        silent = [member for member in self._members if member.ended_silently]
+        silent = [member for member in self._members if member.ended_silently and not member.loss]
         return [*self._unsafe, *([UNSAFE] if not all(member.is_guarded for member in silent) else [])]
 
     def _start(self) -> None:
         """Start all processes at once; the applications open no block before the guardian has the ports."""
         self._cables.start()
-        guardian = self._devices.start([member.patience for member in self._members])
+        vital = [member.patience for member in self._members if member not in self._spare]
+        guardian = self._devices.start(vital)
         with launching():
             for member in self._members:
                 member.start()
@@ -220,7 +226,7 @@ class _Supervisor:
         self._open_devices()
         for member in self._members:
             process = member.process.pid or 0
-            self._devices.watch(process)
+            self._devices.watch(process, member not in self._spare)
             self._cables.watch(process)
             member.supply(self._lines.of(member.computer), self._devices.ports)
 
@@ -283,15 +289,37 @@ class _Supervisor:
             member.listen()
             member.take(last=last, between=self._steering.attend)
             if member.failed and (ended or member.ending) and not (self._stopping and member.stopped):
-                raise self._cause(member)
+                if not self._begun or member not in self._spare:
+                    raise self._cause(member)
+                self._give_up(member)
 
     def _cause(self, member: Member) -> QuadvisError:
         """Return why the run has ended early."""
         member.process.join(GRACE)
         return member.error()
 
+    def _give_up(self, member: Member, reason: str = "") -> None:
+        """Fly on without a computer."""
+        member.give_up(reason)
+        member.listen()
+        member.take(last=True, between=self._steering.attend)
+        self._steering.lose(member.computer)
+
+    def _check_rest(self) -> None:
+        """Give up who has not ended with the others that it is there for."""
+        now = time.monotonic()
+        if any(member.process.is_alive() for member in self._members if member not in self._spare):
+            self._last_need = now
+        elif now > self._last_need + HANG:
+            for member in self._alive:
+                self._give_up(member, f"the application of '{member.computer}' has not ended with the others")
+
     def _check_step(self, member: Member) -> None:
         """End a step that has lasted far too long."""
+        if member in self._spare:
+            if complaint := member.lost_heart():
+                self._give_up(member, complaint)
+            return
         longest = member.hangs(HANG)
         if not longest:
             return

@@ -19,6 +19,7 @@ from quadvis.block import Block
 from quadvis.engine.memory import Memory, Slot
 from quadvis.engine.program import Tunable
 from quadvis.engine.tuning import Acceptance, Change, Key
+from quadvis.errors import QuadvisError
 from quadvis.graph.graph import Graph
 from quadvis.realtime.box import ENTRY, ParameterBox
 from quadvis.realtime.dispatch import bit
@@ -73,6 +74,7 @@ class Tuner:
         self._acceptance = Acceptance(tunables, blocks, self._now)
         self._waiting: list[_Group] = []
         self._flying: dict[str, tuple[int, list[_Group]]] = {}  # by computer: what is in its box
+        self._lost: set[str] = set()  # computers
         self._taken: dict[tuple[str, int], list[_Group]] = {}  # by computer and number: not yet in its notes
 
     @property
@@ -92,8 +94,11 @@ class Tuner:
         if not accepted:
             wanted.future.set_result(tick)
             return
-        self._values |= accepted
         computers = frozenset(self._computers[path] for path, _ in accepted)
+        if lost := computers & self._lost:
+            wanted.future.set_exception(_without(min(lost)))
+            return
+        self._values |= accepted
         self._waiting.append(_Group(accepted, computers, wanted.future))
 
     def send(self, tick: int) -> None:
@@ -130,7 +135,7 @@ class Tuner:
         self._taken[computer, number] = groups
         for group in groups:
             group.ticks[computer] = tick
-            if group.ticks.keys() == group.computers:
+            if group.ticks.keys() == group.computers and not group.future.done():
                 group.future.set_result(max(group.ticks.values()))
 
     def noted(self, computer: str, records: Words) -> None:
@@ -146,6 +151,15 @@ class Tuner:
             if self._computers[path] == computer:
                 value = self._acceptance.as_given(path, name, accepted)
                 self._changed(Change(tick, path, name, value))
+
+    def lose(self, computer: str) -> None:
+        """Wait no more for a computer that has been lost, and give it nothing any more."""
+        self._lost.add(computer)
+        _, flying = self._flying.pop(computer, (0, []))
+        for group in [*flying, *(group for group in self._waiting if computer in group.computers)]:
+            if not group.future.done():
+                group.future.set_exception(_without(computer))
+        self._waiting = [group for group in self._waiting if computer not in group.computers]
 
     def end(self) -> None:
         """Report to all who wait that nothing changes any more."""
@@ -173,6 +187,10 @@ class Tuner:
             return self._values[key]
         part = self._tuned[self._computers[tunable.path]].part
         return getattr(part[tunable.path].block, tunable.name)
+
+
+def _without(computer: str) -> QuadvisError:
+    return QuadvisError(f"the computer '{computer}' has been lost")
 
 
 def box_room(part: Graph) -> int:

@@ -105,6 +105,7 @@ class Session:
                 timed=self._profiler.take,
             )
             self._profiler.end(self.result.flight)
+            self.problem = "; ".join(self.result.flight.problems if self.result.flight else ())
         except QuadvisError as error:
             self.problem = "; ".join([str(error), *getattr(error, "__notes__", ())])
         except Exception as error:

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from multiprocessing import active_children
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from quadvis.diff.difference import diff
 from quadvis.errors import QuadvisError
 from quadvis.output.log_reader import read_log
 from quadvis_blocks.hardware.imu_in import message_of
+from quadvis_blocks.supervision.failsafe import COASTING, LANDING, LEVELLED
 from tests.diagrams.golden import DIAGRAMS, on_devices
 from tests.diagrams.stand_in_world import World
 from tests.processes import children, gone
@@ -102,6 +104,39 @@ def test_each_port_that_is_missing_is_reported_in_a_sentence(capsys: pytest.Capt
     assert [line.partition(":")[0] for line in lines] == [
         *("block 'craft'", "block 'eyes'", "block 'outputs'", "link 'circle_line'", "link 'circle_line'")
     ]
+
+
+@pytest.mark.slow
+def test_without_the_computer_that_sees_the_failsafe_lands_the_craft(tmp_path: Path) -> None:
+    """The outputs are not made safe: the craft would fall from 1.5 m in 0.6 s."""
+    log, bench = tmp_path / "hil.mcap", tmp_path / "bench.yaml"
+    bench.write_text(BENCH.format(FLIGHT))
+    killed: list[float] = []
+
+    def kill(reached: float, _: float) -> None:
+        if reached >= 4.0 and not killed:
+            killed.append(reached)
+            (eyes,) = [each for each in active_children() if each.name == "application vision_pc"]
+            eyes.kill()
+
+    said: list[str] = []
+    result = quadvis.load(bench, stop_time="24 s").run(
+        log=log, real_time=CALM, progress=kill, announce=said.append
+    )
+    words = "the application of 'vision_pc' was killed by SIGKILL"
+    assert any(words in each and each.endswith("fly on without 'vision_pc'") for each in said), said
+    assert result.flight is not None and not result.passed
+    assert [words in each for each in result.flight.problems] == [True]
+    assert not all(verdict.met for verdict in result.outcome.verdicts)
+    held = read_log(log)
+    mode, times = held["supervision/failsafe.mode"], held.times("supervision/failsafe.mode")
+    mode, times = mode[times > killed[0]], times[times > killed[0]]
+    order = mode[np.flatnonzero(np.diff(mode, prepend=-1))]
+    assert order[-3:].tolist() == [COASTING, LEVELLED, LANDING]
+    thrust, times = held["receiver/thrust.held"], held.times("receiver/thrust.held")
+    flown = thrust[(times > killed[0] + 0.1) & (times < killed[0] + 4.0)]
+    assert flown.mean() > 0.8  # N; hover is 1.2, and the safe value 0.2
+    assert held["craft/body.position"][-1, 2] < 0.3
 
 
 @pytest.mark.slow

@@ -38,7 +38,8 @@ class CircleDetector(Block, numeric=False):
     `fewest`) if their sizes and ellipses agree to a few percent with their distances, and if no other circles
     in the picture could be meant. A target that was found before is kept by three or two circles that moved
     together. A circle that is hidden in part, from about a tenth of its diameter on, has no centre, and its
-    quality says why.
+    quality says why. Two circles that one edge cuts are no target, nor are whole circles beside parts of
+    others that are not where the whole ones tell: a picture may be torn.
 
     At steps without a new picture the block repeats the last result, with its stamp and sequence number, and
     `fresh` is false. A picture is not new if it equals one of the last 32 different pictures to the bit,
@@ -53,7 +54,7 @@ class CircleDetector(Block, numeric=False):
     1      three circles
     2      two circles
     3      target not found
-    4      circles of all colours that are no square
+    4      circles of all colours that are no square, or do not belong together
     5      no picture yet
     7      the frame is not a picture, or its size is not the size for `calibration`
     8      four circles of the target that are larger than `radius_max`

@@ -12,7 +12,8 @@ from quadvis_blocks.vision._pose_block import PoseFromCircles, described, no_pos
 from quadvis_vision.camera.pinhole import pinhole
 from quadvis_vision.camera.projection import RADIUS
 from quadvis_vision.detection.detect import INCONSISTENT, NOT_FOUND
-from quadvis_vision.pose.circles import Circle, misfit, seen_circles
+from quadvis_vision.pose.circles import Circle, seen_circles
+from quadvis_vision.pose.consistency import is_a_square
 from quadvis_vision.pose.least_squares import Triangle
 from quadvis_vision.pose.level import level_covariance, level_pose
 from quadvis_vision.pose.refine import Estimate, Tilt, pose_of, refine
@@ -21,7 +22,6 @@ LEVEL, MAP = range(2)
 NO_TILT = 8  # a status; smaller numbers are those of the detector
 SIGMA_MAX = 1e3  # px: from here on a circle counts nothing
 _NUMBERS = 10  # of the triangle of 4 x 4
-MISFIT_MAX = 0.1  # sides; greatest rms error of the levelled pose: 10 deg of tilt give 0.05 at 1.6 sides
 
 
 class PoseImu(PoseFromCircles, Block):
@@ -39,6 +39,9 @@ class PoseImu(PoseFromCircles, Block):
 
     `sigma` takes the place of `pixel_sigma` circle by circle, as the detector measures it in each picture; it
     says nothing of errors of the calibration, which all pictures share.
+
+    There is no pose if three or four circles are not where a square can show them with about this tilt: a
+    picture may be torn, its parts from different instants. With two circles every picture has a pose.
 
     `covariance` is that of a single pose, from the same sigmas. An error of the angles lasts longer than a
     frame, so successive poses share it. Without a pose all other outputs are NaN, `valid` is false, and
@@ -101,8 +104,7 @@ def _estimate(circles: list[Circle], tilt: Tilt, side: float, radius: float, mod
     level = level_pose(circles, tilt.roll, tilt.pitch, radius)
     if level is None:
         return None
-    allowed = MISFIT_MAX * side / level.z  # the size of the side from straight below
-    if not misfit(pose_of(level), circles, radius) < allowed:
+    if not is_a_square(circles, side, radius, level):
         return None
     if mode == MAP:
         return refine(circles, radius, level, tilt)

@@ -35,7 +35,7 @@ STALE, UNCALIBRATED, UNUSABLE, TOO_LARGE = range(5, 9)
 calibration; a picture that is empty, too small, of another size or not uint8 blue-green-red; a square of
 circles that are larger than is allowed."""
 
-QUALITY_MIN = 0.9  # of the symmetry, and of the median size: a circle that lost a fifth of its area
+QUALITY_MIN = 0.9  # of the symmetry, and of the second largest size: a circle that lost a fifth of its area
 SIZES_MAX = math.log(1.15)  # of whole circles of a new target against their median
 BENDS_MAX = (0.12, 1.0)  # of a circle's ellipse against that of the square: the second is px of radius
 CHOICES = 6  # squares that are measured at full resolution
@@ -247,7 +247,8 @@ def detection(discs: Sequence[Disc | None], places: Sequence[CirclePlace]) -> De
     order = sorted(part for part in sizes if part == part)
     if not order:
         return None
-    limit = QUALITY_MIN * (order[(len(order) - 1) // 2] + order[len(order) // 2]) / 2
+    # Of two circles one edge may have cut both, so that only the distance between them tells their size.
+    limit = QUALITY_MIN * (order[-2] if len(order) > 2 else 1.0)
     quality = [
         math.nan if disc is None else min(size, disc.symmetry)
         for disc, size in zip(discs, sizes, strict=True)

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from quadvis_vision.detection.blobs import looks
 from quadvis_vision.detection.circles import Ceiling, CircleTarget, Disc, Pixels, discs, locate
 from quadvis_vision.detection.detect import (
+    INCONSISTENT,
     QUALITY_MIN,
     CirclePlace,
     Detection,
     detection,
+    nothing,
     refined,
     search,
     square_seen,
@@ -28,6 +30,7 @@ REACH = 0.025  # of the picture's width, plus half a radius: the distance over w
 GROWTH_MAX = math.log(1.33)  # of the square from one picture to the next
 TURN_MAX = 0.5  # rad, the same
 BEND_MAX = 0.08  # of the side: deviation of three circles from a motion of the whole square
+PART_MAX = 0.6  # radii; half of a disc has its middle 0.42 from that of the disc
 RADIUS_MAX = math.log(1.6)  # of a followed circle against its expected radius
 
 
@@ -47,9 +50,11 @@ def follow(pixels: Pixels, target: CircleTarget, places: Array, fewest: int = 2)
     else:
         seen = square_seen(whole, target) if exact else refined(pixels, whole, target)
     if seen is not None:
-        return seen
+        return seen if _holds_together(seen, known) else nothing(INCONSISTENT)
     moved = _moved(kept_discs, known)
     kept = None if moved is None else detection(kept_discs, moved)
+    if kept is not None and not _holds_together(kept, known):
+        return nothing(INCONSISTENT)
     if kept is None:
         return search(pixels, target, fewest)
     # The search gives a better target only if it finds more circles than were followed.
@@ -96,6 +101,23 @@ def _look_around(
             best = discs[corner]
             if best is None or best.symmetry < other.symmetry:
                 discs[corner] = other
+
+
+def _holds_together(seen: Detection, known: Sequence[CirclePlace]) -> bool:
+    """Return whether circles that are partly hidden are where the motion of the whole ones takes them.
+
+    A part of a circle lies within the circle. In a picture that is torn through circles it may lie elsewhere.
+    """
+    whole = [corner for corner in range(4) if not math.isnan(seen.centres[corner, 0])]
+    if len(whole) == 4:
+        return True
+    there = [complex(u, v) for u, v in seen.places[:, :2].tolist()]
+    factor, shift, _ = motion([known[k].centre for k in whole], [there[k] for k in whole])
+    return all(
+        abs(factor * known[k].centre + shift - there[k]) <= PART_MAX * seen.places[k, 2]
+        for k in range(4)
+        if k not in whole
+    )
 
 
 def _same(disc: Disc, target: CircleTarget, corner: int, radius: float) -> bool:

@@ -13,16 +13,18 @@ from quadvis.diagram.times import read_duration
 from quadvis.document import YamlMap, YamlNode
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known
 
-COMPUTER_KEYS = ("cpu", "priority", "poll", "overload")
+COMPUTER_KEYS = ("cpu", "priority", "poll", "overload", "on_loss")
 MOST = {"cpu": 4095, "priority": 99}
 AUTO = "auto"
+STOP, CONTINUE = LOSSES = ("stop", "continue")
 
 
 class ComputerSpec(NamedTuple):
     """One computer, and how its loop is to be treated in a real-time run; None: as the command line says.
 
     ``cpu``, ``priority`` and ``poll`` are as the options of the same names. ``overload`` has the limits of
-    its tasks; None: those of the diagram.
+    its tasks; None: those of the diagram. ``on_loss`` says what its loss means for the others: they stop
+    with safe values, or continue without it.
     """
 
     place: Place
@@ -30,6 +32,12 @@ class ComputerSpec(NamedTuple):
     priority: int | None = None
     poll: str | None = None
     overload: OverloadLimits | None = None
+    on_loss: str | None = None
+
+    @property
+    def is_dispensable(self) -> bool:
+        """True if the other computers fly on without it."""
+        return self.on_loss == CONTINUE
 
 
 Computers = dict[str, ComputerSpec | Unknown]
@@ -40,8 +48,8 @@ class ComputersSection(FileSection[Computers]):
 
     key = "computers"
     words = (
-        "who runs the blocks: `name: {cpu, priority, poll, overload}`, each of which may be left out; every "
-        "block then says `at: name`, see below"
+        "who runs the blocks: `name: {cpu, priority, poll, overload, on_loss}`, each of which may be left "
+        "out; every block then says `at: name`, see below"
     )
 
     def read(self, node: YamlNode | None, faults: Faults) -> Computers:
@@ -65,6 +73,7 @@ class ComputersSection(FileSection[Computers]):
             "priority": {**count, "maximum": MOST["priority"], "description": "of SCHED_FIFO; 0 for none"},
             "poll": {"anyOf": [TEXT, QUANTITY], "description": "how long to look at the clock, or 'auto'"},
             "overload": OVERLOAD.schema(),
+            "on_loss": {"enum": list(LOSSES), "description": "what its loss means for the others"},
         })}  # fmt: skip
 
     def resolved(self, diagram: Checked) -> Any:
@@ -82,7 +91,8 @@ def _computer(fields: YamlMap, place: Place, faults: Faults) -> ComputerSpec:
             counts[key] = count
     poll = faults.collect(_poll, fields["poll"]) if "poll" in fields else None
     overload = OVERLOAD.read(fields["overload"], faults) if "overload" in fields else None
-    return ComputerSpec(place, **counts, poll=poll, overload=overload)
+    on_loss = faults.collect(fields["on_loss"].choice, LOSSES) if "on_loss" in fields else None
+    return ComputerSpec(place, **counts, poll=poll, overload=overload, on_loss=on_loss)
 
 
 def _poll(node: YamlNode) -> str:

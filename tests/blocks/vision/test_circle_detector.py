@@ -311,6 +311,29 @@ def test_a_circle_that_is_hidden_in_part_is_reported_missing():
     assert (np.hypot(*(seen.centres[0] - truth)[[0, 2, 3]].T) < 4 * seen.sigma[0, [0, 2, 3]]).all()
 
 
+@pytest.mark.parametrize("left", [0.5, 0.65])
+def test_two_circles_that_one_edge_cuts_are_no_target(left):
+    whole, truth = scene((0, 0, 3.0, 0, 0, 0))
+    radius = RADIUS * 430 / 3.0
+    edge = round(truth[:2, 1].mean() + (2 * left - 1) * radius)
+    cut = whole.copy()
+    cut[edge:] = CEILING
+    rng = np.random.default_rng(3)
+    seen = detect([expose(picture, rng) for picture in (whole, cut, whole)])
+    assert seen.status.tolist() == [0, NOT_FOUND, 0]
+
+
+@pytest.mark.parametrize("shift", [-22, -40])
+def test_circles_whose_parts_are_not_where_the_others_say_are_no_target(shift):
+    whole, truth = scene((0, 0, 3.0, 0, 0, 0))
+    rng = np.random.default_rng(4)
+    pictures = [expose(whole, rng) for _ in range(3)]
+    edge = round(truth[:2, 1].mean() + 0.1 * RADIUS * 430 / 3.0)
+    pictures[1][edge:] = np.roll(pictures[1][edge:], shift, axis=1)
+    seen = detect(pictures)
+    assert seen.status[1] in (NOT_FOUND, INCONSISTENT) and seen.status[[0, 2]].tolist() == [0, 0]
+
+
 def test_a_picture_of_another_size_than_the_calibration_is_refused_and_the_next_one_is_seen():
     first, _ = scene((0, 0, 3.0, 0, 0, 0))
     rng = np.random.default_rng(24)

@@ -189,6 +189,34 @@ def test_points_that_are_no_square_give_no_pose(kind, mode):
     check_nothing(solve(NO_SQUARE[kind], 0.05, 0.02, mode=mode), 4)
 
 
+def torn(pose, shift):
+    """The circles of a picture whose lower half has moved to the side."""
+    image = centres(pose)
+    image[image[:, 1] > image[:, 1].mean(), 0] += shift
+    return image
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("rows", [rows for rows in SUBSETS if len(rows) > 2])
+def test_circles_of_a_torn_picture_give_no_pose(rows, mode):
+    pose = (0.2, -0.1, 3.0, 0.05, -0.03, 0.1)
+    assert solve(only(torn(pose, 0.0), rows), *pose[3:5], mode=mode).valid[0]
+    for shift in (-150.0, -40.0, -15.0, 15.0, 20.0, 60.0):
+        assert not solve(only(torn(pose, shift), rows), *pose[3:5], mode=mode).valid[0], shift
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize(("rows", "wrong"), [((0, 1, 2, 3), 13.0), ((0, 1, 3), 5.0)])
+def test_a_level_that_is_wrong_is_no_torn_picture(rows, wrong, mode):
+    rng = np.random.default_rng(5)
+    for z in (1.6, 3.0, 6.0):
+        for way in np.linspace(0.0, 2 * math.pi, 8):
+            pose = (*rng.uniform(-0.1, 0.1, 2) * z, z, 0.02, -0.03, rng.uniform(-3.0, 3.0))
+            image = centres(pose) + rng.normal(0.0, 0.2, (4, 2))
+            roll, pitch = np.array(pose[3:5]) + math.radians(wrong) * np.array([math.cos(way), math.sin(way)])
+            assert solve(only(image, rows), roll, pitch, mode=mode).valid[0], (z, way)
+
+
 @pytest.mark.parametrize("mode", MODES)
 def test_a_target_below_the_craft_gives_no_pose(mode):
     check_nothing(solve(IMAGE, 3.0, 0.0, mode=mode), 4)

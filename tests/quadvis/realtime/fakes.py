@@ -60,13 +60,19 @@ class FakeClock:
         self._functions = C_FUNCTION(self._get), C_FUNCTION(self._wait)
         self.words = machine_words(*self._functions)
         self.words[clocks.START] = self.words[clocks.BASE] = BEFORE
-        self.shift = 0
 
     def now(self) -> int:
         return self.instant - self.shift
 
+    @property
+    def shift(self) -> int:
+        return int(self.words[clocks.START] - self.words[clocks.BASE])
+
     def follow(self, shift: int) -> None:
-        self.shift = shift
+        self.words[clocks.START] = self.words[clocks.BASE] + shift
+
+    def unshifted(self) -> int:
+        return self.instant
 
     def sleep(self, until: int) -> None:
         until += self.shift
@@ -101,6 +107,7 @@ class CrewClock(FakeClock):
                 assert self._change.wait(30)
 
     def sleep(self, until: int) -> None:
+        until += self.shift
         with self._change:
             self.sleeps += 1
             while True:

@@ -11,7 +11,7 @@ from quadvis.api import Diagram, load_text
 from quadvis.engine.engine import Engine
 from quadvis.errors import RunError
 from quadvis.native.clock import GO
-from quadvis.realtime import dispatch
+from quadvis.realtime import control, dispatch
 from quadvis.realtime.streams import streams_of
 from tests.quadvis.realtime.fakes import CrewClock, Paced
 from tests.quadvis.realtime.test_streams import Kept
@@ -165,6 +165,24 @@ def test_a_task_waits_for_outputs_of_a_faster_one_that_are_under_way() -> None:
     assert paced.engine.read("deep", "u") == 7.0
     paced.engine.write("mid", "y", 8.0)
     assert paced.engine.read("deep", "u") == 7.0
+
+
+@engines
+def test_times_of_a_task_do_not_depend_on_a_shift_while_it_runs(engine: str) -> None:
+    clock = CrewClock()
+    paced = Paced(diagram(), clock, engine=engine)
+    shifts = {4: 300_000, 46: -200_000}  # 2 ms after the slow task's step of tick 2 has begun, and that of 42
+
+    def shift(tick: int) -> None:
+        paced.shared.control[control.SHIFT] = shifts.get(tick, paced.shared.control[control.SHIFT])
+
+    paced.engine.observe("fast", shift)
+    busy(paced, clock, "slow", {tick: 5.5 for tick in range(2, 100, 10)})
+    times = paced.run(100)["slow"]
+    assert (times.steps, times.overruns) == (10, 0)
+    assert times.execution is not None and times.lateness is not None
+    assert times.execution.least == times.execution.most == 5.5e-3
+    assert times.lateness.least == times.lateness.most == 0.0
 
 
 @engines

@@ -185,6 +185,23 @@ def test_every_end_makes_all_ports_safe_for_ever(rig: Any, cause: Any) -> None:
     assert made.alarms() == []  # the supervisor knows
 
 
+def test_the_end_of_a_process_that_others_can_do_without_changes_nothing(rig: Any) -> None:
+    made = rig()
+    made.follow()
+    other = made.process()
+    made.link.send(Watch(other.pid, vital=False))
+    made.guardian.look()
+    other.kill()
+    other.wait()
+    made.guardian.look()
+    for box in made.boxes:
+        box.put(b"again")
+    made.until_wire(b"again", b"again")
+    assert not made.guardian.safe
+    made.application.kill()
+    made.stays_safe()
+
+
 def hang(made: Rig) -> None:
     made.control[control.START] = time.monotonic_ns() - 60 * MS
     made.control[control.BEGUN] = 1 * MS

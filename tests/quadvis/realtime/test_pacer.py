@@ -124,6 +124,23 @@ def test_ticks_are_due_later_or_earlier_as_the_supervisor_shifts_them(engine: st
     assert times.lateness.most == 0.0
 
 
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_how_long_a_step_takes_does_not_depend_on_a_shift_in_the_meantime(engine: str) -> None:
+    clock = FakeClock()
+    paced = Paced(diagram(), clock, engine=engine)
+    shifts = {20: 300_000, 60: -200_000}
+
+    def work(tick: int) -> None:
+        clock.instant += MS // 2
+        paced.shared.control[control.SHIFT] = shifts.get(tick, paced.shared.control[control.SHIFT])
+
+    paced.engine.observe("fast", work)
+    times = paced.run(100)["fast"]
+    assert (times.steps, times.overruns) == (100, 0)
+    assert times.execution is not None
+    assert times.execution.least == times.execution.most == 0.5e-3
+
+
 def test_time_follows_the_ticks_and_the_period_does_not() -> None:
     clock = FakeClock()
     paced = Paced(diagram(), clock)

@@ -174,6 +174,21 @@ def test_an_exception_in_a_block_is_the_error_of_the_run() -> None:
 
 
 @pytest.mark.slow
+def test_what_is_gone_at_the_stop_time_fails_a_run_that_is_judged(capsys: pytest.CaptureFixture[str]) -> None:
+    block = Path("blocks/own/ending.py")
+    block.write_text(block.read_text() + "        raise OSError('the camera is gone')\n")
+    assert main(["run", "flight.yaml", "--real-time", "--priority", "0", "--log", "run.mcap"]) == 1
+    out, err = capsys.readouterr()
+    assert re.search(r"^  met  wave.y within 2 m", out, re.M), out
+    assert "FAILED: 1 of 1 expectations met" in out
+    assert re.search(r"^block 'end', t = \S+ s: cannot close: .*the camera is gone", err, re.M), err
+    log = read_log("run.mcap")
+    assert log.complete and log.summary["expect 1"].startswith("met: wave.y within 2 m")
+    (computer,) = json.loads(log.summary["real time"])["computers"]
+    assert "the camera is gone" in computer["problem"]
+
+
+@pytest.mark.slow
 def test_a_device_that_cannot_be_opened_ends_the_run_before_it_begins() -> None:
     block = Path("blocks/own/ending.py")
     block.write_text(block.read_text().replace('self.note("open")', 'raise OSError("no device")'))

@@ -293,3 +293,58 @@ def test_a_computer_whose_last_tick_is_earlier_leaves_the_outputs_to_the_others(
     result = quadvis.load("flight.yaml").run(real_time=quadvis.RealTime(priority=0, poll="0 s"))
     read = result["back.command"].ravel()
     assert read[~np.isnan(read)][-1] == 1.0  # 0.2 s after the last tick of the other one
+
+
+SEEING = """\
+quadvis: 1
+name: seeing
+rates: {fast: 50 Hz}
+stop_time: 1000 s
+overload: {max: 1000000, consecutive: 50, startup: 1}
+computers: {target: {}, eyes: {on_loss: continue}}
+blocks:
+  seer: {block: own.seer, rate: fast, at: eyes}
+  stick: {block: own.stick, rate: fast, at: target}
+  out:
+    block: hardware.sbus_out
+    rate: fast
+    at: target
+    with: {port: PORT, channels: [1], lowest: [0], highest: [1], initial: [0.5], safe: [0]}
+    in: {command: stick.y}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ["SIGKILL", "SIGSTOP", "fails"])
+def test_a_computer_that_others_can_do_without_is_lost_and_they_go_on(pty: Pty, how: str) -> None:
+    write(pty.path)
+    Path("flight.yaml").write_text(SEEING.replace("PORT", f'"{pty.path}"'))
+    seer = OWN.replace("class Stick", "class Seer").replace("'process'", "'seer'")
+    seer = seer.replace('"process"', '"seer"').replace("            ...\n", "            raise ValueError\n")
+    Path("blocks/own/seer.py").write_text(seer)
+    flight = Flight.__new__(Flight)
+    flight.pty = pty
+    command = [sys.executable, "-m", "quadvis", "run", "flight.yaml", "--real-time", "--priority", "0"]
+    flight.process = subprocess.Popen(
+        [*command, "--poll", "0", "--log", "run.mcap"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    wait_for(lambda: flight.process.poll() is not None or pty.read().endswith(2 * GOING))
+    eyes, flight.application = int(Path("seer").read_text()), int(Path("process").read_text())
+    flight.all = children(flight.process)
+    if how == "fails":
+        Path("go").touch()
+    else:
+        os.kill(eyes, getattr(signal, how))
+    wait_for(lambda: gone(eyes))
+    seen = len(pty.read())
+    wait_for(lambda: len(pty.read()) > seen + 50 * 25)
+    assert SAFE not in pty.read()
+    os.kill(flight.application, signal.SIGKILL)
+    _, told = flight.process.communicate(timeout=60)
+    wait_for(lambda: all(map(gone, flight.all)))
+    flight.check()
+    assert flight.process.returncode == 1
+    words = {"SIGKILL": "was killed by SIGKILL", "SIGSTOP": "no sign of life", "fails": "ValueError"}[how]
+    assert re.search(f"{words}.*; the other computers fly on without 'eyes'", told), told
+    assert "the application of 'target' was killed by SIGKILL" in told
