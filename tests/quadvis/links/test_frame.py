@@ -63,6 +63,7 @@ def test_frames_come_whole_through_any_chunks(values: list[float], cuts: list[in
     assert (decoder.lost, decoder.refused) == (0, 0)
 
 
+@pytest.mark.faults
 @given(st.binary(max_size=400), st.lists(st.integers(0, 10**6), max_size=5))
 def test_noise_is_never_a_frame_and_the_next_frame_but_one_comes(noise: bytes, cuts: list[int]) -> None:
     frames = [encode(ONE, n, n, ONE.pack((float(n),))) for n in range(2)]
