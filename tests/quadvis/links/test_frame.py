@@ -140,8 +140,11 @@ def test_endless_noise_takes_no_memory() -> None:
 KINDS = ("flip", "drop", "insert")
 
 
-def through_damage(frames: int, seed: int) -> None:
-    """Send frames through a line that spoils 1 % of the bytes: nothing wrong is accepted, most come."""
+def through_damage(frames: int, seed: int) -> float:
+    """Send frames through a line that spoils 1 % of the bytes: nothing wrong is accepted, most come.
+
+    Return the share that comes.
+    """
     random = np.random.default_rng(seed)
     decoder, delivered, wrong = Decoder(ONE), 0, 0
     for begin in range(0, frames, 10_000):
@@ -154,6 +157,7 @@ def through_damage(frames: int, seed: int) -> None:
     assert wrong == 0
     assert delivered >= 0.75 * frames
     assert decoder.lost + delivered >= frames - 20
+    return delivered / frames
 
 
 def test_nothing_wrong_is_accepted_from_a_bad_line() -> None:
