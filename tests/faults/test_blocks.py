@@ -58,7 +58,7 @@ WORDS = {
 def test_05_a_block_that_fails_ends_the_flight_with_safe_frames_in_the_same_step(
     kind: str, tmp_path: Path
 ) -> None:
-    with Bench(tmp_path, blocks=BETWEEN.format(kind), own={"spoils": SPOILS}) as bench:
+    with Bench(tmp_path, made={"blocks": BETWEEN.format(kind), "own": {"spoils": SPOILS}}) as bench:
         bench.flies()
         code, _, told = bench.ended()
         bench.left_safe()
@@ -101,12 +101,12 @@ def test_06_a_task_that_is_too_slow_is_counted_by_itself_and_ends_the_flight_onc
     tmp_path: Path,
 ) -> None:
     slow = "  slow: {block: own.slow, rate: sight, at: vision_pc}"
-    with Bench(tmp_path, blocks=slow, own={"slow": SLOW}, overload=LIMITS) as bench:
+    made = {"blocks": slow, "own": {"slow": SLOW}, "overload": LIMITS}
+    with Bench(tmp_path, made=made) as bench:
         bench.flies()
         code, _, told = bench.ended()
         bench.left_safe()
     assert code == 1, told
-    print(told)
     no_trace(told)
     log = bench.log
     missed, at = log["_times/vision_pc/sight.overruns"], log.times("_times/vision_pc/sight.overruns")
