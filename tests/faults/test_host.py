@@ -86,7 +86,7 @@ def test_16_a_target_does_without_its_host_what_it_should_and_its_log_fills_the_
     policy: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bench = BenchLines(tmp_path, more=f"on_host_loss: {policy}\nstop_time: 600 s")
-    with running_target() as lab, bench:
+    with bench, running_target() as lab:  # whose ports are closed before the lines are
         for name in ("QUADVIS_HOME", "XDG_RUNTIME_DIR"):
             monkeypatch.setenv(name, lab.environment[name])
         with host(bench, lab.environment) as (process, seen):
