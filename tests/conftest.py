@@ -25,6 +25,8 @@ os.environ.setdefault("QUADVIS_CACHE", str(Path(__file__).parents[1] / ".pytest_
 # The second stage tries more of them: `-m "slow or hypothesis" --hypothesis-profile thorough`.
 settings.register_profile("thorough", derandomize=True, deadline=None)
 settings.register_profile("quick", settings.get_profile("thorough"), max_examples=20)
+# A search with other examples in each run, for some minutes a test: see tests/faults/README.md.
+settings.register_profile("long", deadline=None, max_examples=20_000)
 settings.load_profile("quick")
 
 

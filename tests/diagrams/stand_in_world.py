@@ -61,7 +61,7 @@ class World:
     """The world, from the beginning of the context to its end.
 
     ``positions`` are those of each tick (m) from when the craft is let go, ``latest`` is the greatest
-    lateness of these ticks (s).
+    lateness of these ticks (s). ``server`` is the camera, which tests may let fail.
     """
 
     def __init__(self, folder: Path, *, text: bool = False) -> None:
@@ -70,7 +70,7 @@ class World:
         self._diagram = quadvis.load(path)
         self._commands, self.rc = _line()
         self._unit, self.imu = _line()
-        self._server = CameraServer(period=1e-3)
+        self.server = CameraServer(period=1e-3)
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._pixels: Any = None
@@ -82,15 +82,15 @@ class World:
         self.error: BaseException | None = None
 
     def __enter__(self) -> World:
-        self._server.make = self._picture
-        self._server.__enter__()
+        self.server.make = self._picture
+        self.server.__enter__()
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._ended.set()
         self._thread.join()
-        self._server.__exit__()
+        self.server.__exit__()
         for descriptor in (self._commands, self._unit):
             os.close(descriptor)
         if self.error is not None:
@@ -99,7 +99,7 @@ class World:
     @property
     def camera(self) -> str:
         """Where the camera is."""
-        return self._server.url
+        return self.server.url
 
     def _picture(self, number: int) -> bytes:
         """Wait for the next picture, and return it."""

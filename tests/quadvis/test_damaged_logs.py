@@ -329,12 +329,14 @@ def kinds(tmp_path_factory: pytest.TempPathFactory, whole: bytes) -> list[bytes]
     return [whole, *(packed(path, fields, 16, 50, packing).read_bytes() for packing in ("LZ4", "ZSTD"))]
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize("kind", range(3))
 def test_every_truncation_is_a_log_or_a_sentence(kind: int, kinds: list[bytes], tmp_path: Path) -> None:
     for size in range(0, len(kinds[kind]), 97):
         survives(tmp_path / "log", kinds[kind][:size])
 
 
+@pytest.mark.faults
 @given(
     kind=st.integers(0, 2),
     flips=st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(1, 255)), min_size=1, max_size=8),
@@ -353,6 +355,7 @@ def test_flipped_bits_and_a_cut_give_a_log_or_a_sentence(
     survives(tmp_path_factory.getbasetemp() / "flipped", bytes(data[: int(cut * len(data))]))
 
 
+@pytest.mark.faults
 @given(
     words=st.lists(
         st.sampled_from([b"\x06", b"\0\0\0", b"zstd", b"\xff", b"quadvis", b"\x0c\x07"]), max_size=60

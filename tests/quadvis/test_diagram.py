@@ -455,6 +455,7 @@ def mutated(draw: st.DrawFn) -> str:
     return text
 
 
+@pytest.mark.faults
 @given(mutated())
 def test_whatever_is_done_to_a_diagram_it_loads_or_has_faults(text: str) -> None:
     try:

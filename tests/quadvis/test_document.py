@@ -330,6 +330,7 @@ TYPED = {
 }  # fmt: skip
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize("text", TYPED)
 def test_hostile_values_are_refused_when_they_are_typed(text):
     node = YamlScalar(text, True, "d.yaml", 3, 7, "x")
@@ -389,6 +390,7 @@ pieces = st.sampled_from(
 )  # fmt: skip
 
 
+@pytest.mark.faults
 @given(st.one_of(st.text(), st.lists(pieces, max_size=25).map("".join)))
 def test_any_text_is_read_or_refused(text):
     faults = Faults()
@@ -400,6 +402,7 @@ def test_any_text_is_read_or_refused(text):
         read_all(root)
 
 
+@pytest.mark.faults
 @given(st.binary(max_size=200))
 def test_any_bytes_are_read_or_refused(data):
     with tempfile.NamedTemporaryFile() as file:

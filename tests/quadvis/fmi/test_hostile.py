@@ -64,6 +64,7 @@ def nothing_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[No
 BIG = ("many elements", "a bomb", "an endless attribute")
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in BIG)) for name in ARCHIVES]
 )
@@ -82,6 +83,7 @@ def test_a_hostile_archive_is_refused_in_a_sentence(name: str, tmp_path: Path) -
     assert set(tmp_path.rglob("*")) == before
 
 
+@pytest.mark.faults
 @needs_gcc
 @pytest.mark.parametrize(
     "name",
@@ -104,6 +106,7 @@ def test_the_same_goes_for_fmi_3(name: str) -> None:
         drive(Fmu(file=fmu(model, 3), deadline=0.5), rate="10 Hz", steps=5)
 
 
+@pytest.mark.faults
 @needs_gcc
 @pytest.mark.parametrize("name", ["foreign memory", pytest.param("hang", marks=pytest.mark.slow)])
 def test_what_follows_ends_at_its_safe_value(name: str, tmp_path: Path) -> None:

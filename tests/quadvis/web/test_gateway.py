@@ -120,6 +120,7 @@ def test_nothing_but_the_files_of_the_page_is_served(running: Running, path: str
 # foreign hosts and pages
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize(
     "host", ["evil.example", "evil.example:{port}", "127.0.0.1", "127.0.0.1:1", "localhost.", ""]
 )
@@ -147,6 +148,7 @@ def test_parts_of_the_page_are_not_for_other_pages(running: Running) -> None:
     assert status_of(running.get("/", Sec_Fetch_Site="cross-site", Sec_Fetch_Mode="navigate")) == 200
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize(
     "origin", ["http://evil.example", "http://127.0.0.1:1", "null", "https://127.0.0.1:{port}", None]
 )
@@ -167,6 +169,7 @@ def test_refusals_do_not_flood_the_terminal(running: Running) -> None:
 # the token
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize(
     "first",
     [

@@ -87,6 +87,7 @@ def test_the_table_of_levels_has_every_verb() -> None:
     assert set(VERBS) == ALWAYS.union(*NOT_FROM_LEVEL.values())
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize("verb", ALL, ids=lambda verb: verb.name)
 @pytest.mark.parametrize("level", range(5))
 def test_a_verb_is_refused_to_all_levels_that_may_not_use_it_and_to_no_other(
@@ -141,6 +142,7 @@ ODD = st.recursive(
 NAMES = sorted({each.name for verb in ALL for each in verb.arguments} | {"more", ""})
 
 
+@pytest.mark.faults
 @given(st.sampled_from(ALL), st.dictionaries(st.sampled_from(NAMES), ODD, max_size=4))
 def test_odd_arguments_are_answered_with_a_sentence_and_never_reach_the_target_unchecked(
     verb: Verb, args: dict[str, Any]

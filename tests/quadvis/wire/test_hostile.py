@@ -31,6 +31,7 @@ from tests.stages import mostly_slow
 ENOUGH = 5.0  # MB by which attacks may let a target grow
 
 
+@pytest.mark.faults
 def test_a_stranger_is_turned_away_before_a_message(rig: Rig) -> None:
     with rig.raw(made_pair("eve")) as eve:
         eve.send(request("status"))
@@ -39,6 +40,7 @@ def test_a_stranger_is_turned_away_before_a_message(rig: Rig) -> None:
     assert rig.echo.calls == [] and rig.server.counts["messages"] == 0
 
 
+@pytest.mark.faults
 def test_whoever_has_no_key_or_takes_the_target_for_another_one_is_not_heard(rig: Rig) -> None:
     pair = rig.key("anna", 0)
     for key, server in ((None, None), (pair, made_pair("x").public)):
@@ -57,6 +59,7 @@ def captured(rig: Rig, pair: KeyPair) -> bytes:
         return bytes(proxy.sent)
 
 
+@pytest.mark.faults
 def test_a_session_that_is_sent_again_does_nothing(rig: Rig) -> None:
     sent = captured(rig, rig.key("anna", 0))
     heard = list(rig.echo.calls)
@@ -108,6 +111,7 @@ RAW = {
 }
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize("name", RAW)
 def test_odd_bytes_are_no_message_and_a_good_host_is_served(name: str, rig: Rig) -> None:
     rig.key("anna", 0)
@@ -123,6 +127,7 @@ def test_odd_bytes_are_no_message_and_a_good_host_is_served(name: str, rig: Rig)
     assert {name for _, name in rig.echo.calls} == {"anna"}
 
 
+@pytest.mark.faults
 def test_connections_that_show_no_key_are_bounded_and_cost_nobody_a_connection(rig: Rig) -> None:
     rig.key("anna", 0)
     rig.key("bob", 0)
@@ -151,6 +156,7 @@ def test_who_is_silent_is_not_even_accepted(rig: Rig) -> None:
         assert anna.request("status", 20)["wire"]["connections"][0] == 1
 
 
+@pytest.mark.faults
 @pytest.mark.slow
 def test_bytes_that_drip_are_cut_off(rig: Rig) -> None:
     rig.key("anna", 0)
@@ -242,6 +248,7 @@ def grown(target: TargetProcess, client: Client, attack: Any) -> float:
     return most - before
 
 
+@pytest.mark.faults
 @pytest.mark.slow
 def test_floods_of_all_kinds_are_bounded_in_memory_and_a_good_host_is_served(target: TargetProcess) -> None:
     good = target.client(0)
@@ -288,6 +295,7 @@ def test_floods_of_all_kinds_are_bounded_in_memory_and_a_good_host_is_served(tar
     good.close()
 
 
+@pytest.mark.faults
 @pytest.mark.slow
 def test_a_host_that_does_not_read_costs_little_and_nobody_else_a_sample(target: TargetProcess) -> None:
     good = target.client(0)

@@ -72,6 +72,7 @@ def test_a_text_that_is_not_utf8_is_refused() -> None:
         read_request(msgpack.packb(GOOD).replace(b"status", b"stat\xff\xfe"))
 
 
+@pytest.mark.faults
 @given(st.binary(max_size=200))
 def test_random_bytes_are_no_request_and_no_reply(data: bytes) -> None:
     for read in (read_request, read_reply):
@@ -89,6 +90,7 @@ def test_an_odd_answer_of_a_target_is_refused(data: bytes) -> None:
         read_reply(data)
 
 
+@pytest.mark.faults
 @given(st.data())
 def test_a_changed_request_is_read_or_refused(draw: st.DataObject) -> None:
     data = bytearray(msgpack.packb(GOOD | {"args": {"names": ["a", "b"], "x": 1.5}}))

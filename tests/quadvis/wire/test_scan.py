@@ -64,11 +64,13 @@ def scanned(data: bytes) -> bool:
     return True
 
 
+@pytest.mark.faults
 @given(st.binary(max_size=60))
 def test_random_bytes_are_accepted_only_if_msgpack_accepts_them(data: bytes) -> None:
     assert not scanned(data) or accepted(data)
 
 
+@pytest.mark.faults
 @given(VALUES, st.data())
 def test_a_changed_message_is_accepted_only_if_msgpack_accepts_it(value: object, draw: st.DataObject) -> None:
     data = bytearray(msgpack.packb(value))
@@ -106,6 +108,7 @@ BOMBS = {
 }
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize("name", BOMBS)
 def test_a_bomb_is_refused(name: str) -> None:
     with pytest.raises(BadError):
