@@ -12,14 +12,17 @@ from quadvis.diagram.group import Group
 from quadvis.diagram.group_files import GroupFiles
 from quadvis.diagram.names import remedy_for
 from quadvis.diagram.overrides import Overrides
+from quadvis.diagram.parameters import Params, substitute
 from quadvis.diagram.parts import Parts
 from quadvis.diagram.scope import FlatBlock, Scope
 from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec, InputSpec
 from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.ports import PORTS
 from quadvis.diagram.settings import Settings
+from quadvis.diagram.settled import settled
 from quadvis.diagram.spec import FileSpec
-from quadvis.diagram.values import file_fault, read_parameter, substitute
+from quadvis.diagram.timing import timed
+from quadvis.diagram.values import file_fault, read_parameter
 from quadvis.document import YamlNode
 from quadvis.errors import (
     UNKNOWN,
@@ -68,7 +71,9 @@ class Expansion:
         self._unknown: set[str] = set()  # paths of blocks and parts that exist, and are `UNKNOWN`
         self._count = 0
         params = {name: self._parameter(name, node) for name, node in spec[PARAMS].items()}
-        self.root = Scope("", spec, params)
+        whole = settled(params, faults)
+        self.spec = timed(spec, whole, self.overrides, faults)
+        self.root = Scope("", spec, whole)
         self._expand(self.root, (os.path.realpath(spec.path),))
         self.overrides.report_unused(lambda path: not self.knows(path), self.blocks, spec[PARAMS])
         self._report_doubled()
@@ -276,9 +281,10 @@ class Expansion:
         if block.inputs is not UNKNOWN:
             self._check_inputs(block, block.inputs or {}, spec[PORTS].inputs)
         values = self._with_taken(scope, block, spec[PARAMS], values)
-        params = {
+        params: Params = {
             name: self.groups.resolved(own, values.get(name, own)) for name, own in spec[PARAMS].items()
         }
+        params = settled(params, self.faults)
         child = Scope(f"{scope.prefix}{block.name}/", spec, params, scope, block)
         scope.children[block.name] = child
         self._expand(child, (*files, self.parts.locate(block)[1]))
