@@ -23,7 +23,7 @@ from quadvis.diagram.settled import settled
 from quadvis.diagram.spec import FileSpec
 from quadvis.diagram.timing import timed
 from quadvis.diagram.values import file_fault, read_parameter
-from quadvis.document import YamlNode
+from quadvis.document import YamlNode, YamlScalar
 from quadvis.errors import (
     UNKNOWN,
     DiagramError,
@@ -152,6 +152,8 @@ class Expansion:
         if not block.is_part:
             self._refuse_groups(block, values)
             kind = self._class(block)
+            if known(kind) and kind.free_names:
+                kind = self._named(kind, block, values)
             if known(kind):
                 values = self._with_taken(scope, block, kind.interface.params, values)
                 kind = self._with_ports(kind, block, values)
@@ -220,6 +222,28 @@ class Expansion:
         except CatalogueError as error:
             self.faults.add(block.kind_place, error.problem, error.remedy)
             return UNKNOWN
+
+    def _named(
+        self, kind: type[Block], block: BlockSpec, values: Mapping[str, YamlNode | Unknown]
+    ) -> type[Block] | Unknown:
+        """Return the class of a block to which its entry gives the names."""
+        if not known(block.parameters) or block.inputs is UNKNOWN or UNKNOWN in values.values():
+            return UNKNOWN
+        given = {
+            name: node.value if isinstance(node, YamlScalar) else node.to_python()
+            for name, node in values.items()
+            if known(node)
+        }
+        inputs = block.inputs if block.inputs is not None and known(block.inputs) else {}
+        try:
+            return kind.named(given, tuple(inputs))
+        except ParameterError as error:
+            node = values.get(error.parameter)
+            place = node.place if node is not None and known(node) else block.place
+            if error.parameter in inputs:
+                place = inputs[error.parameter].place
+            self.faults.add(place, str(error))
+        return UNKNOWN
 
     def _with_ports(
         self, kind: type[Block], block: BlockSpec, values: Mapping[str, YamlNode | Unknown]

@@ -89,6 +89,7 @@ _MEANT = {
     "math.dot": "dotproduct innerproduct",
     "math.cross": "crossproduct",
     "math.matrix_gain": "matrixmultiply matrixmultiplication statefeedback",
+    "math.expression": "fcn matlabfunction matlabfcn interpretedmatlabfunction formula equation",
     "math.function": "mathfunction trigonometricfunction roundingfunction trigonometry sin cos tan asin acos "
     "atan sinh cosh tanh exp log log10 abs sign signum square sqrt reciprocal floor ceil round fix",
     "math.atan2": "arctan2",

@@ -71,16 +71,18 @@ def _any_block(blocks: Mapping[str, type[Block]]) -> Schema:
 
 
 def _one_block(block: type[Block]) -> Schema:
-    interface = block.interface
+    interface, is_open = block.interface, bool(block.ports_from() or block.free_names)
     required = [name for name, param in interface.params.items() if param.required]
     parameters: Schema = {
-        "additionalProperties": ref("value") if block.ports_from() else False,
+        "additionalProperties": ref("value") if is_open else False,
         "properties": {name: _parameter(param) for name, param in interface.params.items()},
     }
     inputs: Schema = {
-        "additionalProperties": ref("input") if block.ports_from() else False,
+        "additionalProperties": ref("input") if is_open else False,
         "properties": {name: _input(port) for name, port in interface.inputs.items()},
-        "required": [name for name, port in interface.inputs.items() if port.default is None],
+        "required": [
+            name for name, port in interface.inputs.items() if port.default is None and not block.free_names
+        ],
     }
     found: Schema = {
         "description": inspect.getdoc(block) or "",
