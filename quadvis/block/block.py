@@ -169,6 +169,10 @@ class Block:
         paths = (getattr(self, param.name) for param in self.interface.files_read)
         return [path for path in paths if path]
 
+    def picture_lines(self) -> tuple[str, ...]:
+        """Return lines for its box in a picture of the diagram, such as the transitions of a machine."""
+        return ()
+
     def doubts(self) -> list[ParameterError]:
         """Return the warnings: values that can run, but are surely a mistake at ``self.period`` (s)."""
         return []

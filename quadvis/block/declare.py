@@ -158,7 +158,7 @@ class Param(Declared):
     may change between ticks of a run. A value of type ``file`` is a path relative to the diagram. It names a
     file or folder that the block reads, or writes if ``writes=True``. A value of type ``port`` is the path of
     a serial port, ``udp:HOST:PORT``, what the driver of a card takes, or ``pty:NAME``: one end of a cable
-    that a real-time run makes.
+    that a real-time run makes. A value of type ``map`` is a map or a list; the block has it as JSON.
     """
 
     def __init__(
@@ -181,7 +181,8 @@ class Param(Declared):
         self.default, self.tune = default.name if isinstance(default, enum.Enum) else default, tune
         self.min, self.max, self.above, self.below = min, max, above, below
         self.is_file, self.is_port = type == "file", type == "port"
-        self.is_text = type in ("str", "file", "port")
+        self.is_map = type == "map"
+        self.is_text = type in ("str", "file", "port", "map")
         super().__init__("int64" if self.choices or self.is_text else type, unit, doc=doc)
         if self.is_text:
             self.type, self.signal = type, SignalType("str", ())

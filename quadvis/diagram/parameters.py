@@ -58,10 +58,21 @@ def substitute(node: YamlNode, params: Params | None, faults: Faults) -> YamlNod
         )
         return faults.read(_spread, value, unit, node.key) if known(value) else UNKNOWN
     if not any(key in node for key in QUANTITY_KEYS):
-        return node  # no value at all: its reader will report this
+        return _substituted_map(node, params, faults)
     node = node.fields(QUANTITY_KEYS[:1], QUANTITY_KEYS[1:], faults)
     value = substitute(node["value"], params, faults) if "value" in node else UNKNOWN
     return faults.read(_spread, value, node.get("unit"), node.key) if known(value) else UNKNOWN
+
+
+def _substituted_map(node: YamlMap, params: Params | None, faults: Faults) -> YamlNode | Unknown:
+    """Return a map of values, each with its parameters; its reader will report one that is no value."""
+    if not named_parameters(node):
+        return node
+    values = {key: substitute(value, params, faults) for key, value in node.values.items()}
+    whole = {key: value for key, value in values.items() if known(value)}
+    if len(whole) < len(values):
+        return UNKNOWN
+    return YamlMap(node.keys, whole, node.file, node.line, node.column, node.key)
 
 
 def _parameter(node: YamlScalar, params: Params | None, faults: Faults) -> YamlNode | Unknown:

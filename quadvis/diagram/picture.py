@@ -11,6 +11,8 @@ from quadvis.links.link import Link
 from quadvis.links.twin import ReceiverTwin
 from quadvis.output.draw import DrawnBlock, DrawnWire, draw
 
+MOST_LINES, LONGEST_LINE = 24, 60  # at the foot of a box
+
 
 def draw_diagram(diagram: Diagram) -> str:
     """Return a picture of a diagram as SVG."""
@@ -27,8 +29,8 @@ def draw_diagram(diagram: Diagram) -> str:
             continue
         interface = node.block.interface
         shown = [port for port in interface.inputs if _is_drawn(node, port)]
-        drawn = DrawnBlock(node.path, node.kind, tuple(shown), tuple(interface.outputs), node.task.name)
-        blocks.append(drawn)
+        outputs, lines = tuple(interface.outputs), tuple(map(_short, node.block.picture_lines()[:MOST_LINES]))
+        blocks.append(DrawnBlock(node.path, node.kind, tuple(shown), outputs, node.task.name, lines))
         for port in shown:
             source = node.inputs[port]
             if isinstance(source, Wire):
@@ -37,6 +39,10 @@ def draw_diagram(diagram: Diagram) -> str:
                 constants[node.path, port] = constant_text(node, port, source.value)
     tasks = {task.name: rate_text(task) for task in diagram.graph.tasks}
     return draw(diagram.name, blocks, wires, constants, tasks)
+
+
+def _short(line: str) -> str:
+    return line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 1]}…"
 
 
 def _kind(link: Link) -> str:

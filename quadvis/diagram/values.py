@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,8 @@ def read_parameter(param: Param, node: YamlNode, diagram: Path | None = None) ->
         if param.writes and diagram is not None and text:
             return str(named_output(text, node.file, diagram)), ()
         return (str(named_file(text, node.file)) if text else ""), ()
+    if param.is_map:
+        return node.text() if isinstance(node, YamlScalar) else json.dumps(node.to_python()), ()
     if param.is_text:
         return node.text(), ()
     if param.choices:

@@ -97,6 +97,7 @@ _MEANT = {
     "math.min_max": "minmax minimum maximum min max extremum",
     "math.modulo": "mod rem remainder fmod",
     "math.convert": "datatypeconversion conversion cast typecast",
+    "logic.state_machine": "stateflow chart statechart fsm finitestatemachine statetransitiontable",
     "logic.compare": "relationaloperator relational comparison comparetoconstant comparetozero",
     "logic.gate": "logicaloperator logical and or not xor nand nor",
     "logic.switch": "ifelse selectsignal",

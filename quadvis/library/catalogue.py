@@ -22,6 +22,7 @@ from types import ModuleType
 from quadvis.block import Block
 from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.errors.caller import as_given
+from quadvis.errors.synonyms import synonym
 from quadvis.library.own_package import OwnPackage
 
 STANDARD = "quadvis_blocks"
@@ -62,7 +63,8 @@ class Catalogue:
     def _find(self, name: str) -> type[Block]:
         match = NAME.fullmatch(name)
         if match is None:
-            remedy = "write group.block, such as signal.derivative"
+            near = synonym(name, self.names())
+            remedy = f"did you mean '{near}'?" if near else "write group.block, such as signal.derivative"
             raise CatalogueError(f"'{name}' is not a block name", remedy)
         if match["library"]:
             return self._in_library(match["library"], match["path"], name)

@@ -12,10 +12,12 @@ import keyword
 import linecache
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from quadvis.block import Block, In, Out
 from quadvis.block.interface import RESERVED
 from quadvis.units.expression import COMPARISONS, Call, Number, Symbol, Tree
 from quadvis_blocks._expressions import functions
@@ -37,23 +39,45 @@ _MOST_SQUARES = 8  # whole powers up to this one are written as products
 
 
 def is_name(name: str) -> bool:
-    """Say whether a name can stand in a function."""
-    return not keyword.iskeyword(name) and not name.startswith("_") and name not in RESERVED
+    """Say whether a signal can have a name, which stands in a function."""
+    return not keyword.iskeyword(name) and not name.startswith("_") and name not in ("self", "time")
+
+
+def is_parameter(name: str) -> bool:
+    """Say whether a parameter can have a name, which is an attribute of the block."""
+    return is_name(name) and name not in RESERVED
+
+
+def with_signals(
+    kind: type[Block],
+    function: Any,
+    asked: Sequence[str],
+    inputs: Mapping[str, In],
+    outputs: Mapping[str, Out],
+) -> type[Block]:
+    """Return a class with these ports, which are no attributes: a signal may have any name."""
+    for name, port in (*inputs.items(), *outputs.items()):
+        port.name = name
+    made: Any = kind
+    made.output = function
+    arguments = {**kind.interface.arguments, "output": tuple(asked)}
+    made.interface = replace(kind.interface, inputs=inputs, outputs=outputs, arguments=arguments)
+    return kind
 
 
 class CodeWriter:
     """Writes expressions as text; ``constants`` are the numbers that it has met (SI)."""
 
-    def __init__(self, words: Mapping[str, str]) -> None:
-        """``words`` say what stands for each name."""
-        self.words = words
+    def __init__(self, words: Mapping[str, str], numbers: str = CONSTANTS) -> None:
+        """``words`` say what stands for each name, ``numbers`` what stands for the array of constants."""
+        self.words, self.numbers = words, numbers
         self.constants: list[float] = []
 
     def number(self, value: float) -> str:
         """Return what stands for a number."""
         if value not in self.constants:
             self.constants.append(value)
-        return f"{CONSTANTS}[{self.constants.index(value)}]"
+        return f"{self.numbers}[{self.constants.index(value)}]"
 
     def text(self, tree: Tree) -> str:
         """Return an expression as text."""

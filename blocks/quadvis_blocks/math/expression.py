@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import replace
 from functools import lru_cache
 from typing import Any, ClassVar
 
@@ -13,7 +12,15 @@ from quadvis.block import Block, Derived, In, Out, Param, ParameterError, copied
 from quadvis.errors import quoted
 from quadvis.units import UnitError, parse_quantity
 from quadvis.units.expression import Tree, names_of, parse_expression
-from quadvis_blocks._expressions.code import CONSTANTS, CodeWriter, elementwise, is_name, made
+from quadvis_blocks._expressions.code import (
+    CONSTANTS,
+    CodeWriter,
+    elementwise,
+    is_name,
+    is_parameter,
+    made,
+    with_signals,
+)
 from quadvis_blocks._expressions.kinds import TIME, Kinds
 
 Texts = tuple[tuple[str, str], ...]
@@ -56,6 +63,13 @@ class Expression(Block):
         base: Any = cls
         return _kind(base, formulas, values, tuple(inputs))
 
+    def picture_lines(self) -> tuple[str, ...]:
+        """Return the formulas."""
+        texts = {
+            name: getattr(self, name) for name in self.interface.params if name in self.interface.outputs
+        }
+        return tuple(f"{name} = {text}" for name, text in texts.items())
+
     def check(self) -> None:
         """Lay the numbers of the formulas down in memory."""
         if self.constants:
@@ -86,9 +100,12 @@ def _is_value(text: str) -> bool:
 def _kind(cls: Any, formulas: Texts, values: tuple[str, ...], inputs: tuple[str, ...]) -> type[Block]:
     trees = _trees(formulas, (*values, *inputs))
     used = {name for tree in trees.values() for name in names_of(tree)}
-    for name in (*dict(formulas), *values, *inputs):
+    for name in (*dict(formulas), *inputs):
         if not is_name(name):
             raise ParameterError(name, f"{quoted(name)} cannot be a name here; choose another one")
+    for name in (*dict(formulas), *values):
+        if not is_parameter(name):
+            raise ParameterError(name, f"{quoted(name)} cannot be a name under 'with'; choose another one")
     for name in values:
         if name not in used:
             raise ParameterError(name, f"no formula has {quoted(name)}; leave it out, or use it")
@@ -140,29 +157,27 @@ def _made(
     results = [(words[name], kinds.is_truth(name)) for name in trees]
     shape = "[*]" if inputs else ""
     members: dict[str, Any] = {
-        "u": None, "y": None, "output": made(elementwise(asked, values, lines, results))["output"],
-        "constants": tuple(writer.constants) or (0.0,),
+        "u": None, "y": None, "output": _nothing, "constants": tuple(writer.constants) or (0.0,),
         CONSTANTS: Derived(f"float64[{len(writer.constants) or 1}]", doc="numbers of the formulas (SI)"),
         "made_for": {}, "__doc__": cls.__doc__, "__module__": cls.__module__,
     }  # fmt: skip
-    for name in inputs:
-        truth = kinds.is_truth(name)
-        members[name] = In(_type(truth, shape), unit=_unit(kinds, name), doc="a signal of the formulas")
     for name in values:
         truth = kinds.is_truth(name)
-        unit = _unit(kinds, name)
         many = "[*?]" if inputs and not truth else ""
+        unit = _unit(kinds, name)
         members[name] = Param(None, _type(truth, many), unit, tune=True, doc="a value of the formulas")
     members |= {name: Param(type="str", doc="a formula") for name in trees}
     kind: type[Block] = type(cls.__name__, (cls,), members)
-    outputs = {
-        name: Out(_type(kinds.is_truth(name), shape), unit=_unit(kinds, name), doc="the value of a formula")
-        for name in trees
-    }
-    for name, output in outputs.items():
-        output.name = name
-    kind.interface = replace(kind.interface, outputs=outputs)
-    return kind
+    types = {name: _type(kinds.is_truth(name), shape) for name in (*inputs, *trees)}
+    units = {name: _unit(kinds, name) for name in types}
+    taken = {name: In(types[name], unit=units[name], doc="a signal of the formulas") for name in inputs}
+    given = {name: Out(types[name], unit=units[name], doc="the value of a formula") for name in trees}
+    function = made(elementwise(asked, values, lines, results))["output"]
+    return with_signals(kind, function, asked, taken, given)
+
+
+def _nothing(self: Any) -> None:
+    """Stand in for a method until the ports are there."""
 
 
 def _type(is_truth: bool, shape: str) -> str:

@@ -79,6 +79,10 @@ def test_an_output_may_use_others_in_any_order() -> None:
     assert found.e.tolist() == [0.5, 1.5]
 
 
+def test_an_input_may_be_called_as_a_method_is() -> None:
+    assert drive(block("start", "update", y="start - update"), start=[3.0], update=[1.0]).y.tolist() == [2]
+
+
 def test_a_parameter_has_a_number_for_each_element() -> None:
     assert drive(block("u", y="k * u", k=[1.0, 2.0]), u=[[3.0, 4.0]]).y[0].tolist() == [3, 8]
 
@@ -136,7 +140,7 @@ WRONG = [
     ({"y": "sine(x)"}, "'sine(x)' calls 'sine', which is not a function here; did you mean 'sin'?"),
     ({"lambda": "x + 1"}, "'lambda' cannot be a name here; choose another one"),
     ({"_y": "x + 1"}, "'_y' cannot be a name here; choose another one"),
-    ({"update": "x + 1"}, "'update' cannot be a name here; choose another one"),
+    ({"update": "x + 1"}, "'update' cannot be a name under 'with'; choose another one"),
     ({"y": "x.__class__"}, "'x.__class__' holds '.'; that is no part of one"),
 ]
 
