@@ -81,11 +81,13 @@ class Expression(Block):
 
 
 def is_formula(text: str, given: Collection[str], inputs: Collection[str]) -> bool:
-    """Say whether a text has names in it; it is a value otherwise."""
+    """Say whether a text has names in it; a quantity is a value, also if its unit is the name of an input."""
+    if text in ("true", "false") or _is_value(text):
+        return False
     try:
         return any(True for _ in names_of(parse_expression(text, (*given, *inputs, TIME))))
     except UnitError:
-        return text not in ("true", "false") and not _is_value(text)
+        return True
 
 
 def _is_value(text: str) -> bool:

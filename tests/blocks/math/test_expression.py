@@ -79,6 +79,10 @@ def test_an_output_may_use_others_in_any_order() -> None:
     assert found.e.tolist() == [0.5, 1.5]
 
 
+def test_a_quantity_is_a_value_though_its_unit_is_the_name_of_an_input() -> None:
+    assert units("s", y="k * s", k="100 V*s") == {"k": "a_0", "s": "a_1", "y": "a_0*a_1"}
+
+
 def test_an_input_may_be_called_as_a_method_is() -> None:
     assert drive(block("start", "update", y="start - update"), start=[3.0], update=[1.0]).y.tolist() == [2]
 
