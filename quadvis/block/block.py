@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Collection, Hashable, Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar, Self, TypeVar
 
@@ -43,6 +43,7 @@ class Block:
     brings_code: ClassVar[str] = ""  # the parameter whose file a run executes
     harmless: ClassVar[str] = ""  # why its writes need no safe values: "a file moves nothing"
     example: ClassVar[str] = ""  # entries under `blocks` that show its use, at the rates fast and continuous
+    free_names: ClassVar[str] = ""  # what diagrams name by themselves: "outputs, by formulas"; see `named`
     # The parameters and the numbers of inputs from which the ports were made; these numbers alone.
     made_for: ClassVar[Mapping[str, Any] | None] = None
     entry_counts: ClassVar[Mapping[str, int]] = NONE
@@ -62,6 +63,15 @@ class Block:
     def ports_from(cls) -> tuple[str, ...]:
         """Return the names of the parameters on which the ports depend, of the arguments of ``ports``."""
         return tuple(name for name in arguments_of_ports(cls) if name in cls.interface.params)
+
+    @classmethod
+    def named(cls, given: Mapping[str, Any], inputs: Collection[str]) -> type[Block]:
+        """Return the class with the names that a diagram gives, for a class with ``free_names``.
+
+        ``given`` are the parameters as plain values, texts as they are written; ``inputs`` are the wired
+        inputs. ParameterError says what is wrong.
+        """
+        return cls
 
     @classmethod
     def with_ports(cls, parameters: Mapping[str, Any], entries: Mapping[str, int] = NONE) -> type[Block]:
@@ -158,6 +168,10 @@ class Block:
         """Return the files that a run reads: the files that parameters name, and all files of a folder."""
         paths = (getattr(self, param.name) for param in self.interface.files_read)
         return [path for path in paths if path]
+
+    def picture_lines(self) -> tuple[str, ...]:
+        """Return lines for its box in a picture of the diagram, such as the transitions of a machine."""
+        return ()
 
     def doubts(self) -> list[ParameterError]:
         """Return the warnings: values that can run, but are surely a mistake at ``self.period`` (s)."""

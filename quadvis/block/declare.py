@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import math
 import operator
 import re
@@ -152,11 +153,12 @@ class Random(State):
 class Param(Declared):
     """A parameter with type, unit and bounds (``min``/``max`` inclusive, ``above``/``below`` exclusive).
 
-    A diagram must give a parameter that has no default. With ``choices`` the value is one of these names; the
-    methods see the index of the name. With ``tune=True`` the value may change between ticks of a run. A value
-    of type ``file`` is a path relative to the diagram. It names a file or folder that the block reads, or
-    writes if ``writes=True``. A value of type ``port`` is the path of a serial port, ``udp:HOST:PORT``, what
-    the driver of a card takes, or ``pty:NAME``: one end of a cable that a real-time run makes.
+    A diagram must give a parameter that has no default. With ``choices`` the value is one of these names, or
+    of those of an enumeration of Python; the methods see the index of the name. With ``tune=True`` the value
+    may change between ticks of a run. A value of type ``file`` is a path relative to the diagram. It names a
+    file or folder that the block reads, or writes if ``writes=True``. A value of type ``port`` is the path of
+    a serial port, ``udp:HOST:PORT``, what the driver of a card takes, or ``pty:NAME``: one end of a cable
+    that a real-time run makes. A value of type ``map`` is a map or a list; the block has it as JSON.
     """
 
     def __init__(
@@ -169,17 +171,19 @@ class Param(Declared):
         max: float | None = None,
         above: float | None = None,
         below: float | None = None,
-        choices: tuple[str, ...] = (),
+        choices: tuple[str, ...] | type[enum.Enum] = (),
         tune: bool = False,
         writes: bool = False,
         doc: str = "",
     ) -> None:
         self.writes = writes
-        self.default, self.choices, self.tune = default, choices, tune
+        self.choices = choices if isinstance(choices, tuple) else tuple(choices.__members__)
+        self.default, self.tune = default.name if isinstance(default, enum.Enum) else default, tune
         self.min, self.max, self.above, self.below = min, max, above, below
         self.is_file, self.is_port = type == "file", type == "port"
-        self.is_text = type in ("str", "file", "port")
-        super().__init__("int64" if choices or self.is_text else type, unit, doc=doc)
+        self.is_map = type == "map"
+        self.is_text = type in ("str", "file", "port", "map")
+        super().__init__("int64" if self.choices or self.is_text else type, unit, doc=doc)
         if self.is_text:
             self.type, self.signal = type, SignalType("str", ())
 
@@ -224,6 +228,7 @@ class Param(Declared):
         return self.signal.scalar == "float64" and self.signal.unify((), {})
 
     def _accept_choice(self, value: Any) -> int:
+        value = value.name if isinstance(value, enum.Enum) else value
         if value in self.choices:
             return self.choices.index(value)
         problem = f"{self.name} must be {self.wanted()}, got {value!r}"

@@ -34,7 +34,8 @@ TAGS = ("not_replayable", "not_restorable", "harmless")
 RESERVED = {
     "self", "time", "period", "until", "interface", "numeric", "stepwise", "functions", "example",
     "open", "close", "write_safe", "keep", "put_back", "brings_code",
-    PORTS, "ports_from", "with_ports", "made_for", "entry_counts", "with_entries",
+    PORTS, "named", "free_names", "picture_lines", "ports_from", "with_ports", "made_for", "entry_counts",
+    "with_entries",
     *CHECKS, *FILES, *METHODS, *TAGS,
 }  # fmt: skip
 
@@ -103,7 +104,11 @@ def _declarations(cls: type[Block]) -> dict[str, Declared]:
     """Return all declarations of a class; for an input of any number the inputs that stand for it."""
     found: dict[str, Declared] = {}
     for base in reversed(cls.__mro__):
-        found.update({name: value for name, value in vars(base).items() if isinstance(value, Declared)})
+        for name, value in vars(base).items():
+            if isinstance(value, Declared):
+                found[name] = value
+            elif value is None:  # taken away by a subclass
+                found.pop(name, None)
     if not cls.entry_counts:
         return found
     entries = {

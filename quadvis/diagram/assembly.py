@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from pathlib import Path
 from types import MappingProxyType
 
 from quadvis.block import Out
@@ -20,6 +21,7 @@ from quadvis.diagram.group_files import GroupFiles
 from quadvis.diagram.keys import RUN_SECTIONS
 from quadvis.diagram.knobs import find_knobs
 from quadvis.diagram.loader import read_group, read_part
+from quadvis.diagram.matrices import matrix_files
 from quadvis.diagram.outputs import check_writers
 from quadvis.diagram.parts import Parts
 from quadvis.diagram.routing import Network
@@ -83,6 +85,7 @@ class Assembly:
         written, faults = self.spec, self.faults
         spec = fill_slots(written, variant, faults)
         expansion = Expansion(spec, self.catalogue, settings, self.parts, self.groups, faults, self.kept)
+        spec = expansion.spec
         wiring = Wiring(expansion, faults)
         wiring.stand_ins = stand_ins(spec, self._outputs)
         wiring.check_ports(expansion.root)
@@ -112,7 +115,7 @@ class Assembly:
                     warn_tasks(limits, graph, faults)
         whole = spec[STOP_TIME]
         context = Context(
-            wiring, graph, stop, whole is not None and known(whole) and stop < whole, faults,
+            wiring, graph, stop, isinstance(whole, Fraction) and stop < whole, faults,
             frozenset(spec[LINKS]),
         )  # fmt: skip
         for section in RUN_SECTIONS:
@@ -121,7 +124,8 @@ class Assembly:
         check_files(spec[FILES], faults)
         seed = spec[SEED] if seed is None else _seed(seed, faults)
         listing = (*(draft.path for draft in drafts), *(link.name for link in links_of(graph)))
-        sources = (*spec.paths, *self.parts.files, *self.groups.files, *self._params)
+        matrices = map(Path, matrix_files())
+        sources = (*spec.paths, *self.parts.files, *self.groups.files, *self._params, *matrices)
         check_writers(drafts, sources, faults)
         check_devices(drafts, faults)
         check_losses(spec[COMPUTERS], drafts, faults)
@@ -165,7 +169,7 @@ def _stop_time(spec: FileSpec, given: str | float | None, faults: Faults) -> Fra
     if written is None:
         faults.add(spec.top, "key 'stop_time' is missing", f"add 'stop_time: 10 s', or give {name}")
         return Fraction(0)
-    return written if known(written) else Fraction(0)
+    return written if isinstance(written, Fraction) else Fraction(0)
 
 
 def _seed(seed: int, faults: Faults) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from quadvis.diagram.parameters import named_parameters
 from quadvis.diagram.parts import Parts
 from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec
 from quadvis.diagram.sections.computers import COMPUTERS
@@ -12,7 +13,7 @@ from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.rates import RATES
 from quadvis.diagram.sections.variants import VARIANTS
 from quadvis.diagram.spec import FileSpec
-from quadvis.diagram.values import named_parameters
+from quadvis.diagram.timing import timing_nodes
 from quadvis.errors import Faults, known
 from quadvis.graph.graph import Graph
 from quadvis.links.endpoints import links_of
@@ -29,7 +30,9 @@ def warn_parameters(spec: FileSpec, faults: Faults) -> None:
 
     Those of its base are not its own.
     """
-    used: set[str] = {name for node in spec.nodes.values() for name in named_parameters(node)}
+    params = (node for node in spec[PARAMS].values() if known(node))
+    nodes = (*spec.nodes.values(), *timing_nodes(spec), *params)
+    used: set[str] = {name for node in nodes for name in named_parameters(node)}
     for block in _blocks(spec):
         inputs = block.inputs if block.inputs is not None and known(block.inputs) else {}
         parameters = block.parameters if known(block.parameters) else {}

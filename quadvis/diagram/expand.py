@@ -12,15 +12,18 @@ from quadvis.diagram.group import Group
 from quadvis.diagram.group_files import GroupFiles
 from quadvis.diagram.names import remedy_for
 from quadvis.diagram.overrides import Overrides
+from quadvis.diagram.parameters import Params, substitute
 from quadvis.diagram.parts import Parts
 from quadvis.diagram.scope import FlatBlock, Scope
 from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec, InputSpec
 from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.ports import PORTS
 from quadvis.diagram.settings import Settings
+from quadvis.diagram.settled import settled
 from quadvis.diagram.spec import FileSpec
-from quadvis.diagram.values import file_fault, read_parameter, substitute
-from quadvis.document import YamlNode
+from quadvis.diagram.timing import timed
+from quadvis.diagram.values import file_fault, read_parameter
+from quadvis.document import YamlNode, YamlScalar
 from quadvis.errors import (
     UNKNOWN,
     DiagramError,
@@ -68,7 +71,9 @@ class Expansion:
         self._unknown: set[str] = set()  # paths of blocks and parts that exist, and are `UNKNOWN`
         self._count = 0
         params = {name: self._parameter(name, node) for name, node in spec[PARAMS].items()}
-        self.root = Scope("", spec, params)
+        whole = settled(params, faults)
+        self.spec = timed(spec, whole, self.overrides, faults)
+        self.root = Scope("", spec, whole)
         self._expand(self.root, (os.path.realpath(spec.path),))
         self.overrides.report_unused(lambda path: not self.knows(path), self.blocks, spec[PARAMS])
         self._report_doubled()
@@ -147,6 +152,8 @@ class Expansion:
         if not block.is_part:
             self._refuse_groups(block, values)
             kind = self._class(block)
+            if known(kind) and kind.free_names:
+                kind = self._named(kind, block, values)
             if known(kind):
                 values = self._with_taken(scope, block, kind.interface.params, values)
                 kind = self._with_ports(kind, block, values)
@@ -216,6 +223,28 @@ class Expansion:
             self.faults.add(block.kind_place, error.problem, error.remedy)
             return UNKNOWN
 
+    def _named(
+        self, kind: type[Block], block: BlockSpec, values: Mapping[str, YamlNode | Unknown]
+    ) -> type[Block] | Unknown:
+        """Return the class of a block to which its entry gives the names."""
+        if not known(block.parameters) or block.inputs is UNKNOWN or UNKNOWN in values.values():
+            return UNKNOWN
+        given = {
+            name: node.value if isinstance(node, YamlScalar) else node.to_python()
+            for name, node in values.items()
+            if known(node)
+        }
+        inputs = block.inputs if block.inputs is not None and known(block.inputs) else {}
+        try:
+            return kind.named(given, tuple(inputs))
+        except ParameterError as error:
+            node = values.get(error.parameter)
+            place = node.place if node is not None and known(node) else block.place
+            if error.parameter in inputs:
+                place = inputs[error.parameter].place
+            self.faults.add(place, str(error))
+        return UNKNOWN
+
     def _with_ports(
         self, kind: type[Block], block: BlockSpec, values: Mapping[str, YamlNode | Unknown]
     ) -> type[Block] | Unknown:
@@ -276,9 +305,10 @@ class Expansion:
         if block.inputs is not UNKNOWN:
             self._check_inputs(block, block.inputs or {}, spec[PORTS].inputs)
         values = self._with_taken(scope, block, spec[PARAMS], values)
-        params = {
+        params: Params = {
             name: self.groups.resolved(own, values.get(name, own)) for name, own in spec[PARAMS].items()
         }
+        params = settled(params, self.faults)
         child = Scope(f"{scope.prefix}{block.name}/", spec, params, scope, block)
         scope.children[block.name] = child
         self._expand(child, (*files, self.parts.locate(block)[1]))

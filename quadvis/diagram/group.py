@@ -51,6 +51,10 @@ class Group(YamlNode):
         """Return the group with other values of some parameters."""
         return Group({**self.entries, **entries}, self.use, self)
 
+    def settled(self, entries: Entries) -> Group:
+        """Return the group with its computed parameters; the group itself if there are none."""
+        return self if entries is self.entries else Group(entries, self.use, self)
+
     def to_python(self) -> Any:
         """Return the values by name."""
         return {name: node.to_python() for name, node in self.entries.items() if known(node)}

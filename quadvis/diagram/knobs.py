@@ -11,12 +11,13 @@ from typing import NamedTuple
 
 from quadvis.diagram.expand import Expansion
 from quadvis.diagram.group import Group
+from quadvis.diagram.parameters import named_parameters, whole_parameter
 from quadvis.diagram.scope import Scope
 from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec, InputSpec
 from quadvis.diagram.sections.links import LINKS
 from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.ports import PORTS
-from quadvis.diagram.values import named_parameters, whole_parameter
+from quadvis.diagram.timing import timing_nodes
 from quadvis.document import YamlNode
 from quadvis.document.number_lists import Numbers
 from quadvis.errors import known
@@ -156,6 +157,8 @@ def _others(scope: Scope) -> Iterator[tuple[str, YamlNode]]:
     """Yield what takes parameters of a scope besides blocks, with words for it."""
     spec = scope.spec
     yield from ((f"'{key}'", node) for key, node in spec.nodes.items())
+    if scope.parent is None:
+        yield from (("a rate, the step or the stop time", node) for node in timing_nodes(spec))
     for child in scope.parts:
         for port, given in child.spec[PORTS].defaults.items():
             if isinstance(given.source, YamlNode):

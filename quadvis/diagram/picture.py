@@ -12,6 +12,8 @@ from quadvis.links.twin import ReceiverTwin
 from quadvis.output.draw import DrawnBlock, DrawnWire, draw
 from quadvis.output.folding import DrawnPicture, folded, part_alone
 
+MOST_LINES, LONGEST_LINE = 24, 60  # at the foot of a box
+
 
 def draw_diagram(diagram: Diagram, *, part: str = "", depth: int | None = None) -> str:
     """Return a picture of a diagram, or of one of its parts, as SVG.
@@ -32,8 +34,8 @@ def draw_diagram(diagram: Diagram, *, part: str = "", depth: int | None = None) 
             continue
         interface = node.block.interface
         shown = [port for port in interface.inputs if _is_drawn(node, port)]
-        drawn = DrawnBlock(node.path, node.kind, tuple(shown), tuple(interface.outputs), node.task.name)
-        blocks.append(drawn)
+        outputs, lines = tuple(interface.outputs), tuple(map(_short, node.block.picture_lines()[:MOST_LINES]))
+        blocks.append(DrawnBlock(node.path, node.kind, tuple(shown), outputs, node.task.name, lines))
         for port in shown:
             source = node.inputs[port]
             if isinstance(source, Wire):
@@ -46,6 +48,10 @@ def draw_diagram(diagram: Diagram, *, part: str = "", depth: int | None = None) 
     picture = folded(picture, depth) if depth is not None else picture
     title = f"{diagram.name}: {part}" if part else diagram.name
     return draw(title, picture.blocks, picture.wires, picture.constants, tasks)
+
+
+def _short(line: str) -> str:
+    return line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 1]}…"
 
 
 def _kind(link: Link) -> str:

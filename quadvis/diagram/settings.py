@@ -13,15 +13,16 @@ A parameter file keeps settings under a name of their own, and may build on anot
 
 from __future__ import annotations
 
+import enum
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from quadvis.diagram.parameters import read_constant
 from quadvis.diagram.sections.forms import TEXT, Schema, map_of, ref
 from quadvis.diagram.sections.header import is_version
-from quadvis.diagram.values import read_constant
 from quadvis.document import YamlList, YamlMap, YamlNode, parse_yaml, read_yaml
 from quadvis.errors import UNKNOWN, DiagramError, Faults, Odd, Place, Unknown, known
 from quadvis.errors.caller import as_given
@@ -192,5 +193,7 @@ def value_text(value: Any) -> str:
     """Return a Python value as the command line writes it."""
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, enum.Enum):
+        return value.name
     tolist = getattr(value, "tolist", None)
     return str(tolist() if tolist else value)

@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 from quadvis.block import Out, entry_name
 from quadvis.diagram.expand import Expansion
+from quadvis.diagram.parameters import substitute
 from quadvis.diagram.reference import Reference
 from quadvis.diagram.scope import FlatBlock, Scope
 from quadvis.diagram.sections.blocks import BLOCKS, INSIDE, InputSpec
 from quadvis.diagram.sections.ports import PORTS
 from quadvis.diagram.slots import StandIn
-from quadvis.diagram.values import substitute
 from quadvis.document import YamlList, YamlNode
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known, suggestion
 from quadvis.graph.graph import Index, Wire

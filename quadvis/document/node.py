@@ -62,6 +62,10 @@ class YamlNode:
     def _described(self) -> str:
         raise NotImplementedError
 
+    def _label(self) -> str:
+        """Return how a fault of a quantity begins."""
+        return f"{quoted(self.key)}: " if self.key else ""
+
     def _scalar(self, expected: str) -> str:
         """Return the text of a scalar; lists and maps are not what was expected."""
         raise self.wrong(expected)
@@ -87,7 +91,7 @@ class YamlNode:
 
     def integer(self) -> int:
         """Return a whole decimal number that fits 64 bits."""
-        text = self._scalar("a whole number")
+        text = units.plain_text(self._scalar("a whole number"))
         if INTEGER.fullmatch(text) is None:
             value = self._unit_free("a whole number")
             round_one = value.is_integer() and abs(value) < 2**53
@@ -101,9 +105,14 @@ class YamlNode:
         return self._unit_free("a number")
 
     def _unit_free(self, expected: str) -> float:
-        text = self._scalar(expected)
+        text = units.plain_text(self._scalar(expected))
         try:
-            return units.parse_number(text)
+            number, unit = units.split_quantity(text)
+            return (
+                float(units.parse_rational(number))
+                if "/" in number and not unit
+                else units.parse_number(text)
+            )
         except UnitError as error:
             number, unit = units.split_quantity(text)
             remedy = f"leave out the unit {quoted(unit)}" if number and unit[:1].isalpha() else error.remedy
@@ -142,7 +151,7 @@ class YamlNode:
     def read(self, read: Callable[[str], _Result]) -> _Result:
         """Return the result of `read` for a quantity; its `UnitError` is raised with the place."""
         text = self._scalar("a text such as '50 ms'")
-        label = f"{quoted(self.key)}: " if self.key else ""
+        label = self._label()
         odd = first_odd(text)
         if odd is not None and meant(odd) == " ":  # odd blanks are accepted elsewhere
             raise self.fault(f"{label}{quoted(text)} holds {with_article(odd)}", replacement(odd))

@@ -89,6 +89,7 @@ _MEANT = {
     "math.dot": "dotproduct innerproduct",
     "math.cross": "crossproduct",
     "math.matrix_gain": "matrixmultiply matrixmultiplication statefeedback",
+    "math.expression": "fcn matlabfunction matlabfcn interpretedmatlabfunction formula equation",
     "math.function": "mathfunction trigonometricfunction roundingfunction trigonometry sin cos tan asin acos "
     "atan sinh cosh tanh exp log log10 abs sign signum square sqrt reciprocal floor ceil round fix",
     "math.atan2": "arctan2",
@@ -96,6 +97,7 @@ _MEANT = {
     "math.min_max": "minmax minimum maximum min max extremum",
     "math.modulo": "mod rem remainder fmod",
     "math.convert": "datatypeconversion conversion cast typecast",
+    "logic.state_machine": "stateflow chart statechart fsm finitestatemachine statetransitiontable",
     "logic.compare": "relationaloperator relational comparison comparetoconstant comparetozero",
     "logic.gate": "logicaloperator logical and or not xor nand nor",
     "logic.switch": "ifelse selectsignal",

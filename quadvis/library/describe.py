@@ -61,6 +61,7 @@ def _tags(block: type[Block]) -> dict[str, str]:
     tags = {tag.replace("_", " "): reason for tag in TAGS if (reason := getattr(block, tag))}
     names = block.ports_from()
     tags |= {"ports": f"they depend on {', '.join(names)}"} if names else {}
+    tags |= {"names": f"a diagram gives those of {block.free_names}"} if block.free_names else {}
     return tags | ({"device": _device(block)} if issubclass(block, Device) else {})
 
 

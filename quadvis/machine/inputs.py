@@ -86,6 +86,12 @@ def read_once(read: Callable[[str], _Read], path: str) -> _Read:
     return found
 
 
+def results_of(read: Callable[[str], Any]) -> list[str]:
+    """Return the files that `read_once` has read with this function, inside `noted_inputs`."""
+    noted = _noted.get()
+    return [path for function, path in noted.results if function is read] if noted is not None else []
+
+
 def note_digest(path: PathLike, digest: str) -> None:
     """Note the SHA-256 of a file's contents; QuadvisError if an earlier reading gave another one."""
     noted = _noted.get()

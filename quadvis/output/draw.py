@@ -15,6 +15,7 @@ from quadvis.output import elkjs as engine
 from quadvis.output import layers, svg
 from quadvis.output.drawing import (
     ARROW,
+    FOOT,
     INDENT,
     LINE,
     MARGIN,
@@ -27,6 +28,7 @@ from quadvis.output.drawing import (
     DrawnBlock,
     DrawnWire,
     Mark,
+    foot_height,
     last,
     row_height,
 )  # fmt: skip
@@ -162,6 +164,9 @@ def _block(drawing: Drawing, number: int, shape: Mapping[str, Any]) -> Iterator[
         yield svg.text(name, x + INDENT, y + row_height(row) + 4, PORT)
     for row, name in enumerate(block.outputs):
         yield svg.text(name, x + width - INDENT, y + row_height(row) + 4, PORT, anchor="end")
+    foot = y + shape["height"] - foot_height(block)
+    for number, text in enumerate(block.lines, 1):
+        yield svg.text(text, x + INDENT, foot + number * FOOT - 3, SMALL, fill="#333333")
     yield "</g>"
 
 

@@ -15,6 +15,7 @@ from quadvis.output import svg
 # Sizes in CSS pixels: fonts, then distances.
 TITLE, NAME, PORT, SMALL = 18.0, 13.0, 11.0, 10.0
 MARGIN, LINE, HEADER, ROW, INDENT, BETWEEN, ARROW = 24.0, 26.0, 38.0, 17.0, 7.0, 18.0, 9.0
+FOOT = 13.0  # from line to line at the foot of a box
 _LONGEST_MARK = 28
 
 # Fill and line of the solver and of each task in the order of the legend: tints on which black text stays
@@ -53,13 +54,17 @@ _OPTIONS = {
 
 @dataclass(frozen=True)
 class DrawnBlock:
-    """A box: `path` is its name with the parts around it ("vision/detector"), `kind` its type in YAML."""
+    """A box: `path` is its name with the parts around it ("vision/detector"), `kind` its type in YAML.
+
+    `lines` stand at its foot.
+    """
 
     path: str
     kind: str
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     task: str
+    lines: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -161,13 +166,14 @@ class Drawing:
         sides = block.inputs, block.outputs
         columns = [max((svg.text_width(name, PORT) for name in names), default=0.0) for names in sides]
         head = max(svg.text_width(last(block.path), NAME, bold=True), svg.text_width(block.kind, SMALL))
-        width = 2 * INDENT + max(head, sum(columns) + BETWEEN * all(columns))
+        foot = max((svg.text_width(line, SMALL) for line in block.lines), default=0.0)
+        width = 2 * INDENT + max(head, foot, sum(columns) + BETWEEN * all(columns))
         inputs = [f"b{number}.i{row}" for row in range(len(block.inputs))]
         rows = max(map(len, sides))
         return {
             "id": f"b{number}",
             "width": width,
-            "height": HEADER + rows * ROW + (4 if rows else 0),
+            "height": HEADER + rows * ROW + (4 if rows else 0) + foot_height(block),
             "layoutOptions": {"elk.portConstraints": "FIXED_POS"},
             "ports": [
                 *(_port_node(port, "WEST", -self.reach(port), row) for row, port in enumerate(inputs)),
@@ -194,6 +200,11 @@ def _part_node(path: str, parts: dict[str, dict[str, Any]]) -> dict[str, Any]:
         parts[path] = {"id": f"p{path}", "layoutOptions": options, "children": []}
         _part_node(outer, parts)["children"].append(parts[path])
     return parts[path]
+
+
+def foot_height(block: DrawnBlock) -> float:
+    """Return the height of the lines at the foot of a box."""
+    return len(block.lines) * FOOT + (INDENT if block.lines else 0.0)
 
 
 def row_height(row: int) -> float:

@@ -8,8 +8,9 @@ from typing import Any
 from quadvis.block import Param, entry_name
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.knobs import Knob
+from quadvis.diagram.parameters import read_constant
 from quadvis.diagram.settings import read_setting
-from quadvis.diagram.values import read_constant, read_value
+from quadvis.diagram.values import read_value
 from quadvis.engine.tuning import NewValue
 from quadvis.errors import Faults, Place, QuadvisError, known, quoted, sentence, suggestion
 from quadvis.graph.graph import Index, Node

@@ -8,6 +8,7 @@ from quadvis.units.quantity import (
     parse_period,
     parse_quantity,
     parse_rational,
+    plain_text,
     read_quantity,
     read_ratio,
     require_unit,
@@ -17,6 +18,6 @@ from quadvis.units.unit import Unit, advised, parse_units, unify
 
 __all__ = [
     "Unit", "UnitError", "advised", "format_quantity", "format_ratio", "parse_number",
-    "parse_period", "parse_quantity", "parse_rational", "parse_units", "read_quantity", "read_ratio",
-    "require_unit", "split_quantity", "unify",
+    "parse_period", "parse_quantity", "parse_rational", "parse_units", "plain_text", "read_quantity",
+    "read_ratio", "require_unit", "split_quantity", "unify",
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Quantities in text: "50 ms", "1/30 s", "2.5 rad/s", "90 %"."""
+"""Quantities in text: "50 ms", "1/30 s", "2.5 rad/s", "90 %", and arithmetic: "2 pi rad/s"."""
 
 from __future__ import annotations
 
@@ -14,7 +14,14 @@ from quadvis.units.unit import Unit, advised
 DECIBEL = "dB"  # of ratios alone: a logarithm is no unit, since products of it mean nothing
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _OTHER_BASE = re.compile(r"[+-]?0(?:[xX][0-9a-fA-F]|[oO][0-7]|[bB][01])")  # 0x10, but not 0 ohm
-_RATIO = re.compile(r"([0-9]+) */ *([0-9]+)(?![0-9.])")
+_RATIO = re.compile(r"([+-]?[0-9]+) */ *([0-9]+)(?![0-9.])")
+_LONGEST_ARITHMETIC = 1000  # characters
+# What only arithmetic has: pi, a function or brackets at its beginning, a sign between numbers behind one.
+_ARITHMETIC = re.compile(
+    r"[-+(\s]*(?:pi\b|[A-Za-z]\w*\()|[-+\s]*\(|[-+\s]*(?=[0-9.]).*"
+    r"(?:\bpi\b|[A-Za-z]\w*\(|[0-9A-Za-z%).]\s*(?:[-+*/^]|\*\*)\s*\(*[-+]?[0-9.]|\)\s*[-+*/^])",
+    re.ASCII,
+)
 
 
 def _exact(number: str, text: str) -> Fraction:
@@ -58,13 +65,58 @@ def _not_a_number(text: str) -> UnitError:
 
 @lru_cache(maxsize=4096)
 def split_quantity(text: str) -> tuple[str, str]:
-    """Return the number and the unit of "50 ms", "50ms", "1/30 s" or "5/s", as texts; either may be empty."""
-    plain = text.strip()
+    """Return the number and the unit of "50 ms", "50ms", "1/30 s" or "5/s", as texts; either may be empty.
+
+    Arithmetic has those of its value: "2 * 5 mm" gives 1/100 and m.
+    """
+    plain = plain_text(text).strip()
     match = _RATIO.match(plain) or _NUMBER.match(plain)
     if match is None:
         return "", plain
     unit = plain[match.end() :].strip()
     return match.group(), f"1{unit}" if unit[:1] == "/" else unit
+
+
+@lru_cache(maxsize=4096)
+def plain_text(text: str) -> str:
+    """Return a quantity without arithmetic: "pi/2 rad" is "1.5707963267948966 rad"; others as they are."""
+    if not _is_arithmetic(text):
+        return text
+    from quadvis.units.arithmetic import arithmetic  # most commands need none
+
+    try:
+        return arithmetic(text).text
+    except UnitError:
+        return text
+
+
+def arithmetic_fault(text: str) -> UnitError | None:
+    """Return what is wrong with a text that is surely meant as arithmetic, if anything."""
+    if not _is_arithmetic(text):
+        return None
+    from quadvis.units.arithmetic import arithmetic
+
+    try:
+        arithmetic(text)
+    except UnitError as error:
+        return error
+    return None
+
+
+def _is_arithmetic(text: str) -> bool:
+    """Say whether a text is meant as arithmetic, and is no plain quantity."""
+    if len(text) > _LONGEST_ARITHMETIC or _ARITHMETIC.match(text) is None:
+        return False
+    plain = text.strip()
+    match = _RATIO.match(plain) or _NUMBER.match(plain)
+    if match is None:
+        return True
+    unit = plain[match.end() :].strip()
+    try:
+        Unit.parse(f"1{unit}" if unit[:1] == "/" else unit or "1")
+    except UnitError:
+        return True
+    return False
 
 
 def parse_quantity(text: str) -> tuple[float, Unit]:
@@ -185,6 +237,9 @@ def _likely(value: float, unit: Unit) -> str:
 @lru_cache(maxsize=4096)
 def _parts(text: str, *wanted: Unit | None) -> tuple[Fraction, Unit]:
     """Return the number and the unit of a text; advice on a wrong text depends on the wanted units."""
+    wrong = arithmetic_fault(text)
+    if wrong is not None:
+        raise wrong
     number, unit = split_quantity(text)
     if not number:
         raise UnitError(f"{quoted(text)} does not begin with a number", "write it as in '50 ms'")

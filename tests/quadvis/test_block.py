@@ -1,3 +1,4 @@
+import enum
 import math
 
 import numpy as np
@@ -19,6 +20,7 @@ from quadvis.block import (
     Work,
     units_of,
 )
+from quadvis.diagram.settings import setting_texts
 
 
 class Filter(Block):
@@ -332,3 +334,26 @@ def test_only_a_state_holds_several_frames(kind: type) -> None:
         TypeError, match=rf"{kind.__name__} cannot be 'frame\[2\]': only a state .*; write frame"
     ):
         kind("frame[2]")
+
+
+class Colour(enum.Enum):
+    """Choices from Python."""
+
+    RED = "r"
+    GREEN = "g"
+
+
+class Lamp(Block):
+    """A block with an enumeration of Python."""
+
+    colour = Param(Colour.GREEN, choices=Colour, doc="colour")
+
+
+def test_an_enumeration_gives_the_choices():
+    assert Lamp.interface.params["colour"].choices == ("RED", "GREEN")
+    assert [Lamp().colour, Lamp(colour="RED").colour, Lamp(colour=Colour.GREEN).colour] == [1, 0, 1]
+    with pytest.raises(
+        ParameterError, match="colour must be one of RED, GREEN, got 'RAD'; did you mean 'RED'"
+    ):
+        Lamp(colour="RAD")
+    assert setting_texts({"lamp.colour": Colour.RED}) == ("lamp.colour=RED",)

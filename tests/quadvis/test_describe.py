@@ -113,7 +113,8 @@ def test_the_facts_are_plain_json() -> None:
 
 @pytest.mark.parametrize("name", Catalogue().names())
 def test_every_default_reads_back_as_it_is(name: str) -> None:
-    from quadvis.diagram.values import read_constant, read_parameter
+    from quadvis.diagram.parameters import read_constant
+    from quadvis.diagram.values import read_parameter
 
     block = Catalogue().find(name)
     for param in block.interface.params.values():

@@ -355,6 +355,27 @@ def test_blocks_without_wires_are_drawn_apart() -> None:
     assert_texts_apart(picture)
 
 
+def test_lines_stand_at_the_foot_of_a_box_below_its_ports() -> None:
+    lines = ("idle → run: level > high", "run → idle: after 0.2 s, a condition that is longer than the ports")
+    plain, tall = (
+        DrawnBlock("mode", "logic.x", ("u",), ("y", "z"), next(iter(TASKS)), each) for each in ((), lines)
+    )
+    boxes = []
+    for block in (plain, tall):
+        picture = ElementTree.fromstring(draw("machine", [block], [], {}, TASKS))
+        group = next(each for each in picture.iter(f"{SVG}g") if each.get("data-path") == "mode")
+        box = next(group.iter(f"{SVG}rect"))
+        boxes.append((group, *(float(box.get(key, "0")) for key in ("x", "y", "width", "height"))))
+    (_, _, _, width, height), (group, x, y, wide, high) = boxes
+    assert wide > width
+    assert high > height + 20
+    texts = {each.text: each for each in group.iter(f"{SVG}text")}
+    ports = max(float(texts[name].get("y", "0")) for name in ("u", "y", "z"))
+    feet = [float(texts[line].get("y", "0")) for line in lines]
+    assert ports < feet[0] < feet[1] < y + high
+    assert all(float(texts[line].get("x", "0")) > x for line in lines)
+
+
 def test_a_block_wired_to_itself_is_drawn() -> None:
     blocks = [block("integrator", "u", "y"), block("sink", "u")]
     wires = [DrawnWire("integrator.y", "integrator", "u", "delay"), DrawnWire("integrator.y", "sink", "u")]

@@ -14,6 +14,7 @@ from quadvis.library.describe import default_text, first_line
 BLOCK_KEYS = ("block", "part", "rate", "at", "slot", "stream", GROUP_KEY, "with", "in")
 WIRE_KEYS = ("from", "across", "over", "initial")
 GROUP_NAME: Schema = {"type": "string", "pattern": r"^\$[A-Za-z_][A-Za-z0-9_]*$"}
+MAPS: Schema = {"type": "object", "additionalProperties": {"type": "object"}}  # states and their values
 LIBRARY_BLOCK: Schema = {
     "type": "string",
     "pattern": "^[a-z][a-z0-9_]*:",
@@ -53,7 +54,7 @@ def _any_block(blocks: Mapping[str, type[Block]]) -> Schema:
             "anyOf": [GROUP_NAME, {"type": "array", "items": GROUP_NAME}],
             "description": "groups whose values it takes for its parameters of the same names",
         },
-        "with": map_of(ref("value"), "parameters"),
+        "with": map_of({"anyOf": [ref("value"), MAPS]}, "parameters"),
         "in": map_of(ref("input"), "inputs: block.port, a constant, or {from: block.port, across: hold}"),
     }
     cases = [
@@ -71,16 +72,21 @@ def _any_block(blocks: Mapping[str, type[Block]]) -> Schema:
 
 
 def _one_block(block: type[Block]) -> Schema:
-    interface = block.interface
+    interface, is_open = block.interface, bool(block.ports_from() or block.free_names)
     required = [name for name, param in interface.params.items() if param.required]
     parameters: Schema = {
-        "additionalProperties": ref("value") if block.ports_from() else False,
-        "properties": {name: _parameter(param) for name, param in interface.params.items()},
+        "additionalProperties": ref("value") if is_open else False,
+        "properties": {
+            name: {"description": _words(param)} if block.free_names else _parameter(param)
+            for name, param in interface.params.items()
+        },
     }
     inputs: Schema = {
-        "additionalProperties": ref("input") if block.ports_from() else False,
+        "additionalProperties": ref("input") if is_open else False,
         "properties": {name: _input(port) for name, port in interface.inputs.items()},
-        "required": [name for name, port in interface.inputs.items() if port.default is None],
+        "required": [
+            name for name, port in interface.inputs.items() if port.default is None and not block.free_names
+        ],
     }
     found: Schema = {
         "description": inspect.getdoc(block) or "",
@@ -105,6 +111,8 @@ def _parameter(param: Param) -> Schema:
     if param.choices:
         # A parameter of the diagram may stand in for the word.
         found["anyOf"] = [{"enum": list(param.choices)}, {"type": "string", "pattern": r"^\$"}]
+    elif param.is_map:
+        found |= {"type": ["object", "array", "string"]}
     elif param.is_text:
         found |= TEXT
     else:

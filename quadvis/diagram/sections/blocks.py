@@ -6,17 +6,19 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from quadvis.block import Block
+from quadvis.diagram.computed import is_computed
 from quadvis.diagram.entries import PATH, refuse_name, with_clean_names
 from quadvis.diagram.group import GROUP_KEY
+from quadvis.diagram.parameters import QUANTITY_KEYS
 from quadvis.diagram.reference import Reference, read_reference
 from quadvis.diagram.sections.block_schema import BLOCK_KEYS, WIRE_KEYS, block_definitions
 from quadvis.diagram.sections.block_text import resolved_block
 from quadvis.diagram.sections.forms import Schema, map_of, ref
 from quadvis.diagram.sections.section import DIAGRAM, PART, Checked, FileSection
-from quadvis.diagram.values import QUANTITY_KEYS
 from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown, closest, known
 from quadvis.graph.graph import CROSSINGS
+from quadvis.units import plain_text
 
 INSIDE = "in"  # the name of a part's inputs for its blocks
 
@@ -169,8 +171,11 @@ def _names_signal(node: YamlNode) -> bool:
 
 
 def is_reference(text: str) -> bool:
-    """Say whether an input's text is meant as a signal: no number, truth value or ``$name``."""
-    return (text[:1].isalpha() or text[:1] == "_") and text not in ("true", "false")
+    """Say whether an input's text is meant as a signal: no number, truth value, ``$name`` or arithmetic."""
+    is_name = (text[:1].isalpha() or text[:1] == "_") and text not in ("true", "false")
+    if not is_name or not ("$" in text or "(" in text or text.startswith("pi")):
+        return is_name
+    return not is_computed(text) and plain_text(text) == text
 
 
 class BlocksSection(FileSection[Blocks]):

@@ -9,10 +9,10 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
+from quadvis.diagram.parameters import named_parameters, substitute
 from quadvis.diagram.reference import Reference, read_reference
 from quadvis.diagram.sections.section import Said, Section, Values
 from quadvis.diagram.times import time_text
-from quadvis.diagram.values import substitute
 from quadvis.diagram.wiring import OpenInput, Wiring
 from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known, suggestion
@@ -99,7 +99,7 @@ class Context:
         values = dict(fields.values)
         for key in keys:
             node = fields.get(key)
-            if not isinstance(node, YamlScalar) or not node.value.startswith("$"):
+            if not isinstance(node, YamlScalar) or not named_parameters(node):
                 continue
             found = substitute(node, self.wiring.expansion.root.params, self.faults)
             if known(found):

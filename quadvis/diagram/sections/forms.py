@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from quadvis.diagram.values import QUANTITY_KEYS
+from quadvis.diagram.matrices import FILE_KEYS
+from quadvis.diagram.parameters import QUANTITY_KEYS
 from quadvis.graph.names import PATTERN
 
 Schema = dict[str, Any]
 
 TEXT: Schema = {"type": ["string", "number", "boolean"]}  # any scalar is a text where one is wanted
 QUANTITY: Schema = {"type": ["string", "number"]}
-CONSTANT: Schema = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": r"^[-+.$\d]"}]}
+CONSTANT: Schema = {
+    "anyOf": [{"type": "number"}, {"type": "string", "pattern": r"^([-+.$(\d]|pi\b|[A-Za-z]\w*\()"}]
+}
 NAME: Schema = {"pattern": "^[A-Za-z_][A-Za-z0-9_/]*$"}
 SIGNAL: Schema = {**TEXT, "pattern": f"^{PATTERN}$", "description": "block.port"}
 
@@ -51,5 +54,14 @@ VALUES: tuple[Schema, ...] = (
     {"type": "boolean"},
     {"type": "array"},
     closed(QUANTITY_KEYS, {"value": {}, "unit": TEXT}, ["value"]),
+    closed(
+        FILE_KEYS,
+        {
+            "file": {**TEXT, "description": "file of a matrix: .csv, .npy, .npz, .mat or .yaml"},
+            "name": {**TEXT, "description": "which array of the file"},
+            "unit": TEXT,
+        },
+        ["file"],
+    ),
 )
 COMMON: Mapping[str, Schema] = {"signal": SIGNAL, "value": {"anyOf": list(VALUES)}}  # what all may refer to

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 from quadvis.diagram.entries import named_entries
+from quadvis.diagram.parameters import substitute
 from quadvis.diagram.sections.forms import CONSTANT, QUANTITY, TEXT, Schema, closed, map_of, ref
 from quadvis.diagram.sections.section import Checked, FileSection
 from quadvis.diagram.times import read_duration
-from quadvis.diagram.values import substitute
 from quadvis.document import YamlMap, YamlNode
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known
 from quadvis.links.endpoints import links_of

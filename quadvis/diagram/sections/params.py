@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from quadvis.diagram.entries import named_entries
 from quadvis.diagram.group import GROUP_KEY
+from quadvis.diagram.parameters import named_parameters, read_constant
 from quadvis.diagram.sections.forms import TEXT, Schema, closed, map_of, ref
 from quadvis.diagram.sections.section import DIAGRAM, GROUP, PART, FileSection
-from quadvis.diagram.values import read_constant
 from quadvis.document import YamlNode
 from quadvis.errors import Faults, Unknown
 
@@ -24,11 +24,11 @@ class ParamsSection(FileSection[Params]):
     kinds = (DIAGRAM, PART, GROUP)
 
     def read(self, node: YamlNode | None, faults: Faults) -> Params:
-        """Return the values with their units."""
+        """Return the values with their units; those that name other parameters as they are written."""
         found: Params = {}
         for name, value in named_entries(node, "parameter", faults):
             with faults.about(f"parameter '{name}'"):
-                found[name] = read_constant(value, faults)
+                found[name] = value if named_parameters(value) else read_constant(value, faults)
         return found
 
     def schema(self) -> Schema:

@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 from quadvis.diagram.entries import named_entries
+from quadvis.diagram.parameters import named_parameters
 from quadvis.diagram.sections.forms import QUANTITY, Schema, closed, map_of, ref
 from quadvis.diagram.sections.section import Checked, FileSection
 from quadvis.diagram.times import read_duration, read_period
@@ -19,11 +20,16 @@ RATE_KEYS = ("rate", "offset")
 
 @dataclass(frozen=True)
 class Rate:
-    """When blocks run: period and offset (s), and where that is written."""
+    """When blocks run: period and offset (s), and where that is written.
+
+    ``node`` is there if the period or the offset is a parameter, which `timing` reads; until then any number
+    stands for the period.
+    """
 
     period: Fraction
     offset: Fraction = Fraction(0)
     place: Place = field(default=Place(""), compare=False)
+    node: YamlNode | None = field(default=None, compare=False)
 
 
 Rates = dict[str, Rate | Unknown]
@@ -42,17 +48,25 @@ def read_rate(node: YamlNode) -> Rate:
     return Rate(period, offset or Fraction(0), node.place)
 
 
+def _open_rate(node: YamlNode) -> Rate:
+    return Rate(Fraction(1), place=node.place, node=node)
+
+
 class RatesSection(FileSection[Rates]):
     """The rates of a diagram, by name."""
 
     key = "rates"
-    words = "named rates: `20 Hz`, `50 ms`, `1/30 s`, or `{rate: 10 Hz, offset: 70 ms}`; exact, no rounding"
+    words = (
+        "named rates: `20 Hz`, `50 ms`, `1/30 s`, or `{rate: 10 Hz, offset: 70 ms}`; exact, no rounding; "
+        "or `$name` of a parameter; `--set rates.name=...` replaces one"
+    )
 
     def read(self, node: YamlNode | None, faults: Faults) -> Rates:
         """Return periods and offsets."""
         found: Rates = {}
         for name, value in named_entries(node, "rate", faults):
-            found[name] = faults.read(read_rate, value)
+            is_open = bool(named_parameters(value))
+            found[name] = _open_rate(value) if is_open else faults.read(read_rate, value)
             if name == CONTINUOUS:
                 remedy = "choose another name, or set 'solver: {step: ...}'"
                 faults.add(value.place, "'continuous' is the rate of the solver", remedy)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Any, NamedTuple
 
+from quadvis.diagram.parameters import named_parameters
 from quadvis.diagram.sections.forms import QUANTITY, Schema, closed
 from quadvis.diagram.sections.section import Checked, FileSection
 from quadvis.diagram.times import read_step
@@ -17,18 +18,25 @@ METHOD = "ode4"  # where none is written
 
 
 class SolverSpec(NamedTuple):
-    """The method and the step (s) of the solver, and where the step is written."""
+    """The method and the step (s) of the solver, and where the step is written.
+
+    ``node`` is the step as it is written; if that names a parameter, `timing` reads it.
+    """
 
     method: str = METHOD
     step: Fraction | Unknown | None = None
     place: Place | None = None
+    node: YamlNode | None = None
 
 
 class SolverSection(FileSection[SolverSpec]):
     """The solver of a diagram."""
 
     key = "solver"
-    words = "`{method: ode1 to ode4, step: 5 ms}` for continuous blocks; the step divides every period"
+    words = (
+        "`{method: ode1 to ode4, step: 5 ms}` for continuous blocks; the step divides every period, "
+        "and may be a parameter, `$name`; `--set solver.step=...` replaces it"
+    )
 
     def read(self, node: YamlNode | None, faults: Faults) -> SolverSpec:
         """Return method and step."""
@@ -38,8 +46,9 @@ class SolverSection(FileSection[SolverSpec]):
         method = faults.collect(fields["method"].choice, SOLVERS) if "method" in fields else None
         if "step" not in fields:
             return SolverSpec(method or METHOD)
-        step = faults.read(read_step, fields["step"])
-        return SolverSpec(method or METHOD, step, fields["step"].place)
+        written = fields["step"]
+        step = UNKNOWN if named_parameters(written) else faults.read(read_step, written)
+        return SolverSpec(method or METHOD, step, written.place, written)
 
     def schema(self) -> Schema:
         """Return the schema: method and step."""

@@ -1,0 +1,106 @@
+"""Arrays out of files: NumPy's and MATLAB's own writers, and damaged and foreign files."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.io import savemat
+
+from quadvis.document.array_file import chosen, read_arrays
+from quadvis.errors import QuadvisError
+
+K = np.array([[1.0, -2.5, 1e-7], [4, 5, 1 / 3]])
+
+
+def _write(folder: Path, name: str) -> str:
+    path = folder / name
+    if path.suffix == ".npz":
+        np.savez(path, K=K, v=K[0], words=np.array([1, 2]))
+    elif path.suffix == ".npy":
+        np.save(path, K)
+    elif path.suffix == ".mat":
+        savemat(path, {"K": K, "v": K[0], "title": "gains", "one": {"x": 1}})
+    elif path.suffix == ".yaml":
+        path.write_text(f"quadvis: 1\nK: {K.tolist()}\nv: {K[0].tolist()}\nname: gains\n")
+    else:
+        np.savetxt(path, K, delimiter=",", fmt="%.17g", header="x,y,z", comments="")
+    return str(path)
+
+
+@pytest.mark.parametrize("name", ["k.npz", "k.mat", "k.yaml"])
+def test_arrays_have_names(name: str, tmp_path: Path) -> None:
+    found = read_arrays(_write(tmp_path, name))
+    assert np.array_equal(chosen(found, "K"), K)
+    assert np.array_equal(np.ravel(chosen(found, "v")), K[0])
+    with pytest.raises(QuadvisError, match="it has no array 'k'; did you mean 'K'"):
+        chosen(found, "k")
+    with pytest.raises(QuadvisError, match="it has several arrays; add 'name:' with one of"):
+        chosen(found, None)
+
+
+@pytest.mark.parametrize("name", ["k.npy", "k.csv"])
+def test_a_single_array_needs_no_name(name: str, tmp_path: Path) -> None:
+    assert np.array_equal(chosen(read_arrays(_write(tmp_path, name)), None), K)
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", "  "])
+def test_tables_have_columns_by_name(separator: str, tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text(f"# a table\nx{separator}y\n1{separator}2\n\n3{separator}4.5\n")
+    found = read_arrays(str(path))
+    assert chosen(found, None).tolist() == [[1, 2], [3, 4.5]]
+    assert chosen(found, "y").tolist() == [2, 4.5]
+
+
+@pytest.mark.parametrize(
+    ("name", "contents", "words"),
+    [
+        ("k.txt", b"1", "the arrays of a '.txt' file cannot be read; give one of .csv, .npy, .npz, .mat"),
+        ("k.csv", b"1,2\n3\n", "its lines are not equally long rows of numbers"),
+        ("k.csv", b"a,b\n1,secret\n", "its lines are not all rows of numbers"),
+        ("k.csv", b"", "its lines are not equally long rows of numbers"),
+        ("k.npy", b"\x93NUMPY", "it is no .npy file that can be read: ValueError"),
+        ("k.npz", b"PK", "it is no .npz file that can be read: BadZipFile"),
+        ("k.mat", b"MATLAB 7.3 MAT-file, ", "it is of version 7.3; save it with '-v7'"),
+        ("k.yaml", b"a: [1, secret]\n", "it has no lists of numbers under names"),
+        ("k.yaml", b"a: [[1, 2], [3]]\n", "it has no lists of numbers under names"),
+    ],
+)  # fmt: skip
+def test_what_is_no_array_is_refused_unquoted(name: str, contents: bytes, words: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    path.write_bytes(contents)
+    with pytest.raises(QuadvisError, match=re.escape(words)) as caught:
+        read_arrays(str(path))
+    assert "secret" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "array", [np.array([1.0, np.nan]), np.array([1j]), np.zeros((0, 2)), np.array(["a"])]
+)
+def test_arrays_that_are_no_numbers_are_refused(array: Any, tmp_path: Path) -> None:
+    np.save(tmp_path / "k.npy", array)
+    with pytest.raises(QuadvisError, match=r"not finite|no real numbers|shape"):
+        read_arrays(str(tmp_path / "k.npy"))
+
+
+def test_pickles_are_not_read(tmp_path: Path) -> None:
+    np.save(tmp_path / "k.npy", np.array([{}], dtype=object), allow_pickle=True)
+    with pytest.raises(QuadvisError, match=r"it is no \.npy file"):
+        read_arrays(str(tmp_path / "k.npy"))
+
+
+@given(kind=st.sampled_from(["csv", "npy", "npz", "mat", "yaml"]), data=st.binary(max_size=200))
+def test_damaged_files_end_in_a_sentence(kind: str, data: bytes) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, f"k.{kind}")
+        path.write_bytes(data)
+        with contextlib.suppress(QuadvisError):
+            read_arrays(str(path))
