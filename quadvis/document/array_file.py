@@ -129,7 +129,7 @@ def _npz(data: bytes) -> Mapping[str, Any]:
 def _mat(data: bytes) -> Mapping[str, Any]:
     if data[:10] == b"MATLAB 7.3":
         raise QuadvisError(sentence("it is of version 7.3", "save it with '-v7'"))
-    from scipy.io import loadmat  # type: ignore[import-untyped]
+    from scipy.io import loadmat
 
     found: dict[str, Any] = loadmat(io.BytesIO(data))
     arrays = {name: array for name, array in found.items() if hasattr(array, "dtype")}
