@@ -189,7 +189,8 @@ def test_a_command_that_ends_in_an_error_has_no_time() -> None:
 
 def test_every_numeric_block_of_the_library_can_be_made_to_be_compiled() -> None:
     catalogue = Catalogue()
-    numeric = [block for block in map(catalogue.find, catalogue.names()) if block.numeric]
+    blocks = map(catalogue.find, catalogue.names())
+    numeric = [block for block in blocks if block.numeric and not block.example]
     required = {name for block in numeric for name, param in block.interface.params.items() if param.required}
     assert required <= whole_library.VALUES.keys()
 
