@@ -36,8 +36,8 @@ RADIO = SbusOut(
     safe=[IDLE] * 4,
 )  # fmt: skip
 INITIAL, SAFE = RADIO.initial_frame(), RADIO.safe_frame()
-# A loop that is held up for a second by other programs goes on, and its outputs keep their values meanwhile.
-LASTING = "{max: 1000000, consecutive: 100}"
+# A loop that is held up for seconds by other programs goes on, and its outputs keep their values meanwhile.
+LASTING = "{max: 1000000, consecutive: 1000}"
 TEXT = """\
 quadvis: 1
 name: bench

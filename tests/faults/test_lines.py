@@ -167,8 +167,7 @@ def no_wrong_command_is_accepted(flown: Bench) -> None:
     """Check the commands from the radio."""
     sent = np.array([frame_command(frame) for frame in flown.frames])
     held = flown.log
-    counts = held["receiver/receiver.heard"] & ~held["receiver/receiver.lost"]
-    came = held["receiver/receiver.command"][counts]
+    came = held["receiver/receiver.command"][held["receiver/receiver.good"]]
     assert one_of(np.round(came, 9), np.round(sent, 9)).all() and len(came) > 500
     assert held["receiver/receiver.refused"][-1] > 10
 

@@ -291,7 +291,7 @@ def test_floods_of_all_kinds_are_bounded_in_memory_and_a_good_host_is_served(tar
     for attack in (requests, long_messages, too_long, connections, strangers):
         assert grown(target, good, attack) < ENOUGH, attack.__name__
     counts = good.request("status", 20)["wire"]["counts"]
-    assert counts["dropped"] > 1000 and counts["turned away"] > 5 and counts["malformed"] > 0
+    assert counts["dropped"] > 100 and counts["turned away"] > 5 and counts["malformed"] > 0
     good.close()
 
 
