@@ -88,8 +88,13 @@ def _checked(parser: Parser, words: Sequence[str]) -> list[str]:
             named = [str(each) for each in place.choices]
             remedy = suggestion(word, named) or f"choose from {', '.join(map(quoted, named))}"
             raise QuadvisError(sentence(f"{_name(place)} cannot be {quoted(word)}", remedy))
-    if len(placed) < len(needed):
-        missing = " and ".join(_name(place) for place in needed[len(placed) :])
+    given = {word.partition("=")[0] for word in found}
+    lacking = [
+        *(_name(place) for place in needed[len(placed) :]),
+        *(name for name, each in parser.options.items() if each.required and name not in given),
+    ]
+    if lacking:
+        missing = " and ".join(lacking)
         raise QuadvisError(f"{missing} is missing; write {_usage(parser)}")
     if len(placed) > len(needed) + len(further):
         raise QuadvisError(
@@ -152,4 +157,5 @@ def _usage(parser: Parser) -> str:
         else _PLACES.get(place.nargs, "{}").format(_name(place))
         for place in parser.places
     )
-    return f"'{' '.join([parser.prog, *places])}'"
+    options = (f"{name} {_name(each)}" for name, each in parser.options.items() if each.required)
+    return f"'{' '.join([parser.prog, *places, *options])}'"
