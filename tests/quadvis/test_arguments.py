@@ -14,6 +14,7 @@ from quadvis.cli.options import parser
 from quadvis.errors import QuadvisError
 
 HELP = "see 'quadvis --help'"
+TUNE = "write 'quadvis tune FILE --minimise NUMBER --over NAME=FROM..TO'"
 COMMANDS = (
     "run, replay, sweep, tune, check, list, describe, analyse, draw, export, program, diff, plot, schema, "
     "completion, camera, cache, target, load, start, stop, unload, status, get, set, scope, log, sets, "
@@ -55,9 +56,9 @@ COMMANDS = (
         (("run", "a", "--seed="), "--seed: '' is not a whole number; write one, such as 3"),
         (("scope", "a", "--level", "high"), "--level: 'high' is not a number; write one, such as 0.5"),
         (("set",), "NAME=VALUE is missing; write 'quadvis set NAME=VALUE [...]'"),
-        (("export", "a"), "--fmu is missing; write 'quadvis export FILE --fmu PART'"),
-        (("export", "--fmu=b"), "FILE is missing; write 'quadvis export FILE --fmu PART'"),
-        (("export",), "FILE and --fmu is missing; write 'quadvis export FILE --fmu PART'"),
+        (("tune", "a", "--over=x=1..2"), f"--minimise is missing; {TUNE}"),
+        (("tune", "--minimise=b", "--over=x=1..2"), f"FILE is missing; {TUNE}"),
+        (("tune",), f"FILE and --minimise and --over is missing; {TUNE}"),
         (("sets", "kep"), "ACTION cannot be 'kep'; choose from 'list', 'save', 'load'"),
         (("sweep", "a", "--workers", "many"), "--workers: 'many' is not a whole number"),
         (("run", "a", "--json=yes"), "--json takes no value; leave 'yes' out"),
