@@ -43,6 +43,7 @@ _MEANT = {
     "method": "solver type algorithm name",
     "step": "dt stepsize fixedstep fixedstepsize timestep h ts",
     "offset": "phase delay start",
+    "bias": "offset dcoffset",
     "unit": "units",
     "value": "val values number",
     # expectations, summaries, figures
