@@ -336,3 +336,20 @@ def test_entries_of_other_tasks_are_latched_where_tasks_run_by_themselves() -> N
     wires = dict(diagram.graph["s"].wires())
     assert wires["u[0]"].latched and wires["u[1]"].delayed
     assert diagram.run()["s.y"][0] == 0.0
+
+
+def test_what_is_expected_of_a_list_s_output_is_judged_and_shown(tmp_path: Path) -> None:
+    text = (
+        "quadvis: 1\nname: all\nrates: {fast: 10 Hz}\nstop_time: 1 s\nblocks:\n"
+        "  one: {block: sources.constant, rate: fast, with: {value: 1 m}}\n"
+        "  two: {block: sources.constant, rate: fast, with: {value: 2 m}}\n"
+        "  all: {block: signal.concatenate, rate: fast, in: {u: [one.y, two.y]}}\n"
+        "expect:\n  - {signal: all.y, within: 1.5 m}\n  - {signal: 'all.y[0]', within: 1.5 m}\n"
+        "summary: {all: {signal: all.y, show: [final]}}\n"
+        "figures: [{title: All, signals: all.y}]\n"
+    )
+    diagram = load_text(text, tmp_path)
+    result = diagram.run()
+    assert [verdict.met for verdict in result.outcome.verdicts] == [False, True]
+    assert result.outcome.summary["all"]["final"] == (1.0, 2.0)
+    assert not result.passed

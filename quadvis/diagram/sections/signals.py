@@ -52,8 +52,10 @@ def check_signal(node: YamlNode, wire: Wire, context: Context) -> Signal | Unkno
     declared = found.block.interface.outputs[wire.port].signal
     if declared.scalar == "frame":
         faults.add(node.place, f"'{name}' is a picture, not a number", "name another signal")
-    is_open = any(isinstance(size, str) and size not in found.sizes for size in declared.shape)
-    if declared.scalar == "frame" or wire.port not in found.units or is_open:
+        return UNKNOWN
+    if wire.port not in found.units or any(symbol not in found.sizes for symbol in declared.symbols):
+        if not faults:  # a requirement must never be left out in silence
+            faults.add(node.place, f"the shape or the unit of '{name}' is not known", "wire its block")
         return UNKNOWN
     shape = found.shape(wire.port)
     try:

@@ -239,7 +239,7 @@ def test_the_log_of_a_run_that_was_killed_is_the_same_as_far_as_it_goes(
 
 def test_the_loop_notes_each_run_of_ticks_that_it_leaves_out() -> None:
     clock = FakeClock({5: 10**7, 9: 35 * 10**6})
-    text = TEXT.replace("own.counter", "sources.sine").replace("b: counter.y", "b: 0 m")
+    text = TEXT.replace("own.counter", "sources.sine").replace("noise.y, counter.y", "noise.y, 0 m")
     paced = Paced(load_text(text), clock)
     ran: list[int] = []
     paced.engine.observe("continuous", ran.append)

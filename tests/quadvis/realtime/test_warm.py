@@ -140,7 +140,10 @@ def test_an_own_block_that_opens_something_is_not_run(monkeypatch: pytest.Monkey
 @engines
 def test_a_warmed_run_has_the_signals_of_one_that_is_not(engine: str) -> None:
     """With noise, continuous states, delays, and tasks that run each by itself."""
-    for text in (CREW, FLIGHT.replace("own.counter", "sources.sine").replace("b: counter.y", "b: 0 m")):
+    for text in (
+        CREW,
+        FLIGHT.replace("own.counter", "sources.sine").replace("noise.y, counter.y", "noise.y, 0 m"),
+    ):
         found = []
         for warms in (False, True):
             diagram = load_text(text)
