@@ -139,3 +139,12 @@ def test_editors_can_show_what_blocks_ports_and_parameters_are() -> None:
     assert gap["description"] == "longest gap (inclusive) that a difference may span (float64, s)"
     names = {entry.get("const") for entry in SCHEMA["$defs"]["block"]["properties"]["block"]["anyOf"]}
     assert names >= set(Catalogue().names())
+
+
+def test_no_name_is_a_truth_value_for_readers_of_yaml_1_1() -> None:
+    """An editor, or another program, would read a key `on` as true."""
+    catalogue = Catalogue()
+    for name in catalogue.names():
+        interface = catalogue.find(name).interface
+        for item in (*interface.params, *interface.inputs):
+            assert yaml.safe_load(item) == item, f"{name}: {item}"

@@ -19,8 +19,8 @@ class Relay(Block):
 
     on_at = Param(0.5, type="float64[*?]", unit="a", tune=True, doc="switches on at or above it")
     off_at = Param(-0.5, type="float64[*?]", unit="a", tune=True, doc="switches off at or below it")
-    on = Param(1.0, type="float64[*?]", unit="b", tune=True, doc="the output while on")
-    off = Param(0.0, type="float64[*?]", unit="b", tune=True, doc="the output while off")
+    on_value = Param(1.0, type="float64[*?]", unit="b", tune=True, doc="the output while on")
+    off_value = Param(0.0, type="float64[*?]", unit="b", tune=True, doc="the output while off")
     initial = Param("off", choices=("off", "on"), doc="what it is between the thresholds at the start")
     u = In("float64[*]", unit="a", doc="any signal")
     y = Out("float64[*]", unit="b", doc="one of the two values")
@@ -31,7 +31,7 @@ class Relay(Block):
         heating:
           block: signal.relay
           rate: fast
-          with: {on_at: 294 K, off_at: 292 K, on: 0 W, off: 2 kW}
+          with: {on_at: 294 K, off_at: 292 K, on_value: 0 W, off_value: 2 kW}
           in: {u: room.y}
     """
 
@@ -46,14 +46,14 @@ class Relay(Block):
     def output(self, u: Any) -> Any:
         """Return the value of its state."""
         if isinstance(u, float):
-            return self.on if _switched(u, self.is_on, self.on_at, self.off_at) else self.off
+            return self.on_value if _switched(u, self.is_on, self.on_at, self.off_at) else self.off_value
         y = np.empty_like(u)
         for index in range(u.size):
             on_at, off_at = element(self.on_at, index), element(self.off_at, index)
             if _switched(u.flat[index], self.is_on.flat[index], on_at, off_at):
-                y.flat[index] = element(self.on, index)
+                y.flat[index] = element(self.on_value, index)
             else:
-                y.flat[index] = element(self.off, index)
+                y.flat[index] = element(self.off_value, index)
         return y
 
     def update(self, u: Any) -> None:

@@ -8,6 +8,7 @@ import select
 import struct
 import termios
 import time
+from contextlib import suppress
 
 PATIENCE = 5.0  # s
 SILENCE = 0.02  # s after which nothing more is on its way
@@ -22,6 +23,23 @@ def put(peer: int, port: int, data: bytes) -> None:
     until = time.monotonic() + PATIENCE
     while _waiting(port) < before + len(data) and time.monotonic() < until:
         time.sleep(1e-4)
+
+
+def filled(peer: int, port: int, data: bytes) -> int:
+    """Write bytes until the pty takes no more and all that it took has arrived; return how many it took.
+
+    The peer's end must not wait.
+    """
+    written, moved = 0, time.monotonic()
+    arrived = _waiting(port)
+    while written < len(data) and time.monotonic() - moved < 10 * SILENCE:
+        with suppress(BlockingIOError):
+            written += os.write(peer, data[written:])
+            moved = time.monotonic()
+        if (now := _waiting(port)) != arrived:
+            arrived, moved = now, time.monotonic()
+        time.sleep(1e-3)
+    return written
 
 
 def heard(peer: int, count: int = 0) -> bytes:

@@ -22,7 +22,7 @@ from quadvis_blocks.hardware._protocol.checksums import xor
 from quadvis_blocks.hardware._protocol.encode import encode
 from quadvis_blocks.hardware.message_in import MessageIn
 from tests.blocks.hardware.protocol.protocols import BYTES, NMEA
-from tests.blocks.hardware.pty_pair import heard, put
+from tests.blocks.hardware.pty_pair import filled, heard, put
 
 LAB = str(Path(__file__).parents[3] / "diagrams" / "protocols" / "lab_imu.yaml")
 
@@ -112,12 +112,7 @@ def test_after_a_long_pause_old_messages_do_not_count() -> None:
     with reading(protocol=LAB) as reader:
         reader.step(line(0.1))
         os.set_blocking(reader.peer, False)
-        backlog, written = 400 * line(0.9), 0
-        try:
-            while written < len(backlog):
-                written += os.write(reader.peer, backlog[written:])
-        except BlockingIOError:
-            pass
+        written = filled(reader.peer, reader.port, 400 * line(0.9))
         found = reader.step()
         assert (found["roll"], found["age"]) == (0.1, pytest.approx(0.01))
         assert found["lost"] > 50

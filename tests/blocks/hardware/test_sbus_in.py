@@ -13,6 +13,7 @@ from quadvis.block import Counted
 from quadvis.errors import RunError
 from quadvis_blocks.hardware._sbus import encode
 from quadvis_blocks.hardware.sbus_in import SbusIn
+from tests.blocks.hardware.pty_pair import filled
 from tests.blocks.hardware.receivers import Receiver, counts, given, messages, receiving, values
 from tests.blocks.hardware.sbus_frames import CENTRE, SWITCHES
 
@@ -117,13 +118,7 @@ def test_a_million_random_bytes_do_no_harm_and_the_next_frames_come() -> None:
 def test_after_a_long_pause_old_frames_do_not_count(reader: Receiver) -> None:
     reader.step(GOOD)
     os.set_blocking(reader.peer, False)
-    backlog = CENTRE[1:] + 200 * frame(1000, 1000)
-    written = 0
-    try:
-        while written < len(backlog):
-            written += os.write(reader.peer, backlog[written:])
-    except BlockingIOError:
-        pass
+    filled(reader.peer, reader.port, CENTRE[1:] + 200 * frame(1000, 1000))
     row = reader.step()
     assert (row["age"], row["command"]) == (pytest.approx(0.01), [0.0, 0.0])
     assert row["lost"] > 100

@@ -214,7 +214,10 @@ blocks:
     with: {breakpoints: {value: [-1, 0, 2], unit: m}, values: {value: [0, 1, 4], unit: N}, outside: linear}
     in: {u: chosen.y}
   either: {block: logic.switch, in: {condition: both.y, then: error.y, otherwise: in.wave}}
-  heat: {block: signal.relay, with: {on_at: 50 cm, off_at: 0 m, on: 2 W, off: 1 W}, in: {u: either.y}}
+  heat:
+    block: signal.relay
+    with: {on_at: 50 cm, off_at: 0 m, on_value: 2 W, off_value: 1 W}
+    in: {u: either.y}
 """
 FED = """\
 quadvis: 1
