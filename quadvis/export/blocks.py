@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import chain
@@ -12,6 +13,7 @@ from typing import Any, NamedTuple
 from quadvis.block import Block
 from quadvis.engine.program import COPY, Op, Program
 from quadvis.errors import QuadvisError
+from quadvis.export.apart import written_apart
 from quadvis.export.c_functions import SENTENCE, translated
 from quadvis.export.c_types import Unexportable
 from quadvis.export.selection import INPUT
@@ -24,9 +26,16 @@ from quadvis.native.runtime import RUNTIME
 
 ROOM = Path(__file__).parent
 PRELUDE = ROOM / "c" / "prelude.h"
-TRANSLATOR = ("assembly_text", "blocks", "c_functions", "c_operations", "c_types")  # of this room
+TRANSLATOR = ("apart", "assembly_text", "blocks", "c_functions", "c_operations", "c_types")  # of this room
 START = "start"
 Announce = Callable[[str], None]
+
+
+VECTOR = re.compile(r"<\d+ x ")  # in LLVM's text
+
+
+class VectorFound(Exception):
+    """The code has vectors, which C does not have."""
 
 
 class BlockCode(NamedTuple):
@@ -90,13 +99,25 @@ def _translated(kind: BlockType, prefix: str, path: str, announce: Announce | No
     if kept is None:
         if announce:
             announce(f"writing {kind.block.__name__} in C, once")
-        kept = MachineCode(_written(kind, prefix, path).encode())
+        kept = MachineCode(_written_anywhere(kind, prefix, path).encode())
         cache.keep(key, kept)
     return kept.content.decode()
 
 
-def _written(kind: BlockType, prefix: str, path: str) -> str:
-    """Write a block type in C; QuadvisError, with the block's path, if that cannot be."""
+def _written_anywhere(kind: BlockType, prefix: str, path: str) -> str:
+    """Write a block type in C; QuadvisError, with the block's path, if that cannot be.
+
+    What this process has compiled with vectors, such as a sum, numba takes over as it is. Then a process that
+    has compiled nothing yet writes it.
+    """
+    try:
+        return written(kind, prefix, path)
+    except VectorFound:
+        return written_apart(kind, prefix, path)
+
+
+def written(kind: BlockType, prefix: str, path: str) -> str:
+    """Write a block type in C, in this process; VectorFound if numba brings code with vectors."""
     import numba
 
     from quadvis.native.compiler import compiled_methods
@@ -105,7 +126,10 @@ def _written(kind: BlockType, prefix: str, path: str) -> str:
         with _without_vectors():
             compiled = dict(compiled_methods(kind))
         entries = [f"{prefix}_{name}" for name in compiled]
-        return translated(_linked(compiled, prefix), entries, prefix)
+        text = _linked(compiled, prefix)
+        if VECTOR.search(text):
+            raise VectorFound
+        return translated(text, entries, prefix)
     except (Unexportable, NotImplementedError, numba.core.errors.NumbaError) as error:
         cause = next((line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__)
         raise QuadvisError(

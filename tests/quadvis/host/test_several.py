@@ -266,7 +266,10 @@ def test_the_bench_flies_with_world_and_vision_on_one_machine_and_control_on_ano
     assert lab1["detector.found"].sum() > LASTING * 5
     assert lab2["circle_line.age"][20:].min() > 0
     if lateness < LATE and missed < MISSED:
-        assert code == 0, said.out
+        # A verdict wants all samples, and some ticks may have been lost.
+        unmet = [line for line in said.out.splitlines() if "NOT MET" in line]
+        assert all("samples are there" in line for line in unmet), said.out
+        assert code == (1 if unmet else 0)
     for place in places:
         assert quadvis.replay(place).same
 
