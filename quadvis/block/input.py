@@ -79,6 +79,7 @@ class Input(LineDevice):
         """Open the port."""
         self._received, self._gone, self._stamp = bytearray(), "", math.nan
         self._age, self._counts = math.nan, dict.fromkeys(Counted, 0)
+        self._late = False  # whether what is decoded came before a pause, and does not count
         self._newest = self._nothing()
         path = self.actual_port or self.port_given
         if path.startswith(CABLE):
@@ -94,6 +95,7 @@ class Input(LineDevice):
         except PortError as error:
             self._gone, found = f"{self.port_given}: {error}, at t = {time:.9g} s", Waiting()
         fresh = 0
+        self._late = found.late
         self._counts[Counted.LOST] += 0 if starts else found.skipped
         for piece in () if starts else found.pieces:
             self._received += piece

@@ -136,6 +136,8 @@ class ReceiverInput(Input):
     def _judged(self, counts: Sequence[int]) -> Any:
         if not self.valid(counts):
             return self._refused(Counted.REFUSED)
+        if self._late:  # from before a pause: it says nothing of the link now
+            return Counted.LOST
         if not self._link.frame(self._now):
             return Counted.LOST
         shares = (self._used(counts) - self.shortest) / (self.longest - self.shortest)

@@ -124,6 +124,19 @@ def test_after_a_long_pause_old_frames_do_not_count(reader: Receiver) -> None:
     assert row["lost"] > 100
 
 
+def test_what_came_before_a_pause_makes_no_link_good(reader: Receiver) -> None:
+    """Else the commands of a loss would count as the pilot's: full stop in the air."""
+    reader.step()
+    os.set_blocking(reader.peer, False)
+    filled(reader.peer, reader.port, 200 * CENTRE)
+    row = reader.step()
+    assert (row["good"], row["heard"], row["command"]) == (False, False, [-0.5, -820.0])
+    assert row["lost"] > 100
+    reader.step(2 * GOOD)
+    row = reader.step(2 * GOOD)
+    assert (row["good"], row["command"]) == (True, [0.0, 0.0])
+
+
 def test_a_port_that_is_lost_lets_the_age_grow_and_is_reported_at_the_end() -> None:
     with (
         pytest.raises(RunError, match=r"block 'block', t = \S+ s: cannot close: .*gone"),
