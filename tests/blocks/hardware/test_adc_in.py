@@ -242,4 +242,4 @@ def test_a_cable_brings_what_a_board_puts_out_to_what_another_one_measures(tmp_p
     (tmp_path / "sticks.yaml").write_text(DIAGRAM)
     result = quadvis.load(tmp_path / "sticks.yaml").run(real_time=quadvis.RealTime(priority=0, poll="0 s"))
     assert result["read.voltage"][-1].tolist() == [3.5, 1.25]
-    assert result["read.refused"][-1] == 0
+    assert result["read.refused"][-1] <= 1  # the first bytes may be the rest of a frame
