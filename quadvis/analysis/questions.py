@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from quadvis.diagram.times import read_duration
 from quadvis.document import YamlScalar
 from quadvis.errors import QuadvisError
+from quadvis.graph.names import split_names
 
 
 def read_cuts(texts: Sequence[str]) -> dict[str, list[str]]:
@@ -16,24 +17,8 @@ def read_cuts(texts: Sequence[str]) -> dict[str, list[str]]:
         name, equals, signals = text.partition("=")
         if not equals:
             name, signals = text, text
-        found[name.strip()] = _listed(signals)
+        found[name.strip()] = split_names(signals)
     return found
-
-
-def _listed(text: str) -> list[str]:
-    """Split at the commas outside of indices."""
-    parts = [""]
-    depth = 0
-    for letter in text:
-        if letter == "[":
-            depth += 1
-        elif letter == "]":
-            depth -= 1
-        if letter == "," and depth == 0:
-            parts.append("")
-        else:
-            parts[-1] += letter
-    return [part.strip() for part in parts]
 
 
 def read_limits(texts: Sequence[str]) -> dict[str, tuple[str, str, str]]:

@@ -418,6 +418,7 @@ def export(options: argparse.Namespace) -> int:
 
 def _export_log(options: argparse.Namespace) -> int:
     """Write signals of a log."""
+    from quadvis.graph.names import split_names
     from quadvis.output.log_reader import read_log
     from quadvis.output.table_files import FORMATS, TableRequest, write_table
 
@@ -428,21 +429,9 @@ def _export_log(options: argparse.Namespace) -> int:
     log = read_log(options.file)
     if log.damage:
         print(log.damage, file=sys.stderr)
-    names = tuple(name for text in options.signals for name in signal_names(text))
+    names = tuple(name for text in options.signals for name in split_names(text) if name)
     write_table(log, Path(options.output), TableRequest(names, options.rate or "", options.every or ""))
     return 0
-
-
-def signal_names(text: str) -> list[str]:
-    """Return the names of signals in a text, divided by commas outside of brackets."""
-    names, depth = [""], 0
-    for letter in text:
-        depth += (letter == "[") - (letter == "]")
-        if letter == "," and not depth:
-            names.append("")
-        else:
-            names[-1] += letter
-    return [name for part in names if (name := part.strip())]
 
 
 def program(options: argparse.Namespace) -> int:

@@ -8,11 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from quadvis.cli.commands import signal_names
 from quadvis.diagram.sections.figures import FIGURES, read_figures
 from quadvis.document import YamlMap, read_yaml
 from quadvis.errors import Faults, QuadvisError
-from quadvis.graph.names import wire_text
+from quadvis.graph.names import split_names, wire_text
 from quadvis.output.figures import Figure, Trace, signal_figure, with_signals
 from quadvis.output.log_reader import Log, read_log
 from quadvis.output.plot import plot_logs, plot_times
@@ -45,7 +44,7 @@ def _figures(options: argparse.Namespace, logs: Sequence[Log], own_blocks: OwnBl
     """Return the figures that are asked for; [] means one for each block."""
     log = logs[0]
     if options.signals:
-        traces = [_trace(log, name) for text in options.signals for name in signal_names(text)]
+        traces = [_trace(log, name) for text in options.signals for name in split_names(text) if name]
         against = _trace(log, options.against) if options.against else None
         return [signal_figure(traces, log.units, against)]
     if options.against:

@@ -13,11 +13,11 @@ from quadvis.diagram.sections.ports import PORTS
 from quadvis.diagram.spec import FileSpec
 from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar
 from quadvis.errors import Faults, Unknown, known
+from quadvis.library.describe import keyed
 from quadvis.machine.columns import table
 from quadvis.machine.shipped import named_file
 
 TOP = "#"
-LINE = 90  # characters of a line of an entry
 
 
 def part_facts(name: str) -> dict[str, Any]:
@@ -104,6 +104,4 @@ def _entry(name: str, part: FileSpec) -> list[str]:
     """Return an entry under `blocks` that uses the part."""
     ports = part[PORTS]
     wires = [f"{port}: block.port" for port in ports.inputs if port not in ports.defaults]
-    line = f"  in: {{{_listed(wires)}}}"
-    wired = [line] if len(line) <= LINE else ["  in:", *(f"    {wire}" for wire in wires)]
-    return [f"{part.name}:", f"  part: {name}", *(wired if wires else [])]
+    return [f"{part.name}:", f"  part: {name}", *keyed("in", wires)]

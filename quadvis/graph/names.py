@@ -37,6 +37,19 @@ def read_index(text: str) -> Index | None:
     return tuple(parts)
 
 
+def split_names(text: str) -> list[str]:
+    """Return the names in a text that are divided by commas; those inside of indices do not divide."""
+    parts = [""]
+    depth = 0
+    for letter in text:
+        depth += (letter == "[") - (letter == "]")
+        if letter == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return [part.strip() for part in parts]
+
+
 def index_text(index: Index) -> str:
     """Return an index as a diagram writes it."""
     parts = [_slice_text(part) if isinstance(part, slice) else str(part) for part in index]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -153,11 +153,16 @@ def example(name: str, block: type[Block]) -> list[str]:
         if port.default is None
     }
     for key, values in (("with", required), ("in", wired)):
-        entries = [f"{item}: {text}" for item, text in values.items()]
-        line = f"  {key}: {{{', '.join(entries)}}}"
-        if entries:
-            lines += [line] if len(line) <= LINE else [f"  {key}:", *(f"    {entry}" for entry in entries)]
+        lines += keyed(key, [f"{item}: {text}" for item, text in values.items()])
     return lines
+
+
+def keyed(key: str, entries: Sequence[str]) -> list[str]:
+    """Return the lines of a key with a map in an entry of a diagram: one line, unless it is too long."""
+    line = f"  {key}: {{{', '.join(entries)}}}"
+    if not entries:
+        return []
+    return [line] if len(line) <= LINE else [f"  {key}:", *(f"    {entry}" for entry in entries)]
 
 
 def _gives_ports(param: Param, block: type[Block]) -> bool:

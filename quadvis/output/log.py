@@ -232,7 +232,7 @@ def message_definition(block: RecordedBlock) -> str:
     """Return the `ros2msg` definition of a row: bools travel as int64, arrays flat in C order."""
     if not block.size:
         raise ValueError(f"'{block.path}' has no outputs to log")
-    names = _unique((_field_name(port.name) for port in block.ports), "_")
+    names = unique((_field_name(port.name) for port in block.ports), "_")
     lines = []
     for port, name in zip(block.ports, names, strict=True):
         size = f"[{port.size}]" if port.shape else ""
@@ -248,7 +248,7 @@ def _message_names(paths: Iterable[str]) -> list[str]:
     """Return names that ROS accepts for messages: "/vision/detector" becomes "VisionDetector"."""
     words = (re.findall("[A-Za-z0-9]+", path) for path in paths)
     names = ("".join(word[:1].upper() + word[1:] for word in found) for found in words)
-    return _unique((name if name[:1].isalpha() else f"Block{name}" for name in names), "X")
+    return unique((name if name[:1].isalpha() else f"Block{name}" for name in names), "X")
 
 
 def _field_name(name: str) -> str:
@@ -257,7 +257,7 @@ def _field_name(name: str) -> str:
     return plain if plain[:1].isalpha() else f"f_{plain}".rstrip("_")
 
 
-def _unique(names: Iterable[str], joint: str) -> list[str]:
+def unique(names: Iterable[str], joint: str) -> list[str]:
     """Return the names, with a number added to each repeated name."""
     found: list[str] = []
     for name in names:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.errors import QuadvisError
+from quadvis.output.log import unique
 from quadvis.output.recording import RecordedBlock, RecordedPort, Recording
 
 MAGIC = b"ULog\x01\x12\x35\x01"
@@ -75,14 +76,7 @@ def _field(name: str, port: RecordedPort) -> str:
 
 def _names(names: Sequence[str]) -> list[str]:
     """Return names that ULog permits, each once."""
-    found: list[str] = []
-    for name in names:
-        plain = re.sub(r"[^a-z0-9_/-]", "_", name.lower())
-        count = 1
-        while (unique := plain if count == 1 else f"{plain}_{count}") in found:
-            count += 1
-        found.append(unique)
-    return found
+    return unique([re.sub(r"[^a-z0-9_/-]", "_", name.lower()) for name in names], "_")
 
 
 def _rows(
