@@ -44,15 +44,33 @@ def held_back() -> Iterator[None]:
     """Delay the terminal's signals; processes begun inside ignore them until `leave_to_parent`.
 
     A signal that this thread blocks is taken by another one, and its handler then runs here all the same. So
-    in the main thread the handlers wait, too, that of SIGTERM among them.
+    the handlers wait, too, as with `put_off`.
+    """
+    with put_off():
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, KEYS)
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def put_off(at_once: Callable[[], None] | None = None) -> Iterator[None]:
+    """Let what the handlers of signals do wait for the end of the block; in the main thread only.
+
+    ``at_once`` is called when a signal comes.
     """
     late: list[int] = []
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, KEYS)
-    handlers = _replaced(lambda number, _: late.append(number))
+
+    def note(number: int, _: object) -> None:
+        late.append(number)
+        if at_once is not None:
+            at_once()
+
+    handlers = _replaced(note)
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
         for number, handler in handlers.items():
             signal.signal(number, handler)
         for number in late[:1]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from quadvis.engine.taps import Tap
 from quadvis.engine.tuning import Change
 from quadvis.errors import QuadvisError, RunError
-from quadvis.machine.interrupts import held_back
+from quadvis.machine.interrupts import held_back, put_off
 from quadvis.machine.processes import launching
 from quadvis.native.choice import Announce
 from quadvis.realtime.application import GRACE
@@ -286,12 +286,17 @@ class _Supervisor:
         """Take what has come; an error if an application has ended early."""
         for member in self._members:
             ended = not member.process.is_alive()
-            member.listen()
-            member.take(last=last, between=self._steering.attend)
+            self._take(member, last=last)
             if member.failed and (ended or member.ending) and not (self._stopping and member.stopped):
                 if not self._begun or member not in self._spare:
                     raise self._cause(member)
                 self._give_up(member)
+
+    def _take(self, member: Member, *, last: bool) -> None:
+        """Take what has come from an application; a signal waits until all of it is handed on."""
+        with put_off(self._devices.make_safe):
+            member.listen()
+            member.take(last=last, between=self._steering.attend)
 
     def _cause(self, member: Member) -> QuadvisError:
         """Return why the run has ended early."""
@@ -301,8 +306,7 @@ class _Supervisor:
     def _give_up(self, member: Member, reason: str = "") -> None:
         """Fly on without a computer."""
         member.give_up(reason)
-        member.listen()
-        member.take(last=True, between=self._steering.attend)
+        self._take(member, last=True)
         self._steering.lose(member.computer)
 
     def _check_rest(self) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.faults.bench import SAFE, Bench, no_trace
+from tests.faults.bench import PATIENCE, SAFE, Bench, no_trace
 from tests.processes import linux, wait_for
 
 pytestmark = [pytest.mark.faults, pytest.mark.slow, linux]
@@ -91,6 +91,7 @@ def test_10_a_loop_that_was_held_up_is_safe_meanwhile_and_leaves_out_what_it_mis
         before = len(bench.frames)
         began = pause(bench, 0.5)
         bench.flies(began + 1.5)
+        wait_for(lambda: bench.has_ended or bench.frames[-1] != SAFE, PATIENCE)  # it flies again
         runs = [(safe, len([*run])) for safe, run in groupby(bench.frames[before:], SAFE.__eq__)]
         bench.send(signal.SIGTERM)
         bench.ended()

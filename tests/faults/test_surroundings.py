@@ -19,7 +19,7 @@ import pytest
 
 from quadvis.output.log_reader import read_log
 from tests.faults.bench import PATIENCE, Bench, no_trace
-from tests.processes import linux, wait_for
+from tests.processes import gone, linux, wait_for
 
 pytestmark = [pytest.mark.faults, pytest.mark.slow, linux]
 
@@ -142,7 +142,8 @@ def test_18_a_flight_needs_no_reader_and_no_more_descriptors_or_memory_than_it_h
             bench.flies(1.5)
             for process in [bench.process.pid, *bench.members]:
                 no_more(process)
-            wait_for(lambda: bench.time >= 4.9, PATIENCE)
+            # It may fail for memory before its end, and then nobody sends any more.
+            wait_for(lambda: bench.time >= 4.9 or any(map(gone, bench.members)), PATIENCE)
             said = bytearray()  # its last sentence waits for us
             wait_for(lambda: said.extend(drained(reader)) or bench.has_ended, PATIENCE)
             assert bench.process.wait(PATIENCE) == 1  # what it has found cannot be printed

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from quadvis.machine.interrupts import held_back
+from quadvis.machine.interrupts import held_back, put_off
 from tests.processes import wait_for
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of a Unix")
@@ -87,3 +87,11 @@ def test_an_ignored_signal_stays_ignored() -> None:
         assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
         os.kill(os.getpid(), signal.SIGINT)
     assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+
+
+def test_who_is_called_at_once_is_called_before_the_end(handlers: list[int]) -> None:
+    order: list[str] = []
+    with pytest.raises(Came), put_off(lambda: order.append("at once")):
+        os.kill(os.getpid(), signal.SIGINT)
+        order.append("inside")
+    assert order == ["at once", "inside"] and handlers == [signal.SIGINT]

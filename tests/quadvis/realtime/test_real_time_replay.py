@@ -6,7 +6,9 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from quadvis.api import load_text
 from quadvis.cli import main
 from quadvis.engine.tuning import NewValue
 from quadvis.errors import QuadvisError
+from quadvis.output.log import LogWriter
 from tests.processes import children, gone, wait_for
 from tests.quadvis.realtime.fakes import FakeClock, Paced
 from tests.quadvis.realtime.steered import CALM, Steered
@@ -102,6 +105,27 @@ def test_a_run_with_overruns_is_the_same_to_the_bit() -> None:
     )  # others may lie between two ticks
     with pytest.raises(QuadvisError, match="lacks the outputs of 'counter' at t = "):
         replay(rewritten(log, without("/_replay/left_out", longest)))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="real time is Linux's")
+def test_a_run_that_is_interrupted_while_rows_are_handed_on_has_them_all(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What has been taken from the loop is in the log, or a replay would lack it in the middle."""
+    write, came = LogWriter.write_rows, []
+
+    def interrupted(self: LogWriter, block: int, times: Any, rows: Any) -> None:
+        if not came and times[-1] > 0.2e9:
+            came.append(block)
+            time.sleep(0.1)  # more rows come meanwhile
+            os.kill(os.getpid(), signal.SIGINT)
+        write(self, block, times, rows)
+
+    monkeypatch.setattr(LogWriter, "write_rows", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        quadvis.load("flight.yaml").run(log="run.mcap", real_time=CALM)
+    found = replay("run.mcap")
+    assert came and found.same and not found.whole and found.ticks > 20
 
 
 DRAG = '''
