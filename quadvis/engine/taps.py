@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 class Tap(ABC):
     """Takes a block's outputs at the block's first and then at every ``every`` ticks of the block's own.
 
-    ``block`` is the path of the block. A row is taken when the outputs of the tick are there and before the
-    updates. A restored run is tapped at the same ticks as the first one.
+    ``block`` is the path of the block, ``topic`` that of its rows in the log of the run, "" if they do not go
+    there. A row is taken when the outputs of the tick are there and before the updates. A restored run is
+    tapped at the same ticks as the first one.
     """
 
     block: str
     every: int
+    topic = ""
 
     @abstractmethod
     def take(self, tick: int, row: memoryview) -> None:

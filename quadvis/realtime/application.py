@@ -51,6 +51,7 @@ from quadvis.realtime.reports import Reports
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
 from quadvis.realtime.streams import RowStream
 from quadvis.realtime.system import SHARE, Grants, ask_all, raise_thread, wake_up_time
+from quadvis.realtime.tail import LogTail
 from quadvis.realtime.warm import warm
 
 GRACE = 2.0  # s that a step has to end, once it was asked to
@@ -63,7 +64,7 @@ class Setup:
     ``computer`` is the one whose blocks it runs, "" in a diagram without computers. ``ladder`` has the
     priorities of its tasks. ``rooms`` are those of the notes, ``box`` that of the parameter box; ``pictures``
     are the words of the picture box, if there is one. ``lines`` has the words of its links in memory, by
-    their names.
+    their names. ``tail`` says where rows belong that no supervisor has taken.
     """
 
     text: str
@@ -84,6 +85,7 @@ class Setup:
     last_ticks: LastTicks
     box: int
     pictures: Any
+    tail: LogTail | None
 
 
 class Supply(NamedTuple):
@@ -301,6 +303,12 @@ class _Application:
         profile = self._engine.profile() if self._setup.wishes.profile else None
         return Ending(unsafe=self._pacer.unsafe, profile=profile)
 
+    def add_tail(self) -> None:
+        """Add to the log what a supervisor that has died could not."""
+        setup, parent = self._setup, parent_process()
+        if self._start and self._engine is not None and setup.tail and not (parent and parent.is_alive()):
+            setup.tail.add(setup.streams, self._shared, self._engine.period)
+
 
 def perform(setup: Setup) -> None:
     """Run an application: the whole life of its process."""
@@ -317,6 +325,7 @@ def perform(setup: Setup) -> None:
         ending = application.failed(error)
     with suppress(OSError):  # the supervisor may have ended
         setup.link.send(ending)
+    application.add_tail()
 
 
 def _polled(wishes: RealTime, schedule: Schedule, clock: MonotonicClock) -> int:

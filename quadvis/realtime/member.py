@@ -31,6 +31,7 @@ from quadvis.realtime.pictures import Picture, PictureBox, picture_signals
 from quadvis.realtime.ring import RecordRing, Words
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
 from quadvis.realtime.streams import RowStream, StreamTaps, nothing, room_for, streams_of
+from quadvis.realtime.tail import LogTail
 from quadvis.realtime.times import TaskTimes
 from quadvis.realtime.tuner import Tuned, box_room
 
@@ -87,7 +88,7 @@ class Member:
         setup = Setup(
             diagram.resolved, str(diagram.path.parent), diagram.path.name, diagram.own_blocks,
             IS_COMMAND.get(), computer, engine, wishes, ladder, rooms, streams, words, self._theirs, devices,
-            lines, last_ticks, box, pictures,
+            lines, last_ticks, box, pictures, self._tail(),
         )  # fmt: skip
         self._pictures = PictureBox(pictures) if pictures is not None else None
         self._schedule = Schedule.of(part)
@@ -102,6 +103,18 @@ class Member:
         self.ending: Ending | None = None
         self.loss = ""
         self._warned, self._overruns = 0.0, [0] * len(rooms)
+
+    def _tail(self) -> LogTail | None:
+        """Return where its rows belong in the log of the run, if there is one."""
+        log = self._taker.log
+        if log is None:
+            return None
+        streams = tuple(
+            tuple(next((tap.topic for tap in own if tap.topic), "") for own in taps)
+            for _, taps in self._streams
+        )
+        notes = (topics.get(self.computer, "") for topics in (log.left_out, log.releases))
+        return LogTail(log.path, streams, *notes)
 
     def start(self) -> None:
         """Start the process, which loads the diagram and waits for its `supply`."""

@@ -87,6 +87,11 @@ class RecordRing:
         self._taken = self.words[TAKEN] = until
         return found
 
+    def kept(self) -> Words:
+        """Return the newest records (N, width) that are still there, taken or not, for who has put them."""
+        present = int(self.words[PUT])
+        return self._records[np.arange(max(0, present - self._room), present) % self._room]
+
 
 def place_in(words: Any, start: int, room: int, width: int) -> Any:
     """Return where the next record of the ring at ``start`` begins; -1 if it is full, which is counted."""

@@ -12,6 +12,7 @@ from quadvis.graph.graph import MULTI, Graph
 from quadvis.output.recording import RecordedBlock
 from quadvis.output.stretch import stamps_of
 from quadvis.realtime.note_taker import NoteTaker
+from quadvis.realtime.tail import LogTopics
 from quadvis.run.rows import left_out, releases, times_of
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ class LoggedNotes:
             for task in graph.tasks if measured else ():
                 blocks["times", computer, task.name] = times_of(computer, task.name)
         self.blocks: Sequence[RecordedBlock] = [*blocks.values()]
+        self._blocks = blocks
         self._places = {key: before + number for number, key in enumerate(blocks)}
         self._periods = {computer: graph.tick for computer, graph in graphs.items()}
 
@@ -61,4 +63,16 @@ class LoggedNotes:
             rows[:, :2] = (rows[:, :2] * NANOSECOND).view(np.int64)
             write(computer, ("times", computer, task), times[:, 0], rows)
 
-        return NoteTaker(leave_out, release, time)
+        return NoteTaker(leave_out, release, time, self._topics(writer))
+
+    def _topics(self, writer: RunLog | None) -> LogTopics | None:
+        """Return where everything goes, if this is a log that does not begin anew."""
+        from quadvis.output.log import LogWriter  # only a run with a log waits for this import
+
+        if not isinstance(writer, LogWriter):
+            return None
+
+        def named(kind: str) -> dict[str, str]:
+            return {key[1]: block.path for key, block in self._blocks.items() if key[0] == kind}
+
+        return LogTopics(str(writer.path.absolute()), named("left out"), named("releases"))

@@ -28,8 +28,10 @@ class Taker:
 class RowTap(Tap):
     """Hands the rows of a block with their stamps (ns) to all its consumers."""
 
-    def __init__(self, block: str, every: int, period: Fraction, takers: Sequence[Taker]) -> None:
-        self.block, self.every = block, every
+    def __init__(
+        self, block: str, every: int, period: Fraction, takers: Sequence[Taker], topic: str = ""
+    ) -> None:
+        self.block, self.every, self.topic = block, every, topic
         self._one = tuple(taker.one for taker in takers)
         self._many = tuple(taker.many for taker in takers)
         self._numerator, self._denominator = (period * NANOSECONDS).as_integer_ratio()
@@ -51,7 +53,7 @@ class PacedTap(Tap):
     """Hands the rows of a block in a real-time run on, and tells its judge of ticks that have none."""
 
     def __init__(self, tap: RowTap, node: Node, graph: Graph, judge: RowJudge) -> None:
-        self.block, self.every = tap.block, tap.every
+        self.block, self.every, self.topic = tap.block, tap.every, tap.topic
         self._tap, self._judge = tap, judge
         self._first = graph.ticks(node.task.offset)
         self._spacing = graph.ticks(node.task.period) * tap.every

@@ -115,7 +115,8 @@ def recorded(
             judge = RowJudge(each.block, judging)
             takers = _takers(index, signals, writer, judge)
             if takers:
-                tap = RowTap(each.node.path, each.every, diagram.graph.tick, takers)
+                topic = each.block.path if writer else ""
+                tap = RowTap(each.node.path, each.every, diagram.graph.tick, takers, topic)
                 taken.append(Taken(each.node, judge, tap))
 
         def change(made: Change) -> None:
