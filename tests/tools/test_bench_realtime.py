@@ -63,8 +63,8 @@ def test_a_cyclictest_that_fails_is_quoted(cyclictest: Path) -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="real time is Linux's")
 def test_the_table_has_all_cases(cyclictest: Path) -> None:
     arguments = ("--rates", "50", "--rounds", "1", "--seconds", "1", "--blocks", "3")
-    cases = [*bench.CASES, *bench.TUNED_CASES]
-    found = json.loads(run_script(TOOL, *arguments, "--json", "--writes", "20").stdout)
+    cases = [*bench.CASES, *bench.TUNED_CASES, *bench.READ_CASES]
+    found = json.loads(run_script(TOOL, *arguments, "--json", "--writes", "20", "--reader").stdout)
     assert list(found) == ["50"]
     assert list(found["50"]) == ["cyclictest", *cases]
     for (case,) in found["50"].values():
