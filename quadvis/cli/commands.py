@@ -157,7 +157,8 @@ def sweep(options: argparse.Namespace) -> int:
         table = run_sweep(
             options.file, over, variant=one,
             settings=options.set, params=options.params, stop_time=options.stop_time, seed=options.seed,
-            workers=options.workers, output=table_path, timings=options.timings, resume=options.resume,
+            workers=options.workers, cluster=options.cluster, output=table_path,
+            timings=options.timings, resume=options.resume,
             engine=options.engine, announce=progress.say,
             plot=None if options.plot == "" else plot, logs=options.logs, own_blocks=_own_blocks(options),
             progress=progress,

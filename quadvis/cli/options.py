@@ -379,6 +379,8 @@ def _sweep_options(parser: Parser) -> None:
     parser.add_argument("--seed", type=int, metavar="N", help="seed of every run; replaces the diagram's")
     _engine_option(parser)
     parser.add_argument("--workers", type=int, metavar="N", help="processes; default: one per processor")
+    words = "let the workers of a Dask cluster do the runs: the address of its scheduler, tcp://host:8786"
+    parser.add_argument("--cluster", metavar="ADDRESS", help=words)
     words = "the table, .csv or .parquet; default runs/NAME-sweep.csv, with variant and sets in its name"
     parser.add_argument("--output", "-o", metavar="TABLE", help=words)
     words = "picture of the summary; default: beside the table, '' for none"

@@ -50,6 +50,12 @@ class Grid:
             base.own_blocks,
         )
 
+    @property
+    def named(self) -> list[Path]:
+        """The parameter files among the values of the axes, also those that were not loaded."""
+        values = [value for axis in self.axes if axis.name == PARAMS for value in axis.values]
+        return [Path(value) for value in values if value != NONE]
+
     def check(self) -> Diagram:
         """Load the diagram with each value of each axis, other axes at their first; return the first diagram.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -43,6 +43,7 @@ def sweep(
     stop_time: str | float | None = None,
     seed: int | None = None,
     workers: int | None = None,
+    cluster: str | None = None,
     output: str | Path | None = None,
     timings: bool = False,
     resume: bool = False,
@@ -63,14 +64,19 @@ def sweep(
     ``workers`` processes share the runs (by default one for each processor); the table is the same to the bit
     for any number of workers. It is written to ``output`` (.csv or .parquet). If the sweep is interrupted, or
     a worker (RunError) or this process is killed, the file keeps all finished runs but those of the last two
-    seconds. ``resume`` takes over the runs of that file with the same hash, and does the others. ``plot`` is
-    the file for a picture of the summary (PNG), ``logs`` a folder for a log of every run. ``engine`` and
-    ``announce`` are as in `Diagram.run`; what has to be compiled is compiled before the workers begin.
+    seconds. ``cluster`` is the address of a scheduler of Dask, such as ``tcp://host:8786``: its workers do
+    the runs, have the same quadvis, and get the files. ``resume`` takes over the runs of ``output`` with the
+    same hash, and does the others. ``plot`` is the file for a picture of the summary (PNG), ``logs`` a folder
+    for a log of every run. ``engine`` and ``announce`` are as in `Diagram.run`; what has to be compiled is
+    compiled before the workers begin.
 
     A run that stops with an error is a row that says so. QuadvisError if a value does not fit the diagram, or
     if a file cannot be written because it is an input, another kind of file, or the output of another sweep.
     """
-    axes, processes = read_axes(over), _workers(workers)
+    axes, processes = read_axes(over), _workers(workers, cluster)
+    if cluster and logs:
+        taken = as_given("--logs", "logs")
+        raise QuadvisError(f"the workers of a cluster write no logs here; leave {taken} out, or the cluster")
     _refuse_conflicts(axes, variant, settings, seed)
     given = (str(path), variant, setting_texts(settings), setting_paths(params), stop_time, bool(own_blocks))
     places = points(axes)
@@ -89,7 +95,7 @@ def sweep(
         if resume and target is not None and target.stat().st_size:
             jobs = _not_known(jobs, _earlier(target, found), collection)
         try:
-            with closing(perform_all(jobs, processes)) as rows:
+            with closing(_performed(jobs, processes, cluster, grid)) as rows:
                 for row in rows:
                     if row is not None:
                         collection.add(row)
@@ -163,7 +169,21 @@ def setting_paths(params: Files) -> tuple[str, ...]:
     return (str(params),) if isinstance(params, str | os.PathLike) else tuple(map(str, params))
 
 
-def _workers(given: int | None) -> int:
+def _performed(
+    jobs: Sequence[Job], processes: int, cluster: str | None, grid: Grid
+) -> Generator[Row | None, None, None]:
+    """Do the jobs, here or on a cluster."""
+    if cluster is None:
+        return perform_all(jobs, processes)
+    from quadvis.sweeps.cluster import perform_on  # what it needs takes a while
+
+    return perform_on(cluster, jobs, [*grid.inputs, *grid.named])
+
+
+def _workers(given: int | None, cluster: str | None) -> int:
+    if given is not None and cluster is not None:
+        both = f"{as_given('--workers', 'workers')} and {as_given('--cluster', 'cluster')}"
+        raise QuadvisError(f"{both} exclude each other: a cluster has its own workers")
     if given is not None and given < 1:
         raise QuadvisError(f"{given} worker processes cannot do anything; give 1 or more")
     return given or processors()

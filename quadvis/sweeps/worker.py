@@ -181,6 +181,12 @@ def perform(job: Job) -> Row:
     return Row(job.index, digest, units, found, passed, result.lost, wall=result.wall)
 
 
+def forget() -> None:
+    """Load the diagram of the next run anew."""
+    global _loaded
+    _loaded = None
+
+
 def diagram_of(job: Job) -> Diagram:
     """Return the diagram of a run; successive runs of one configuration and the same files share it.
 

@@ -1,0 +1,95 @@
+"""Runs of a sweep on a cluster of Dask: jobs go to its workers, with the files that they need.
+
+A worker has its own quadvis, and is refused if that is another one: one table is of one software. Files, the
+user's own blocks among them, travel as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable, Iterator, Sequence
+from importlib import import_module
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from quadvis.errors import QuadvisError, RunError, quoted
+from quadvis.sweeps.parcel import Parcel, difference, software
+from quadvis.sweeps.pool import IDLE
+from quadvis.sweeps.worker import Job, Row
+
+PATIENCE = 10.0  # s in which the scheduler must answer and have a worker
+MOST_JOBS = 16  # of one task: what a lost worker repeats
+SHARES = 8  # tasks for each thread of the cluster, at least, if there are so many jobs
+
+
+def perform_on(address: str, jobs: Sequence[Job], paths: Iterable[Path]) -> Generator[Row | None, None, None]:
+    """Yield the rows as they come, and None after a second without one; closing it gives the jobs up.
+
+    ``paths`` are the files that the jobs need. What a worker that is lost has not done goes to another one.
+    QuadvisError if no cluster is at the address, or if a worker has other software; RunError if one job
+    after the other has lost its worker.
+    """
+    if not jobs:
+        return
+    with _client(address) as client:
+        _check_workers(client, address)
+        from quadvis.sweeps.cluster_worker import Store, perform_there
+
+        parcel = Parcel.of(paths)
+        store = Store(parcel)
+        client.register_plugin(store)
+        count = max(1, min(MOST_JOBS, len(jobs) // (SHARES * sum(client.nthreads().values()) or 1)))
+        tasks = [tuple(jobs[first : first + count]) for first in range(0, len(jobs), count)]
+        futures = client.map(perform_there, tasks, parcel=parcel.key, pure=False)
+        try:
+            yield from _rows(futures)
+        finally:
+            client.cancel(futures)
+            client.unregister_worker_plugin(store.name)
+
+
+def _client(address: str) -> Any:
+    try:
+        client: Any = import_module("distributed").Client
+    except ImportError:
+        remedy = "pip install 'quadvis[cluster]'"
+        raise QuadvisError(f"a sweep on a cluster needs the package distributed; {remedy}") from None
+    try:
+        return client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError, TimeoutError):
+        remedy = "start 'dask scheduler', and give its address, such as tcp://host:8786"
+        raise QuadvisError(f"no scheduler of Dask answers at {quoted(address)}; {remedy}") from None
+
+
+def _check_workers(client: Any, address: str) -> None:
+    """Wait for a worker; refuse those with other software."""
+    try:
+        client.wait_for_workers(1, timeout=PATIENCE)
+    except TimeoutError:
+        remedy = f"start some by 'dask worker {address} --nworkers auto --nthreads 1'"
+        raise QuadvisError(f"the cluster at {quoted(address)} has no workers; {remedy}") from None
+    for worker, theirs in client.run(software, on_error="return").items():
+        if isinstance(theirs, BaseException):
+            raise QuadvisError(f"the worker {worker} cannot do a sweep of quadvis: {theirs}")
+        if problem := difference(theirs):
+            raise QuadvisError(f"the worker {worker} {problem}")
+
+
+def _rows(futures: Sequence[Any]) -> Iterator[Row | None]:
+    from distributed import KilledWorker
+
+    done: SimpleQueue[Any] = SimpleQueue()
+    for future in futures:
+        future.add_done_callback(done.put)
+    left = len(futures)
+    while left:
+        try:
+            found: Sequence[Row] = done.get(timeout=IDLE).result()
+        except Empty:
+            yield None
+            continue
+        except KilledWorker:
+            problem = "some jobs have lost one worker after the other, perhaps for lack of memory"
+            raise RunError(f"{problem}; try fewer workers on each machine") from None
+        left -= 1
+        yield from found
