@@ -33,10 +33,10 @@ def perform_on(address: str, jobs: Sequence[Job], paths: Iterable[Path]) -> Gene
         return
     with _client(address) as client:
         _check_workers(client, address)
-        from quadvis.sweeps.cluster_worker import Store, perform_there
+        from quadvis.sweeps.cluster_worker import ParcelStore, perform_there
 
         parcel = Parcel.of(paths)
-        store = Store(parcel)
+        store = ParcelStore(parcel)
         client.register_plugin(store)
         count = max(1, min(MOST_JOBS, len(jobs) // (SHARES * sum(client.nthreads().values()) or 1)))
         tasks = [tuple(jobs[first : first + count]) for first in range(0, len(jobs), count)]

@@ -21,7 +21,7 @@ _last: list[str] = []  # the key of the parcel of the last jobs
 _running = threading.Lock()  # a diagram is loaded once for successive runs
 
 
-class Store(WorkerPlugin):
+class ParcelStore(WorkerPlugin):
     """Gives each worker a parcel, those that come later, too."""
 
     def __init__(self, parcel: Parcel) -> None:
