@@ -359,6 +359,13 @@ def diff(options: argparse.Namespace) -> int:
     return 0 if found.same else FAILED
 
 
+def fmt(options: argparse.Namespace) -> int:
+    """Write files in the house style; 1 with --check if one is not."""
+    from quadvis.cli.fmt import fmt as perform
+
+    return perform(options)
+
+
 def analyse(options: argparse.Namespace) -> int:
     """Print poles, margins and limits of a diagram's loop; 1 if it is not stable or misses a margin."""
     from quadvis.analysis.analyse import analyse as analyse_loop

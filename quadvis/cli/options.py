@@ -63,6 +63,12 @@ signals (null unless both are logs): {compared, different: [{signal, unit, eleme
 different_rows, time_s}], only_old, only_new, unlike: [{signal, what}]}. A kind is added, removed or changed.
 Exit code: 0 the same, 1 different, 2 bad input."""
 
+FMT_HELP = """\
+Keys get the order of the reference, levels are indented by two blanks, and a map in brackets that is too long
+for its line gets a line for each key. Comments, the order of blocks, and the kind of each list and map stay.
+The result is read again before it is written: a file whose meaning would change is refused.
+Exit code: 0 done, 1 with --check if a file is not in the style, 2 bad input."""
+
 SHELL_HELP = """\
 examples:
   quadvis completion bash > ~/.local/share/bash-completion/completions/quadvis
@@ -219,6 +225,13 @@ def parser() -> Parser:
     _diff_options(
         add("diff", commands.diff, "print what differs between two diagrams, variants or logs", DIFF_HELP)
     )
+    words = "write YAML files in the house style, with their comments and their meaning"
+    style = add("fmt", commands.fmt, words, FMT_HELP)
+    style.add_argument("files", metavar="FILE", nargs="+", help="diagrams, parts, or other YAML files")
+    style.add_argument(
+        "--check", action="store_true", help="write nothing; exit code 1 if a file would change"
+    )
+    style.add_argument("--diff", action="store_true", help="write nothing; print what would change")
     _plot_options(add("plot", commands.plot, "draw the figures of a log, or of several in one", PLOT_HELP))
     schema = add("schema", commands.schema, "print the JSON schema of diagrams, for editors")
     schema.add_argument("--output", "-o", metavar="PATH", help="default: standard output")
