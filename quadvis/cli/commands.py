@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quadvis.cli.default_places import default_name, log_path, runs_folder
-from quadvis.errors import Fault, QuadvisError, RunError, counted
+from quadvis.errors import Fault, QuadvisError, RunError, counted, quoted
 from quadvis.machine.files import SVG, Kind, check_output, file_name, write_output
 from quadvis.machine.garbage import collected_from_now_on
 from quadvis.machine.shipped import PREFIX, named_file
@@ -347,6 +347,8 @@ def describe(options: argparse.Namespace) -> int:
 
 def diff(options: argparse.Namespace) -> int:
     """Print the difference of two diagrams or runs; 1 if there is one."""
+    if options.git:
+        return _flat(options)
     from quadvis.diff.difference import diff as compare
     from quadvis.diff.report import DiffReport
     from quadvis.machine.status_line import shows_colours
@@ -358,6 +360,31 @@ def diff(options: argparse.Namespace) -> int:
     else:
         print("\n".join(DiffReport(found, shows_colours(sys.stdout)).lines()))
     return 0 if found.same else FAILED
+
+
+def _flat(options: argparse.Namespace) -> int:
+    """Print one file with a line for each value, for git to compare."""
+    from quadvis.diff.flat import flat_text
+    from quadvis.machine.inputs import read_input
+
+    if options.new is not None or options.variants:
+        raise QuadvisError(f"--git takes one file; leave {quoted(options.new or '--variants')} out")
+    print(flat_text(read_input(options.old).decode(errors="replace")), end="")
+    return 0
+
+
+def merge(options: argparse.Namespace) -> int:
+    """Merge three versions of a file by key; 1 with conflicts."""
+    from quadvis.cli.merge import merge as perform
+
+    return perform(options)
+
+
+def fmt(options: argparse.Namespace) -> int:
+    """Write files in the house style; 1 with --check if one is not."""
+    from quadvis.cli.fmt import fmt as perform
+
+    return perform(options)
 
 
 def analyse(options: argparse.Namespace) -> int:

@@ -13,7 +13,22 @@ from quadvis.cli.arguments import Parser
 from quadvis.library.catalogue import Catalogue
 from quadvis.library.shipped_files import shipped_names
 
-FILES = ("FILE", "LOG", "PATH", "PNG", "TABLE", "FILE.yaml", "PATH.json", "OLD", "NEW")
+FILES = (
+    "FILE",
+    "LOG",
+    "PATH",
+    "PNG",
+    "TABLE",
+    "FILE.yaml",
+    "PATH.json",
+    "OLD",
+    "NEW",
+    "A",
+    "B",
+    "BASE",
+    "OURS",
+    "THEIRS",
+)
 FOLDERS = ("FOLDER",)
 
 

@@ -63,6 +63,20 @@ signals (null unless both are logs): {compared, different: [{signal, unit, eleme
 different_rows, time_s}], only_old, only_new, unlike: [{signal, what}]}. A kind is added, removed or changed.
 Exit code: 0 the same, 1 different, 2 bad input."""
 
+MERGE_HELP = """\
+Three lines make git use it for the diagrams of a repository, and show changes by block and key:
+  echo '*.yaml diff=quadvis merge=quadvis' >> .gitattributes
+  git config diff.quadvis.textconv 'quadvis diff --git'
+  git config merge.quadvis.driver 'quadvis merge %O %A %B'
+Both versions of what both have changed stand between marks, as git has them, and are said in words.
+Exit code: 0 merged, 1 with conflicts, 2 a file that cannot be read."""
+
+FMT_HELP = """\
+Keys get the order of the reference, levels are indented by two blanks, and a map in brackets that is too long
+for its line gets a line for each key. Comments, the order of blocks, and the kind of each list and map stay.
+The result is read again before it is written: a file whose meaning would change is refused.
+Exit code: 0 done, 1 with --check if a file is not in the style, 2 bad input."""
+
 SHELL_HELP = """\
 examples:
   quadvis completion bash > ~/.local/share/bash-completion/completions/quadvis
@@ -219,6 +233,18 @@ def parser() -> Parser:
     _diff_options(
         add("diff", commands.diff, "print what differs between two diagrams, variants or logs", DIFF_HELP)
     )
+    words = "merge two versions of a file that come from a third one, by block and key; for git"
+    merge = add("merge", commands.merge, words, MERGE_HELP)
+    merge.add_argument("base", metavar="BASE", help="what both come from")
+    merge.add_argument("ours", metavar="OURS", help="one of them, which becomes the result")
+    merge.add_argument("theirs", metavar="THEIRS", help="the other one")
+    words = "write YAML files in the house style, with their comments and their meaning"
+    style = add("fmt", commands.fmt, words, FMT_HELP)
+    style.add_argument("files", metavar="FILE", nargs="+", help="diagrams, parts, or other YAML files")
+    style.add_argument(
+        "--check", action="store_true", help="write nothing; exit code 1 if a file would change"
+    )
+    style.add_argument("--diff", action="store_true", help="write nothing; print what would change")
     _plot_options(add("plot", commands.plot, "draw the figures of a log, or of several in one", PLOT_HELP))
     schema = add("schema", commands.schema, "print the JSON schema of diagrams, for editors")
     schema.add_argument("--output", "-o", metavar="PATH", help="default: standard output")
@@ -287,6 +313,10 @@ def _replay_options(parser: Parser) -> None:
 def _diff_options(parser: Parser) -> None:
     parser.add_argument("old", metavar="A", help="a diagram or a log")
     parser.add_argument("new", metavar="B", nargs="?", help="another one; default: A in another variant")
+    words = (
+        "print A with a line for each value, its keys before it; git compares such lines, see 'quadvis merge'"
+    )
+    parser.add_argument("--git", action="store_true", help=words)
     words = "the variant of A, and that of B; 'none' is the diagram without one"
     parser.add_argument("--variants", nargs=2, metavar=("X", "Y"), help=words)
     parser.add_argument("--json", action="store_true", help="print one JSON object instead of the text")

@@ -1,4 +1,4 @@
-"""Signals from files of other programs: CSV, Parquet, NumPy's .npz and MATLAB's .mat.
+"""Signals from files of other programs: CSV, Parquet, NumPy's .npz, MATLAB's .mat; `ros_signals` reads MCAP.
 
 A table has the time in one column, "time", "t" or "timestamp", with its unit if that is not s, "time (ms)",
 and a signal in each other one; the unit of a signal stands after its name, "speed (m/s)" or "speed [m/s]".
@@ -6,7 +6,7 @@ Columns "pose[0]", "pose[1]" that lie side by side are one signal. An empty cell
 
 In .npz and .mat each signal is an array of N rows. Its times are an array "NAME.time" (NAME_time in MATLAB),
 or else the array "time", "t", "tout" or "timestamp". MATLAB's structures with time are read, too: those of
-Simulink and of ``quadvis export``.
+Simulink and of ``quadvis export`` (`mat_files`).
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.errors import QuadvisError, quoted
-from quadvis.graph.graph import Index
-from quadvis.graph.names import read_index
 from quadvis.machine.inputs import read_input
-from quadvis.output.log_reader import Log, read_log
-from quadvis.output.recording import RecordedBlock, RecordedPort, Recording
+from quadvis.output.foreign_recording import KINDS, ForeignSignals
+from quadvis.output.log_reader import Log, is_foreign, read_log
+from quadvis.output.mat_files import read_mat
+from quadvis.output.ros_signals import read_messages
 from quadvis.output.stretch import NANOSECONDS
 from quadvis.units import Unit, UnitError
 
@@ -37,39 +37,6 @@ MOST_BYTES = 1 << 31
 MOST_SIZE = 1 << 31  # bytes of all arrays in an archive
 _HEAD = re.compile(r"(?P<name>.*?)\s*(?:\((?P<round>[^()]*)\)|\[(?P<square>[^\[\]]*)\])?\s*")
 _ELEMENT = re.compile(r"(?P<name>.*)\[(?P<number>[0-9]+)\]")
-_KINDS = {"f": "float64", "i": "int64", "u": "int64", "b": "bool"}
-
-
-class ForeignBlock(RecordedBlock):
-    """One signal of such a file, under the name that it has there."""
-
-    def signal(self, port: RecordedPort) -> str:
-        """Return the name of the signal."""
-        return port.name
-
-
-class ForeignSignals(Recording):
-    """The signals of a file that is no log of ours; the names are those of the file."""
-
-    damage = ""  # as of a log: nothing is read of a damaged file
-
-    def __init__(self, path: Path) -> None:
-        """Begin without signals."""
-        super().__init__()
-        self.path = path
-
-    def take(self, name: str, unit: str, stamps: NDArray[np.int64], values: NDArray[Any]) -> None:
-        """Add a signal: stamps (N,) in ns, values (N, ...)."""
-        kind = _KINDS[values.dtype.kind]
-        port = RecordedPort(name, kind, values.shape[1:], unit or "1")
-        self.add(ForeignBlock(f"/{len(self.blocks)}", (port,)))
-        slots = np.ascontiguousarray(values, "<f8" if kind == "float64" else "<i8").reshape(len(values), -1)
-        self.extend(len(self.blocks) - 1, stamps, slots.view(np.int64))
-
-    def _source(self, name: str) -> tuple[str, Index]:
-        whole, bracket, rest = name.partition("[")
-        index = read_index(rest.removesuffix("]")) if bracket and rest.endswith("]") else ()
-        return (whole, index) if index is not None else (name, ())
 
 
 class _Head(NamedTuple):
@@ -84,7 +51,9 @@ Played = Log | ForeignSignals
 
 def read_recording(path: str | Path) -> Played:
     """Read the log of a run, or a file of another program, which is known by its suffix."""
-    return read_signals(path) if Path(path).suffix.lower() in READERS else read_log(path)
+    if Path(path).suffix.lower() in READERS:
+        return read_signals(path)
+    return read_messages(path) if is_foreign(path) else read_log(path)
 
 
 def read_signals(path: str | Path) -> ForeignSignals:
@@ -94,6 +63,8 @@ def read_signals(path: str | Path) -> ForeignSignals:
     signals = ForeignSignals(file)
     try:
         READERS[file.suffix.lower()](data, signals)
+        for name, why in {} if signals.names else signals.unplayed.items():
+            raise QuadvisError(f"there is no signal in it; {quoted(name)} is none: {why}")
     except QuadvisError as error:
         raise QuadvisError(f"'{path}': {error}") from error
     return signals
@@ -157,7 +128,7 @@ def _parquet(data: bytes, signals: ForeignSignals) -> None:
         head = f"{field.name} ({unit})" if unit else field.name
         there = ~np.asarray(column.is_null())
         values = np.asarray(column.fill_null(0) if column.null_count else column)
-        if values.dtype.kind not in _KINDS:
+        if values.dtype.kind not in KINDS:
             raise QuadvisError(f"column {quoted(field.name)} has no numbers but {field.type}")
         columns.append((head, values, there))
     _take_columns(signals, columns)
@@ -240,16 +211,7 @@ def _npz(data: bytes, signals: ForeignSignals) -> None:
 
 
 def _mat(data: bytes, signals: ForeignSignals) -> None:
-    from scipy.io import loadmat  # python-control brings it
-
-    try:
-        arrays = loadmat(BytesIO(data), simplify_cells=True)
-    except NotImplementedError as error:
-        remedy = "save it by save(..., '-v7')"
-        raise QuadvisError(f"this is MATLAB's format 7.3, which is not read; {remedy}") from error
-    except Exception as error:  # scipy raises many kinds for damaged files
-        raise QuadvisError(f"this is no file of MATLAB that can be read: {error}") from error
-    arrays = {name: value for name, value in arrays.items() if not name.startswith("__")}
+    arrays = read_mat(data)
     structures = {name: arrays.pop(name) for name in list(arrays) if isinstance(arrays[name], dict)}
     for name, structure in structures.items():
         _take_structure(signals, name, structure)
@@ -285,9 +247,8 @@ def _take_arrays(signals: ForeignSignals, arrays: Mapping[str, NDArray[Any]], en
             continue
         time = f"{name}{ending}" if f"{name}{ending}" in own else common
         if time is None:
-            raise QuadvisError(
-                f"{quoted(name)} has no times; add an array '{name}{ending}', or 'time' for all"
-            )
+            signals.unplayed[name] = f"it has no times; add an array '{name}{ending}', or 'time' for all"
+            continue
         stamps = _stamps(time, np.asarray(arrays[time], np.float64).ravel())
         _take_rows(signals, name, "", stamps, values)
 
@@ -296,13 +257,15 @@ def _take_rows(
     signals: ForeignSignals, name: str, unit: str, stamps: NDArray[np.int64], values: NDArray[Any]
 ) -> None:
     """Take an array of N rows; one of (N, 1) is that of a scalar, as MATLAB has them."""
-    if values.dtype.kind not in _KINDS:
-        raise QuadvisError(f"{quoted(name)} has no numbers")
+    if values.dtype.kind not in KINDS:
+        signals.unplayed[name] = "it has no numbers"
+        return
     values = np.atleast_1d(values)
     if values.ndim == 2 and values.shape[1] == 1:
         values = values[:, 0]
     if len(values) != len(stamps):
-        raise QuadvisError(f"{quoted(name)} has {len(values)} rows, and {len(stamps)} times")
+        signals.unplayed[name] = f"it has {len(values)} rows, and {len(stamps)} times"
+        return
     signals.take(name, unit, stamps, values)
 
 

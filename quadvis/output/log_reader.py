@@ -77,6 +77,8 @@ class Log(Recording):
                 self.diagram = record.data[:LONGEST_DIAGRAM].decode(errors="replace")
             elif record.name == FILES:
                 self.files = _texts(record.data)
+        elif not isinstance(record, mcap.MetadataRecord):
+            return
         elif record.name == METADATA:
             self.metadata = record.entries
             self.ports = ports_of(record.entries)
@@ -162,6 +164,25 @@ def log_facts(path: str | Path) -> dict[str, str]:
         record for record in records if isinstance(record, mcap.MetadataRecord) and record.name == METADATA
     )
     return next((record.entries for record in facts), {})
+
+
+def is_foreign(path: str | Path) -> bool:
+    """Return whether an MCAP file begins as one of another program: with channels, and no fact of a run."""
+    try:
+        with open(path, "rb") as file:
+            data = file.read(FIRST)
+    except OSError:
+        return False
+    records = mcap.RecordScan(data).records() if data.startswith(mcap.MAGIC) else iter(())
+    for record in records:
+        if isinstance(record, mcap.AttachmentRecord | mcap.MetadataRecord) and record.name in (
+            DIAGRAM,
+            METADATA,
+        ):
+            return False
+        if isinstance(record, mcap.ChannelRecord):
+            return "fields" not in record.entries
+    return False
 
 
 def _is_time(name: str) -> bool:

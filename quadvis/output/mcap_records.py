@@ -57,12 +57,24 @@ class MetadataRecord:
 
 
 @dataclass(frozen=True)
+class SchemaRecord:
+    """The type of the messages of channels: its name, the language of its definition, the definition."""
+
+    number: int
+    name: str
+    language: str
+    definition: str
+
+
+@dataclass(frozen=True)
 class ChannelRecord:
-    """The description of all messages with one number: their topic and further entries."""
+    """The description of all messages with one number: their topic, further entries, type and encoding."""
 
     number: int
     topic: str
     entries: dict[str, str]
+    schema: int = 0
+    encoding: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +86,7 @@ class MessageRecord:
     data: bytes
 
 
-Record = AttachmentRecord | MetadataRecord | ChannelRecord | MessageRecord
+Record = AttachmentRecord | MetadataRecord | SchemaRecord | ChannelRecord | MessageRecord
 
 
 class RecordScan:
@@ -223,10 +235,16 @@ def _read(kind: int, body: memoryview) -> Iterator[Record]:
         channel, _, time = struct.unpack_from("<HIQ", body)
         yield MessageRecord(channel, time, bytes(body[22:]))
     elif kind == CHANNEL:
-        number, _ = struct.unpack("<HH", _slice(body, 0, 4))
+        number, schema = struct.unpack("<HH", _slice(body, 0, 4))
         topic, place = _text(body, 4)
-        _, place = _text(body, place)
-        yield ChannelRecord(number, topic, _entries(body, place))
+        encoding, place = _text(body, place)
+        yield ChannelRecord(number, topic, _entries(body, place), schema, encoding)
+    elif kind == SCHEMA:
+        number = int.from_bytes(_slice(body, 0, 2), "little")
+        name, place = _text(body, 2)
+        language, place = _text(body, place)
+        definition = bytes(body[place + 4 :]).decode(errors="replace")  # some are no texts, and not read
+        yield SchemaRecord(number, name, language, definition)
     elif kind == METADATA:
         name, place = _text(body, 0)
         yield MetadataRecord(name, _entries(body, place))

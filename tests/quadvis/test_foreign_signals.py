@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
+import h5py
+import hdf5storage
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -106,6 +109,85 @@ def test_numbers_of_simulink(tmp_path: Path) -> None:
     assert found["speed"].tolist() == [1.0, 2.0, 3.0] and found["speed"].shape == (3,)
     assert found["scope"].shape == (3, 2)
     assert found["many.b"].tolist() == [0.0, 3.0, 6.0]
+
+
+def in_hdf5(path: Path) -> None:
+    """Write what MATLAB's save(..., '-v7.3') does: a head of 512 bytes, the last axis first."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+
+        def put(name: str, values: Any, kind: str, group: Any = file) -> Any:
+            made = group.create_dataset(name, data=values)
+            made.attrs["MATLAB_class"] = np.bytes_(kind)
+            return made
+
+        put("t", [[0.0, 0.5, 1.0]], "double")
+        put("pose", np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]).T, "double")
+        put("valid", np.array([[1, 0, 1]], np.uint8), "logical")
+        put("author", np.array([[ord(letter)] for letter in "Ada"], np.uint16), "char")
+        put("gains", [[1.0, 2.0]], "double")
+        for name, values in (("a", [[2.0, 3.0, 4.0]]), ("b", [[1.0, 1.0, 0.0]])):
+            put(f"#refs#/{name}", values, "double")
+            text = [[ord(letter)] for letter in f"speed {name}"]
+            put(f"#refs#/label {name}", np.array(text, np.uint16), "char")
+        scope = file.create_group("scope")
+        put("time", [[0.0, 0.1, 0.2]], "double", scope)
+        inner = scope.create_group("signals")
+        for name, head in (("values", ""), ("label", "label ")):
+            inner[name] = np.array([[file[f"#refs#/{head}{each}"].ref] for each in "ab"], h5py.ref_dtype)
+        file["elsewhere"] = h5py.ExternalLink("other.mat", "/t")
+    with open(path, "r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file")
+
+
+def test_a_file_of_matlab_7_3(tmp_path: Path) -> None:
+    in_hdf5(tmp_path / "x.mat")
+    found = read_signals(tmp_path / "x.mat")
+    assert found["pose"].tolist() == [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]
+    assert found["valid"].dtype == bool and found["valid"].tolist() == [True, False, True]
+    assert found.stamps("scope.speed b").tolist() == [0, 100_000_000, 200_000_000]
+    assert found["scope.speed a"].tolist() == [2.0, 3.0, 4.0]
+    with pytest.raises(QuadvisError, match="'gains': it has 2 rows, and 3 times"):
+        found.find("gains")
+    y = drive(
+        Recording(file=str(tmp_path / "x.mat"), signal="pose[1]", between="linear"), rate="4 Hz", steps=3
+    ).y
+    assert y.tolist() == [2.0, 3.0, 4.0]
+
+
+def test_hdf5storage_writes_the_same(tmp_path: Path) -> None:
+    time = np.linspace(0, 1, 11)
+    values = np.arange(22.0).reshape(11, 2)
+    structure = {"time": time, "values": values, "unit": "m/s"}
+    arrays = {"tout": time, "speed": values[:, 0], "log": structure}
+    for oned_as in ("row", "column"):
+        path = tmp_path / f"{oned_as}.mat"
+        hdf5storage.savemat(str(path), arrays, format="7.3", oned_as=oned_as, store_python_metadata=False)
+        found = read_signals(path)
+        np.testing.assert_array_equal(found["log"], values)
+        np.testing.assert_array_equal(found["speed"], values[:, 0])
+        assert found.port("log").unit == "m/s"
+
+
+def test_without_h5py_there_is_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    in_hdf5(tmp_path / "x.mat")
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(QuadvisError, match=r"needs the package h5py; install 'quadvis\[hdf5\]', or save"):
+        read_signals(tmp_path / "x.mat")
+
+
+def test_numbers_in_another_file_are_refused(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "x.mat", "w", userblock_size=512) as file:
+        file.create_dataset("t", (3,), "f8", external=[(str(tmp_path / "secret"), 0, 24)])
+    with pytest.raises(QuadvisError, match="'/t' lies in another file; save it into this one"):
+        read_signals(tmp_path / "x.mat")
+
+
+def test_cells_that_hold_one_another_end(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "x.mat", "w", userblock_size=512) as file:
+        cell = file.create_dataset("a", (2,), h5py.ref_dtype)
+        cell[:] = [cell.ref, cell.ref]
+    with pytest.raises(QuadvisError, match="nested deeper than 16"):
+        read_signals(tmp_path / "x.mat")
 
 
 def test_arrays_have_times_of_their_own_or_those_of_all(tmp_path: Path) -> None:

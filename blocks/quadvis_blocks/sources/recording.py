@@ -25,9 +25,14 @@ class Recording(Block, numeric=False):
     the last row up to this time, of several rows with one time the last; at the ticks of the recorded run it
     is the recorded value to the bit. With ``linear`` it moves in straight lines between the rows, element by
     element. Times count in whole nanoseconds. A log that is cut or damaged is played as far as it goes.
+
+    In a bag of ROS 2 a signal is a topic with a field, ``imu.angular_velocity``, ``imu.angular_velocity.x``;
+    quaternions are x, y, z, w there; standard messages have their units; times count from the first message.
     """
 
-    file = Param(type="file", doc="log of a run (.mcap), or .csv, .parquet, .npz, .mat of any program")
+    file = Param(
+        type="file", doc="log of a run or bag of ROS 2 (.mcap), or .csv, .parquet, .npz, .mat of any program"
+    )
     signal = Param(type="str", doc="its name, such as craft.position, or an element, craft.position[2]")
     begin = Param(0.0, unit="s", doc="time of the log that is played at time 0")
     between = Param("hold", choices=("hold", "linear"), doc="what happens between the rows")
