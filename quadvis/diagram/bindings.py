@@ -85,6 +85,11 @@ class Bindings:
                 self._known[declared, count, parts] = found  # what is bound stays so
         return found
 
+    @property
+    def count(self) -> int:
+        """The number of variables that are bound, in all elements."""
+        return sum(map(len, self.elements))
+
     def open(self, declared: Iterable[Declared]) -> list[str]:
         """Return the variables of some ports and parameters that nothing has bound yet, in some element."""
         names = {name for item in declared for unit in item.units for name in unit.variables}

@@ -106,7 +106,7 @@ class Builder:
 
     def _choose_step(self) -> Fraction | Unknown | None:
         """Take the solver's step if anything is continuous; every period must be a whole number of steps."""
-        first = next(filter(_is_continuous, self.expansion.blocks.values()), None)
+        first = next(filter(self._is_continuous, self.expansion.blocks.values()), None)
         if first is None:
             return None
         step = self.spec[SOLVER].step
@@ -133,6 +133,17 @@ class Builder:
             self.faults.add(self.spec[SOLVER].place or self.spec.place, problem, remedy)
         return step
 
+    def _rate(self, flat: FlatBlock) -> tuple[str, Place] | Unknown | None:
+        """Return the rate of a block, and where it is written: where there is no choice, 'continuous'."""
+        if flat.rate is None and not self.spec[RATES] and self.spec[SOLVER].step is not None:
+            return CONTINUOUS, flat.spec.place
+        return flat.rate
+
+    def _is_continuous(self, flat: FlatBlock) -> bool:
+        rate = self._rate(flat)
+        named = rate is not None and known(rate) and rate[0] == CONTINUOUS
+        return named or (known(flat.kind) and bool(flat.kind.interface.continuous))
+
     def _task(self, flat: FlatBlock, kind: type[Block]) -> Task | Unknown:
         """Return the task of a block."""
         own = flat.spec.rate
@@ -145,14 +156,15 @@ class Builder:
                 remedy = "leave 'rate' out, or write 'continuous'"
                 self.faults.add(own[1], problem, remedy + sampled)
             return self._continuous
-        if flat.rate is None:
+        rate = self._rate(flat)
+        if rate is None:
             names = [*self.spec[RATES], CONTINUOUS]
             choice = f"choose from {', '.join(names)}" if len(names) > 1 else "declare one under 'rates'"
             self.faults.add(list(flat.around)[-1].place, "key 'rate' is missing", choice)
             return UNKNOWN
-        if flat.rate is UNKNOWN:
+        if not known(rate):
             return UNKNOWN
-        name, place = flat.rate
+        name, place = rate
         if name == CONTINUOUS:
             return self._continuous
         if name not in self.spec[RATES]:
@@ -282,9 +294,3 @@ class Builder:
         wanted = [port for port in ports.inputs if port not in ports.defaults]
         if known(inputs) and found.port in absent(wanted, inputs, ports.inputs):
             self.faults.add(part.instance.place, *unconnected(found.port, reader), subject=part.subject)
-
-
-def _is_continuous(flat: FlatBlock) -> bool:
-    rate = flat.rate
-    named = rate is not None and known(rate) and rate[0] == CONTINUOUS
-    return named or (known(flat.kind) and bool(flat.kind.interface.continuous))

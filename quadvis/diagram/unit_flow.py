@@ -39,7 +39,7 @@ class UnitFlow(Flow):
             if case not in self.cases:
                 inputs, outputs = draft.interface.inputs, draft.interface.outputs
                 counts |= {name: math.prod(node.shape(name)) for name in (*inputs, *outputs)}
-                every = {**outputs, **params, **inputs}
+                every = {**params, **outputs, **inputs}  # a formula and its output have one name
                 self.cases[case] = dict(self._noted(self.bindings[path], every, counts, node.sizes))
             node.units.update(self.cases[case])
 
@@ -157,11 +157,17 @@ class UnitFlow(Flow):
                 self._report_given(path, name, declared, wrong, None)
 
     def _match_given(self, path: str) -> None:
-        for name, declared, units in self._given(path):
-            wrong = self.bindings[path].match(declared.units, units)
-            if wrong is not None:
-                unit = units[wrong]
-                self._report_given(path, name, declared, wrong, unit if isinstance(unit, Unit) else None)
+        """Let given values bind variables: one may tell what another one, read before it, needs to know."""
+        bindings, given, bound = self.bindings[path], list(self._given(path)), -1
+        while bound < bindings.count:
+            bound = bindings.count
+            for name, declared, units in given:
+                wrong = bindings.match(declared.units, units)
+                if wrong is not None:
+                    unit = units[wrong]
+                    self._report_given(path, name, declared, wrong, unit if isinstance(unit, Unit) else None)
+            if len(given) == 1:
+                return
 
     def _match_bare(self, path: str) -> None:
         """Let numbers without unit bind open variables, first numbers whose unit is a variable itself."""

@@ -110,7 +110,7 @@ _MEANT = {
     "sources.sine": "sinewave",
     "sources.pulse": "pulsegenerator squarewave",
     "sources.noise": "randomnumber whitenoise bandlimitedwhitenoise gaussiannoise",
-    "sources.table": "fromworkspace waveform",
+    "sources.table": "fromworkspace waveform piecewise",
     "sources.repeating_sequence": "repeatingsequencestair repeatingtable",
     "sources.clock": "time digitalclock",
     "sources.chirp": "chirpsignal sweep",
@@ -136,6 +136,7 @@ _MEANT = {
     "rotation.quaternion_product": "quaternionmultiplication quaternionmultiply quatmultiply",
     "rotation.attitude_from_rates": "attitudeintegrator quaternionintegrator",
     "plant.rigid_body": "6dof sixdof rigidbody 6dofquaternion 6dofeulerangles multirotor",
+    "plant.bicycle": "car vehicle ackermann bicyclemodel kinematicbicycle",
     "systems.transfer_function": "transferfcn transferfunction tf ltisiso discretetransferfcn discretefilter",
 }  # fmt: skip
 _STANDS_FOR: dict[str, list[str]] = {}

@@ -7,7 +7,7 @@ import itertools
 from quadvis.errors import QuadvisError, suggestion
 from quadvis.machine.shipped import PREFIX, named_file, shipped_folder
 
-FOLDERS = ("parts", "crafts", "calib", "protocols", "sets")
+FOLDERS = ("textbook", "parts", "crafts", "calib", "protocols", "sets")
 KINDS = ("*.yaml", *(f"{folder}/*.yaml" for folder in FOLDERS), "models/*.xml")
 
 

@@ -177,6 +177,23 @@ def test_a_variant_takes_the_wires_and_the_rate_of_its_slot(tmp_path: Path) -> N
     assert (slow.kind, slow.task.name) == ("signal.gain", "slow")
 
 
+def test_without_rates_but_with_a_solver_blocks_are_continuous(tmp_path: Path) -> None:
+    text = (
+        "quadvis: 1\nname: lag\nsolver: {step: 10 ms}\nstop_time: 1 s\nblocks:\n"
+        "  error: {block: signal.sum, with: {signs: +-}, in: {u: [1, lag.y]}}\n"
+        "  rate: {block: signal.gain, with: {factor: 1 1/s}, in: {u: error.y}}\n"
+        "  lag: {block: signal.integrator, in: {u: rate.y}}\n"
+    )
+    diagram = load_text(text, tmp_path)
+    assert {node.task.name for node in diagram.graph.nodes} == {"continuous"}
+    assert diagram.run()["lag.y"][-1] == pytest.approx(1.0 - math.exp(-1.0), abs=1e-9)
+    clock = "quadvis: 1\nname: c\nstop_time: 1 s\n{}blocks: {{c: {{block: sources.clock}}}}\n"
+    assert load_text(clock.format("solver: {step: 10 ms}\n"), tmp_path).graph["c"].task.continuous
+    for others in ("rates: {slow: 1 Hz}\nsolver: {step: 10 ms}\n", ""):  # a choice; none at all
+        with pytest.raises(DiagramError, match="block 'c': key 'rate' is missing"):
+            load_text(clock.format(others), tmp_path)
+
+
 @pytest.mark.parametrize(
     ("values", "unit"),
     [

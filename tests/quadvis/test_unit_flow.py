@@ -96,6 +96,30 @@ def test_a_decay_of_a_plain_number_needs_one_unit_only(order: int) -> None:
     assert diagram.graph["k"].unit("y") == "1/s"
 
 
+@pytest.mark.parametrize(("controller", "car"), [("a", "b"), ("b", "a")])
+def test_a_constant_tells_what_a_gain_read_before_it_needs_to_know(controller: str, car: str) -> None:
+    diagram = loaded(
+        f"  {controller}:\n    block: systems.pid\n"
+        f"    with: {{method: continuous, kp: 800 N*s/m, ki: 40 N/m}}\n"
+        f"    in: {{reference: 10 m/s, measurement: {car}.y}}\n"
+        f"  {car}:\n    block: systems.transfer_function\n"
+        f"    with: {{denominator: [1000, 50], gain: 1 m/s/N}}\n    in: {{u: {controller}.y}}\n"
+    )
+    assert str(diagram.graph[controller].units["y"][0]) == "N"
+    assert str(diagram.graph[car].units["y"][0]) == "m/s"
+
+
+def test_the_outputs_of_formulas_have_their_units() -> None:
+    diagram = load_text(
+        f"{HEAD}{METRES}"
+        "  law: {block: math.expression, rate: c, with: {force: k * x, k: 2 N/m}, in: {x: metres.y}}\n"
+        "expect: [{signal: law.force, below: 3 N}]\n"
+        "figures: [{title: force, panels: [{title: force, signals: law.force, unit: kN}]}]\n"
+    )
+    assert str(diagram.graph["law"].units["force"][0]) == "N"
+    assert diagram.run().passed
+
+
 def test_what_one_ring_says_counts_in_the_next() -> None:
     first = """\
   a: {block: signal.unit_delay, rate: c, with: {initial: 1 m}, in: {u: b.y}}

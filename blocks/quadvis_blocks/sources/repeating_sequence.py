@@ -38,6 +38,7 @@ class RepeatingSequence(Block):
         if self.times[0] != 0.0:
             raise ParameterError("times", f"times must begin with 0 s, got {self.times[0]:g} s")
         check_finite("values", self.values)
+        self.stepwise = self.interpolation == HOLD
 
     def output(self, time: float) -> Any:
         """Return the value at this time."""

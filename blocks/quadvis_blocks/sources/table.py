@@ -37,6 +37,7 @@ class Table(Block):
             raise ParameterError("times", f"{problem}, got {len(self.times)}")
         if (np.diff(self.times) <= 0.0).any():
             raise ParameterError("times", "times must increase from row to row")
+        self.stepwise = self.interpolation == HOLD
 
     def output(self, time: float) -> Any:
         """Return the vector at this time."""

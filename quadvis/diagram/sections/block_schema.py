@@ -46,7 +46,10 @@ def _any_block(blocks: Mapping[str, type[Block]]) -> Schema:
     common: dict[str, Schema] = {
         "block": {"anyOf": [*known, LIBRARY_BLOCK]},
         "part": {**TEXT, "description": "file of a subsystem, relative to this one"},
-        "rate": {**TEXT, "description": f"one of the diagram's rates, or '{CONTINUOUS}'"},
+        "rate": {
+            **TEXT,
+            "description": f"one of the diagram's rates, or '{CONTINUOUS}'; not needed without rates",
+        },
         "at": {**TEXT, "description": "the computer that runs it, or its inner blocks"},
         "slot": {"type": "boolean", "description": "variants may put another block here"},
         "stream": {**NAME, **TEXT, "description": "name of its noise in place of its path"},

@@ -58,7 +58,8 @@ class RatesSection(FileSection[Rates]):
     key = "rates"
     words = (
         "named rates: `20 Hz`, `50 ms`, `1/30 s`, or `{rate: 10 Hz, offset: 70 ms}`; exact, no rounding; "
-        "or `$name` of a parameter; `--set rates.name=...` replaces one"
+        "or `$name` of a parameter; `--set rates.name=...` replaces one; without `rates`, but with a "
+        "`solver`, blocks run in continuous time where they say no `rate`"
     )
 
     def read(self, node: YamlNode | None, faults: Faults) -> Rates:
