@@ -173,6 +173,10 @@ class Block:
         """Return lines for its box in a picture of the diagram, such as the transitions of a machine."""
         return ()
 
+    def picture_fraction(self) -> tuple[str, str] | None:
+        """Return what stands above and below the line of a fraction in its box, for a transfer function."""
+        return None
+
     def doubts(self) -> list[ParameterError]:
         """Return the warnings: values that can run, but are surely a mistake at ``self.period`` (s)."""
         return []

@@ -34,8 +34,8 @@ TAGS = ("not_replayable", "not_restorable", "harmless")
 RESERVED = {
     "self", "time", "period", "until", "interface", "numeric", "stepwise", "functions", "example",
     "open", "close", "write_safe", "keep", "put_back", "brings_code",
-    PORTS, "named", "free_names", "picture_lines", "ports_from", "with_ports", "made_for", "entry_counts",
-    "with_entries",
+    PORTS, "named", "free_names", "picture_lines", "picture_fraction", "ports_from", "with_ports", "made_for",
+    "entry_counts", "with_entries",
     *CHECKS, *FILES, *METHODS, *TAGS,
 }  # fmt: skip
 

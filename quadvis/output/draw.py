@@ -16,8 +16,10 @@ from quadvis.output import layers, svg
 from quadvis.output.drawing import (
     ARROW,
     FOOT,
+    HEADER,
     INDENT,
     LINE,
+    MAIN,
     MARGIN,
     NAME,
     PILL_COLOURS,
@@ -158,16 +160,32 @@ def _block(drawing: Drawing, number: int, shape: Mapping[str, Any]) -> Iterator[
     yield svg.element("rect", **size, rx=3, fill=fill, stroke=line, stroke_width=1.5)
     yield svg.text(last(block.path), middle, y + 16, NAME, bold=True, anchor="middle")
     yield svg.text(block.kind, middle, y + 29, SMALL, anchor="middle", fill="#444444")
+    yield from _main(block, middle, y + HEADER + 6)
     for row, name in enumerate(block.inputs):
         if mark := drawing.marks.get(f"b{number}.i{row}"):
-            yield from _mark(mark, x, y + row_height(row))
-        yield svg.text(name, x + INDENT, y + row_height(row) + 4, PORT)
+            yield from _mark(mark, x, y + row_height(block, row))
+        yield svg.text(name, x + INDENT, y + row_height(block, row) + 4, PORT)
     for row, name in enumerate(block.outputs):
-        yield svg.text(name, x + width - INDENT, y + row_height(row) + 4, PORT, anchor="end")
+        yield svg.text(name, x + width - INDENT, y + row_height(block, row) + 4, PORT, anchor="end")
     foot = y + shape["height"] - foot_height(block)
     for number, text in enumerate(block.lines, 1):
         yield svg.text(text, x + INDENT, foot + number * FOOT - 3, SMALL, fill="#333333")
     yield "</g>"
+
+
+def _main(block: DrawnBlock, middle: float, y: float) -> Iterator[str]:
+    """Yield the main parameters and the fraction, the first base line at a height."""
+    if block.fraction:
+        above, below = block.fraction
+        half = max(svg.text_width(text, PORT) for text in block.fraction) / 2
+        line = svg.points([(middle - half, y + 3.5), (middle + half, y + 3.5)])
+        yield svg.text(above, middle, y, PORT, anchor="middle")
+        yield svg.element("polyline", points=line, stroke="#111111")
+        yield svg.text(below, middle, y + MAIN + 2, PORT, anchor="middle")
+        y += 2 * MAIN + 3
+    for text in block.main:
+        yield svg.text(text, middle, y, PORT, anchor="middle")
+        y += MAIN
 
 
 def _mark(mark: Mark, x: float, y: float) -> Iterable[str]:

@@ -16,6 +16,7 @@ from quadvis.output import svg
 TITLE, NAME, PORT, SMALL = 18.0, 13.0, 11.0, 10.0
 MARGIN, LINE, HEADER, ROW, INDENT, BETWEEN, ARROW = 24.0, 26.0, 38.0, 17.0, 7.0, 18.0, 9.0
 FOOT = 13.0  # from line to line at the foot of a box
+MAIN = 14.0  # from line to line of the main parameters
 _LONGEST_MARK = 28
 
 # Fill and line of the solver and of each task in the order of the legend: tints on which black text stays
@@ -56,7 +57,8 @@ _OPTIONS = {
 class DrawnBlock:
     """A box: `path` is its name with the parts around it ("vision/detector"), `kind` its type in YAML.
 
-    `lines` stand at its foot.
+    `main` are the lines of its main parameters under the name, `fraction` what stands above and below the
+    line of a fraction there; `lines` stand at its foot.
     """
 
     path: str
@@ -65,6 +67,8 @@ class DrawnBlock:
     outputs: tuple[str, ...]
     task: str
     lines: tuple[str, ...] = ()
+    main: tuple[str, ...] = ()
+    fraction: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True)
@@ -166,6 +170,7 @@ class Drawing:
         sides = block.inputs, block.outputs
         columns = [max((svg.text_width(name, PORT) for name in names), default=0.0) for names in sides]
         head = max(svg.text_width(last(block.path), NAME, bold=True), svg.text_width(block.kind, SMALL))
+        head = max(head, *(svg.text_width(text, PORT) for text in (*block.main, *(block.fraction or ("",)))))
         foot = max((svg.text_width(line, SMALL) for line in block.lines), default=0.0)
         width = 2 * INDENT + max(head, foot, sum(columns) + BETWEEN * all(columns))
         inputs = [f"b{number}.i{row}" for row in range(len(block.inputs))]
@@ -173,18 +178,24 @@ class Drawing:
         return {
             "id": f"b{number}",
             "width": width,
-            "height": HEADER + rows * ROW + (4 if rows else 0) + foot_height(block),
+            "height": header_height(block) + rows * ROW + (4 if rows else 0) + foot_height(block),
             "layoutOptions": {"elk.portConstraints": "FIXED_POS"},
             "ports": [
-                *(_port_node(port, "WEST", -self.reach(port), row) for row, port in enumerate(inputs)),
-                *(_port_node(f"b{number}.o{row}", "EAST", width, row) for row in range(len(block.outputs))),
+                *(
+                    _port_node(port, "WEST", -self.reach(port), row_height(block, row))
+                    for row, port in enumerate(inputs)
+                ),
+                *(
+                    _port_node(f"b{number}.o{row}", "EAST", width, row_height(block, row))
+                    for row in range(len(block.outputs))
+                ),
             ],
         }
 
 
-def _port_node(name: str, side: str, x: float, row: int) -> dict[str, Any]:
+def _port_node(name: str, side: str, x: float, y: float) -> dict[str, Any]:
     size = {"width": max(-x, 0), "height": 0}
-    return {"id": name, "x": x, "y": row_height(row), **size, "layoutOptions": {"elk.port.side": side}}
+    return {"id": name, "x": x, "y": y, **size, "layoutOptions": {"elk.port.side": side}}
 
 
 def _part_node(path: str, parts: dict[str, dict[str, Any]]) -> dict[str, Any]:
@@ -207,9 +218,14 @@ def foot_height(block: DrawnBlock) -> float:
     return len(block.lines) * FOOT + (INDENT if block.lines else 0.0)
 
 
-def row_height(row: int) -> float:
+def header_height(block: DrawnBlock) -> float:
+    """Return the height of name, type and main parameters at the top of a box."""
+    return HEADER + MAIN * (len(block.main) + 2 * bool(block.fraction)) + 3 * bool(block.fraction)
+
+
+def row_height(block: DrawnBlock, row: int) -> float:
     """Return the distance of a row of ports from the top of its box."""
-    return HEADER + (row + 0.5) * ROW
+    return header_height(block) + (row + 0.5) * ROW
 
 
 def last(path: str) -> str:

@@ -19,7 +19,7 @@ class Compare(Block):
     """
 
     operator = Param(
-        "<", choices=OPERATORS, doc="how they must compare; in quotes, since YAML knows > itself"
+        "<", choices=OPERATORS, shown=True, doc="how they must compare; in quotes, since YAML knows > itself"
     )
     takes = Param("float64", choices=KINDS, doc="the kind of the inputs")
     a = In("float64[*]", unit="a", doc="the left side")

@@ -20,7 +20,7 @@ class Counter(Block):
     limit the count stays there, or goes on from the other one.
     """
 
-    count_on = Param("rising", choices=NAMES, doc="what counts")
+    count_on = Param("rising", choices=NAMES, shown=True, doc="what counts")
     initial = Param(0, type="int64", doc="the count at the start and at a reset")
     lower = Param(0, type="int64", min=-MOST, max=MOST, tune=True, doc="smallest count")
     upper = Param(MOST, type="int64", min=-MOST, max=MOST, tune=True, doc="largest count")

@@ -16,7 +16,7 @@ class Gate(Block):
     ``xor`` is true if an odd number of inputs is. ``not`` takes one input.
     """
 
-    operator = Param("and", choices=OPERATORS, doc="which operation")
+    operator = Param("and", choices=OPERATORS, shown=True, doc="which operation")
     u = In("bool[*]", many=True, doc="the truth values")
     y = Out("bool[*]", doc="the result")
 

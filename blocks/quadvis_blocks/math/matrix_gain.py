@@ -16,7 +16,9 @@ class MatrixGain(Block):
     The sums run along the rows of the matrix, from left to right. A scalar counts as a vector of one element.
     """
 
-    gain = Param(((1.0,),), type="float64[m,n]", unit="b/a", tune=True, doc="the matrix, row by row")
+    gain = Param(
+        ((1.0,),), type="float64[m,n]", unit="b/a", tune=True, shown=True, doc="the matrix, row by row"
+    )
     file = Param(
         "", type="file", doc="a text file with the matrix in SI units, one row a line, in place of ``gain``"
     )

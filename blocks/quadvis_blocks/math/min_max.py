@@ -13,7 +13,7 @@ MIN, MAX = range(2)
 class MinMax(Block):
     """The smallest or the largest of several signals, element by element; NaN if one of them is NaN."""
 
-    function = Param("min", choices=("min", "max"), doc="which of them")
+    function = Param("min", choices=("min", "max"), shown=True, doc="which of them")
     u = In("float64[*]", unit="a", many=True, doc="the signals")
     y = Out("float64[*]", unit="a", doc="the smallest or largest")
 

@@ -14,7 +14,7 @@ class Delay(Block):
     `signal.transport_delay` delays by a time.
     """
 
-    steps = Param(1, type="int64", min=1, max=100_000, doc="how many samples")
+    steps = Param(1, type="int64", min=1, max=100_000, shown=True, doc="how many samples")
     initial = Param(0.0, type="float64[*?]", unit="a", doc="the output before the first sample arrives")
     first = Param(
         (), type="float64[k]", unit="a", doc="the outputs before, the oldest first, in place of ``initial``"

@@ -11,7 +11,12 @@ class Gain(Block):
     """A signal times a factor, element by element: ``y = factor * u``."""
 
     factor = Param(
-        1.0, type="float64[*?]", unit="b/a", tune=True, doc="the factor, one for all elements or one each"
+        1.0,
+        type="float64[*?]",
+        unit="b/a",
+        tune=True,
+        shown=True,
+        doc="the factor, one for all elements or one each",
     )
     u = In("float64[*]", unit="a", doc="any signal")
     y = Out("float64[*]", unit="b", doc="the product")

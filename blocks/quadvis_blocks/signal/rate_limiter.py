@@ -15,9 +15,15 @@ class RateLimiter(Block):
     initial value is given, ``y[0] = u[0]``.
     """
 
-    rising = Param(1.0, type="float64[*?]", unit="a/s", min=0.0, tune=True, doc="fastest rise")
+    rising = Param(1.0, type="float64[*?]", unit="a/s", min=0.0, tune=True, shown=True, doc="fastest rise")
     falling = Param(
-        1.0, type="float64[*?]", unit="a/s", min=0.0, tune=True, doc="fastest fall, a positive number"
+        1.0,
+        type="float64[*?]",
+        unit="a/s",
+        min=0.0,
+        tune=True,
+        shown=True,
+        doc="fastest fall, a positive number",
     )
     initial = Param(
         math.inf,

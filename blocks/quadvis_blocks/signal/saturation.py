@@ -14,8 +14,8 @@ class Saturation(Block):
     With ``lower = -upper`` this is the function sigma of the paper's section 4.
     """
 
-    lower = Param(-1.0, type="float64[*?]", unit="a", tune=True, doc="smallest value that passes")
-    upper = Param(1.0, type="float64[*?]", unit="a", tune=True, doc="largest value that passes")
+    lower = Param(-1.0, type="float64[*?]", unit="a", tune=True, shown=True, doc="smallest value that passes")
+    upper = Param(1.0, type="float64[*?]", unit="a", tune=True, shown=True, doc="largest value that passes")
     u = In("float64[*]", unit="a", doc="any signal")
     y = Out("float64[*]", unit="a", doc="the signal within the limits")
 

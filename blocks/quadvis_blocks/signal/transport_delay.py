@@ -28,6 +28,7 @@ class TransportDelay(Block):
         RADIO_DELAY,
         unit="s",
         above=0.0,
+        shown=True,
         doc="time until a change arrives; default: the 22 ms of a radio frame",
     )
     initial = Param(0.0, type="float64[*?]", unit="a", doc="the output until the first input arrives")

@@ -17,7 +17,13 @@ class Noise(Block):
     """
 
     sigma = Param(
-        1.0, type="float64[*]", unit="a", min=0.0, tune=True, doc="standard deviation of each sample"
+        1.0,
+        type="float64[*]",
+        unit="a",
+        min=0.0,
+        tune=True,
+        shown=True,
+        doc="standard deviation of each sample",
     )
     mean = Param(0.0, unit="a", tune=True, doc="mean value of every element")
     y = Out("float64[*]", unit="a", doc="the noise")

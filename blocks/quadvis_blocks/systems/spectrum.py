@@ -25,7 +25,7 @@ class Spectrum(Block):
     """
 
     frequencies = Param(type="float64[k]", unit="Hz", min=0.0, doc="where the spectrum is computed")
-    samples = Param(100, type="int64", min=1, max=10_000_000, doc="length of a window, n")
+    samples = Param(100, type="int64", min=1, max=10_000_000, shown=True, doc="length of a window, n")
     window = Param("none", choices=("none", "hann"), doc="how the samples of a window are weighed")
     u = In(unit="a", doc="the signal")
     amplitude = Out("float64[k]", unit="a", doc="amplitude at each frequency")
