@@ -10,7 +10,8 @@ from quadvis.graph.graph import Constant, Node, Wire
 from quadvis.graph.names import wire_text
 from quadvis.links.link import Link
 from quadvis.links.twin import ReceiverTwin
-from quadvis.output.draw import DrawnBlock, DrawnWire, draw
+from quadvis.output.draw import draw
+from quadvis.output.drawn import DrawnBlock, DrawnWire
 from quadvis.output.folding import DrawnPicture, folded, part_alone
 
 MOST_LINES, LONGEST_LINE = 24, 60  # at the foot of a box
@@ -52,10 +53,10 @@ def draw_diagram(diagram: Diagram, *, part: str = "", depth: int | None = None) 
 
 def _box(node: Node, inputs: tuple[str, ...]) -> DrawnBlock:
     block = node.block
+    lines = tuple(map(_short, block.picture_lines()[:MOST_LINES]))
     return DrawnBlock(
-        node.path, node.kind, inputs, tuple(block.interface.outputs), node.task.name,
-        tuple(map(_short, block.picture_lines()[:MOST_LINES])), main_parameters(node),
-        block.picture_fraction(),
+        node.path, node.kind, inputs, tuple(block.interface.outputs), node.task.name, lines,
+        main_parameters(node), block.symbol, block.picture_formula(), block.picture_signs(),
     )  # fmt: skip
 
 

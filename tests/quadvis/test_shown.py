@@ -32,8 +32,8 @@ def lines(text: str) -> tuple[str, ...]:
         ("{block: signal.gain, rate: fast, with: {factor: -2 N*s/m}, in: {u: speed.y}}", ("-2 N·s/m",)),
         ("{block: signal.gain, rate: fast, with: {factor: 0.125}, in: {u: speed.y}}", ("0.125",)),
         ("{block: signal.low_pass, rate: fast, with: {time_constant: 0.05 s}, in: {u: speed.y}}", ("50 ms",)),
-        ("{block: signal.delay, rate: fast, with: {steps: 5}, in: {u: speed.y}}", ("5",)),
-        ("{block: logic.compare, rate: fast, with: {operator: '>='}, in: {a: speed.y, b: 1 m/s}}", (">=",)),
+        ("{block: systems.moving_average, rate: fast, with: {samples: 5}, in: {u: speed.y}}", ("5",)),
+        ("{block: math.convert, rate: fast, with: {gives: int64}, in: {u: true}}", ("int64",)),
         (
             "{block: signal.saturation, rate: fast, with: {lower: -20 cm/s, upper: 1 m/s}, in: {u: speed.y}}",
             ("lower -0.2 m/s", "upper 1 m/s"),
@@ -88,4 +88,5 @@ def test_a_transfer_function_is_a_small_fraction_in_the_picture() -> None:
         found[2]: float(found[1])
         for found in re.finditer(r'<text [^>]*?y="([\d.]+)"[^>]*>([^<]*)</text>', svg)
     }
-    assert heights["x"] < heights["2"] < heights["0.5 s² + 1"] < heights["u"]
+    assert heights["x"] < heights["2"] < heights["0.5 s² + 1"]
+    assert "transfer_function</text>" not in svg  # the fraction says it

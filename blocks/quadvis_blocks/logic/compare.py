@@ -19,7 +19,7 @@ class Compare(Block):
     """
 
     operator = Param(
-        "<", choices=OPERATORS, shown=True, doc="how they must compare; in quotes, since YAML knows > itself"
+        "<", choices=OPERATORS, doc="how they must compare; in quotes, since YAML knows > itself"
     )
     takes = Param("float64", choices=KINDS, doc="the kind of the inputs")
     a = In("float64[*]", unit="a", doc="the left side")
@@ -37,6 +37,10 @@ class Compare(Block):
         unit = "a" if takes == 0 else "1"
         sides = {"a": "the left side", "b": "the right side"}
         return {name: In(f"{KINDS[takes]}[*]", unit=unit, doc=doc) for name, doc in sides.items()}
+
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the operator."""
+        return (OPERATORS[self.operator],)
 
     def output(self, a: Any, b: Any) -> Any:
         """Return the truth value."""

@@ -41,6 +41,10 @@ class Counter(Block):
         digit: {block: logic.counter, rate: fast, with: {upper: 9, at_limit: wrap}, in: {u: high.y}}
     """
 
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return that it counts."""
+        return ("1 2 3",)
+
     def check(self) -> None:
         """Refuse limits that exclude each other or the initial count."""
         refuse_reversed(("lower", self.lower), ("upper", self.upper))

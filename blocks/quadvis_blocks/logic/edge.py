@@ -9,7 +9,7 @@ from quadvis_blocks._edges import NAMES, fires
 class Edge(Block):
     """True for one tick when a truth value changes. What is true at the start is no edge."""
 
-    direction = Param("rising", choices=NAMES[:3], shown=True, doc="which changes count")
+    direction = Param("rising", choices=NAMES[:3], doc="which changes count")
     u = In("bool", doc="the truth value")
     y = Out("bool", doc="whether it has changed since the tick before")
     before = State("bool", doc="the truth value at the tick before")
@@ -20,6 +20,10 @@ class Edge(Block):
         high: {block: logic.compare, rate: fast, with: {operator: ">"}, in: {a: pulses.y, b: 0.5}}
         begun: {block: logic.edge, rate: fast, in: {u: high.y}}
     """
+
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the edge."""
+        return (("↑", "↓", "↕")[self.direction],)
 
     def output(self, u: bool) -> bool:
         """Return whether there is an edge."""

@@ -16,7 +16,7 @@ class Gate(Block):
     ``xor`` is true if an odd number of inputs is. ``not`` takes one input.
     """
 
-    operator = Param("and", choices=OPERATORS, shown=True, doc="which operation")
+    operator = Param("and", choices=OPERATORS, doc="which operation")
     u = In("bool[*]", many=True, doc="the truth values")
     y = Out("bool[*]", doc="the result")
 
@@ -26,6 +26,10 @@ class Gate(Block):
         high: {block: logic.compare, rate: fast, with: {operator: "<"}, in: {a: wave.y, b: 1 m}}
         inside: {block: logic.gate, rate: fast, with: {operator: and}, in: {u: [low.y, high.y]}}
     """
+
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the operator."""
+        return (OPERATORS[self.operator].upper(),)
 
     def check(self) -> None:
         """Refuse several inputs of ``not``."""

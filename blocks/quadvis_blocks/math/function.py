@@ -36,7 +36,7 @@ class Function(Block):
     not have, such as the root of a negative number, ends the run.
     """
 
-    function = Param("sin", choices=FUNCTIONS, shown=True, doc="which function")
+    function = Param("sin", choices=FUNCTIONS, doc="which function")
     u = In("float64[*]", unit="a", doc="the argument")
     y = Out("float64[*]", unit="b", doc="the value of the function")
 
@@ -53,6 +53,10 @@ class Function(Block):
             "u": In("float64[*]", unit=given, doc="the argument"),
             "y": Out("float64[*]", unit=found, doc="the value of the function"),
         }
+
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the function."""
+        return (FUNCTIONS[self.function],)
 
     def output(self, u: Any) -> Any:
         """Return the value."""

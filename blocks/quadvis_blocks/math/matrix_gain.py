@@ -25,6 +25,7 @@ class MatrixGain(Block):
     u = In("float64[n?]", unit="a", doc="a vector with an element for each column")
     y = Out("float64[m]", unit="b", doc="the product, with an element for each row")
 
+    symbol = "gain"
     example = """
         state: {block: sources.constant, rate: fast, with: {value: [0.1, -0.2]}}
         feedback: {block: math.matrix_gain, rate: fast, with: {gain: [[-1, -1.7]]}, in: {u: state.y}}

@@ -13,7 +13,7 @@ MIN, MAX = range(2)
 class MinMax(Block):
     """The smallest or the largest of several signals, element by element; NaN if one of them is NaN."""
 
-    function = Param("min", choices=("min", "max"), shown=True, doc="which of them")
+    function = Param("min", choices=("min", "max"), doc="which of them")
     u = In("float64[*]", unit="a", many=True, doc="the signals")
     y = Out("float64[*]", unit="a", doc="the smallest or largest")
 
@@ -21,6 +21,10 @@ class MinMax(Block):
         wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
         above: {block: math.min_max, rate: fast, with: {function: max}, in: {u: [wave.y, 0 m]}}
     """
+
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the function."""
+        return (("min", "max")[self.function],)
 
     def output(self, *u: Any) -> Any:
         """Return the signal that is beyond all others."""

@@ -24,6 +24,7 @@ class Backlash(Block):
     last = State("float64[*]")
     driven = Work("float64[*]")
 
+    symbol = "backlash"
     example = """
         motor: {block: sources.sine, rate: fast, with: {amplitude: 10 deg, frequency: 1 Hz}}
         gear: {block: signal.backlash, rate: fast, with: {width: 2 deg}, in: {u: motor.y}}

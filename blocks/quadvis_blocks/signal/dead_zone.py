@@ -21,6 +21,7 @@ class DeadZone(Block):
     u = In("float64[*]", unit="a", doc="any signal")
     y = Out("float64[*]", unit="a", doc="what is beyond the zone")
 
+    symbol = "dead_zone"
     example = """
         stick: {block: sources.sine, rate: fast, with: {amplitude: 1, frequency: 1 Hz}}
         command: {block: signal.dead_zone, rate: fast, with: {lower: -0.1, upper: 0.1}, in: {u: stick.y}}

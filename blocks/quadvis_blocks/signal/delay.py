@@ -6,6 +6,8 @@ from typing import Any
 
 from quadvis.block import Block, In, Out, Param, ParameterError, State
 
+RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+
 
 class Delay(Block):
     """The signal of ``steps`` samples ago: ``y[k] = u[k - steps]``. It breaks algebraic loops.
@@ -14,7 +16,7 @@ class Delay(Block):
     `signal.transport_delay` delays by a time.
     """
 
-    steps = Param(1, type="int64", min=1, max=100_000, shown=True, doc="how many samples")
+    steps = Param(1, type="int64", min=1, max=100_000, doc="how many samples")
     initial = Param(0.0, type="float64[*?]", unit="a", doc="the output before the first sample arrives")
     first = Param(
         (), type="float64[k]", unit="a", doc="the outputs before, the oldest first, in place of ``initial``"
@@ -33,6 +35,10 @@ class Delay(Block):
     def ports(cls, steps: int) -> dict[str, Any]:
         """Return room for the samples."""
         return {"kept": State(f"float64[{steps},*]", doc="the samples on their way, in a ring")}
+
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the shift by so many samples."""
+        return (f"z⁻{str(self.steps).translate(RAISED)}",)
 
     def check(self) -> None:
         """Refuse first outputs that are not as many as the samples."""

@@ -31,6 +31,7 @@ class Friction(Block):
     u = In("float64[*]", unit="a", doc="the speed")
     y = Out("float64[*]", unit="b", doc="the force, in the direction of the speed")
 
+    symbol = "friction"
     example = """
         speed: {block: sources.sine, rate: fast, with: {amplitude: 1 m/s, frequency: 1 Hz}}
         drag:

@@ -21,6 +21,7 @@ class Gain(Block):
     u = In("float64[*]", unit="a", doc="any signal")
     y = Out("float64[*]", unit="b", doc="the product")
 
+    symbol = "gain"
     example = """
         speed: {block: sources.sine, rate: fast, with: {amplitude: 1 m/s, frequency: 1 Hz}}
         drag: {block: signal.gain, rate: fast, with: {factor: -2 N*s/m}, in: {u: speed.y}}

@@ -26,6 +26,10 @@ class LowPass(Block):
         smooth: {block: signal.low_pass, rate: fast, with: {time_constant: 50 ms}, in: {u: wave.y}}
     """
 
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the transfer function."""
+        return ("1", "τ s + 1")
+
     def start(self) -> None:
         """Begin with the initial value."""
         self.smooth = self.initial

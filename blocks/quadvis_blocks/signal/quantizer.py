@@ -24,6 +24,7 @@ class Quantizer(Block):
     u = In("float64[*]", unit="a", doc="any signal")
     y = Out("float64[*]", unit="a", doc="the nearest step")
 
+    symbol = "quantizer"
     example = """
         angle: {block: sources.ramp, rate: fast, with: {slope: 1 rad/s}}
         encoder: {block: signal.quantizer, rate: fast, with: {interval: 5 deg}, in: {u: angle.y}}

@@ -36,6 +36,7 @@ class RateLimiter(Block):
     last = State("float64[*]")
     given = Work("float64[*]")
 
+    symbol = "rate_limiter"
     example = """
         command: {block: sources.step, rate: fast, with: {after: 1 m, at: 0.2 s}}
         ramp: {block: signal.rate_limiter, rate: fast, with: {rising: 2 m/s}, in: {u: command.y}}

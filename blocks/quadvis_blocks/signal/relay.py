@@ -28,6 +28,7 @@ class Relay(Block):
     y = Out("float64[*]", unit="b", doc="one of the two values")
     is_on = State("bool[*]")
 
+    symbol = "relay"
     example = """
         room: {block: sources.sine, rate: fast, with: {amplitude: 2 K, bias: 293 K, frequency: 1 Hz}}
         heating:

@@ -19,6 +19,7 @@ class Saturation(Block):
     u = In("float64[*]", unit="a", doc="any signal")
     y = Out("float64[*]", unit="a", doc="the signal within the limits")
 
+    symbol = "saturation"
     example = """
         wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
         limited: {block: signal.saturation, rate: fast, with: {lower: -1 m, upper: 1.5 m}, in: {u: wave.y}}

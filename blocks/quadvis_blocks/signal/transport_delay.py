@@ -44,6 +44,10 @@ class TransportDelay(Block):
         radio: {block: signal.transport_delay, rate: fast, with: {delay: 50 ms}, in: {u: wave.y}}
     """
 
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the transfer function."""
+        return ("e⁻ˢᵀ",)
+
     def check(self) -> None:
         """Refuse a delay that holds more values than there is room for."""
         check_delay(self.delay, CAPACITY - 1, self.period)

@@ -27,6 +27,7 @@ class Chirp(Block):
     sweep = Param("linear", choices=("linear", "logarithmic"), doc="how the frequency moves")
     y = Out(unit="a", doc="the wave")
 
+    symbol = "chirp"
     example = """
         probe:
           block: sources.chirp

@@ -16,6 +16,7 @@ class Constant(Block):
     value = Param(0.0, type="float64[*]", unit="a", tune=True, shown=True, doc="the value")
     y = Out("float64[*]", unit="a", doc="the value")
 
+    symbol = "value"
     example = """
         place: {block: sources.constant, rate: fast, with: {value: {value: [1, 2, 0.5], unit: m}}}
     """

@@ -30,6 +30,7 @@ class Noise(Block):
     draw = State("float64[*]")
     stream = Random()
 
+    symbol = "noise"
     example = """
         error: {block: sources.noise, rate: fast, with: {sigma: 2 cm}}
     """

@@ -31,6 +31,7 @@ class Prbs(Block):
     register = State("int64")
     ticks = State("int64", doc="how long the present value has lasted")
 
+    symbol = "binary_noise"
     example = """
         probe: {block: sources.prbs, rate: fast, with: {order: 5, hold: 2, low: -1 N, high: 1 N}}
     """

@@ -21,6 +21,7 @@ class Pulse(Block):
     begin = Param(0.0, unit="s", doc="instant of the first rise")
     y = Out(unit="a", doc="the pulses")
 
+    symbol = "pulse"
     example = """
         knocks: {block: sources.pulse, rate: fast, with: {high: 2 N, interval: 0.5 s, width: 0.1 s}}
     """

@@ -15,6 +15,7 @@ class Ramp(Block):
     begin = Param(0.0, unit="s", tune=True, doc="instant at which it begins to change")
     y = Out(unit="a", doc="the ramp")
 
+    symbol = "ramp"
     example = """
         height: {block: sources.ramp, rate: fast, with: {slope: 0.3 m/s, begin: 0.2 s}}
     """

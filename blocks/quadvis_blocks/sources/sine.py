@@ -17,6 +17,7 @@ class Sine(Block):
     bias = Param(0.0, unit="a", tune=True, doc="mean value")
     y = Out(unit="a", doc="the wave")
 
+    symbol = "sine"
     example = """
         wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 0.5 Hz, phase: 90 deg}}
     """

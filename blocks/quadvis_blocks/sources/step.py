@@ -18,6 +18,7 @@ class Step(Block):
     at = Param(1.0, unit="s", tune=True, shown=True, doc="instant of the step")
     y = Out(unit="a", doc="the step")
 
+    symbol = "step"
     example = """
         command: {block: sources.step, rate: fast, with: {before: 0 m, after: 1 m, at: 0.5 s}}
     """

@@ -30,6 +30,7 @@ class UniformNoise(Block):
     draw = State("float64[*]", doc="numbers between 0 and 1")
     stream = Random()
 
+    symbol = "noise"
     example = """
         shaking: {block: sources.uniform_noise, rate: fast, with: {lower: -2 cm, upper: 2 cm}}
     """

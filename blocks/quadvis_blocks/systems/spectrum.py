@@ -36,6 +36,7 @@ class Spectrum(Block):
     whole_real = State("float64[k]", doc="sums of the last whole window")
     whole_imaginary = State("float64[k]", doc="sums of the last whole window")
 
+    symbol = "spectrum"
     example = """
         wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 0.2 Hz}}
         lines:

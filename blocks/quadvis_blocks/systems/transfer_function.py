@@ -86,7 +86,7 @@ class TransferFunction(Lti, Sampled, Block):
             model = self.computed(of_polynomials(numerator, denominator), exact)
         self.take(model, discrete=self.method != CONTINUOUS)
 
-    def picture_fraction(self) -> tuple[str, str]:
+    def picture_formula(self) -> tuple[str, str]:
         """Return numerator and denominator."""
         given = polynomials(self.read_file("file", read_model)) if self.file else None
         numerator, denominator = given or (self.numerator, self.denominator)

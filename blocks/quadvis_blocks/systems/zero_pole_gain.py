@@ -74,7 +74,7 @@ class ZeroPoleGain(Lti, Sampled, Block):
             model = self.computed(of_roots(zeros, poles, 1.0), exact)
         self.take(model, discrete=self.method != CONTINUOUS)
 
-    def picture_fraction(self) -> tuple[str, str]:
+    def picture_formula(self) -> tuple[str, str]:
         """Return numerator and denominator as products."""
         zeros, poles = _roots("zeros", self.zeros), _roots("poles", self.poles)
         return of_factors(zeros, poles, self.gain, "z" if self.method == DISCRETE else "s")

@@ -49,7 +49,7 @@ def test_a_polynomial_is_written_as_it_is(coefficients: list[int]) -> None:
     ],
 )
 def test_a_block_says_its_fraction(block: Any, found: tuple[str, str]) -> None:
-    assert block.picture_fraction() == found
+    assert block.picture_formula() == found
 
 
 def test_what_is_long_gets_a_name() -> None:
