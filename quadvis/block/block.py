@@ -45,6 +45,7 @@ class Block:
     brings_code: ClassVar[str] = ""  # the parameter whose file a run executes
     harmless: ClassVar[str] = ""  # why its writes need no safe values: "a file moves nothing"
     example: ClassVar[str] = ""  # entries under `blocks` that show its use, at the rates fast and continuous
+    symbol: ClassVar[str] = ""  # by which pictures show it: one of `quadvis.block.symbol.SYMBOLS`
     free_names: ClassVar[str] = ""  # what diagrams name by themselves: "outputs, by formulas"; see `named`
     # The parameters and the numbers of inputs from which the ports were made; these numbers alone.
     made_for: ClassVar[Mapping[str, Any] | None] = None
@@ -174,6 +175,14 @@ class Block:
     def picture_lines(self) -> tuple[str, ...]:
         """Return lines for its box in a picture of the diagram, such as the transitions of a machine."""
         return ()
+
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return what a picture shows in the place of its type: a text, or numerator and denominator."""
+        return ()
+
+    def picture_signs(self) -> Mapping[str, str]:
+        """Return signs that a picture shows at inputs in the place of their names: + and - of a sum."""
+        return {}
 
     def doubts(self) -> list[ParameterError]:
         """Return the warnings: values that can run, but are surely a mistake at ``self.period`` (s)."""

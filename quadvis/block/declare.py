@@ -159,6 +159,9 @@ class Param(Declared):
     file or folder that the block reads, or writes if ``writes=True``. A value of type ``port`` is the path of
     a serial port, ``udp:HOST:PORT``, what the driver of a card takes, or ``pty:NAME``: one end of a cable
     that a real-time run makes. A value of type ``map`` is a map or a list; the block has it as JSON.
+
+    With ``shown=True`` a picture of the diagram has the value under the name of the block: for the one or two
+    parameters that say what the block does, such as the factor of a gain. A port is always shown.
     """
 
     def __init__(
@@ -174,9 +177,10 @@ class Param(Declared):
         choices: tuple[str, ...] | type[enum.Enum] = (),
         tune: bool = False,
         writes: bool = False,
+        shown: bool = False,
         doc: str = "",
     ) -> None:
-        self.writes = writes
+        self.writes, self.shown = writes, shown or type == "port"
         self.choices = choices if isinstance(choices, tuple) else tuple(choices.__members__)
         self.default, self.tune = default.name if isinstance(default, enum.Enum) else default, tune
         self.min, self.max, self.above, self.below = min, max, above, below

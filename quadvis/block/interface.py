@@ -20,6 +20,7 @@ from quadvis.block.declare import (
     Work,
     entry_name,
 )
+from quadvis.block.symbol import check_symbol
 from quadvis.errors import sentence, suggestion
 
 if TYPE_CHECKING:
@@ -34,8 +35,8 @@ TAGS = ("not_replayable", "not_restorable", "harmless")
 RESERVED = {
     "self", "time", "period", "until", "interface", "numeric", "stepwise", "functions", "example",
     "open", "close", "write_safe", "keep", "put_back", "brings_code",
-    PORTS, "named", "free_names", "picture_lines", "ports_from", "with_ports", "made_for", "entry_counts",
-    "with_entries",
+    PORTS, "named", "free_names", "picture_lines", "picture_formula", "picture_signs",
+    "symbol", "ports_from", "with_ports", "made_for", "entry_counts", "with_entries",
     *CHECKS, *FILES, *METHODS, *TAGS,
 }  # fmt: skip
 
@@ -123,6 +124,7 @@ def _declarations(cls: type[Block]) -> dict[str, Declared]:
 
 def interface_of(cls: type[Block]) -> Interface:
     """Return what a class declares; TypeError if its declarations contradict each other or its methods."""
+    check_symbol(cls.symbol, cls.__name__)
     found = _declarations(cls)
     for name in found:
         if name in RESERVED:

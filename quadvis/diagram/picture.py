@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.sections.block_text import constant_text
+from quadvis.diagram.shown import main_parameters
 from quadvis.diagram.times import rate_text
 from quadvis.graph.graph import Constant, Node, Wire
 from quadvis.graph.names import wire_text
 from quadvis.links.link import Link
 from quadvis.links.twin import ReceiverTwin
-from quadvis.output.draw import DrawnBlock, DrawnWire, draw
+from quadvis.output.draw import draw
+from quadvis.output.drawn import DrawnBlock, DrawnWire
 from quadvis.output.folding import DrawnPicture, folded, part_alone
 
 MOST_LINES, LONGEST_LINE = 24, 60  # at the foot of a box
@@ -34,8 +36,7 @@ def draw_diagram(diagram: Diagram, *, part: str = "", depth: int | None = None) 
             continue
         interface = node.block.interface
         shown = [port for port in interface.inputs if _is_drawn(node, port)]
-        outputs, lines = tuple(interface.outputs), tuple(map(_short, node.block.picture_lines()[:MOST_LINES]))
-        blocks.append(DrawnBlock(node.path, node.kind, tuple(shown), outputs, node.task.name, lines))
+        blocks.append(_box(node, tuple(shown)))
         for port in shown:
             source = node.inputs[port]
             if isinstance(source, Wire):
@@ -48,6 +49,15 @@ def draw_diagram(diagram: Diagram, *, part: str = "", depth: int | None = None) 
     picture = folded(picture, depth) if depth is not None else picture
     title = f"{diagram.name}: {part}" if part else diagram.name
     return draw(title, picture.blocks, picture.wires, picture.constants, tasks)
+
+
+def _box(node: Node, inputs: tuple[str, ...]) -> DrawnBlock:
+    block = node.block
+    lines = tuple(map(_short, block.picture_lines()[:MOST_LINES]))
+    return DrawnBlock(
+        node.path, node.kind, inputs, tuple(block.interface.outputs), node.task.name, lines,
+        main_parameters(node), block.symbol, block.picture_formula(), block.picture_signs(),
+    )  # fmt: skip
 
 
 def _short(line: str) -> str:

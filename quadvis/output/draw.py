@@ -13,24 +13,19 @@ from typing import Any
 
 from quadvis.output import elkjs as engine
 from quadvis.output import layers, svg
-from quadvis.output.drawing import (
+from quadvis.output.drawing import PILL_COLOURS, Drawing
+from quadvis.output.drawn import (
     ARROW,
-    FOOT,
     INDENT,
     LINE,
     MARGIN,
-    NAME,
-    PILL_COLOURS,
     PORT,
     SMALL,
     TITLE,
-    Drawing,
     DrawnBlock,
     DrawnWire,
     Mark,
-    foot_height,
     last,
-    row_height,
 )  # fmt: skip
 from quadvis.output.elkjs import LayoutError
 
@@ -134,11 +129,13 @@ def _part(shape: Mapping[str, Any]) -> Iterator[str]:
 
 def _wire(drawing: Drawing, number: int, shape: Mapping[str, Any]) -> Iterator[str]:
     wire, (source, target) = drawing.wires[number], drawing.ends[number]
-    colour = drawing.colours_of(int(source[1:].partition(".")[0]))[1]
+    colour = drawing.colours_of(int(source[1:].partition(".")[0])).line
     (section,) = shape["sections"]
     corners = [section["startPoint"], *section.get("bendPoints", ()), section["endPoint"]]
-    x, y = corners[-1]["x"] + drawing.reach(target), corners[-1]["y"]
-    line = svg.points([*((corner["x"], corner["y"]) for corner in corners), (x, y)])
+    x, y = corners[-1]["x"] + drawing.reach(target) + drawing.inset(target), corners[-1]["y"]
+    way = [(corner["x"], corner["y"]) for corner in corners]
+    start = (way[0][0] - drawing.inset(source), way[0][1])
+    line = svg.points([start, *way[1:], (x, y)])
     end = f"{wire.target_block}.{wire.target_port}"
     yield svg.opening("g", class_="wire", data_source=wire.source, data_target=end)
     yield svg.element("title", f"{wire.source} → {end}" + (f" ({wire.crossing})" if wire.crossing else ""))
@@ -150,28 +147,18 @@ def _wire(drawing: Drawing, number: int, shape: Mapping[str, Any]) -> Iterator[s
 
 
 def _block(drawing: Drawing, number: int, shape: Mapping[str, Any]) -> Iterator[str]:
-    block, (fill, line) = drawing.blocks[number], drawing.colours_of(number)
-    x, y, width = shape["x"], shape["y"], shape["width"]
-    size = {"x": x, "y": y, "width": width, "height": shape["height"]}
-    middle = x + width / 2
+    block, form, x, y = drawing.blocks[number], drawing.forms[number], shape["x"], shape["y"]
     yield svg.opening("g", class_="block", data_path=block.path)
-    yield svg.element("rect", **size, rx=3, fill=fill, stroke=line, stroke_width=1.5)
-    yield svg.text(last(block.path), middle, y + 16, NAME, bold=True, anchor="middle")
-    yield svg.text(block.kind, middle, y + 29, SMALL, anchor="middle", fill="#444444")
-    for row, name in enumerate(block.inputs):
+    yield svg.element("title", f"{block.path}: {block.kind}")
+    yield from form.elements(x, y, drawing.colours_of(number))
+    for row, (inset, height) in enumerate(form.inputs):
         if mark := drawing.marks.get(f"b{number}.i{row}"):
-            yield from _mark(mark, x, y + row_height(row))
-        yield svg.text(name, x + INDENT, y + row_height(row) + 4, PORT)
-    for row, name in enumerate(block.outputs):
-        yield svg.text(name, x + width - INDENT, y + row_height(row) + 4, PORT, anchor="end")
-    foot = y + shape["height"] - foot_height(block)
-    for number, text in enumerate(block.lines, 1):
-        yield svg.text(text, x + INDENT, foot + number * FOOT - 3, SMALL, fill="#333333")
+            yield from _mark(mark, x, y + height, inset)
     yield "</g>"
 
 
-def _mark(mark: Mark, x: float, y: float) -> Iterable[str]:
-    """Yield the mark before the input at (x, y)."""
+def _mark(mark: Mark, x: float, y: float, inset: float) -> Iterable[str]:
+    """Yield the mark before the room of a block at (x, y); its outline begins ``inset`` further on."""
     left = x - ARROW - mark.width
     size = {"x": left, "y": y - 7, "width": mark.width, "height": 14}
     fill, line = PILL_COLOURS if mark.crossing else ("#ffffff", "none")
@@ -179,7 +166,7 @@ def _mark(mark: Mark, x: float, y: float) -> Iterable[str]:
     yield svg.element("title", mark.text)
     if mark.constant:
         yield svg.text(mark.shown, x - ARROW - 3, y + 3.5, SMALL, anchor="end", fill="#333333")
-        yield svg.element("polyline", points=svg.points([(x - ARROW, y), (x, y)]), stroke="#555555")
+        yield svg.element("polyline", points=svg.points([(x - ARROW, y), (x + inset, y)]), stroke="#555555")
     else:
         yield svg.element("rect", **size, rx=7, fill=fill, stroke=line)
         yield svg.text(mark.shown, left + mark.width / 2, y + 3.5, SMALL, anchor="middle", fill="#333333")

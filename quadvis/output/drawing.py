@@ -5,18 +5,13 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from quadvis.errors import QuadvisError
 from quadvis.graph.graph import CONTINUOUS
 from quadvis.output import svg
-
-# Sizes in CSS pixels: fonts, then distances.
-TITLE, NAME, PORT, SMALL = 18.0, 13.0, 11.0, 10.0
-MARGIN, LINE, HEADER, ROW, INDENT, BETWEEN, ARROW = 24.0, 26.0, 38.0, 17.0, 7.0, 18.0, 9.0
-FOOT = 13.0  # from line to line at the foot of a box
-_LONGEST_MARK = 28
+from quadvis.output.drawn import ARROW, INDENT, PORT, DrawnBlock, DrawnWire, Mark
+from quadvis.output.forms import Colours, form_of
 
 # Fill and line of the solver and of each task in the order of the legend: tints on which black text stays
 # legible, lines that the colour-blind can distinguish (after Okabe and Ito, darkened).
@@ -52,50 +47,6 @@ _OPTIONS = {
 }
 
 
-@dataclass(frozen=True)
-class DrawnBlock:
-    """A box: `path` is its name with the parts around it ("vision/detector"), `kind` its type in YAML.
-
-    `lines` stand at its foot.
-    """
-
-    path: str
-    kind: str
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    task: str
-    lines: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class DrawnWire:
-    """A wire from `source` ("block.port" or "block.port[0]"); `crossing` says how it changes rates."""
-
-    source: str
-    target_block: str
-    target_port: str
-    crossing: str | None = None
-
-
-@dataclass(frozen=True)
-class Mark:
-    """The mark before an input: the elements that its wire takes and how it crosses rates, or a constant."""
-
-    text: str
-    crossing: bool = False
-    constant: bool = False
-
-    @property
-    def shown(self) -> str:
-        """The text, cut if it is long."""
-        return self.text if len(self.text) <= _LONGEST_MARK else self.text[: _LONGEST_MARK - 1] + "…"
-
-    @property
-    def width(self) -> float:
-        """Pixels from left to right."""
-        return svg.text_width(self.shown, SMALL) + INDENT
-
-
 class Drawing:
     """The diagram with every reference resolved and every size known; the layout engine finds positions.
 
@@ -120,6 +71,7 @@ class Drawing:
                 raise QuadvisError(f"block '{block.path}': task '{block.task}' is not in the legend; add it")
         self.marks = {self._port("i", *at): Mark(value, constant=True) for at, value in constants.items()}
         self.ends = [self._ends(wire) for wire in wires]
+        self.forms = [form_of(block) for block in blocks]
 
     def _port(self, side: str, path: str, port: str) -> str:
         """Return the id of an input ("i") or output ("o")."""
@@ -143,9 +95,15 @@ class Drawing:
             self.marks[target] = Mark(words, crossing=wire.crossing is not None)
         return self._port("o", path, port), target
 
-    def colours_of(self, number: int) -> tuple[str, str]:
+    def colours_of(self, number: int) -> Colours:
         """Return the fill and line of a block."""
-        return self.colours[self.blocks[number].task]
+        return Colours(*self.colours[self.blocks[number].task])
+
+    def inset(self, port: str) -> float:
+        """Return how far a wire goes on from the side of the room for a block to its outline."""
+        number, _, rest = port[1:].partition(".")
+        form, row = self.forms[int(number)], int(rest[1:])
+        return form.inputs[row][0] if rest[0] == "i" else form.width - form.outputs[row][0]
 
     def reach(self, port: str) -> float:
         """Return the length of arrow and mark before an input: the layout engine ends the wire there."""
@@ -163,28 +121,24 @@ class Drawing:
         return root
 
     def _node(self, number: int, block: DrawnBlock) -> dict[str, Any]:
-        sides = block.inputs, block.outputs
-        columns = [max((svg.text_width(name, PORT) for name in names), default=0.0) for names in sides]
-        head = max(svg.text_width(last(block.path), NAME, bold=True), svg.text_width(block.kind, SMALL))
-        foot = max((svg.text_width(line, SMALL) for line in block.lines), default=0.0)
-        width = 2 * INDENT + max(head, foot, sum(columns) + BETWEEN * all(columns))
-        inputs = [f"b{number}.i{row}" for row in range(len(block.inputs))]
-        rows = max(map(len, sides))
+        form = self.forms[number]
+        inputs = [(f"b{number}.i{row}", height) for row, (_, height) in enumerate(form.inputs)]
+        outputs = [(f"b{number}.o{row}", height) for row, (_, height) in enumerate(form.outputs)]
         return {
             "id": f"b{number}",
-            "width": width,
-            "height": HEADER + rows * ROW + (4 if rows else 0) + foot_height(block),
+            "width": form.width,
+            "height": form.height,
             "layoutOptions": {"elk.portConstraints": "FIXED_POS"},
             "ports": [
-                *(_port_node(port, "WEST", -self.reach(port), row) for row, port in enumerate(inputs)),
-                *(_port_node(f"b{number}.o{row}", "EAST", width, row) for row in range(len(block.outputs))),
+                *(_port_node(port, "WEST", -self.reach(port), height) for port, height in inputs),
+                *(_port_node(port, "EAST", form.width, height) for port, height in outputs),
             ],
         }
 
 
-def _port_node(name: str, side: str, x: float, row: int) -> dict[str, Any]:
+def _port_node(name: str, side: str, x: float, y: float) -> dict[str, Any]:
     size = {"width": max(-x, 0), "height": 0}
-    return {"id": name, "x": x, "y": row_height(row), **size, "layoutOptions": {"elk.port.side": side}}
+    return {"id": name, "x": x, "y": y, **size, "layoutOptions": {"elk.port.side": side}}
 
 
 def _part_node(path: str, parts: dict[str, dict[str, Any]]) -> dict[str, Any]:
@@ -200,18 +154,3 @@ def _part_node(path: str, parts: dict[str, dict[str, Any]]) -> dict[str, Any]:
         parts[path] = {"id": f"p{path}", "layoutOptions": options, "children": []}
         _part_node(outer, parts)["children"].append(parts[path])
     return parts[path]
-
-
-def foot_height(block: DrawnBlock) -> float:
-    """Return the height of the lines at the foot of a box."""
-    return len(block.lines) * FOOT + (INDENT if block.lines else 0.0)
-
-
-def row_height(row: int) -> float:
-    """Return the distance of a row of ports from the top of its box."""
-    return HEADER + (row + 0.5) * ROW
-
-
-def last(path: str) -> str:
-    """Return the name of a block or part without the parts around it."""
-    return path.rpartition("/")[2]

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from quadvis.errors import QuadvisError, counted, quoted, suggestion
-from quadvis.output.drawing import DrawnBlock, DrawnWire, last
+from quadvis.output.drawn import DrawnBlock, DrawnWire, last
 
 INSIDE, OUTSIDE = "in", "out"  # what stands for the surroundings of a part; no block of a part is called so
 

@@ -30,10 +30,11 @@ def text(
     bold: bool = False,
     anchor: str = "start",
     fill: str = "#111111",
+    class_: str = "",
 ) -> str:
     """Return a text whose base line starts, ends or has its middle at (x, y), according to `anchor`."""
-    weight = {"font_weight": "bold"} if bold else {}
-    return element("text", content, x=x, y=y, font_size=size, text_anchor=anchor, fill=fill, **weight)
+    more = ({"font_weight": "bold"} if bold else {}) | ({"class_": class_} if class_ else {})
+    return element("text", content, x=x, y=y, font_size=size, text_anchor=anchor, fill=fill, **more)
 
 
 def points(corners: Iterable[tuple[float, float]]) -> str:

@@ -22,7 +22,8 @@ from matplotlib.textpath import TextPath
 
 import quadvis.output.elkjs
 from quadvis.errors import QuadvisError
-from quadvis.output.draw import DrawnBlock, DrawnWire, draw
+from quadvis.output.draw import draw
+from quadvis.output.drawn import DrawnBlock, DrawnWire
 from quadvis.output.elkjs import LayoutError
 from tests.stages import mostly_slow
 
@@ -105,13 +106,29 @@ def extent(text: ElementTree.Element) -> Rectangle:
     return Rectangle(left, y - 0.76 * size, left + width, y + 0.1 * size)
 
 
+def outline_of(group: ElementTree.Element) -> Rectangle:
+    """The rectangle around the outline of a block."""
+    shape = next(each for each in group if each.get("class") == "outline")
+    if shape.tag == f"{SVG}circle":
+        x, y, r = (float(shape.attrib[name]) for name in ("cx", "cy", "r"))
+        return Rectangle(x - r, y - r, x + r, y + r)
+    if shape.tag == f"{SVG}polygon":
+        corners = [tuple(map(float, corner.split(","))) for corner in shape.attrib["points"].split()]
+        (left, top), (right, bottom) = (
+            map(min, zip(*corners, strict=True)),
+            map(max, zip(*corners, strict=True)),
+        )
+        return Rectangle(left, top, right, bottom)
+    return Rectangle.of(shape)
+
+
 def read(svg: str, *, texts: bool = True) -> Picture:
     picture = Picture(ElementTree.fromstring(svg))
     groups = list(picture.root.iter(f"{SVG}g"))
     for group in groups:
         role, rectangle = group.get("class"), group.find(f"{SVG}rect")
         if role == "block":
-            box = Box(Rectangle.of(rectangle))
+            box = Box(outline_of(group))
             for text in group.findall(f"{SVG}text"):
                 box.texts.setdefault(text.text or "", []).append(text)
             picture.boxes[group.attrib["data-path"]] = box
@@ -321,7 +338,8 @@ def test_equal_diagrams_give_equal_bytes_in_every_process(hover_svg: str) -> Non
     blocks, wires, constants = hover()
     assert draw("hover", blocks, wires, constants, TASKS) == hover_svg
     program = (
-        "import sys; from quadvis.output.draw import *; b = [DrawnBlock('a', 'k', ('u',), ('y',), 't')]; "
+        "import sys; from quadvis.output.draw import draw; from quadvis.output.drawn import *; "
+        "b = [DrawnBlock('a', 'k', ('u',), ('y',), 't')]; "
         "sys.stdout.write(draw('self', b, [DrawnWire('a.y', 'a', 'u')], {}, {'t': 't'}))"
     )
     once, again = (

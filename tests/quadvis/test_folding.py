@@ -10,7 +10,7 @@ import pytest
 import quadvis
 from quadvis.cli import main
 from quadvis.errors import QuadvisError
-from quadvis.output.drawing import DrawnBlock, DrawnWire
+from quadvis.output.drawn import DrawnBlock, DrawnWire
 from quadvis.output.folding import DrawnPicture, folded, part_alone
 
 ROOT = Path(__file__).parents[2]

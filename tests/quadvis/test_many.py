@@ -136,7 +136,8 @@ def test_a_run_by_hand_reads_an_entry() -> None:
 
 def test_a_picture_shows_each_entry() -> None:
     picture = draw_diagram(loaded(SUM))
-    assert all(f">u[{number}]<" in picture for number in range(3))
+    assert all(f'data-target="s.u[{number}]"' in picture for number in (0, 2))
+    assert picture.count('class="outline"') == 3 and "<circle" in picture
 
 
 def test_a_slot_takes_the_list_of_the_block_before_it(tmp_path: Path) -> None:

@@ -25,7 +25,9 @@ class Altitude(Block):
     leaves a height error of d / a2.
     """
 
-    bandwidth = Param(1.0, unit="rad/s", above=0.0, tune=True, doc="lambda, the place of the two poles")
+    bandwidth = Param(
+        1.0, unit="rad/s", above=0.0, tune=True, shown=True, doc="lambda, the place of the two poles"
+    )
     gains = Param(
         (0.0, 0.0), type="float64[2]", unit="N*s/m N/m", min=0.0, tune=True,
         doc="a1, a2 of equation (18); both zero: from the bandwidth",

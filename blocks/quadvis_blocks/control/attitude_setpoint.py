@@ -22,7 +22,9 @@ class AttitudeSetpoint(Block):
     Source: the outer loop of equations (11) and (12), linear in the tilt; the paper's own laws give torques.
     """
 
-    bandwidth = Param(1.0, unit="rad/s", above=0.0, tune=True, doc="lambda, the place of the two poles")
+    bandwidth = Param(
+        1.0, unit="rad/s", above=0.0, tune=True, shown=True, doc="lambda, the place of the two poles"
+    )
     tilt_limit = Param(
         0.2, unit="rad", above=0.0, below=0.5 * math.pi, tune=True, doc="greatest |roll|, |pitch|"
     )

@@ -16,7 +16,7 @@ class LevelCorrection(Block):
     above the time that the flight controller takes for an angle.
     """
 
-    time_constant = Param(1.0, unit="s", above=0.0, tune=True, doc="of the correction")
+    time_constant = Param(1.0, unit="s", above=0.0, tune=True, shown=True, doc="of the correction")
     limit = Param(0.1, unit="rad", min=0.0, tune=True, doc="greatest correction")
     wanted = In(unit="rad", doc="angle that the craft is to take")
     measured = In(unit="rad", doc="angle that it has, by our inertial unit; NaN if there is none")

@@ -28,7 +28,9 @@ class NestedAngle(Block):
     """
 
     axis = Param("roll", choices=("roll", "pitch"), doc="roll moves the craft along y, pitch along -x")
-    bandwidth = Param(2.0, unit="rad/s", above=0.0, tune=True, doc="lambda of the law; 1 in the paper")
+    bandwidth = Param(
+        2.0, unit="rad/s", above=0.0, tune=True, shown=True, doc="lambda of the law; 1 in the paper"
+    )
     amplitudes = Param(
         (0.4, 0.19), type="float64[2]", unit="rad", above=0.0, tune=True,
         doc="M3, M4: the angle, and speed * lambda / g",

@@ -38,7 +38,12 @@ class NestedSaturation(Block):
 
     axis = Param("roll", choices=("roll", "pitch"), doc="roll moves the craft along y, pitch along -x")
     bandwidth = Param(
-        2.0, unit="rad/s", above=0.0, tune=True, doc="lambda, the place of the four poles; 1 in the paper"
+        2.0,
+        unit="rad/s",
+        above=0.0,
+        tune=True,
+        shown=True,
+        doc="lambda, the place of the four poles; 1 in the paper",
     )
     amplitudes = Param(
         (2.0, 0.9, 0.4, 0.19), type="float64[4]", unit="rad", above=0.0, tune=True,

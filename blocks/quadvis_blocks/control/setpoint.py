@@ -15,6 +15,7 @@ class Setpoint(Block):
         type="float64[4]",
         unit="m m m rad",
         tune=True,
+        shown=True,
         doc="x forward, y right, h up, heading",
     )
     position = Out("float64[3]", unit="m", doc="x, y, h to hold")

@@ -23,7 +23,9 @@ class Yaw(Block):
     heading error of d / a2.
     """
 
-    bandwidth = Param(1.0, unit="rad/s", above=0.0, tune=True, doc="lambda, the place of the two poles")
+    bandwidth = Param(
+        1.0, unit="rad/s", above=0.0, tune=True, shown=True, doc="lambda, the place of the two poles"
+    )
     gains = Param(
         (0.0, 0.0), type="float64[2]", unit="1/s 1/s^2", min=0.0, tune=True,
         doc="a1, a2 of equation (19); both zero: from the bandwidth",

@@ -16,7 +16,7 @@ class YawRate(Block):
     Source: equation (19) without its damping, which the flight controller has.
     """
 
-    bandwidth = Param(1.0, unit="rad/s", above=0.0, tune=True, doc="lambda of control.yaw")
+    bandwidth = Param(1.0, unit="rad/s", above=0.0, tune=True, shown=True, doc="lambda of control.yaw")
     limit = Param(1.0, unit="rad/s", above=0.0, tune=True, doc="greatest |rate|")
     angle = In(unit="rad", doc="yaw angle psi, clockwise from above")
     angle_reference = In(unit="rad", default=0.0, doc="heading to hold")

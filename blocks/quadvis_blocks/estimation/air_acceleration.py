@@ -35,7 +35,7 @@ class AirAcceleration(Block):
     yaw = In(unit="rad", doc="clockwise from above is positive")
     acceleration = Out("float64[3]", unit="m/s^2", doc="by the air, along x and y; along h it is 0")
 
-    time_constant = Param(0.1, unit="s", above=0.0, tune=True, doc="of the lag")
+    time_constant = Param(0.1, unit="s", above=0.0, tune=True, shown=True, doc="of the lag")
     smooth = State("float64[3]", unit="m/s^2")
     smooth_now = Work("float64[3]", unit="m/s^2")  # with the force of this tick
 

@@ -59,7 +59,9 @@ class Predictor(Block):
         "float64[3]", unit="rad/s", doc="rates of change of roll, pitch and yaw when the command acts"
     )
 
-    delay = Param(RADIO_DELAY, unit="s", min=0.0, max=1.0, doc="time from sending a command to its arrival")
+    delay = Param(
+        RADIO_DELAY, unit="s", min=0.0, max=1.0, shown=True, doc="time from sending a command to its arrival"
+    )
     lag = Param(MOTOR_LAG, unit="s", above=0.0, doc="time constant of a motor")
     arm = Param(ARM, unit="m", above=0.0, doc="l, from the centre to each rotor; default: Draganfly IV")
     inertia = Param(

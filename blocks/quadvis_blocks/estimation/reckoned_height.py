@@ -24,7 +24,9 @@ class ReckonedHeight(Block):
     the end; an error d of the trim gives d t^2 / 2.
     """
 
-    bandwidth = Param(4.0, unit="rad/s", above=0.0, tune=True, doc="how fast the model follows the frames")
+    bandwidth = Param(
+        4.0, unit="rad/s", above=0.0, tune=True, shown=True, doc="how fast the model follows the frames"
+    )
     trim_bandwidth = Param(
         0.1, unit="rad/s", min=0.0, tune=True, doc="how fast the trim follows; slower than gusts"
     )

@@ -29,7 +29,9 @@ class RotorState(Block):
         "float64[3]", unit="rad/s^2", doc="about roll, pitch, yaw over inertia: mean until the next tick"
     )
 
-    delay = Param(RADIO_DELAY, unit="s", min=0.0, doc="time from sending a command to its arrival")
+    delay = Param(
+        RADIO_DELAY, unit="s", min=0.0, shown=True, doc="time from sending a command to its arrival"
+    )
     lag = Param(MOTOR_LAG, unit="s", above=0.0, doc="time constant of a motor")
     arm = Param(ARM, unit="m", above=0.0, doc="l, from the centre to each rotor; default: Draganfly IV")
     inertia = Param(

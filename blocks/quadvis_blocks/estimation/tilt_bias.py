@@ -34,7 +34,9 @@ class TiltBias(Block):
     roll_bias = Out(unit="rad", doc="error of the unit's roll")
     pitch_bias = Out(unit="rad", doc="error of the unit's pitch")
 
-    time_constant = Param(10.0, unit="s", min=0.0, tune=True, doc="of the average; 0: only the newest frame")
+    time_constant = Param(
+        10.0, unit="s", min=0.0, tune=True, shown=True, doc="of the average; 0: only the newest frame"
+    )
     restart = Param(
         RESTART,
         unit="s",

@@ -38,6 +38,10 @@ class Compare(Block):
         sides = {"a": "the left side", "b": "the right side"}
         return {name: In(f"{KINDS[takes]}[*]", unit=unit, doc=doc) for name, doc in sides.items()}
 
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the operator."""
+        return (OPERATORS[self.operator],)
+
     def output(self, a: Any, b: Any) -> Any:
         """Return the truth value."""
         if self.operator == LESS:

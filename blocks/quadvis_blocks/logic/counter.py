@@ -20,7 +20,7 @@ class Counter(Block):
     limit the count stays there, or goes on from the other one.
     """
 
-    count_on = Param("rising", choices=NAMES, doc="what counts")
+    count_on = Param("rising", choices=NAMES, shown=True, doc="what counts")
     initial = Param(0, type="int64", doc="the count at the start and at a reset")
     lower = Param(0, type="int64", min=-MOST, max=MOST, tune=True, doc="smallest count")
     upper = Param(MOST, type="int64", min=-MOST, max=MOST, tune=True, doc="largest count")
@@ -40,6 +40,10 @@ class Counter(Block):
         high: {block: logic.compare, rate: fast, with: {operator: ">"}, in: {a: pulses.y, b: 0.5}}
         digit: {block: logic.counter, rate: fast, with: {upper: 9, at_limit: wrap}, in: {u: high.y}}
     """
+
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return that it counts."""
+        return ("1 2 3",)
 
     def check(self) -> None:
         """Refuse limits that exclude each other or the initial count."""

@@ -21,6 +21,10 @@ class Edge(Block):
         begun: {block: logic.edge, rate: fast, in: {u: high.y}}
     """
 
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the edge."""
+        return (("↑", "↓", "↕")[self.direction],)
+
     def output(self, u: bool) -> bool:
         """Return whether there is an edge."""
         return fires(self.direction, u, self.before, self.seen)

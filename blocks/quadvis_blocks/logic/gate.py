@@ -27,6 +27,10 @@ class Gate(Block):
         inside: {block: logic.gate, rate: fast, with: {operator: and}, in: {u: [low.y, high.y]}}
     """
 
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the operator."""
+        return (OPERATORS[self.operator].upper(),)
+
     def check(self) -> None:
         """Refuse several inputs of ``not``."""
         count = self.entry_counts.get("u", 1)

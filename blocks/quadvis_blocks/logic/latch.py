@@ -24,6 +24,10 @@ class Latch(Block):
         alarm: {block: logic.latch, rate: fast, in: {set: high.y, reset: low.y}}
     """
 
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the usual letters."""
+        return ("S R",)
+
     def start(self) -> None:
         """Begin with the initial value."""
         self.held = self.initial

@@ -22,6 +22,7 @@ class MultiportSwitch(Block):
     u = In("float64[*]", unit="a", many=True, doc="the signals")
     y = Out("float64[*]", unit="a", doc="the chosen signal")
 
+    symbol = "switch"
     example = """
         slow: {block: sources.sine, rate: fast, with: {frequency: 1 Hz}}
         quick: {block: sources.sine, rate: fast, with: {frequency: 5 Hz}}

@@ -11,7 +11,7 @@ class OnDelay(Block):
     What is true at the start counts from the start.
     """
 
-    delay = Param(1.0, unit="s", min=0.0, tune=True, doc="how long it must be true")
+    delay = Param(1.0, unit="s", min=0.0, tune=True, shown=True, doc="how long it must be true")
     u = In("bool", doc="the truth value")
     y = Out("bool", doc="whether it has lasted")
     since = State(unit="s", doc="the instant from which on it is true")

@@ -15,6 +15,7 @@ class Switch(Block):
     otherwise = In("float64[*]", unit="a", doc="the output while it is false")
     y = Out("float64[*]", unit="a", doc="the chosen signal")
 
+    symbol = "switch"
     example = """
         wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
         high: {block: logic.compare, rate: fast, with: {operator: ">"}, in: {a: wave.y, b: 0 m}}

@@ -25,6 +25,10 @@ class Atan2(Block):
         bearing: {block: math.atan2, rate: fast, in: {y: north.y, x: 1 m}}
     """
 
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the function."""
+        return ("atan2",)
+
     def output(self, y: Any, x: Any) -> Any:
         """Return the angle."""
         if isinstance(y, float):

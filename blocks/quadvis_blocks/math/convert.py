@@ -20,7 +20,7 @@ class Convert(Block):
     """
 
     takes = Param("bool", choices=KINDS, doc="the kind of the input")
-    gives = Param("float64", choices=KINDS, doc="the kind of the output")
+    gives = Param("float64", choices=KINDS, shown=True, doc="the kind of the output")
     rounding = Param("nearest", choices=NAMES, doc=f"from a number to a whole one: {WORDS}")
     u = In("bool[*]", doc="the signal")
     y = Out("float64[*]", doc="the same as another kind")

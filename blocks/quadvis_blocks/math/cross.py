@@ -22,6 +22,10 @@ class Cross(Block):
         torque: {block: math.cross, rate: fast, in: {a: arm.y, b: force.y}}
     """
 
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the product."""
+        return ("a × b",)  # noqa: RUF001
+
     def output(self, a: Any, b: Any) -> Any:
         """Return the vector."""
         return np.array((

@@ -20,6 +20,10 @@ class Dot(Block):
         power: {block: math.dot, rate: fast, in: {a: force.y, b: speed.y}}
     """
 
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the product."""
+        return ("a · b",)
+
     def output(self, a: Any, b: Any) -> float:
         """Return the sum of the products."""
         total = a[0] * b[0]

@@ -54,6 +54,10 @@ class Function(Block):
             "y": Out("float64[*]", unit=found, doc="the value of the function"),
         }
 
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the function."""
+        return (FUNCTIONS[self.function],)
+
     def output(self, u: Any) -> Any:
         """Return the value."""
         if isinstance(u, float):

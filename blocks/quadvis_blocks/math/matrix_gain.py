@@ -16,13 +16,16 @@ class MatrixGain(Block):
     The sums run along the rows of the matrix, from left to right. A scalar counts as a vector of one element.
     """
 
-    gain = Param(((1.0,),), type="float64[m,n]", unit="b/a", tune=True, doc="the matrix, row by row")
+    gain = Param(
+        ((1.0,),), type="float64[m,n]", unit="b/a", tune=True, shown=True, doc="the matrix, row by row"
+    )
     file = Param(
         "", type="file", doc="a text file with the matrix in SI units, one row a line, in place of ``gain``"
     )
     u = In("float64[n?]", unit="a", doc="a vector with an element for each column")
     y = Out("float64[m]", unit="b", doc="the product, with an element for each row")
 
+    symbol = "gain"
     example = """
         state: {block: sources.constant, rate: fast, with: {value: [0.1, -0.2]}}
         feedback: {block: math.matrix_gain, rate: fast, with: {gain: [[-1, -1.7]]}, in: {u: state.y}}

@@ -22,6 +22,10 @@ class MinMax(Block):
         above: {block: math.min_max, rate: fast, with: {function: max}, in: {u: [wave.y, 0 m]}}
     """
 
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the function."""
+        return (("min", "max")[self.function],)
+
     def output(self, *u: Any) -> Any:
         """Return the signal that is beyond all others."""
         first = u[0]

@@ -20,7 +20,10 @@ class Modulo(Block):
     """
 
     function = Param(
-        "mod", choices=("mod", "rem"), doc="whose sign the result has: the divisor's, the dividend's"
+        "mod",
+        choices=("mod", "rem"),
+        shown=True,
+        doc="whose sign the result has: the divisor's, the dividend's",
     )
     u = In("float64[*]", unit="a", doc="the dividend")
     divisor = In("float64[*]", unit="a", doc="the divisor")

@@ -26,6 +26,10 @@ class Power(Block):
         cube: {block: math.power, rate: fast, in: {u: share.y, exponent: 3}}
     """
 
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the power."""
+        return ("uᵖ",)
+
     def output(self, u: Any, exponent: Any) -> Any:
         """Return the power."""
         if isinstance(u, float):

@@ -40,6 +40,14 @@ class Product(Block):
             "y": Out("float64[*]", unit=f"b{''.join(above + below)}", doc="the product"),
         }
 
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the sign of the product."""
+        return ("÷",) if self.divides.all() else ("×",)  # noqa: RUF001
+
+    def picture_signs(self) -> dict[str, str]:
+        """Return the sign of each factor."""
+        return {f"u[{place}]": "÷" if divides else "×" for place, divides in enumerate(self.divides)}  # noqa: RUF001
+
     def check(self) -> None:
         """Refuse signs that are none, or of another number than the factors."""
         count = self.entry_counts.get("u", len(self.signs))

@@ -39,6 +39,7 @@ class Dryden(Block):
         unit="m/s",
         min=0.0,
         tune=True,
+        shown=True,
         doc="wind at 6 m (20 ft); light, moderate and severe turbulence are 7.7, 15.4 and 23.2 m/s",
     )
     airspeed = Param(5.0, unit="m/s", above=0.0, doc="speed of the craft through the air")

@@ -22,6 +22,7 @@ class Gust(Block):
         unit="m/s",
         min=0.0,
         tune=True,
+        shown=True,
         doc="standard deviation along x, y, h",
     )
     correlation_time = Param(

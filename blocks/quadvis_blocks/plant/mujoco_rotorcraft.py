@@ -38,7 +38,7 @@ class MujocoRotorcraft(Block, numeric=False):
     Source: E. Todorov, T. Erez, Y. Tassa, MuJoCo: A physics engine for model-based control, IROS 2012.
     """
 
-    model = Param(type="file", doc="model of the craft and its world (MJCF)")
+    model = Param(type="file", shown=True, doc="model of the craft and its world (MJCF)")
     drag = Param(
         DRAG, unit="N*s/m", min=0.0, tune=True, doc="drag force divided by the speed through the air"
     )

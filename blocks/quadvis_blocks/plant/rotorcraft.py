@@ -38,7 +38,7 @@ class Rotorcraft(Block):
     singular in ``rigid_body``.
     """
 
-    model = Param("paper", choices=("paper", "rigid_body"), doc="equations of motion")
+    model = Param("paper", choices=("paper", "rigid_body"), shown=True, doc="equations of motion")
     mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass; default: Draganfly IV")
     arm = Param(ARM, unit="m", above=0.0, doc="l, from the centre to each rotor; default: Draganfly IV")
     inertia = Param(

@@ -32,7 +32,7 @@ class Representation(Block):
     Quaternion from Rotation Matrix, Journal of Guidance and Control 1 (1978).
     """
 
-    kind = Param("euler_to_quaternion", choices=KINDS, doc="from which form into which")
+    kind = Param("euler_to_quaternion", choices=KINDS, shown=True, doc="from which form into which")
     u = In("float64[3]", unit="rad", doc="the rotation")
     y = Out("float64[4]", doc="the same rotation in the other form")
     last = State("float64[4]", doc="the last quaternion")

@@ -21,7 +21,9 @@ class Rotate(Block):
     Source: J. B. Kuipers, Quaternions and Rotation Sequences, chapter 5.
     """
 
-    by = Param("quaternion", choices=("quaternion", "dcm", "euler"), doc="the form of the rotation")
+    by = Param(
+        "quaternion", choices=("quaternion", "dcm", "euler"), shown=True, doc="the form of the rotation"
+    )
     direction = Param("to_world", choices=("to_world", "to_body"), doc="from which axes to which")
     attitude = In("float64[4]", doc="the rotation")
     v = In("float64[3]", unit="a", doc="the vector")

@@ -15,13 +15,16 @@ class Backlash(Block):
     ``y[k] = max(u[k] - width/2, min(u[k] + width/2, y[k-1]))``, ``y[-1] = initial``, element by element.
     """
 
-    width = Param(1.0, type="float64[*?]", unit="a", min=0.0, tune=True, doc="the play, from end to end")
+    width = Param(
+        1.0, type="float64[*?]", unit="a", min=0.0, tune=True, shown=True, doc="the play, from end to end"
+    )
     initial = Param(0.0, type="float64[*?]", unit="a", doc="the output before the first sample")
     u = In("float64[*]", unit="a", doc="the side that drives")
     y = Out("float64[*]", unit="a", doc="the side that is driven")
     last = State("float64[*]")
     driven = Work("float64[*]")
 
+    symbol = "backlash"
     example = """
         motor: {block: sources.sine, rate: fast, with: {amplitude: 10 deg, frequency: 1 Hz}}
         gear: {block: signal.backlash, rate: fast, with: {width: 2 deg}, in: {u: motor.y}}

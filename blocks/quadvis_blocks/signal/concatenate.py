@@ -18,6 +18,7 @@ class Concatenate(Block):
     u = In("float64[n?]", unit="a", many=True, doc="scalars and vectors")
     y = Out("float64[n]", unit="a", doc="all their elements, in the order of the list")
 
+    symbol = "bar"
     example = """
         wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
         position: {block: signal.concatenate, rate: fast, in: {u: [wave.y, 0 m, 1.5 m]}}

@@ -16,11 +16,12 @@ class DeadZone(Block):
     ``y = u - upper`` above ``upper``, ``u - lower`` below ``lower``, 0 between. With both at 0, ``y = u``.
     """
 
-    lower = Param(-0.5, type="float64[*?]", unit="a", tune=True, doc="lower end of the zone")
-    upper = Param(0.5, type="float64[*?]", unit="a", tune=True, doc="upper end of the zone")
+    lower = Param(-0.5, type="float64[*?]", unit="a", tune=True, shown=True, doc="lower end of the zone")
+    upper = Param(0.5, type="float64[*?]", unit="a", tune=True, shown=True, doc="upper end of the zone")
     u = In("float64[*]", unit="a", doc="any signal")
     y = Out("float64[*]", unit="a", doc="what is beyond the zone")
 
+    symbol = "dead_zone"
     example = """
         stick: {block: sources.sine, rate: fast, with: {amplitude: 1, frequency: 1 Hz}}
         command: {block: signal.dead_zone, rate: fast, with: {lower: -0.1, upper: 0.1}, in: {u: stick.y}}

@@ -6,6 +6,8 @@ from typing import Any
 
 from quadvis.block import Block, In, Out, Param, ParameterError, State
 
+RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+
 
 class Delay(Block):
     """The signal of ``steps`` samples ago: ``y[k] = u[k - steps]``. It breaks algebraic loops.
@@ -33,6 +35,10 @@ class Delay(Block):
     def ports(cls, steps: int) -> dict[str, Any]:
         """Return room for the samples."""
         return {"kept": State(f"float64[{steps},*]", doc="the samples on their way, in a ring")}
+
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the shift by so many samples."""
+        return (f"z⁻{str(self.steps).translate(RAISED)}",)
 
     def check(self) -> None:
         """Refuse first outputs that are not as many as the samples."""

@@ -55,6 +55,10 @@ class Derivative(Block):
         speed: {block: signal.derivative, rate: fast, in: {u: wave.y}}
     """
 
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the derivative."""
+        return ("du / dt",)
+
     def start(self) -> None:
         """Forget all samples."""
         begin(self.stamps)

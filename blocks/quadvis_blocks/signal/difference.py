@@ -14,10 +14,15 @@ class Difference(Block):
     minus = In("float64[*]", unit="a", doc="the signal with the negative sign")
     y = Out("float64[*]", unit="a", doc="the difference")
 
+    symbol = "sum"
     example = """
         wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
         error: {block: signal.difference, rate: fast, in: {plus: 1 m, minus: wave.y}}
     """
+
+    def picture_signs(self) -> dict[str, str]:
+        """Return the two signs."""
+        return {"plus": "+", "minus": "-"}
 
     def output(self, plus: Any, minus: Any) -> Any:
         """Return the difference."""

@@ -31,6 +31,10 @@ class DiscreteIntegrator(Integral, Block):
           in: {u: error.y}
     """
 
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the transfer function without limits."""
+        return ("T", "z - 1")
+
     def output(self, reset: bool, value: Any) -> Any:
         """Return the integral."""
         if fires(self.reset_on, reset, self.before, self.seen):

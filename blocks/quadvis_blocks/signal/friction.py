@@ -16,13 +16,22 @@ class Friction(Block):
     around speed 0, by at most one step of the solver times its acceleration.
     """
 
-    coulomb = Param(1.0, type="float64[*?]", unit="b", min=0.0, tune=True, doc="the force at any speed")
+    coulomb = Param(
+        1.0, type="float64[*?]", unit="b", min=0.0, tune=True, shown=True, doc="the force at any speed"
+    )
     viscous = Param(
-        0.0, type="float64[*?]", unit="b/a", min=0.0, tune=True, doc="the force for each unit of speed"
+        0.0,
+        type="float64[*?]",
+        unit="b/a",
+        min=0.0,
+        tune=True,
+        shown=True,
+        doc="the force for each unit of speed",
     )
     u = In("float64[*]", unit="a", doc="the speed")
     y = Out("float64[*]", unit="b", doc="the force, in the direction of the speed")
 
+    symbol = "friction"
     example = """
         speed: {block: sources.sine, rate: fast, with: {amplitude: 1 m/s, frequency: 1 Hz}}
         drag:

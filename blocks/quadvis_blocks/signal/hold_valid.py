@@ -19,7 +19,7 @@ class HoldValid(Block):
     the output is ``initial``, the age counts from the start, and ``ok`` is false.
     """
 
-    max_age = Param(0.25, unit="s", min=0.0, tune=True, doc="greatest age (inclusive) that is ok")
+    max_age = Param(0.25, unit="s", min=0.0, tune=True, shown=True, doc="greatest age (inclusive) that is ok")
     restart = Param(
         RESTART,
         unit="s",

@@ -25,6 +25,10 @@ class Integrator(Integral, Block):
         speed: {block: signal.integrator, with: {upper: 0.8 m/s}, in: {u: force.y}}
     """
 
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return 1/s."""
+        return ("1", "s")
+
     def output(self, reset: bool, value: Any) -> Any:
         """Return the integral."""
         if fires(self.reset_on, reset, self.before, self.seen):

@@ -35,6 +35,7 @@ class Lookup1d(Block):
     u = In("float64[*]", unit="a", doc="the input of the table")
     y = Out("float64[*]", unit="b", doc="its value")
 
+    symbol = "lookup"
     example = """
         throttle: {block: sources.ramp, rate: fast, with: {slope: 1 1/s}}
         thrust:

@@ -27,6 +27,7 @@ class Lookup2d(Block):
     column = In("float64[*]", unit="b", doc="where in the columns")
     y = Out("float64[*]", unit="c", doc="the value of the table")
 
+    symbol = "lookup"
     example = """
         speed: {block: sources.ramp, rate: fast, with: {slope: 10 m/s^2}}
         lift:

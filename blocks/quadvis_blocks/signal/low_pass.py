@@ -15,7 +15,7 @@ class LowPass(Block):
     direct feedthrough.
     """
 
-    time_constant = Param(0.1, unit="s", above=0.0, tune=True, doc="time to 63 % of a step")
+    time_constant = Param(0.1, unit="s", above=0.0, tune=True, shown=True, doc="time to 63 % of a step")
     initial = Param(0.0, type="float64[*?]", unit="a", doc="the output at the first sample")
     u = In("float64[*]", unit="a", doc="any signal")
     y = Out("float64[*]", unit="a", doc="the smoothed signal")
@@ -25,6 +25,10 @@ class LowPass(Block):
         wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
         smooth: {block: signal.low_pass, rate: fast, with: {time_constant: 50 ms}, in: {u: wave.y}}
     """
+
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the transfer function."""
+        return ("1", "τ s + 1")
 
     def start(self) -> None:
         """Begin with the initial value."""

@@ -17,11 +17,14 @@ class Quantizer(Block):
     otherwise; so -u gives -y.
     """
 
-    interval = Param(1.0, type="float64[*?]", unit="a", above=0.0, tune=True, doc="the size of a step")
+    interval = Param(
+        1.0, type="float64[*?]", unit="a", above=0.0, tune=True, shown=True, doc="the size of a step"
+    )
     rounding = Param("nearest", choices=NAMES, doc=WORDS)
     u = In("float64[*]", unit="a", doc="any signal")
     y = Out("float64[*]", unit="a", doc="the nearest step")
 
+    symbol = "quantizer"
     example = """
         angle: {block: sources.ramp, rate: fast, with: {slope: 1 rad/s}}
         encoder: {block: signal.quantizer, rate: fast, with: {interval: 5 deg}, in: {u: angle.y}}

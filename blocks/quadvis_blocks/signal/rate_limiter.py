@@ -15,9 +15,15 @@ class RateLimiter(Block):
     initial value is given, ``y[0] = u[0]``.
     """
 
-    rising = Param(1.0, type="float64[*?]", unit="a/s", min=0.0, tune=True, doc="fastest rise")
+    rising = Param(1.0, type="float64[*?]", unit="a/s", min=0.0, tune=True, shown=True, doc="fastest rise")
     falling = Param(
-        1.0, type="float64[*?]", unit="a/s", min=0.0, tune=True, doc="fastest fall, a positive number"
+        1.0,
+        type="float64[*?]",
+        unit="a/s",
+        min=0.0,
+        tune=True,
+        shown=True,
+        doc="fastest fall, a positive number",
     )
     initial = Param(
         math.inf,
@@ -30,6 +36,7 @@ class RateLimiter(Block):
     last = State("float64[*]")
     given = Work("float64[*]")
 
+    symbol = "rate_limiter"
     example = """
         command: {block: sources.step, rate: fast, with: {after: 1 m, at: 0.2 s}}
         ramp: {block: signal.rate_limiter, rate: fast, with: {rising: 2 m/s}, in: {u: command.y}}

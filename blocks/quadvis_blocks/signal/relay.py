@@ -17,8 +17,10 @@ class Relay(Block):
     values from the first tick on.
     """
 
-    on_at = Param(0.5, type="float64[*?]", unit="a", tune=True, doc="switches on at or above it")
-    off_at = Param(-0.5, type="float64[*?]", unit="a", tune=True, doc="switches off at or below it")
+    on_at = Param(0.5, type="float64[*?]", unit="a", tune=True, shown=True, doc="switches on at or above it")
+    off_at = Param(
+        -0.5, type="float64[*?]", unit="a", tune=True, shown=True, doc="switches off at or below it"
+    )
     on_value = Param(1.0, type="float64[*?]", unit="b", tune=True, doc="the output while on")
     off_value = Param(0.0, type="float64[*?]", unit="b", tune=True, doc="the output while off")
     initial = Param("off", choices=("off", "on"), doc="what it is between the thresholds at the start")
@@ -26,6 +28,7 @@ class Relay(Block):
     y = Out("float64[*]", unit="b", doc="one of the two values")
     is_on = State("bool[*]")
 
+    symbol = "relay"
     example = """
         room: {block: sources.sine, rate: fast, with: {amplitude: 2 K, bias: 293 K, frequency: 1 Hz}}
         heating:

@@ -14,11 +14,12 @@ class Saturation(Block):
     With ``lower = -upper`` this is the function sigma of the paper's section 4.
     """
 
-    lower = Param(-1.0, type="float64[*?]", unit="a", tune=True, doc="smallest value that passes")
-    upper = Param(1.0, type="float64[*?]", unit="a", tune=True, doc="largest value that passes")
+    lower = Param(-1.0, type="float64[*?]", unit="a", tune=True, shown=True, doc="smallest value that passes")
+    upper = Param(1.0, type="float64[*?]", unit="a", tune=True, shown=True, doc="largest value that passes")
     u = In("float64[*]", unit="a", doc="any signal")
     y = Out("float64[*]", unit="a", doc="the signal within the limits")
 
+    symbol = "saturation"
     example = """
         wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
         limited: {block: signal.saturation, rate: fast, with: {lower: -1 m, upper: 1.5 m}, in: {u: wave.y}}

@@ -20,11 +20,16 @@ class Sum(Block):
     y = Out("float64[*]", unit="a", doc="the sum")
     minus = Derived("bool[u]", doc="which terms are subtracted")
 
+    symbol = "sum"
     example = """
         wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
         offset: {block: sources.constant, rate: fast, with: {value: 20 cm}}
         error: {block: signal.sum, rate: fast, with: {signs: "+--"}, in: {u: [1 m, wave.y, offset.y]}}
     """
+
+    def picture_signs(self) -> dict[str, str]:
+        """Return the sign of each term."""
+        return {f"u[{place}]": "-" if minus else "+" for place, minus in enumerate(self.minus)}
 
     def check(self) -> None:
         """Refuse signs that are none, or of another number than the terms."""

@@ -28,6 +28,7 @@ class TransportDelay(Block):
         RADIO_DELAY,
         unit="s",
         above=0.0,
+        shown=True,
         doc="time until a change arrives; default: the 22 ms of a radio frame",
     )
     initial = Param(0.0, type="float64[*?]", unit="a", doc="the output until the first input arrives")
@@ -42,6 +43,10 @@ class TransportDelay(Block):
         wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
         radio: {block: signal.transport_delay, rate: fast, with: {delay: 50 ms}, in: {u: wave.y}}
     """
+
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the transfer function."""
+        return ("e⁻ˢᵀ",)
 
     def check(self) -> None:
         """Refuse a delay that holds more values than there is room for."""

@@ -28,6 +28,10 @@ class TrapezoidalIntegrator(Integral, Block):
         area: {block: signal.trapezoidal_integrator, rate: fast, in: {u: wave.y}}
     """
 
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the transfer function without limits."""
+        return ("T (z + 1)", "2 (z - 1)")
+
     def output(self, u: Any, freeze: bool, reset: bool, value: Any) -> Any:
         """Return the integral."""
         if fires(self.reset_on, reset, self.before, self.seen):

@@ -20,6 +20,10 @@ class UnitDelay(Block):
         before: {block: signal.unit_delay, rate: fast, in: {u: wave.y}}
     """
 
+    def picture_formula(self) -> tuple[str, ...]:
+        """Return the shift by a sample."""
+        return ("z⁻¹",)
+
     def start(self) -> None:
         """Begin with the initial value."""
         self.last = self.initial

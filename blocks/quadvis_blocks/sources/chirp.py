@@ -20,13 +20,14 @@ class Chirp(Block):
 
     amplitude = Param(1.0, unit="a", tune=True, doc="half of the peak-to-peak height")
     bias = Param(0.0, unit="a", tune=True, doc="mean value")
-    first = Param(0.1, unit="Hz", min=0.0, doc="frequency at the beginning")
-    last = Param(10.0, unit="Hz", min=0.0, doc="frequency at the end")
+    first = Param(0.1, unit="Hz", min=0.0, shown=True, doc="frequency at the beginning")
+    last = Param(10.0, unit="Hz", min=0.0, shown=True, doc="frequency at the end")
     duration = Param(10.0, unit="s", above=0.0, doc="time from the beginning to the end")
     begin = Param(0.0, unit="s", doc="instant of the beginning")
     sweep = Param("linear", choices=("linear", "logarithmic"), doc="how the frequency moves")
     y = Out(unit="a", doc="the wave")
 
+    symbol = "chirp"
     example = """
         probe:
           block: sources.chirp

@@ -10,6 +10,7 @@ class Clock(Block):
 
     y = Out(unit="s", doc="the time")
 
+    symbol = "clock"
     example = """
         now: {block: sources.clock, rate: fast}
         late: {block: logic.compare, rate: fast, with: {operator: ">="}, in: {a: now.y, b: 0.5 s}}

@@ -13,9 +13,10 @@ class Constant(Block):
     The value is tunable, so the block is a knob that can be turned during a run.
     """
 
-    value = Param(0.0, type="float64[*]", unit="a", tune=True, doc="the value")
+    value = Param(0.0, type="float64[*]", unit="a", tune=True, shown=True, doc="the value")
     y = Out("float64[*]", unit="a", doc="the value")
 
+    symbol = "value"
     example = """
         place: {block: sources.constant, rate: fast, with: {value: {value: [1, 2, 0.5], unit: m}}}
     """

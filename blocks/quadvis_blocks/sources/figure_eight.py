@@ -22,7 +22,7 @@ class FigureEight(Block):
     centre = Param((0.0, 0.0, 1.5), type="float64[3]", unit="m", doc="x, y, h of the crossing")
     length = Param(0.4, unit="m", min=0.0, doc="reach along x, to each side")
     width = Param(0.2, unit="m", min=0.0, doc="reach along y, to each side")
-    lap = Param(20.0, unit="s", above=0.0, doc="time for one round")
+    lap = Param(20.0, unit="s", above=0.0, shown=True, doc="time for one round")
     begin = Param(0.0, unit="s", doc="instant of the start")
     start_time = Param(2.0, unit="s", above=0.0, doc="time constant of the start")
     position = Out("float64[3]", unit="m", doc="x, y, h")

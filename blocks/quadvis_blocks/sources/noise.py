@@ -17,13 +17,20 @@ class Noise(Block):
     """
 
     sigma = Param(
-        1.0, type="float64[*]", unit="a", min=0.0, tune=True, doc="standard deviation of each sample"
+        1.0,
+        type="float64[*]",
+        unit="a",
+        min=0.0,
+        tune=True,
+        shown=True,
+        doc="standard deviation of each sample",
     )
     mean = Param(0.0, unit="a", tune=True, doc="mean value of every element")
     y = Out("float64[*]", unit="a", doc="the noise")
     draw = State("float64[*]")
     stream = Random()
 
+    symbol = "noise"
     example = """
         error: {block: sources.noise, rate: fast, with: {sigma: 2 cm}}
     """

@@ -24,13 +24,14 @@ class Prbs(Block):
 
     order = Param(7, type="int64", min=2, max=20, doc="how long the register is")
     hold = Param(1, type="int64", min=1, max=2**31, doc="how many ticks each value lasts")
-    low = Param(-1.0, unit="a", tune=True, doc="one value")
-    high = Param(1.0, unit="a", tune=True, doc="the other value, with which it begins")
+    low = Param(-1.0, unit="a", tune=True, shown=True, doc="one value")
+    high = Param(1.0, unit="a", tune=True, shown=True, doc="the other value, with which it begins")
     y = Out(unit="a", doc="the sequence")
     taps = Derived("int64", doc="the places that are fed back, as bits")
     register = State("int64")
     ticks = State("int64", doc="how long the present value has lasted")
 
+    symbol = "binary_noise"
     example = """
         probe: {block: sources.prbs, rate: fast, with: {order: 5, hold: 2, low: -1 N, high: 1 N}}
     """

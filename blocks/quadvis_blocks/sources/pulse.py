@@ -15,12 +15,13 @@ class Pulse(Block):
     """
 
     low = Param(0.0, unit="a", tune=True, doc="value between pulses")
-    high = Param(1.0, unit="a", tune=True, doc="value during a pulse")
-    interval = Param(1.0, unit="s", above=0.0, doc="time from one rise to the next")
+    high = Param(1.0, unit="a", tune=True, shown=True, doc="value during a pulse")
+    interval = Param(1.0, unit="s", above=0.0, shown=True, doc="time from one rise to the next")
     width = Param(0.5, unit="s", min=0.0, doc="time from a rise to the next fall")
     begin = Param(0.0, unit="s", doc="instant of the first rise")
     y = Out(unit="a", doc="the pulses")
 
+    symbol = "pulse"
     stepwise = True  # a solver step that ends at a jump is without it
 
     example = """

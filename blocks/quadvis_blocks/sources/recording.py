@@ -33,7 +33,9 @@ class Recording(Block, numeric=False):
     file = Param(
         type="file", doc="log of a run or bag of ROS 2 (.mcap), or .csv, .parquet, .npz, .mat of any program"
     )
-    signal = Param(type="str", doc="its name, such as craft.position, or an element, craft.position[2]")
+    signal = Param(
+        type="str", shown=True, doc="its name, such as craft.position, or an element, craft.position[2]"
+    )
     begin = Param(0.0, unit="s", doc="time of the log that is played at time 0")
     between = Param("hold", choices=("hold", "linear"), doc="what happens between the rows")
     before = Param(

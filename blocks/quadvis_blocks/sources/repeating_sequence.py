@@ -25,6 +25,7 @@ class RepeatingSequence(Block):
     begin = Param(0.0, unit="s", doc="instant of the first point; before it, the sequence runs as well")
     y = Out(unit="a", doc="the signal")
 
+    symbol = "sequence"
     example = """
         saw:
           block: sources.repeating_sequence

@@ -11,12 +11,13 @@ from quadvis.block import Block, Out, Param, ParameterError
 class Sine(Block):
     """A sine wave: ``y = bias + amplitude * sin(2 pi frequency t + phase)``."""
 
-    amplitude = Param(1.0, unit="a", tune=True, doc="half of the peak-to-peak height")
-    frequency = Param(1.0, unit="Hz", min=0.0, tune=True, doc="cycles per second")
+    amplitude = Param(1.0, unit="a", tune=True, shown=True, doc="half of the peak-to-peak height")
+    frequency = Param(1.0, unit="Hz", min=0.0, tune=True, shown=True, doc="cycles per second")
     phase = Param(0.0, unit="rad", tune=True, doc="phase at t = 0")
     bias = Param(0.0, unit="a", tune=True, doc="mean value")
     y = Out(unit="a", doc="the wave")
 
+    symbol = "sine"
     example = """
         wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 0.5 Hz, phase: 90 deg}}
     """

@@ -14,10 +14,11 @@ class Step(Block):
     """
 
     before = Param(0.0, unit="a", tune=True, doc="value before the step")
-    after = Param(1.0, unit="a", tune=True, doc="value from the step on")
-    at = Param(1.0, unit="s", tune=True, doc="instant of the step")
+    after = Param(1.0, unit="a", tune=True, shown=True, doc="value from the step on")
+    at = Param(1.0, unit="s", tune=True, shown=True, doc="instant of the step")
     y = Out(unit="a", doc="the step")
 
+    symbol = "step"
     stepwise = True  # a solver step that ends at a jump is without it
 
     example = """

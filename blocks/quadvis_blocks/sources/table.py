@@ -23,6 +23,7 @@ class Table(Block):
     interpolation = Param("linear", choices=("linear", "hold"), doc="what happens between the rows")
     y = Out("float64[n]", unit="a", doc="the vector")
 
+    symbol = "lookup"
     example = """
         path:
           block: sources.table

@@ -17,14 +17,20 @@ class UniformNoise(Block):
     independent. The numbers follow from the run's seed and the block's path.
     """
 
-    lower = Param(-1.0, type="float64[*]", unit="a", tune=True, doc="lower limit")
+    lower = Param(-1.0, type="float64[*]", unit="a", tune=True, shown=True, doc="lower limit")
     upper = Param(
-        1.0, type="float64[*?]", unit="a", tune=True, doc="upper limit, one for all elements or one each"
+        1.0,
+        type="float64[*?]",
+        unit="a",
+        tune=True,
+        shown=True,
+        doc="upper limit, one for all elements or one each",
     )
     y = Out("float64[*]", unit="a", doc="the noise")
     draw = State("float64[*]", doc="numbers between 0 and 1")
     stream = Random()
 
+    symbol = "noise"
     example = """
         shaking: {block: sources.uniform_noise, rate: fast, with: {lower: -2 cm, upper: 2 cm}}
     """

@@ -26,9 +26,11 @@ class Butterworth(Lti, Block):
     """
 
     order = Param(2, type="int64", min=1, max=20, doc="order of the low-pass filter behind it")
-    corner = Param(unit="Hz", above=0.0, doc="the corner; of a band the lower one")
-    upper_corner = Param(0.0, unit="Hz", min=0.0, doc="the upper corner of a band; 0 is none")
-    band = Param("low", choices=BANDS, doc="what passes: below the corner, above it, the band, or all else")
+    corner = Param(unit="Hz", above=0.0, shown=True, doc="the corner; of a band the lower one")
+    upper_corner = Param(0.0, unit="Hz", min=0.0, shown=True, doc="the upper corner of a band; 0 is none")
+    band = Param(
+        "low", choices=BANDS, shown=True, doc="what passes: below the corner, above it, the band, or all else"
+    )
     method = Param("digital", choices=("digital", "continuous"), doc="how it is computed")
 
     example = """

@@ -17,7 +17,7 @@ class MovingAverage(Block):
     sum does not drift, however long a run is.
     """
 
-    samples = Param(10, type="int64", min=1, max=100_000, doc="length of the window")
+    samples = Param(10, type="int64", min=1, max=100_000, shown=True, doc="length of the window")
     u = In("float64[*]", unit="a", doc="any signal")
     y = Out("float64[*]", unit="a", doc="the mean")
     ring = State("float64[1,*]", doc="samples, and sums of them")

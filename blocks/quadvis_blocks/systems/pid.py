@@ -36,9 +36,9 @@ class Pid(Block):
     Sources: K. J. Astrom, T. Hagglund, Advanced PID Control, chapters 3 and 13.
     """
 
-    kp = Param(1.0, type="float64[*?]", unit="b/a", tune=True, doc="proportional gain")
-    ki = Param(0.0, type="float64[*?]", unit="b/a/s", tune=True, doc="integral gain")
-    kd = Param(0.0, type="float64[*?]", unit="b*s/a", tune=True, doc="derivative gain")
+    kp = Param(1.0, type="float64[*?]", unit="b/a", tune=True, shown=True, doc="proportional gain")
+    ki = Param(0.0, type="float64[*?]", unit="b/a/s", tune=True, shown=True, doc="integral gain")
+    kd = Param(0.0, type="float64[*?]", unit="b*s/a", tune=True, shown=True, doc="derivative gain")
     filter_time = Param(
         0.0, unit="s", min=0.0, tune=True, doc="time constant of the derivative's filter, 1/N"
     )

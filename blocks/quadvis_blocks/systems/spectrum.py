@@ -25,7 +25,7 @@ class Spectrum(Block):
     """
 
     frequencies = Param(type="float64[k]", unit="Hz", min=0.0, doc="where the spectrum is computed")
-    samples = Param(100, type="int64", min=1, max=10_000_000, doc="length of a window, n")
+    samples = Param(100, type="int64", min=1, max=10_000_000, shown=True, doc="length of a window, n")
     window = Param("none", choices=("none", "hann"), doc="how the samples of a window are weighed")
     u = In(unit="a", doc="the signal")
     amplitude = Out("float64[k]", unit="a", doc="amplitude at each frequency")
@@ -36,6 +36,7 @@ class Spectrum(Block):
     whole_real = State("float64[k]", doc="sums of the last whole window")
     whole_imaginary = State("float64[k]", doc="sums of the last whole window")
 
+    symbol = "spectrum"
     example = """
         wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 0.2 Hz}}
         lines:

@@ -18,7 +18,7 @@ class Statistics(Block):
     samples, of those that there are. The sums do not drift, however long a run is.
     """
 
-    samples = Param(100, type="int64", min=1, max=100_000, doc="length of the window, n")
+    samples = Param(100, type="int64", min=1, max=100_000, shown=True, doc="length of the window, n")
     u = In("float64[*]", unit="a", doc="any signal")
     mean = Out("float64[*]", unit="a", doc="the mean")
     rms = Out("float64[*]", unit="a", doc="the root of the mean square, about 0")

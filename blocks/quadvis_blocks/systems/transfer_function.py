@@ -13,7 +13,8 @@ from quadvis_blocks.systems._lti import Lti, lti
 from quadvis_blocks.systems._models import degree, of_polynomials
 from quadvis_blocks.systems._of_control import polynomials_of
 from quadvis_blocks.systems._sampled import Sampled
-from quadvis_blocks.systems._sampling import CONTINUOUS, DIRECT, MATCHED, matched, roots_of
+from quadvis_blocks.systems._sampling import CONTINUOUS, DIRECT, DISCRETE, MATCHED, matched, roots_of
+from quadvis_blocks.systems._written import fraction
 
 IMPROPER = "numerator must be of a degree that is not higher than the denominator's; add a filter, N/(s + N)"
 
@@ -84,6 +85,12 @@ class TransferFunction(Lti, Sampled, Block):
             exact = self._matched(numerator, denominator)
             model = self.computed(of_polynomials(numerator, denominator), exact)
         self.take(model, discrete=self.method != CONTINUOUS)
+
+    def picture_formula(self) -> tuple[str, str]:
+        """Return numerator and denominator."""
+        given = polynomials(self.read_file("file", read_model)) if self.file else None
+        numerator, denominator = given or (self.numerator, self.denominator)
+        return fraction(numerator, denominator, self.gain, "z" if self.method == DISCRETE else "s")
 
     def _matched(self, numerator: Any, denominator: Any) -> Any:
         if self.method != MATCHED or np.isnan(self.period):

@@ -12,7 +12,8 @@ from quadvis_blocks.systems._lti import Lti, lti
 from quadvis_blocks.systems._models import of_roots, paired
 from quadvis_blocks.systems._of_control import method_of, roots_text
 from quadvis_blocks.systems._sampled import Sampled
-from quadvis_blocks.systems._sampling import CONTINUOUS, DIRECT, MATCHED, matched
+from quadvis_blocks.systems._sampling import CONTINUOUS, DIRECT, DISCRETE, MATCHED, matched
+from quadvis_blocks.systems._written import of_factors
 
 
 class ZeroPoleGain(Lti, Sampled, Block):
@@ -72,6 +73,11 @@ class ZeroPoleGain(Lti, Sampled, Block):
                 exact = matched(zeros, poles, 1.0, self.period)
             model = self.computed(of_roots(zeros, poles, 1.0), exact)
         self.take(model, discrete=self.method != CONTINUOUS)
+
+    def picture_formula(self) -> tuple[str, str]:
+        """Return numerator and denominator as products."""
+        zeros, poles = _roots("zeros", self.zeros), _roots("poles", self.poles)
+        return of_factors(zeros, poles, self.gain, "z" if self.method == DISCRETE else "s")
 
 
 def _roots(name: str, text: str) -> list[complex]:

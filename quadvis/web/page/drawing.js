@@ -8,7 +8,6 @@ import { makeSvg, readDrawing } from "./svg.js";
 import { View } from "./view.js";
 
 const FAR = 0.45; // pixels of the screen for one unit, below which names are all that can be read
-const TAGS = { name: 0, kind: 1 }; // the texts of a block by their places; all others are ports
 
 export class Drawing {
   #blocks = new Map();
@@ -39,10 +38,6 @@ export class Drawing {
       const reach = wire.querySelector("polyline").cloneNode();
       reach.setAttribute("class", "reach");
       wire.prepend(reach);
-    }
-    for (const block of blocks) {
-      const texts = [...block.querySelectorAll(":scope > text")];
-      texts.forEach((each, index) => each.classList.add(Object.keys(TAGS)[index] ?? "port"));
     }
     const layer = makeSvg("g", { class: "values" });
     content.append(layer);
