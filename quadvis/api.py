@@ -73,13 +73,14 @@ class Diagram(Checked):
         *,
         cuts: Mapping[str, str | Sequence[str]] = MappingProxyType({}),
         limits: Mapping[str, tuple[str, str, str]] = MappingProxyType({}),
+        transfers: Mapping[str, Sequence[str]] = MappingProxyType({}),
         at: float | None = None,
         engine: str = "auto",
     ) -> Analysis:
         """Linearise the closed loop at its operating point; see ``quadvis.analysis.analyse.analyse``."""
         from quadvis.analysis.analyse import analyse
 
-        return analyse(self, cuts, limits, at, engine)
+        return analyse(self, cuts, limits, at, engine, transfers)
 
     def varied(self, setting: str) -> Diagram:
         """Return the diagram, loaded again with one more parameter replaced: ``block.parameter=value``."""

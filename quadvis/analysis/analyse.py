@@ -1,4 +1,4 @@
-"""`quadvis analyse`: a diagram's closed loop, linearised; its poles, margins at cut points, and limits."""
+"""`quadvis analyse`: a diagram's closed loop, linearised; its poles, margins, transfers, and limits."""
 
 from __future__ import annotations
 
@@ -16,10 +16,22 @@ from quadvis.analysis.linearise import Linear, linearised
 from quadvis.analysis.loops import AnalysisError
 from quadvis.analysis.margins import Loop, rates
 from quadvis.analysis.systems import closed_loop
+from quadvis.analysis.transfers import Transfers
 from quadvis.analysis.vary import STABLE, Limits
-from quadvis.analysis.verdict import LoopVerdict, judge_limit, judge_margin
-from quadvis.diagram.loop_requirements import RequiredMargin
-from quadvis.diagram.sections.analyse import Cut
+from quadvis.analysis.verdict import (
+    LoopVerdict,
+    judge_limit,
+    judge_margin,
+    judge_sensitivity,
+    judge_transfer,
+)
+from quadvis.diagram.loop_requirements import (
+    LoopRequirement,
+    RequiredMargin,
+    RequiredSensitivity,
+    RequiredTransfer,
+)
+from quadvis.diagram.sections.cuts import Cut
 from quadvis.errors import DiagramError
 from quadvis.errors.caller import as_given
 from quadvis.graph.graph import Graph
@@ -34,13 +46,15 @@ if TYPE_CHECKING:
 class Analysis:
     """The closed loop of a diagram around its operating point.
 
-    ``linear`` holds its matrices, ``loops`` the loops opened at the cut points, by name; ``limits`` holds the
-    tolerances of parameters, each of which is sought when it is first read.
+    ``linear`` holds its matrices, ``loops`` the loops opened at the cut points, by name; ``transfers`` holds
+    the responses of one signal to another one, ``limits`` the tolerances of parameters. Each of these is
+    computed when it is first read.
     """
 
     diagram: Diagram
     linear: Linear
     loops: Mapping[str, Loop]
+    transfers: Transfers
     limits: Limits
 
     @property
@@ -61,12 +75,24 @@ class Analysis:
     @cached_property
     def verdicts(self) -> tuple[LoopVerdict, ...]:
         """What is to be said on each margin and limit that the diagram expects, in the order of the file."""
-        return tuple(
-            judge_margin(requirement, self.loops[requirement.label])
-            if isinstance(requirement, RequiredMargin)
-            else judge_limit(requirement, self.stable, self.limits.answer(requirement.limit))
-            for requirement in self.diagram.loop_requirements
-        )
+        return tuple(self._judge(requirement) for requirement in self.diagram.loop_requirements)
+
+    def _judge(self, requirement: LoopRequirement) -> LoopVerdict:
+        if isinstance(requirement, RequiredMargin):
+            return judge_margin(requirement, self.loops[requirement.label])
+        if isinstance(requirement, RequiredSensitivity):
+            return judge_sensitivity(requirement, self.loops[requirement.label])
+        if isinstance(requirement, RequiredTransfer):
+            return judge_transfer(requirement, self.transfers[requirement.label])
+        return judge_limit(requirement, self.stable, self.limits.answer(requirement.limit))
+
+    def transfer(self, name: str) -> Any:
+        """Return a transfer as `control.StateSpace`: continuous, or discrete with the hyperperiod as its dt.
+
+        A sampled one has an input and an output for each instant of the hyperperiod. AnalysisError if there
+        is no such transfer, or if it cannot be linearised.
+        """
+        return self.transfers[name].system
 
     @property
     def passed(self) -> bool:
@@ -82,7 +108,7 @@ class Analysis:
         """Return the analysis as plain data: what `quadvis analyse --json` prints."""
         loops = {
             label: {"signals": list(loop.signals), **{
-                key: finite(value) for key, value in vars(loop.margins).items()
+                key: finite(value) for key, value in (vars(loop.margins) | _peaks(loop)).items()
             }}
             for label, loop in self.loops.items()
         }  # fmt: skip
@@ -106,6 +132,7 @@ class Analysis:
             "passed": self.passed,
             "poles": [[float(pole.real), float(pole.imag)] for pole in self.poles],
             "cuts": loops,
+            "transfers": {label: response.facts() for label, response in self.transfers.items()},
             "limits": limits,
             "expect": [verdict.facts() for verdict in self.verdicts],
         }
@@ -117,21 +144,30 @@ def analyse(
     limits: Mapping[str, tuple[str, str, str]] = MappingProxyType({}),
     at: float | None = None,
     engine: str = AUTO,
+    transfers: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> Analysis:
     """Linearise a diagram's closed loop, and answer the questions of its section ``analyse`` and the caller.
 
     ``cuts`` maps names of cut points to signals. ``limits`` maps names to a parameter and the first and last
-    value of its search: ``("eyes/camera.latency", "50 ms", "2 s")``. ``at`` (s) is the time at which the
-    operating point is sought. ``engine`` is that of `Diagram.run`. AnalysisError if no operating point is
-    found, or if the loop has no derivative; DiagramError if a cut or a limit names nothing that exists.
+    value of its search: ``("eyes/camera.latency", "50 ms", "2 s")``; ``transfers`` to two signals, ``(from,
+    to)``. ``at`` (s) is the time at which the operating point is sought. ``engine`` is that of `Diagram.run`.
+    AnalysisError if no operating point is found, or if the loop has no derivative; DiagramError if a cut, a
+    limit or a transfer names nothing that exists.
     """
     opened, sought = diagram.questions.more(cuts, limits)
+    ways = diagram.questions.more_transfers(transfers)
     at = diagram.questions.at if at is None else at
     _check_pictures(diagram)
     linear = linearised(diagram.graph, opened, at, engine)
     stable = bool((rates(linear).real < STABLE).all())
     loops = {cut.label: _loop(linear, cut, stable) for cut in opened}
-    return Analysis(diagram, linear, loops, Limits(diagram, sought, at, engine))
+    return Analysis(
+        diagram, linear, loops, Transfers(diagram, ways, at, engine), Limits(diagram, sought, at, engine)
+    )
+
+
+def _peaks(loop: Loop) -> dict[str, float]:
+    return {f"{name}_peak": value for name, value in vars(loop.peaks).items()}
 
 
 def _loop(linear: Linear, cut: Cut, stable: bool) -> Loop:

@@ -18,7 +18,7 @@ from quadvis.analysis.loops import AnalysisError, blocks_on_loops, hyperperiod
 from quadvis.analysis.probe import STEP, Channel, Matrix, Positions, Probe, Vector, silence
 from quadvis.analysis.progress import announce
 from quadvis.analysis.state import Columns, find_state, slope, stacked
-from quadvis.diagram.sections.analyse import Cut
+from quadvis.diagram.sections.cuts import Cut
 from quadvis.engine.engine import Engine
 from quadvis.graph.devices import refuse_devices
 from quadvis.graph.graph import Graph
@@ -61,29 +61,36 @@ def linearised(graph: Graph, cuts: Sequence[Cut], at: float, engine: str = AUTO)
     if no steady state is near, if the loop is not smooth there, if a cut is not on the loop, or if the graph
     has neither a loop nor a state.
     """
-    refuse_devices(graph)
-    try:
-        return _linearised(graph, cuts, at, engine)
-    except Unsettled:
-        return _linearised(graph, cuts, LATER * max(at, 1.0), engine)
-
-
-def _linearised(graph: Graph, cuts: Sequence[Cut], at: float, wanted: str) -> Linear:
     looped = blocks_on_loops(graph)
     _check_cuts(graph, looped, cuts)
     signals = {(signal.block, signal.port) for cut in cuts for signal in cut.signals}
-    engine = Engine(with_breaks(graph, signals))
-    silence(engine)
-    loop = {node.task for node in graph.nodes if node.path in looped}
-    ticks = int(at / graph.tick) + hyperperiod(graph, loop) * (len(engine.memory.floats) if looped else 1)
-    use(engine, choose(engine, ticks, wanted, announce))
-    with engine:
-        announce("running to the operating point")
-        probe = Probe(engine, cuts, at)
-        linear = _linearise(probe)
+    opened = with_breaks(graph, signals)
+    linear = linearised_part(opened, blocks_on_loops(opened), cuts, at, engine)
     if not looped and not linear.states:
         raise AnalysisError("there is nothing to analyse: the diagram has no loop and no state")
     return linear
+
+
+def linearised_part(
+    graph: Graph, blocks: set[str], cuts: Sequence[Cut], at: float, engine: str = AUTO
+) -> Linear:
+    """Return the same of some blocks of a graph, which has its breaks already; of none: of all."""
+    refuse_devices(graph)
+    try:
+        return _linearised(graph, blocks, cuts, at, engine)
+    except Unsettled:
+        return _linearised(graph, blocks, cuts, LATER * max(at, 1.0), engine)
+
+
+def _linearised(graph: Graph, blocks: set[str], cuts: Sequence[Cut], at: float, wanted: str) -> Linear:
+    engine = Engine(graph)
+    silence(engine)
+    tasks = {node.task for node in graph.nodes if node.path in blocks}
+    ticks = int(at / graph.tick) + hyperperiod(graph, tasks) * (len(engine.memory.floats) if blocks else 1)
+    use(engine, choose(engine, ticks, wanted, announce))
+    with engine:
+        announce("running to the operating point")
+        return _linearise(Probe(engine, cuts, at, blocks))
 
 
 def _check_cuts(graph: Graph, looped: set[str], cuts: Sequence[Cut]) -> None:
@@ -144,6 +151,9 @@ def _lifted(probe: Probe, places: Positions, columns: Columns) -> Linear:
     a, c = stacked(columns, places)
     b, d = np.zeros((len(places), count)), np.zeros((count, count))
     for column, channel in enumerate(probe.channels):
+        if channel.read_only:
+            continue
+        announce(f"{column} of {count} instants disturbed")
         added = np.zeros(count)
         added[column] = STEP * probe.scale[channel.read]
         above, below = (probe.after(none, 0.0, sign * added) for sign in (1.0, -1.0))
@@ -180,6 +190,8 @@ def _derivative(probe: Probe, places: Positions) -> Linear:
     matrix = np.zeros((states + count, states + count))
     for column in range(states + count):
         added, place = np.zeros(count), places[:0]
+        if column >= states and probe.channels[column - states].read_only:
+            continue
         if column < states:
             place = places[column : column + 1]
             step = float(STEP * probe.scale[place[0]])

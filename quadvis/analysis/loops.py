@@ -59,6 +59,18 @@ def blocks_on_loops(graph: Graph) -> set[str]:
     return {path for path in readers if path in _downstream(readers, path)}
 
 
+def blocks_between(graph: Graph, begin: Iterable[str], end: Iterable[str]) -> set[str]:
+    """Return the blocks on the way of a change of some blocks to others, both included."""
+    readers: dict[str, set[str]] = {node.path: set() for node in graph.nodes}
+    sources: dict[str, set[str]] = {node.path: set() for node in graph.nodes}
+    for node in graph.nodes:
+        for _, wire in node.wires():
+            readers[wire.block].add(node.path)
+            sources[node.path].add(wire.block)
+    reached = set().union(*(_downstream(readers, path) | {path} for path in begin))
+    return reached.intersection(*[set().union(*(_downstream(sources, path) | {path} for path in end))])
+
+
 def _downstream(readers: dict[str, set[str]], path: str) -> set[str]:
     found: set[str] = set()
     waiting = list(readers[path])

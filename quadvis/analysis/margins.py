@@ -26,6 +26,7 @@ Complexes = NDArray[np.complex128]
 DENSITY = 120  # frequencies in a decade
 FAINT = 1e-4  # a locus below this gain is never critical: its gain margin is above 1e4
 VISIBLE = 1e-3
+BEYOND = 1e-6  # how far outside of the band a sensitivity is that of its end
 PRECISION = 1e-11
 
 
@@ -45,6 +46,18 @@ class Margins:
     phase_lead: float = math.nan
     delay: float = math.nan
     crossover: float = math.nan
+
+
+@dataclass(frozen=True)
+class SensitivityPeaks:
+    """The largest sensitivity S = 1 / (1 + L) and complementary sensitivity T = L / (1 + L) of a loop.
+
+    Textbooks call them Ms and Mt. L are the loci, so 1 / Ms is their least distance from -1. NaN for an
+    unstable loop.
+    """
+
+    sensitivity: float = math.nan
+    complementary: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -74,6 +87,34 @@ class Loop:
         if not self.stable:
             return Margins()
         return _margins([*self._crossings(), *self._ends()])
+
+    @cached_property
+    def peaks(self) -> SensitivityPeaks:
+        """The peaks of the sensitivities at this cut."""
+        if not self.stable:
+            return SensitivityPeaks()
+        grid, loci = self.loci
+        with np.errstate(all="ignore"):  # where the loop's gain is infinite its sensitivity is 0
+            sensitivity = np.nan_to_num(1.0 / (1.0 + loci), posinf=0.0, neginf=0.0)
+        return SensitivityPeaks(
+            self._greatest(grid, np.abs(sensitivity), 1.0),
+            self._greatest(grid, np.abs(1.0 - sensitivity), 0.0),
+        )
+
+    def _greatest(self, grid: NDArray[np.float64], sizes: NDArray[np.float64], added: float) -> float:
+        """Return the largest size of the closed loop's loci with a number added, near the grid's largest."""
+
+        def size(omega: float) -> float:
+            return float(np.abs(added + np.linalg.eigvals(self._response(omega))).max())
+
+        best = int(np.argmax(sizes.max(axis=1)))
+        found = library("scipy.optimize").minimize_scalar(
+            lambda omega: -size(omega),
+            bounds=(grid[max(0, best - 1)], grid[min(len(grid) - 1, best + 1)]),
+            method="bounded",
+        )
+        ends = [size(BEYOND * grid[0])] + ([] if self.closed.period else [size(grid[-1] / BEYOND)])
+        return max(float(sizes.max()), -float(found.fun), *ends)
 
     @cached_property
     def idle(self) -> tuple[str, ...]:
@@ -122,7 +163,7 @@ class Loop:
         if self.closed.period:
             high = math.pi / self.closed.period
             low = min(low, 0.01 * high)
-        return np.geomspace(low, high, max(50, int(DENSITY * math.log10(high / low))))
+        return grid_between(low, high)
 
     def _response(self, omega: float) -> Complexes:
         """Return the response (y) of the closed loop to a disturbance (d)."""
@@ -203,6 +244,11 @@ class Loop:
             else:
                 right, after = middle, value
         return 0.5 * (left + right), 0.5 * (before + after)
+
+
+def grid_between(low: float, high: float) -> NDArray[np.float64]:
+    """Return frequencies that are evenly spaced by their logarithms."""
+    return np.geomspace(low, high, max(50, int(DENSITY * math.log10(high / low))))
 
 
 def _opened(response: Complexes) -> Complexes:

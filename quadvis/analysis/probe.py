@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.analysis.cut import break_path
-from quadvis.analysis.loops import blocks_on_loops, hyperperiod, instants_of
-from quadvis.diagram.sections.analyse import Cut
+from quadvis.analysis.loops import hyperperiod, instants_of
+from quadvis.diagram.sections.cuts import Cut
 from quadvis.engine.engine import Engine
 from quadvis.engine.layout import TIME, Placed
 from quadvis.engine.memory import Slot
@@ -29,7 +29,7 @@ STEP = 1e-5  # of a central difference, relative to values above 1; it gives err
 class Channel:
     """One element of a cut signal at one tick of the hyperperiod: its slot to read and its slot to disturb.
 
-    ``time`` (s) counts from the start of the hyperperiod.
+    ``time`` (s) counts from the start of the hyperperiod. One that is ``read_only`` is never disturbed.
     """
 
     cut: str
@@ -38,6 +38,7 @@ class Channel:
     added: int
     tick: int
     time: float
+    read_only: bool = False
 
 
 def silence(engine: Engine) -> None:
@@ -51,12 +52,15 @@ class Probe:
     """Computes the effect of a hyperperiod on the memory; the run stands at its beginning, without noise.
 
     ``positions`` are the 8-byte slots that can hold the loop's state; ``names`` are their names in texts.
+    ``blocks`` are what counts as the loop: all that lie on loops, or those of a transfer.
     """
 
-    def __init__(self, engine: Engine, cuts: Sequence[Cut], at: float) -> None:
+    def __init__(
+        self, engine: Engine, cuts: Sequence[Cut], at: float, blocks: Set[str] = frozenset()
+    ) -> None:
         self.engine, self.graph = engine, engine.graph
         self.program, self.floats = engine.program, engine.memory.floats
-        self.loop = blocks_on_loops(self.graph) or {node.path for node in self.graph.nodes}
+        self.loop = blocks or {node.path for node in self.graph.nodes}
         self.tasks = {node.task for node in self.graph.nodes if node.path in self.loop}
         self.span = hyperperiod(self.graph, self.tasks)
         self.names = dict(self._named())
@@ -155,12 +159,15 @@ class Probe:
         for signal in cut.signals:
             task = self.graph[signal.block].task
             every, offset = self.graph.ticks(task.period), self.graph.ticks(task.offset)
-            read = self.program[signal.block].outputs[signal.port].position
-            added = self.program[break_path(signal.block, signal.port)].inputs["added"].position
+            opened = self.program[break_path(signal.block, signal.port)]
+            added = opened.inputs["added"].position
+            outputs = self.program[signal.block].outputs
+            read = (outputs[signal.port] if signal.port in outputs else opened.outputs["y"]).position
             for element in signal.elements:
                 for tick in range(offset % every, self.span, every):
                     time = float(tick * self.graph.tick)
-                    yield Channel(cut.label, signal.text, read + element, added + element, tick, time)
+                    places = read + element, added + element
+                    yield Channel(cut.label, signal.text, *places, tick, time, cut.read_only)
 
     def _named(self) -> Iterator[tuple[int, str]]:
         """Yield the slots of real numbers of the blocks of the loop, with their names.

@@ -1,4 +1,4 @@
-"""Read the cuts and limits of the command line."""
+"""Read the cuts, transfers and limits of the command line."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from quadvis.graph.names import split_names
 
 
 def read_cuts(texts: Sequence[str]) -> dict[str, list[str]]:
-    """Read ``torque=control/roll.torque``, or ``a.y,b.y``, which is also the name of the cut."""
+    """Read ``torque=control/roll.torque``, or ``a.y,b.y``, which is also the name of the cut or transfer."""
     found: dict[str, list[str]] = {}
     for text in texts:
         name, equals, signals = text.partition("=")

@@ -1,32 +1,27 @@
-"""The text that `quadvis analyse` prints, and its Bode plots."""
+"""The text that `quadvis analyse` prints."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 
 from quadvis.analysis.analyse import Analysis
 from quadvis.analysis.margins import Loop
+from quadvis.analysis.response import Response
 from quadvis.analysis.verdict import LoopVerdict
-from quadvis.errors import QuadvisError, counted
+from quadvis.errors import counted
 from quadvis.machine.columns import table
-from quadvis.machine.files import PNG, file_name, write_output
-from quadvis.output.canvas import blank_sheet
-from quadvis.output.style import COLOURS, STYLE
 from quadvis.units import Unit, format_quantity
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 SECOND = Unit.parse("s")
 SHOWN = 8  # poles in the table
 REAL = 1e-3
-HEADS = ("loop opened at", "crossover", "phase margin", "delay margin", "gain margin")
+HEADS = ("loop opened at", "crossover", "phase margin", "delay margin", "gain margin", "Ms", "Mt")
+WAYS = (
+    "transfer", "gain at 0", "bandwidth", "largest gain", "rise time", "overshoot", "settling time",
+)  # fmt: skip
 
 
 def analysis_lines(analysis: Analysis) -> Iterator[str]:
@@ -42,8 +37,10 @@ def analysis_lines(analysis: Analysis) -> Iterator[str]:
         yield f"and {more} faster"
     if analysis.loops:
         yield from _indented([HEADS, *map(_row, analysis.loops.values())])
-    elif not analysis.limits:
+    elif not analysis.limits and not analysis.transfers:
         yield "No loop was opened: name signals with --cut, or under 'analyse: {cuts: ...}'."
+    if analysis.transfers:
+        yield from _indented([WAYS, *map(_way, analysis.transfers.values())])
     width = max(map(len, analysis.limits), default=0)
     for label, found in analysis.limits.items():
         yield f"  {label.ljust(width)}  {found.text}"
@@ -90,82 +87,53 @@ def _growing_states(analysis: Analysis) -> str:
 def _row(loop: Loop) -> tuple[str, ...]:
     margins = loop.margins
     if math.isnan(margins.gain_up):
-        return loop.label, "", "not stable", "", ""
-    lead = f", lead {_degrees(margins.phase_lead)}" if margins.phase_lead < math.pi else ""
+        return loop.label, "", "not stable", "", "", "", ""
+    lead = f", lead {degrees(margins.phase_lead)}" if margins.phase_lead < math.pi else ""
     down = f"x {margins.gain_down:.4g}" if margins.gain_down else "no lower"
+    peaks = f"{loop.peaks.sensitivity:.4g}", f"{loop.peaks.complementary:.4g}"
     up = f"x {margins.gain_up:.4g}" if math.isfinite(margins.gain_up) else "no upper"
     if math.isnan(margins.crossover):
-        return loop.label, "none", "any", "any", f"{down}, {up}"
+        return loop.label, "none", "any", "any", f"{down}, {up}", *peaks
     return (
         loop.label,
         f"{margins.crossover:.4g} rad/s",
-        f"{_degrees(margins.phase_lag)}{lead}",
+        f"{degrees(margins.phase_lag)}{lead}",
         f"{margins.delay:.4g} s",
         f"{down}, {up}",
+        *peaks,
     )
+
+
+def _way(response: Response) -> tuple[str, ...]:
+    step, unit = response.step, response.transfer.unit
+    gains = tuple(_gain(gain, unit) for gain in (response.dc_gain, response.peak))
+    at = f" at {_frequency(response.peak_frequency)}" if response.peak_frequency else ""
+    row = (response.transfer.label, gains[0], _frequency(response.bandwidth), gains[1] + at)
+    if not response.stable:
+        return *row, "", "does not settle", ""
+    share = "none" if math.isnan(step.overshoot) else f"{100.0 * step.overshoot:.3g} %"
+    return *row, _time(step.rise_time), share, _time(step.settling_time)
+
+
+def _gain(gain: float, unit: Unit) -> str:
+    number = "unlimited" if math.isinf(gain) else f"{gain:.4g}"
+    return f"{number} {unit}" if unit.symbols and math.isfinite(gain) else number
+
+
+def _frequency(omega: float) -> str:
+    if math.isnan(omega):
+        return "none"
+    return "unlimited" if math.isinf(omega) else f"{omega:.4g} rad/s"
+
+
+def _time(time: float) -> str:
+    return "none" if math.isnan(time) else f"{time:.4g} s"
 
 
 def _verdict_row(verdict: LoopVerdict) -> tuple[str, ...]:
     return "met" if verdict.met else "NOT MET", str(verdict.requirement), verdict.shown
 
 
-def _degrees(angle: float) -> str:
+def degrees(angle: float) -> str:
+    """Return an angle (rad) as text."""
     return f"{math.degrees(angle):.1f} deg"
-
-
-def save_bode_plots(analysis: Analysis, folder: Path) -> list[Path]:
-    """Draw the response of each opened loop as ``NAME-bode-CUT.png``; return the paths.
-
-    QuadvisError if one of them would replace an input of the diagram, or a file that is no picture.
-    """
-    diagram = analysis.diagram
-    name = file_name(*filter(None, (diagram.name, diagram.variant)))
-    paths = []
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for loop in analysis.loops.values():
-            with blank_sheet(8.0, 6.0, STYLE, layout="constrained") as figure:
-                figure.suptitle(f"Loop opened at {loop.label}")
-                gain, phase = figure.subplots(2, 1, sharex=True)
-                _draw(loop, gain, phase)
-                figure.align_ylabels()
-                paths.append(folder / f"{name}-bode-{file_name(loop.label)}.png")
-                _save(figure, paths[-1], diagram.inputs)
-    except OSError as error:
-        raise QuadvisError(f"cannot write into '{folder}': {error.strerror or error}") from error
-    return paths
-
-
-def _save(figure: Figure, path: Path, inputs: Iterable[Path]) -> None:
-    write_output(
-        path,
-        PNG,
-        lambda file: figure.savefig(file, format="png", dpi=120, metadata={"Software": None}),
-        inputs,
-    )
-
-
-def _draw(loop: Loop, gain: Axes, phase: Axes) -> None:
-    from matplotlib.ticker import MultipleLocator
-
-    omega, values = loop.bode()
-    angles = np.degrees(np.unwrap(np.angle(values)))
-    middle = int(np.argmin(np.abs(np.log(np.abs(values) + 1e-300))))
-    angles -= 360.0 * round((angles[middle] + 180.0) / 360.0)  # between -360 and 0 near the crossover
-    gain.loglog(omega, np.abs(values), color=COLOURS[0])
-    phase.semilogx(omega, angles, color=COLOURS[0])
-    gain.axhline(1.0, color="#666666", linewidth=0.8, linestyle="--")
-    phase.axhline(-180.0, color="#666666", linewidth=0.8, linestyle="--")
-    margins, words = loop.margins, ", ".join(loop.signals)
-    if math.isfinite(margins.crossover):
-        for axes in (gain, phase):
-            axes.axvline(margins.crossover, color=COLOURS[1], linewidth=0.8)
-        found = f"crossover {margins.crossover:.3g} rad/s, phase margin {_degrees(margins.phase_lag)}"
-        words += f"\n{found}, delay margin {margins.delay:.3g} s"
-    gain.set_title(words)
-    for axis in (gain.yaxis, phase.xaxis):
-        axis.set_major_formatter(lambda value, _: f"{value:g}")
-    phase.yaxis.set_major_locator(MultipleLocator(45.0 if np.ptp(angles) < 400.0 else 90.0))
-    gain.set_ylabel("gain")
-    phase.set_ylabel("phase (deg)")
-    phase.set_xlabel("frequency (rad/s)")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import import_module
 from typing import Any
 
@@ -19,17 +20,32 @@ def library(name: str = "control") -> Any:
 
 
 def state_space(linear: Linear, a: Matrix, b: Matrix, c: Matrix, d: Matrix) -> Any:
-    """Return a `control.StateSpace` with names of states and channels; dt is the hyperperiod if lifted.
+    """Return a `control.StateSpace` with names of states and channels; dt is the hyperperiod if lifted."""
+    names = [_name(channel.text, channel.read, channel.time, linear) for channel in linear.channels]
+    return named_system(
+        (a, b, c, d), linear.period, linear.states,
+        [f"{name} in" for name in names], [f"{name} out" for name in names],
+    )  # fmt: skip
+
+
+def named_system(
+    matrices: tuple[Matrix, Matrix, Matrix, Matrix],
+    period: float,
+    states: Sequence[str],
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+) -> Any:
+    """Return a `control.StateSpace`.
 
     The names have ':' where diagrams have '.', because python-control reserves the '.'.
     """
-    names = [_name(channel.text, channel.read, channel.time, linear) for channel in linear.channels]
-    return library().StateSpace(
-        a, b, c, d, linear.period,
-        states=[name.replace(".", ":") for name in linear.states],
-        inputs=[f"{name} in" for name in names],
-        outputs=[f"{name} out" for name in names],
-    )  # fmt: skip
+    plain = [[name.replace(".", ":") for name in names] for names in (states, inputs, outputs)]
+    return library().StateSpace(*matrices, period, states=plain[0], inputs=plain[1], outputs=plain[2])
+
+
+def instant_names(text: str, times: Sequence[float]) -> list[str]:
+    """Return the names of a number at the instants of a hyperperiod; its own name if there is one instant."""
+    return [text] if len(times) == 1 else [f"{text} @ {_ticks(time)}" for time in times]
 
 
 def closed_loop(linear: Linear) -> Any:
@@ -40,7 +56,7 @@ def closed_loop(linear: Linear) -> Any:
 def _name(text: str, place: int, time: float, linear: Linear) -> str:
     places = sorted({channel.read for channel in linear.channels if channel.text == text})
     element = f"({places.index(place)})" if len(places) > 1 else ""
-    name = f"{text}{element}".replace(".", ":")
+    name = f"{text}{element}"
     return f"{name} @ {_ticks(time)}" if linear.period else name
 
 

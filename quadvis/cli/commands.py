@@ -388,17 +388,19 @@ def fmt(options: argparse.Namespace) -> int:
 
 
 def analyse(options: argparse.Namespace) -> int:
-    """Print poles, margins and limits of a diagram's loop; 1 if it is not stable or misses a margin."""
+    """Print poles, margins, transfers and limits of a loop; 1 if it is not stable or misses a margin."""
     from quadvis.analysis.analyse import analyse as analyse_loop
+    from quadvis.analysis.plots import save_plots
     from quadvis.analysis.progress import watched
     from quadvis.analysis.questions import read_cuts, read_limits, read_time
-    from quadvis.analysis.report import analysis_lines, save_bode_plots
+    from quadvis.analysis.report import analysis_lines
     from quadvis.machine.status_line import AnalysisLine
 
     diagram = _load(options)
     cuts, limits, at = read_cuts(options.cut), read_limits(options.vary), read_time(options.at)
+    transfers = read_cuts(options.transfer)
     with AnalysisLine() as progress, watched(progress):
-        analysis = analyse_loop(diagram, cuts, limits, at, options.engine)
+        analysis = analyse_loop(diagram, cuts, limits, at, options.engine, transfers)
         if options.json:
             facts = analysis.facts()
         else:
@@ -407,7 +409,7 @@ def analyse(options: argparse.Namespace) -> int:
                 print(line, flush=True)
     paths: list[str] = []
     if options.output:
-        paths = [str(path) for path in save_bode_plots(analysis, Path(options.output))]
+        paths = [str(path) for path in save_plots(analysis, Path(options.output))]
     if options.json:
         _print_json(facts | {"plots": paths})
     elif paths:

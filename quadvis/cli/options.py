@@ -121,10 +121,14 @@ Exit code: 0 done, fmpy finds no problem in it; 2 it cannot be exported, or bad 
 
 ANALYSE_HELP = """\
 Noise is removed, Newton's method finds a steady state nearby, and the loop is linearised there;
-a sampled loop is lifted over one hyperperiod. All signals of a cut are opened together.
+a sampled loop is lifted over one hyperperiod. All signals of a cut are opened together. A transfer goes from
+a disturbance that is added to an output (for all readers) or to an input (for its block) to another signal.
+With -o the loops' Bode and Nyquist plots and the transfers' Bode plots and steps are drawn.
 --json prints one object: diagram, variant, hash, hyperperiod_s (0 for a continuous loop), states, stable,
 passed; poles: [[real, imaginary]] in 1/s; cuts: {name: {signals, gain_up, gain_down, phase_lag, phase_lead,
-delay, crossover}} in factors, rad, s and rad/s, null for no limit;
+delay, crossover, sensitivity_peak, complementary_peak}} in factors, rad, s and rad/s, null for no limit;
+transfers: {name: {from, to, open, unit, hyperperiod_s, stable, dc_gain, bandwidth, peak, peak_frequency,
+resonance, rise_time, overshoot, settling_time}} in the unit, rad/s and s, null for none;
 limits: {name: {vary, unit, stable_to, reached, reason}};
 expect: [{expectation, label, kind, unit, limit, found, met, lack (why nothing is found)}].
 Exit code: 0 stable, with all margins that the diagram expects; 1 not stable, or a margin is not met;
@@ -193,17 +197,19 @@ def parser() -> Parser:
     describe.add_argument("--json", action="store_true", help="print its declarations as JSON")
     _own_block_option(describe)
     analyse = add(
-        "analyse", commands.analyse, "linearise the closed loop: poles, margins, limits", ANALYSE_HELP
+        "analyse", commands.analyse, "linearise the loop: poles, margins, transfers, limits", ANALYSE_HELP
     )
     _diagram_options(analyse)
     words = "another cut point: one signal or several, such as torque=control/roll.torque; may be repeated"
     analyse.add_argument("--cut", action="append", default=[], metavar="[NAME=]SIGNAL,...", help=words)
+    words = "another transfer: from one signal to another one, such as reference=speed.y,motor.y"
+    analyse.add_argument("--transfer", action="append", default=[], metavar="[NAME=]FROM,TO", help=words)
     words = "how far a parameter can go, such as eyes/camera.latency='100 ms..2 s'; may be repeated"
     analyse.add_argument("--vary", action="append", default=[], metavar="PARAM=FROM..TO", help=words)
     analyse.add_argument("--at", metavar="T", help="time at which the operating point is sought")
     _engine_option(analyse)
     analyse.add_argument("--json", action="store_true", help="print one JSON object instead of the tables")
-    analyse.add_argument("--output", "-o", metavar="FOLDER", help="write Bode plots there, as PNG")
+    analyse.add_argument("--output", "-o", metavar="FOLDER", help="write plots there, as PNG")
     draw = add("draw", commands.draw, "draw a diagram as SVG")
     _diagram_options(draw)
     draw.add_argument("--part", metavar="PART", help="draw the inside of this part, such as control")

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 from quadvis.diagram.ages import KEY, SECOND, read_route
-from quadvis.diagram.loop_requirements import MARGINS, LoopRequirement
+from quadvis.diagram.loop_requirements import MARGINS, SENSITIVITIES, TRANSFERS, LoopRequirement
 from quadvis.diagram.requirements import EXPECTATIONS, Expectation
 from quadvis.diagram.sections.context import Context, RunSection
-from quadvis.diagram.sections.expect_loop import DIRECTIONS, read_limit, read_margin
+from quadvis.diagram.sections.expect_loop import (
+    DIRECTIONS,
+    read_limit,
+    read_margin,
+    read_response,
+    read_sensitivity,
+)
 from quadvis.diagram.sections.forms import QUANTITY, SIGNAL, TEXT, Schema, closed, list_of, ref
 from quadvis.diagram.sections.section import Checked
 from quadvis.diagram.sections.signals import STRETCH_KEYS, Asked, check_signal, in_stretch, read_stretch
@@ -26,8 +32,17 @@ ONE = Unit()
 FORMS: Mapping[str, tuple[str, ...]] = {
     "signal": (*STRETCH_KEYS, *EXPECTATIONS),
     "margin": tuple(MARGINS),
+    **dict.fromkeys(SENSITIVITIES, ("below",)),
+    "transfer": tuple(TRANSFERS),
     "limit": DIRECTIONS,
     KEY: ("after", "before", "below"),
+}
+# Those of the loop, with what reads them.
+OF_LOOP: Mapping[str, Callable[[YamlMap, Context], Iterator[LoopRequirement]]] = {
+    "margin": read_margin,
+    **dict.fromkeys(SENSITIVITIES, read_sensitivity),
+    "transfer": read_response,
+    "limit": read_limit,
 }
 
 
@@ -45,6 +60,7 @@ class Expect(RunSection[Expected]):
     words = (
         "requirements: `{signal, after, before, of}` with one of `within`, `rms`, `below`, `above`, `count`, "
         "`at_least`; `{age: [stamp, block], below}`; `{margin: cut}` with `gain`, `phase`, `delay`; "
+        "`{sensitivity: cut, below}`; `{transfer}` with `bandwidth`, `overshoot` and others; "
         "`{limit, above}`, see below"
     )
 
@@ -62,7 +78,7 @@ class Expect(RunSection[Expected]):
                 read = _read if form == "signal" else _read_age
                 found += read(fields, context) if fields is not None else ()
             elif fields is not None and form in fields:
-                loop += (read_margin if form == "margin" else read_limit)(fields, context)
+                loop += OF_LOOP[form](fields, context)
         written = [context.written(entry) for entry in of_run]
         return Expected(tuple(found), written or None, tuple(loop))
 
@@ -79,6 +95,7 @@ class Expect(RunSection[Expected]):
         margins: dict[str, Schema] = {
             key: {**QUANTITY, "description": words} for key, words in MARGINS.items()
         }
+        cut: Schema = {**TEXT, "description": "a cut under `analyse`"}
         of = {
             "signal": {"signal": SIGNAL, **stretch, **kinds},
             KEY: {
@@ -86,7 +103,15 @@ class Expect(RunSection[Expected]):
                 **{key: QUANTITY for key in STRETCH_KEYS[:2]},
                 "below": {**QUANTITY, "description": "less than this age at each tick of the block"},
             },
-            "margin": {"margin": {**TEXT, "description": "a cut under `analyse`"}, **margins},
+            "margin": {"margin": cut, **margins},
+            **{
+                key: {key: cut, "below": {**QUANTITY, "description": "its peak is less: 2, or 6 dB"}}
+                for key in SENSITIVITIES
+            },
+            "transfer": {
+                "transfer": {**TEXT, "description": "a transfer under `analyse`"},
+                **{key: {**QUANTITY, "description": kind.doc} for key, kind in TRANSFERS.items()},
+            },
             "limit": {
                 "limit": {**TEXT, "description": "a limit under `analyse`"},
                 "above": {**QUANTITY, "description": "the value up to which the loop must be stable"},

@@ -1,35 +1,42 @@
-"""`margin` and `limit` under `expect`: requirements on the loop, which `quadvis analyse` judges."""
+"""`margin`, `sensitivity`, `transfer`, `limit` under `expect`: what `quadvis analyse` judges."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import TypeVar
 
 from quadvis.diagram.loop_requirements import (
     MARGINS,
+    SENSITIVITIES,
+    TRANSFERS,
     LoopRequirement,
     RequiredLimit,
     RequiredMargin,
+    RequiredSensitivity,
+    RequiredTransfer,
     direction,
 )
-from quadvis.diagram.sections.analyse import ANALYSE, Cut, Limit
+from quadvis.diagram.sections.analyse import ANALYSE, Limit
 from quadvis.diagram.sections.context import Context
+from quadvis.diagram.sections.cuts import Cut
+from quadvis.diagram.sections.transfers import Transfer
 from quadvis.diagram.times import SECOND
 from quadvis.document import YamlMap, YamlNode
-from quadvis.errors import UNKNOWN, DiagramError, Unknown, known, suggestion
+from quadvis.errors import UNKNOWN, DiagramError, QuadvisError, Unknown, known, suggestion
 from quadvis.units import Unit, read_ratio, split_quantity
 
-RADIAN, HALF_TURN = Unit.parse("rad"), Unit.parse("deg").scale * 180.0
+HERTZ, RADIAN, HALF_TURN = Unit.parse("Hz"), Unit.parse("rad"), Unit.parse("deg").scale * 180.0
 DIRECTIONS = ("above", "below")
 
-Asked = TypeVar("Asked", Cut, Limit)
+Asked = TypeVar("Asked", Cut, Limit, Transfer)
 
 
 def read_margin(fields: YamlMap, context: Context) -> Iterator[LoopRequirement]:
     """Read ``{margin: torque, phase: 35 deg, delay: 40 ms}``, one requirement for each kind of margin."""
     faults = context.faults
     questions = context.values[ANALYSE]
-    cut = _named(fields["margin"], "cut", questions.cuts, questions.named[0], context)
+    cut = _named(fields["margin"], "cut", questions.cuts, "cuts", context)
     if not any(kind in fields for kind in MARGINS):
         remedy = f"add one of {', '.join(MARGINS)}"
         faults.add(fields.place, "nothing is expected of the margin", remedy)
@@ -45,7 +52,7 @@ def read_limit(fields: YamlMap, context: Context) -> Iterator[LoopRequirement]:
     """Read ``{limit: vision latency, above: 300 ms}``."""
     faults = context.faults
     questions = context.values[ANALYSE]
-    limit = _named(fields["limit"], "limit", questions.limits, questions.named[1], context)
+    limit = _named(fields["limit"], "limit", questions.limits, "limits", context)
     if not any(kind in fields for kind in DIRECTIONS):
         remedy = "add 'above', the value up to which the loop must be stable"
         faults.add(fields.place, "nothing is expected of the limit", remedy)
@@ -58,13 +65,61 @@ def read_limit(fields: YamlMap, context: Context) -> Iterator[LoopRequirement]:
             yield RequiredLimit(limit, kind, least)
 
 
-def _named(
-    node: YamlNode, word: str, found: Sequence[Asked], named: tuple[str, ...] | Unknown, context: Context
-) -> Asked | Unknown:
-    """Return the cut or limit of `analyse` that a text names."""
-    text = context.faults.collect(node.text)
+def read_sensitivity(fields: YamlMap, context: Context) -> Iterator[LoopRequirement]:
+    """Read ``{sensitivity: torque, below: 2}``, or `complementary_sensitivity` in its place."""
+    kind = next(iter(each for each in SENSITIVITIES if each in fields))
+    cut = _named(fields[kind], "cut", context.values[ANALYSE].cuts, "cuts", context)
+    if "below" not in fields:
+        problem, remedy = "nothing is expected of the sensitivity", "add 'below', such as 2 or 6 dB"
+        context.faults.add(fields.place, problem, remedy)
+    fields = context.filled(fields, ("below",))
+    most = context.faults.collect(_gain, fields["below"]) if "below" in fields else None
+    if most is not None and known(cut):
+        yield RequiredSensitivity(cut, kind, most, split_quantity(fields["below"].text())[1])
+
+
+def read_response(fields: YamlMap, context: Context) -> Iterator[LoopRequirement]:
+    """Read ``{transfer: reference, bandwidth: 3 Hz, overshoot: 20 %}``, one requirement for each kind."""
+    faults, questions = context.faults, context.values[ANALYSE]
+    transfer = _named(fields["transfer"], "transfer", questions.transfers, "transfer", context)
+    if not any(kind in fields for kind in TRANSFERS):
+        faults.add(fields.place, "nothing is expected of the transfer", f"add one of {', '.join(TRANSFERS)}")
+    fields = context.filled(fields, TRANSFERS)
+    if not known(transfer):
+        return
+    for kind in filter(fields.__contains__, TRANSFERS):
+        bound = faults.collect(_response, fields[kind], kind, transfer)
+        if bound is not None:
+            yield RequiredTransfer(transfer, kind, bound, split_quantity(fields[kind].text())[1])
+
+
+def _response(node: YamlNode, kind: str, transfer: Transfer) -> float:
+    """Return a bound of a transfer in SI units."""
+    if kind == "resonance":
+        value = node.read(read_ratio)
+    elif kind == "bandwidth" and _is_in_hertz(node.text()):
+        value = 2.0 * math.pi * node.quantity(HERTZ, bare=False)
+    else:
+        unit = TRANSFERS[kind].unit
+        value = node.quantity(Unit.parse(unit) if unit else transfer.unit, bare=False)
+    if value < 0.0 or (value == 0.0 and kind != "overshoot"):
+        raise node.wrong("more than 0", "write how much it may be, such as 3 Hz, 20 % or 2 s")
+    return value
+
+
+def _is_in_hertz(text: str) -> bool:
+    """Return whether a frequency is written in Hz; one that is no quantity is a fault elsewhere."""
+    try:
+        return Unit.parse(split_quantity(text)[1]).dimension_equals(HERTZ)
+    except QuadvisError:
+        return False
+
+
+def _named(node: YamlNode, word: str, found: Sequence[Asked], key: str, context: Context) -> Asked | Unknown:
+    """Return the cut, transfer or limit of `analyse` that a text names."""
+    text, named = context.faults.collect(node.text), context.values[ANALYSE].named[key]
     if text is not None and known(named) and text not in named:
-        remedy = suggestion(text, named) or f"declare it under 'analyse: {{{word}s: ...}}'"
+        remedy = suggestion(text, named) or f"declare it under 'analyse: {{{key}: ...}}'"
         context.faults.add(node.place, f"there is no {word} '{text}'", remedy)
     return next((each for each in found if each.label == text), UNKNOWN)
 

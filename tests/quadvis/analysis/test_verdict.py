@@ -98,7 +98,7 @@ def test_gains_are_factors_or_decibels_and_are_said_as_they_are_written(tmp_path
         "NOT MET: torque: gain margin at least x 5.1: x 5",
         "met: torque: phase margin at least 1 rad: 1.197 rad",
     ]
-    assert verdicts[0].requirement.least == approx(10 ** (13.9 / 20), rel=1e-15)
+    assert verdicts[0].requirement.bound == approx(10 ** (13.9 / 20), rel=1e-15)
 
 
 def test_an_unstable_loop_meets_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
