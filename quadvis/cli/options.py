@@ -30,9 +30,11 @@ Exit code: 0 all expectations met, 1 an expectation is not met, the run stopped 
 CHECK_HELP = """\
 --json prints one object: ok, faults or warnings: [{file, line, column, subject, problem, remedy}]; without a
 fault also diagram, blocks, hash, links and ages; with --accuracy also accuracy: {solver, step_s, converged,
-verdict, remarks, signals: [{signal, unit, difference, time, share (of the range of the signal), order}]},
-the largest share first.
-Exit code: 0 no fault, 1 a signal changes by more than 1 % of its range with half the step, 2 a fault."""
+verdict, remarks, too_large (null, or {block, pole: [real, imaginary] in 1/s, stable_to_s}),
+signals: [{signal, unit, difference, time, share (of the range of the signal), order}]}, the largest share
+first.
+Exit code: 0 no fault, 1 the step is not stable or half of it changes a signal by more than 1 % of its range,
+2 a fault."""
 
 REPLAY_HELP = """\
 The diagram, the seed, the ticks, and what came from outside are those of the log; the diagram's files must be

@@ -275,8 +275,8 @@ class Interpreter:
         try:
             for call in self._derivatives:
                 call()
-            state = self._solver.advance(self._rates, time, floats[self._states], floats[self._slopes])
-        except _MinorError as failure:
+            state = self._solver.advance(self.rates, time, floats[self._states], floats[self._slopes])
+        except MinorError as failure:
             return self._stop(failure.call, failure.error)
         except Exception as error:
             return self._stop(call, error)
@@ -284,8 +284,8 @@ class Interpreter:
         floats[self._states] = state
         return None if np.isfinite(state).all() else Stop(self.tick, (), found=NOT_FINITE_STATE)
 
-    def _rates(self, time: float, state: Vector) -> Vector:
-        """Return the derivative at a minor step."""
+    def rates(self, time: float, state: Vector) -> Vector:
+        """Return the derivative at a minor step, written over the memory; MinorError if a block fails."""
         floats = self.memory.floats
         floats[TIME.position] = time
         floats[self._states] = state
@@ -296,11 +296,11 @@ class Interpreter:
             for call in self._derivatives:
                 call()
         except Exception as error:
-            raise _MinorError(call, error) from error
+            raise MinorError(call, error) from error
         return floats[self._slopes]
 
 
-class _MinorError(Exception):
+class MinorError(Exception):
     """A block failed at a minor step."""
 
     def __init__(self, call: Call, error: Exception) -> None:

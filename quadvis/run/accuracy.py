@@ -20,9 +20,12 @@ from numpy.typing import NDArray
 from quadvis.diagram.outputs import files_written
 from quadvis.diagram.rewritten import refined
 from quadvis.diagram.times import time_text
+from quadvis.engine.engine import Engine
 from quadvis.engine.solver import ORDERS
-from quadvis.errors import QuadvisError
-from quadvis.native.choice import AUTO
+from quadvis.engine.stability import REMEDY, TooLargeStep, too_large
+from quadvis.errors import QuadvisError, sentence
+from quadvis.graph.devices import refuse_devices
+from quadvis.native.choice import AUTO, choose, use
 from quadvis.output.recording import Recording
 from quadvis.output.statistics import finite
 from quadvis.run.session import run
@@ -31,6 +34,7 @@ if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
 
 REFINED = (1, 2, 4)  # the step is divided by these
+LOOKS = 50  # of so many instants of a run the poles are looked at
 ROUNDING = 1e-12  # of a signal's range: differences below come from rounding
 ACCURATE = 1e-2  # of a signal's range: the largest difference of a run that counts as converged
 NEAR = 0.5  # an order seen that lacks no more is that of the solver
@@ -64,13 +68,15 @@ class Accuracy:
     """What a smaller step changes: ``signals`` have the largest change first.
 
     ``step`` is the solver's (s); None if no block has a continuous state, so that there is nothing to refine.
-    ``noisy`` are blocks that draw noise at every step, which is other noise at a smaller one.
+    ``noisy`` are blocks that draw noise at every step, which is other noise at a smaller one. ``too_large``
+    has the pole for which the step was, at some time of the run, too large to be stable.
     """
 
     solver: str
     step: Fraction | None
     signals: tuple[SignalAccuracy, ...] = ()
     noisy: tuple[str, ...] = ()
+    too_large: TooLargeStep | None = None
 
     @property
     def worst(self) -> SignalAccuracy | None:
@@ -79,14 +85,16 @@ class Accuracy:
 
     @property
     def converged(self) -> bool:
-        """True if no signal changes by more than `ACCURATE` of its range."""
-        return self.worst is None or self.worst.share <= ACCURATE
+        """True if no signal changes by more than `ACCURATE` of its range, and the step was always stable."""
+        return self.too_large is None and (self.worst is None or self.worst.share <= ACCURATE)
 
     @property
     def verdict(self) -> str:
         """One sentence for people."""
         if self.step is None:
             return "nothing to refine: no block has a continuous state"
+        if self.too_large is not None:
+            return sentence(self.too_large.problem, REMEDY)
         worst, step = self.worst, time_text(self.step)
         if worst is None:
             return f"converged: half the step of {step} changes nothing beyond rounding"
@@ -127,6 +135,7 @@ class Accuracy:
             "step_s": None if self.step is None else float(self.step),
             "converged": self.converged,
             "verdict": self.verdict,
+            "too_large": None if self.too_large is None else self.too_large.facts(),
             "remarks": list(self.remarks),
             "signals": [signal.facts() for signal in self.signals],
         }
@@ -144,6 +153,7 @@ def accuracy(diagram: Diagram, say: Say | None = None, engine: str = AUTO) -> Ac
     if written := files_written([node.block for node in graph.nodes]):
         problem = f"the accuracy takes {len(REFINED)} runs, and each would write '{written[0]}'"
         raise QuadvisError(f"{problem}; leave out the block that writes it")
+    unstable = _too_large(diagram, say, engine)
     runs = [_signals(diagram, factor, say, engine) for factor in REFINED]
     noisy = [
         node.path
@@ -151,7 +161,27 @@ def accuracy(diagram: Diagram, say: Say | None = None, engine: str = AUTO) -> Ac
         if node.task.continuous and node.block.interface.streams and not node.hidden
     ]
     found = sorted(_compared(runs), key=lambda each: (-each.share, each.name))
-    return Accuracy(graph.solver, graph.step, tuple(found), tuple(noisy))
+    return Accuracy(graph.solver, graph.step, tuple(found), tuple(noisy), unstable)
+
+
+def _too_large(diagram: Diagram, say: Say | None, engine: str) -> TooLargeStep | None:
+    """Return the pole that asks for the smallest step, of those at some instants of a run; None if none does.
+
+    RunError if the run fails, which says this pole, too.
+    """
+    found: list[TooLargeStep] = []
+    refuse_devices(diagram.graph)
+    made = Engine(diagram.graph, diagram.seed)
+    made.end_before(diagram.ticks)
+    use(made, choose(made, diagram.ticks, engine))
+    with made:
+        for number in range(LOOKS + 1):
+            if say is not None:
+                say(f"poles at {made.time:.1f} of {diagram.duration:g} s")
+            made.run(number * diagram.ticks // LOOKS - made.tick)
+            excess = too_large(diagram.graph.solver, diagram.graph.tick, made.poles())
+            found += [excess] if excess is not None else []
+    return min(found, key=lambda each: each.limit, default=None)
 
 
 def _signals(diagram: Diagram, factor: int, say: Say | None, engine: str) -> Recording:
