@@ -9,7 +9,9 @@ import yaml
 
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.load import load_text
+from quadvis.diagram.sections.solver import LEAST
 from quadvis.document import dump_yaml
+from quadvis.graph.graph import VARIABLE
 
 
 def written_out(diagram: Diagram) -> dict[str, Any]:
@@ -24,9 +26,17 @@ def rewritten(diagram: Diagram, written: dict[str, Any]) -> Diagram:
     return replace(found, ports=diagram.ports, knobs=diagram.knobs, here=diagram.here)
 
 
-def refined(diagram: Diagram, factor: int) -> Diagram:
-    """Return a diagram with a solver step so many times smaller; it must have one."""
-    written = written_out(diagram)
-    assert diagram.graph.step is not None
-    written["solver"]["step"] = f"{diagram.graph.step / factor} s"
+def refined(diagram: Diagram, times: int) -> Diagram:
+    """Return a diagram with a solver step halved so many times; it must have one.
+
+    Of a solver that chooses its steps the tolerances are made a tenth as often.
+    """
+    written, graph = written_out(diagram), diagram.graph
+    assert graph.step is not None
+    if graph.solver in VARIABLE:
+        rtol, atol = graph.tolerances
+        written["solver"]["rtol"] = max(LEAST, rtol / 10**times)
+        written["solver"]["atol"] = atol / 10**times
+    else:
+        written["solver"]["step"] = f"{graph.step / 2**times} s"
     return rewritten(diagram, written)

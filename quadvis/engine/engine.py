@@ -215,7 +215,11 @@ class Engine:
         )  # fmt: skip
 
     def snapshot(self) -> Snapshot:
-        """Return the whole state between two ticks."""
+        """Return the whole state between two ticks.
+
+        A solver of variable step begins anew there, so that a restored run repeats to the bit.
+        """
+        self._interpreter.restart()
         kept = tuple([self._selves[number].keep() for number in self._keepers])
         return Snapshot(self.tick, self.memory.content(), tuple(self.memory.frames), kept)
 
@@ -226,6 +230,7 @@ class Engine:
             raise ValueError("the snapshot is of another graph")
         memory.raw[:] = snapshot.memory
         memory.frames[:] = snapshot.frames
+        self._interpreter.restart()
         self._executor.tick = snapshot.tick
         for number, kept in zip(self._keepers, snapshot.kept, strict=True):
             try:

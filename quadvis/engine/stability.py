@@ -26,8 +26,10 @@ DELTA = 1e-5  # of a central difference, relative to values above 1
 RESTING = 1e-9  # of a pole's size: poles with less damping are those of oscillations that may go on
 REACH = 3.0  # of h p: beyond, no formula is stable to the left of the origin
 SCANNED = 300
+NEAR_LIMIT = 20.0  # so many times a step is its limit where it may be bounded by it
+NOISE = 1e-7  # of the fastest pole: slower ones may come from rounding
 APART = 1000.0  # how much faster than the slowest the fastest pole of stiff states is
-REMEDY = "make the step smaller"
+REMEDY = "make the step smaller, or use 'method: Radau'"
 
 Matrix = NDArray[np.float64]
 
@@ -157,6 +159,19 @@ def _owners(program: Program) -> Iterator[str]:
     for block in program.blocks:
         for name in block.slopes:
             yield from [block.path] * block.field(name).size
+
+
+def stiffness(solver: str, step: Fraction, found: list[StatePole]) -> str:
+    """Return a sentence if a stable step is bounded by what has decayed long before the rest; else ""."""
+    slow = [pole for pole in found if abs(pole.value) > NOISE * abs(found[0].value)]
+    if not slow or stable_to(solver, found[0].value) > NEAR_LIMIT * float(step):
+        return ""
+    ratio = abs(found[0].value) / abs(slow[-1].value)
+    if ratio < APART:
+        return ""
+    fast = f"the pole of '{found[0].block}' at {found[0].shown}"
+    bounded = f"is {ratio:.2g} times as fast as the slowest, and bounds the step of {solver}"
+    return f"stiff: {fast} {bounded}; 'method: Radau' has no such bound"
 
 
 def too_large(solver: str, step: Fraction, found: list[StatePole]) -> TooLargeStep | None:

@@ -13,6 +13,7 @@ from quadvis.engine.layout import TIME, Placed
 from quadvis.engine.memory import Memory
 from quadvis.engine.program import Program
 from quadvis.engine.stability import REMEDY, Marks
+from quadvis.engine.variable_step import NoStep
 from quadvis.errors import QuadvisError, RunError, sentence
 from quadvis.graph.graph import Graph, Node
 from quadvis.machine.failures import MEMORY, arithmetic, is_short_of_memory, surroundings
@@ -25,6 +26,10 @@ SMALLER_STEP = "a smaller solver step may help"
 def explained(stop: Stop, graph: Graph, program: Program, memory: Memory, marks: Marks) -> QuadvisError:
     """Return the error that a stop means, to be raised; ``marks`` may know the cause."""
     time = float(stop.tick * program.period)
+    if isinstance(stop.error, NoStep):
+        problem = f"the solver {program.solver} cannot go on: {_lowered(str(stop.error))}"
+        remedy = "a state may go to infinity or jump; a larger 'rtol' or 'atol' may help"
+        return RunError(sentence(problem, remedy), time=time)
     if stop.error is not None:
         return _failed(stop.error, program.blocks[stop.blocks[0]], graph, memory, time, marks)
     if stop.found == NOT_FINITE_OUTPUT:
@@ -35,6 +40,11 @@ def explained(stop: Stop, graph: Graph, program: Program, memory: Memory, marks:
                 problem = _with_cause(f"state '{name}' left the finite numbers", marks)
                 return RunError(problem, block=block.path, time=time)
     raise AssertionError("a state that is not finite belongs to a block")
+
+
+def _lowered(text: str) -> str:
+    """Return another program's sentence as a part of one."""
+    return text[:1].lower() + text[1:].rstrip(".")
 
 
 def _with_cause(problem: str, marks: Marks) -> str:

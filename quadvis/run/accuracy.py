@@ -22,9 +22,10 @@ from quadvis.diagram.rewritten import refined
 from quadvis.diagram.times import time_text
 from quadvis.engine.engine import Engine
 from quadvis.engine.solver import ORDERS
-from quadvis.engine.stability import REMEDY, TooLargeStep, too_large
+from quadvis.engine.stability import REMEDY, TooLargeStep, stiffness, too_large
 from quadvis.errors import QuadvisError, sentence
 from quadvis.graph.devices import refuse_devices
+from quadvis.graph.graph import VARIABLE, Tolerances
 from quadvis.native.choice import AUTO, choose, use
 from quadvis.output.recording import Recording
 from quadvis.output.statistics import finite
@@ -33,7 +34,7 @@ from quadvis.run.session import run
 if TYPE_CHECKING:
     from quadvis.diagram.diagram import Diagram
 
-REFINED = (1, 2, 4)  # the step is divided by these
+REFINED = (0, 1, 2)  # the step is halved so many times
 LOOKS = 50  # of so many instants of a run the poles are looked at
 ROUNDING = 1e-12  # of a signal's range: differences below come from rounding
 ACCURATE = 1e-2  # of a signal's range: the largest difference of a run that counts as converged
@@ -68,8 +69,10 @@ class Accuracy:
     """What a smaller step changes: ``signals`` have the largest change first.
 
     ``step`` is the solver's (s); None if no block has a continuous state, so that there is nothing to refine.
-    ``noisy`` are blocks that draw noise at every step, which is other noise at a smaller one. ``too_large``
-    has the pole for which the step was, at some time of the run, too large to be stable.
+    ``noisy`` blocks draw noise at every step, which is other noise at a smaller one. ``too_large`` has the
+    pole for which the step was, at some time of the run, too large to be stable; ``stiff`` is what is to be
+    said of poles far apart, or empty. A solver that chooses its steps has ``tolerances``, which are made a
+    tenth in place of the half of a step.
     """
 
     solver: str
@@ -77,6 +80,8 @@ class Accuracy:
     signals: tuple[SignalAccuracy, ...] = ()
     noisy: tuple[str, ...] = ()
     too_large: TooLargeStep | None = None
+    stiff: str = ""
+    tolerances: Tolerances | None = None
 
     @property
     def worst(self) -> SignalAccuracy | None:
@@ -96,14 +101,22 @@ class Accuracy:
         if self.too_large is not None:
             return sentence(self.too_large.problem, REMEDY)
         worst, step = self.worst, time_text(self.step)
+        given = f"a step of {step}" if self.tolerances is None else f"'rtol: {self.tolerances.rtol:g}'"
         if worst is None:
-            return f"converged: half the step of {step} changes nothing beyond rounding"
+            return f"converged: {self.less} changes nothing beyond rounding"
         if self.converged:
-            share = f"{worst.share:.2g} of the range of '{worst.name}'"
-            return f"converged to {share} at a step of {step}; {self._order(worst.order)}"
-        remedy = f"make it smaller, such as {time_text(self._smaller(worst))}"
+            order = f"; {self._order(worst.order)}" if self.tolerances is None else ""
+            return f"converged to {worst.share:.2g} of the range of '{worst.name}' with {given}{order}"
+        smaller = time_text(self._smaller(worst)) if self.tolerances is None else "a hundredth"
         changed = f"'{worst.name}' by {100 * worst.share:.3g} % of its range"
-        return f"not converged: half the step of {step} changes {changed}; {remedy}"
+        return f"not converged: {self.less} changes {changed}; make it smaller, such as {smaller}"
+
+    @property
+    def less(self) -> str:
+        """What has made the changes, in words."""
+        if self.tolerances is not None:
+            return f"a tenth of the tolerance of {self.tolerances.rtol:g}"
+        return f"half the step of {time_text(self.step)}" if self.step is not None else ""
 
     def _order(self, seen: float) -> str:
         order = ORDERS[self.solver]
@@ -123,10 +136,9 @@ class Accuracy:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What is to be said of the differences besides."""
-        if not self.noisy:
-            return ()
         names = ", ".join(f"'{name}'" for name in self.noisy)
-        return (f"noise drawn at every step is other noise with half of it: {names}",)
+        noise = f"noise drawn at every step is other noise with half of it: {names}" if names else ""
+        return tuple(filter(None, (noise, self.stiff)))
 
     def facts(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -153,23 +165,25 @@ def accuracy(diagram: Diagram, say: Say | None = None, engine: str = AUTO) -> Ac
     if written := files_written([node.block for node in graph.nodes]):
         problem = f"the accuracy takes {len(REFINED)} runs, and each would write '{written[0]}'"
         raise QuadvisError(f"{problem}; leave out the block that writes it")
-    unstable = _too_large(diagram, say, engine)
-    runs = [_signals(diagram, factor, say, engine) for factor in REFINED]
+    tolerances = graph.tolerances if graph.solver in VARIABLE else None
+    unstable, stiff = _looked(diagram, say, engine) if tolerances is None else (None, "")
+    runs = [_signals(diagram, times, say, engine) for times in REFINED]
     noisy = [
         node.path
         for node in graph.nodes
-        if node.task.continuous and node.block.interface.streams and not node.hidden
+        if tolerances is None and node.task.continuous and node.block.interface.streams and not node.hidden
     ]
     found = sorted(_compared(runs), key=lambda each: (-each.share, each.name))
-    return Accuracy(graph.solver, graph.step, tuple(found), tuple(noisy), unstable)
+    return Accuracy(graph.solver, graph.step, tuple(found), tuple(noisy), unstable, stiff, tolerances)
 
 
-def _too_large(diagram: Diagram, say: Say | None, engine: str) -> TooLargeStep | None:
-    """Return the pole that asks for the smallest step, of those at some instants of a run; None if none does.
+def _looked(diagram: Diagram, say: Say | None, engine: str) -> tuple[TooLargeStep | None, str]:
+    """Return what the poles at some instants of a run say: which asks for a smaller step, and if it is stiff.
 
     RunError if the run fails, which says this pole, too.
     """
     found: list[TooLargeStep] = []
+    stiff = ""
     refuse_devices(diagram.graph)
     made = Engine(diagram.graph, diagram.seed)
     made.end_before(diagram.ticks)
@@ -179,19 +193,24 @@ def _too_large(diagram: Diagram, say: Say | None, engine: str) -> TooLargeStep |
             if say is not None:
                 say(f"poles at {made.time:.1f} of {diagram.duration:g} s")
             made.run(number * diagram.ticks // LOOKS - made.tick)
-            excess = too_large(diagram.graph.solver, diagram.graph.tick, made.poles())
+            poles = made.poles()
+            excess = too_large(diagram.graph.solver, diagram.graph.tick, poles)
             found += [excess] if excess is not None else []
-    return min(found, key=lambda each: each.limit, default=None)
+            stiff = stiff or stiffness(diagram.graph.solver, diagram.graph.tick, poles)
+    least = min(found, key=lambda each: each.limit, default=None)
+    return least, stiff if least is None else ""
 
 
-def _signals(diagram: Diagram, factor: int, say: Say | None, engine: str) -> Recording:
+def _signals(diagram: Diagram, times: int, say: Say | None, engine: str) -> Recording:
     """Return what is logged of a run with a smaller step."""
-    finer = refined(diagram, factor)
+    finer = refined(diagram, times)
 
     def progress(time: float, _: float) -> None:
         if say is not None:
-            step = time_text(finer.graph.tick)
-            say(f"step of {step}: {min(time, finer.duration):.1f} of {finer.duration:g} s")
+            how = time_text(finer.graph.tick)
+            if finer.graph.solver in VARIABLE:
+                how = f"{finer.graph.tolerances.rtol:g}"
+            say(f"with {how}: {min(time, finer.duration):.1f} of {finer.duration:g} s")
 
     return run(finer, progress=progress, engine=engine).signals
 

@@ -95,9 +95,11 @@ def profile_lines(computer: str, profile: ProfileReport) -> list[str]:
 def accuracy_lines(found: Accuracy) -> list[str]:
     """Return what a smaller step changes: a table, the largest change first, and the verdict."""
     changed = [each for each in found.signals if each.difference > 0.0]
-    rows: list[tuple[str, ...]] = [("signal", "half the step changes it by", "of its range", "at", "order")]
+    orders = ("order",) if found.tolerances is None else ("",)
+    rows: list[tuple[str, ...]] = [("signal", f"{found.less} changes it by", "of its range", "at", *orders)]
     for each in changed:
         order = "-" if isnan(each.order) else f"{each.order:.1f}"
+        order = order if found.tolerances is None else ""
         difference = f"{each.difference:.3g}{'' if each.unit == '1' else f' {each.unit}'}"
         rows.append((each.name, difference, f"{each.share:.2g}", f"{each.time:g} s", order))
     lines = table(rows) if changed else []

@@ -16,7 +16,7 @@ from quadvis.engine.solver import ORDERS
 from quadvis.errors import QuadvisError
 from quadvis.graph.graph import SOLVERS
 
-HEAD = "signal half the step changes it by of its range at order"
+HEAD = "signal half the step of 100 ms changes it by of its range at order"
 DIAGRAMS = Path(__file__).parents[2] / "diagrams"
 DECAY = """\
 quadvis: 1
@@ -74,7 +74,7 @@ def test_the_difference_and_the_order_are_those_of_the_formula(method: str) -> N
     else:
         assert found.converged
         assert found.verdict.endswith(
-            f"at a step of 100 ms; order seen: {x.order:.1f}, of {order} for {method}"
+            f"with a step of 100 ms; order seen: {x.order:.1f}, of {order} for {method}"
         )
 
 
