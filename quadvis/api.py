@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from quadvis.export.fmu import ExportedFmu
     from quadvis.output.recording import Recorded
     from quadvis.realtime.options import RealTime
+    from quadvis.run.accuracy import Accuracy
     from quadvis.run.live import LiveRun
     from quadvis.run.loops import Progress
     from quadvis.run.result import Result
@@ -67,6 +68,12 @@ class Diagram(Checked):
         judging = Judging(self.summary, self.expectations)
         judging.read(signals)
         return judging.outcome()
+
+    def accuracy(self, *, engine: str = "auto") -> Accuracy:
+        """Run it with smaller steps, and say what these change; see ``quadvis.run.accuracy.accuracy``."""
+        from quadvis.run.accuracy import accuracy
+
+        return accuracy(self, engine=engine)
 
     def analyse(
         self,

@@ -53,7 +53,7 @@ def worst_age(graph: Graph, meter: str) -> float:
     parts = {node.path: node for node in _way(graph, meter)}
     nodes = [parts[node.path] for node in graph.nodes if node.path in parts]
     step = graph.step if any(node.task.continuous for node in nodes) else None
-    alone = Graph(graph.name, nodes, graph.solver, step, graph.tasking)
+    alone = Graph(graph.name, nodes, graph.solver, step, graph.tasking, graph.tolerances)
     span = hyperperiod(alone, alone.tasks)
     senders = [node.block for node in nodes if isinstance(node.block, SenderTwin)]
     longest = sum(float(node.task.period) for node in nodes) + sum(sender.latency for sender in senders)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from quadvis.graph.graph import Graph
     from quadvis.library.catalogue import Catalogue, OwnBlocks
     from quadvis.realtime.options import RealTime
+    from quadvis.run.accuracy import Accuracy
 
 SCHEMA = Kind("the schema", (b"{",), rb'"\$schema"')
 PARAMETERS = Kind("the parameter file", (b"#", b"quadvis:"), rb"^set:")
@@ -226,8 +227,18 @@ def _places(diagram: Diagram, options: argparse.Namespace) -> list[str]:
     ]
 
 
+def _accuracy(diagram: Diagram) -> Accuracy:
+    """Run a diagram with smaller steps."""
+    from quadvis.machine.status_line import AnalysisLine
+    from quadvis.run.accuracy import accuracy
+
+    collected_from_now_on()
+    with AnalysisLine() as progress:
+        return accuracy(diagram, progress)
+
+
 def check(options: argparse.Namespace) -> int:
-    """Report all faults of a diagram; 2 if any are found."""
+    """Report all faults of a diagram, 2 if any are found; with --accuracy 1 if its step is too large."""
     from quadvis.analysis.ages import worst_ages
     from quadvis.diagram.load import check as check_diagram
     from quadvis.errors import DiagramError
@@ -248,17 +259,24 @@ def check(options: argparse.Namespace) -> int:
     count = sum(not node.origin for node in diagram.graph.nodes)
     links = {link.name: link.facts() for link in diagram.links}
     ages = worst_ages(diagram)
+    accuracy: Accuracy | None = None
     if options.json:
         found = {"ok": True, "diagram": diagram.name, "blocks": count, "hash": diagram.hash, "links": links}
         found |= {"ages": {age.text: age.greatest for age in ages}}
+        found |= {"accuracy": (accuracy := _accuracy(diagram)).facts()} if options.accuracy else {}
         _print_json(found | {"warnings": _plain_faults(diagram.warnings)})
     else:
         print(f"{options.file}: {count} blocks in {tasks}: no fault")
         lines = [*(f"link {name}: {facts}" for name, facts in links.items()), *map(str, ages)]
         lines += _hold_ups(diagram.graph)
         lines += _places(diagram, options)
-        print("".join(f"  {line}\n" for line in lines), end="")
-    return 0
+        print("".join(f"  {line}\n" for line in lines), end="", flush=True)
+        if options.accuracy:
+            from quadvis.run.report import accuracy_lines
+
+            accuracy = _accuracy(diagram)
+            print("\n".join(accuracy_lines(accuracy)))
+    return 0 if accuracy is None or accuracy.converged else FAILED
 
 
 def _print_warnings(diagram: Any, options: argparse.Namespace) -> None:

@@ -27,6 +27,15 @@ Numbers are in the unit beside them, null for a number that is unknown or infini
 Exit code: 0 all expectations met, 1 an expectation is not met, the run stopped or its log lacks something,
 2 bad input; 130, 129 or 143 interrupted, hung up or ended."""
 
+CHECK_HELP = """\
+--json prints one object: ok, faults or warnings: [{file, line, column, subject, problem, remedy}]; without a
+fault also diagram, blocks, hash, links and ages; with --accuracy also accuracy: {solver, step_s, converged,
+verdict, remarks, too_large (null, or {block, pole: [real, imaginary] in 1/s, stable_to_s}),
+signals: [{signal, unit, difference, time, share (of the range of the signal), order}]}, the largest share
+first.
+Exit code: 0 no fault, 1 the step is not stable or half of it changes a signal by more than 1 % of its range,
+2 a fault."""
+
 REPLAY_HELP = """\
 The diagram, the seed, the ticks, and what came from outside are those of the log; the diagram's files must be
 what they were. No device is opened, and nothing is written but the new log.
@@ -178,8 +187,10 @@ def parser() -> Parser:
     _replay_options(add("replay", commands.replay, "repeat a run from its log, to the bit", REPLAY_HELP))
     _sweep_options(add("sweep", commands.sweep, "run a diagram at every point of a grid", SWEEP_HELP))
     _tune_options(add("tune", commands.tune, "look for the best values of parameters", TUNE_HELP))
-    check = add("check", commands.check, "check a diagram and report all its faults")
+    check = add("check", commands.check, "check a diagram and report all its faults", CHECK_HELP)
     _diagram_options(check)
+    words = "run it also with a half and a quarter of the solver's step, and say what this changes"
+    check.add_argument("--accuracy", action="store_true", help=words)
     check.add_argument("--json", action="store_true", help="print the faults and warnings as JSON")
     blocks = add("list", commands.list_blocks, "list all blocks, and the files that come with quadvis")
     words = "show what has these words in its name or its text; the words of other programs count, too"

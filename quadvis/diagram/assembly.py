@@ -97,7 +97,7 @@ class Assembly:
         with faults.about(EXPECT.key):
             routes = read_routes(spec.nodes.get(EXPECT.key), wiring, faults)
         nodes = WireCheck(drafts, faults, self.cases, network, routes, spec[TASKING]).run()
-        graph = Graph(spec.name, nodes, spec[SOLVER].method, step, spec[TASKING])
+        graph = Graph(spec.name, nodes, spec[SOLVER].method, step, spec[TASKING], spec[SOLVER].tolerances)
         stop = _stop_time(spec, stop_time, faults)
         if known(builder.step):
             tasks = {draft.task for draft in drafts if known(draft.task)}

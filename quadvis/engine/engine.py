@@ -15,6 +15,7 @@ from quadvis.engine.interpreter import Call, Executor, Interpreter, Stop
 from quadvis.engine.memory import Memory, Slot
 from quadvis.engine.profile import Profile, ProfileReport, Timed
 from quadvis.engine.program import Program, make_program
+from quadvis.engine.stability import Marks, StatePole, poles
 from quadvis.engine.stops import cannot, explained
 from quadvis.engine.taps import MachineCall, Observer, Tap
 from quadvis.engine.tuning import Tuning
@@ -50,6 +51,7 @@ class Engine:
         self._executor: Executor = self._interpreter
         self._selves = self._interpreter.selves
         self.memory: Memory = self._interpreter.memory
+        self._marks = Marks(self._interpreter)
         self.tuning = Tuning(self.program, {node.path: node.block for node in graph.nodes}, self.memory)
         blocks = enumerate(self._selves)
         self._keepers = [number for number, block in blocks if type(block).keep is not Block.keep]
@@ -164,6 +166,8 @@ class Engine:
     def run(self, ticks: int) -> None:
         """Run that many ticks, without those that the clock leaves out."""
         end = self.tick + ticks
+        if self.program.states and isinstance(self.clock, Unpaced):
+            self._marks.note()
         while self.tick < end:
             due = self.clock.wait(self.tick, end)
             self._executor.tick = due.start
@@ -174,7 +178,11 @@ class Engine:
 
     def explained(self, stop: Stop) -> QuadvisError:
         """Return the error that a stop of an executor means, to be raised."""
-        return explained(stop, self.graph, self.program, self.memory)
+        return explained(stop, self.graph, self.program, self.memory, self._marks)
+
+    def poles(self) -> list[StatePole]:
+        """Return the poles of the continuous states between two ticks, the fastest first."""
+        return poles(self._interpreter)
 
     def hold_safe(self) -> None:
         """Write the safe values of all blocks, and let no block write any more; everything else goes on."""
@@ -207,7 +215,11 @@ class Engine:
         )  # fmt: skip
 
     def snapshot(self) -> Snapshot:
-        """Return the whole state between two ticks."""
+        """Return the whole state between two ticks.
+
+        A solver of variable step begins anew there, so that a restored run repeats to the bit.
+        """
+        self._interpreter.restart()
         kept = tuple([self._selves[number].keep() for number in self._keepers])
         return Snapshot(self.tick, self.memory.content(), tuple(self.memory.frames), kept)
 
@@ -218,6 +230,7 @@ class Engine:
             raise ValueError("the snapshot is of another graph")
         memory.raw[:] = snapshot.memory
         memory.frames[:] = snapshot.frames
+        self._interpreter.restart()
         self._executor.tick = snapshot.tick
         for number, kept in zip(self._keepers, snapshot.kept, strict=True):
             try:

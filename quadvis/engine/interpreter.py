@@ -16,8 +16,9 @@ from quadvis.engine.layout import TIME
 from quadvis.engine.memory import SLOT, Memory
 from quadvis.engine.profile import Profile
 from quadvis.engine.program import COPY, Op, Program, TaskProgram
-from quadvis.engine.solver import Solver, Vector
+from quadvis.engine.solver import TABLEAUS, Solver, Vector
 from quadvis.engine.taps import MachineCall, Observer, Tap
+from quadvis.engine.variable_step import NoStep, VariableSolver
 
 Call = Callable[[], None]
 NOT_FINITE_OUTPUT = "output"
@@ -110,7 +111,8 @@ class Interpreter:
         self._states = np.array(program.states, np.intp)
         self._slopes = np.array(program.slopes, np.intp)
         self._held = slice(0, program.held * SLOT)
-        self._solver = Solver(program.solver, float(program.period))
+        self._solver = Solver(program.solver, float(program.period)) if program.solver in TABLEAUS else None
+        self._variable = VariableSolver(program, self.memory) if self._solver is None else None
         self.observers: list[Tap | Observer] = []
         self._rhythms = [(task.every, task.offset) for task in program.tasks]
         self._moments: dict[tuple[bool, ...], _Moment] = {}
@@ -273,19 +275,30 @@ class Interpreter:
         held = bytes(raw[self._held])
         call = None
         try:
-            for call in self._derivatives:
-                call()
-            state = self._solver.advance(self._rates, time, floats[self._states], floats[self._slopes])
-        except _MinorError as failure:
+            if self._variable is not None:
+                state = self._variable.advance(self.rates, self.tick)
+            else:
+                assert self._solver is not None
+                for call in self._derivatives:
+                    call()
+                state = self._solver.advance(self.rates, time, floats[self._states], floats[self._slopes])
+        except MinorError as failure:
             return self._stop(failure.call, failure.error)
+        except NoStep as error:
+            return Stop(self.tick, (), error)
         except Exception as error:
             return self._stop(call, error)
         raw[self._held] = held
         floats[self._states] = state
         return None if np.isfinite(state).all() else Stop(self.tick, (), found=NOT_FINITE_STATE)
 
-    def _rates(self, time: float, state: Vector) -> Vector:
-        """Return the derivative at a minor step."""
+    def restart(self) -> None:
+        """Let a solver with a memory of its own begin anew at the next tick."""
+        if self._variable is not None:
+            self._variable.restart()
+
+    def rates(self, time: float, state: Vector) -> Vector:
+        """Return the derivative at a minor step, written over the memory; MinorError if a block fails."""
         floats = self.memory.floats
         floats[TIME.position] = time
         floats[self._states] = state
@@ -296,11 +309,11 @@ class Interpreter:
             for call in self._derivatives:
                 call()
         except Exception as error:
-            raise _MinorError(call, error) from error
+            raise MinorError(call, error) from error
         return floats[self._slopes]
 
 
-class _MinorError(Exception):
+class MinorError(Exception):
     """A block failed at a minor step."""
 
     def __init__(self, call: Call, error: Exception) -> None:

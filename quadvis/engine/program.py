@@ -17,7 +17,7 @@ from typing import NamedTuple
 from quadvis.block.random import stream_start
 from quadvis.engine.layout import TIME, Layout, Placed
 from quadvis.engine.memory import Memory, Slot
-from quadvis.graph.graph import SINGLE, Constant, Graph, Node
+from quadvis.graph.graph import SINGLE, USUAL, Constant, Graph, Node, Tolerances
 from quadvis.machine.garbage import uncollected
 
 COPY = "copy"
@@ -106,6 +106,7 @@ class Program:
     minor: tuple[Op, ...]
     tunables: tuple[Tunable, ...]
     time: Slot = TIME
+    tolerances: Tolerances = USUAL
 
     @cached_property
     def _numbers(self) -> dict[str, int]:
@@ -228,6 +229,7 @@ def make_program(graph: Graph, seed: int) -> Program:
         tuple(calls["deriv"].values()),
         tuple(calls["output"][number] for number in _minor(graph.nodes) if number in calls["output"]),
         tuple(_tunables(graph, blocks)),
+        tolerances=graph.tolerances,
     )
 
 

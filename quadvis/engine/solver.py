@@ -33,6 +33,7 @@ TABLEAUS = {
         (0.0, 1 / 2, 1 / 2, 1.0), ((), (1 / 2,), (0.0, 1 / 2), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
     ),
 }
+ORDERS = {name: int(name[-1]) for name in TABLEAUS}  # of the error after a given time
 
 
 class Solver:

@@ -12,6 +12,8 @@ from quadvis.engine.interpreter import NOT_FINITE_OUTPUT, Stop
 from quadvis.engine.layout import TIME, Placed
 from quadvis.engine.memory import Memory
 from quadvis.engine.program import Program
+from quadvis.engine.stability import REMEDY, Marks
+from quadvis.engine.variable_step import NoStep
 from quadvis.errors import QuadvisError, RunError, sentence
 from quadvis.graph.graph import Graph, Node
 from quadvis.machine.failures import MEMORY, arithmetic, is_short_of_memory, surroundings
@@ -21,19 +23,34 @@ SHOWN = 4  # numbers in a message
 SMALLER_STEP = "a smaller solver step may help"
 
 
-def explained(stop: Stop, graph: Graph, program: Program, memory: Memory) -> QuadvisError:
-    """Return the error that a stop means, to be raised."""
+def explained(stop: Stop, graph: Graph, program: Program, memory: Memory, marks: Marks) -> QuadvisError:
+    """Return the error that a stop means, to be raised; ``marks`` may know the cause."""
     time = float(stop.tick * program.period)
+    if isinstance(stop.error, NoStep):
+        problem = f"the solver {program.solver} cannot go on: {_lowered(str(stop.error))}"
+        remedy = "a state may go to infinity or jump; a larger 'rtol' or 'atol' may help"
+        return RunError(sentence(problem, remedy), time=time)
     if stop.error is not None:
-        return _failed(stop.error, program.blocks[stop.blocks[0]], graph, memory, time)
+        return _failed(stop.error, program.blocks[stop.blocks[0]], graph, memory, time, marks)
     if stop.found == NOT_FINITE_OUTPUT:
-        return _not_finite(stop, graph, program, memory, time)
+        return _not_finite(stop, graph, program, memory, time, marks)
     for block in program.blocks:
         for name in block.slopes:
             if not np.isfinite(memory.view(block.field(name))).all():
-                problem = sentence(f"state '{name}' left the finite numbers", SMALLER_STEP)
+                problem = _with_cause(f"state '{name}' left the finite numbers", marks)
                 return RunError(problem, block=block.path, time=time)
     raise AssertionError("a state that is not finite belongs to a block")
+
+
+def _lowered(text: str) -> str:
+    """Return another program's sentence as a part of one."""
+    return text[:1].lower() + text[1:].rstrip(".")
+
+
+def _with_cause(problem: str, marks: Marks) -> str:
+    """Return the sentence on numbers that left the finite ones: why, if that is known, and the remedy."""
+    cause = marks.cause()
+    return sentence(problem, SMALLER_STEP) if cause is None else f"{problem}, as {cause.problem}; {REMEDY}"
 
 
 def cannot(method: str, path: str, block: Block, error: Exception, time: float) -> QuadvisError:
@@ -50,7 +67,9 @@ def _own(error: Exception, path: str) -> QuadvisError | None:
     return None
 
 
-def _failed(error: Exception, block: Placed, graph: Graph, memory: Memory, time: float) -> QuadvisError:
+def _failed(
+    error: Exception, block: Placed, graph: Graph, memory: Memory, time: float, marks: Marks
+) -> QuadvisError:
     own = _own(error, block.path)
     if own is not None:
         return own
@@ -62,7 +81,7 @@ def _failed(error: Exception, block: Placed, graph: Graph, memory: Memory, time:
     own_code = node.block.__module__.startswith(OWN_MODULES)
     place = source_line(error, file_of(type(node.block))) if own_code else ""
     problem = f"{arithmetic(error)}{f' in {place}' if place else ''}{_inputs(block, memory)}"
-    reason = sentence(problem, _remedy(graph, block.path))
+    reason = _with_cause(problem, marks) if _is_integrated(graph, block.path) else problem
     return RunError(reason, block=block.path, port=outputs[0] if len(outputs) == 1 else "", time=time)
 
 
@@ -97,21 +116,23 @@ def _inputs(block: Placed, memory: Memory) -> str:
     return f" ({', '.join(found[:SHOWN])}{', ...' if len(found) > SHOWN else ''})" if found else ""
 
 
-def _remedy(graph: Graph, path: str) -> str:
-    """Return that a smaller step may help if the solver integrates a state that has its share in a block."""
+def _is_integrated(graph: Graph, path: str) -> bool:
+    """Return whether the solver integrates a state that has its share in a block."""
     waiting, seen = [path], {path}
     while waiting:
         node = graph[waiting.pop()]
         if node.block.interface.continuous:
-            return SMALLER_STEP
+            return True
         for _, wire in node.wires():
             if wire.block not in seen:
                 seen.add(wire.block)
                 waiting.append(wire.block)
-    return ""
+    return False
 
 
-def _not_finite(stop: Stop, graph: Graph, program: Program, memory: Memory, time: float) -> RunError:
+def _not_finite(
+    stop: Stop, graph: Graph, program: Program, memory: Memory, time: float, marks: Marks
+) -> RunError:
     """Name the first port, in execution order, that is not finite."""
     for block in (program.blocks[number] for number in stop.blocks):
         for port, slot in block.outputs.items():
@@ -119,6 +140,8 @@ def _not_finite(stop: Stop, graph: Graph, program: Program, memory: Memory, time
                 value: Any = memory.read(slot)
                 if not np.isfinite(value).all():
                     text = np.array2string(np.asarray(value), precision=4)
-                    problem = sentence(f"the output became {text}", _remedy(graph, block.path))
+                    problem = f"the output became {text}"
+                    if _is_integrated(graph, block.path):
+                        problem = _with_cause(problem, marks)
                     return RunError(problem, block=block.path, port=port, time=time)
     raise AssertionError("a value that is not finite belongs to a port")

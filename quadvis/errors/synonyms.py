@@ -41,6 +41,8 @@ _MEANT = {
     "across": "crossing transition ratetransition via mode sampling",
     # solver, rates, values
     "method": "solver type algorithm name",
+    "rtol": "reltol relativetolerance relerr tolerance",
+    "atol": "abstol absolutetolerance abserr",
     "step": "dt stepsize fixedstep fixedstepsize timestep h ts",
     "offset": "phase delay start",
     "bias": "offset dcoffset",

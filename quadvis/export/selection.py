@@ -12,7 +12,7 @@ from quadvis.block import Block, Out, State
 from quadvis.diagram.diagram import Diagram
 from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.fmi.signals import plain_name
-from quadvis.graph.graph import MULTI, Graph, Node, Wire
+from quadvis.graph.graph import MULTI, VARIABLE, Graph, Node, Wire
 from quadvis.graph.names import read_name
 
 WHOLE = "."  # names the whole diagram
@@ -57,6 +57,9 @@ def selected_blocks(diagram: Diagram, name: str) -> ExportSelection:
         )
     if graph.tasking == MULTI:
         raise QuadvisError("a diagram with 'tasking: multi' cannot be exported; leave the key out")
+    if graph.solver in VARIABLE and any(node.block.interface.continuous for node in chosen):
+        problem = f"the solver '{graph.solver}' cannot be exported"
+        raise QuadvisError(sentence(problem, "choose one of fixed step, ode1 to ode4"))
     _refuse(chosen)
     inputs = _Inputs(diagram, name, chosen)
     nodes = [*inputs.nodes.values(), *(replace(node, inputs=inputs.wired(node)) for node in chosen)]

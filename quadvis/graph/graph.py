@@ -21,11 +21,22 @@ CROSSINGS = {
     "newest": "whatever the producer gave last, for rates that do not fit into each other",
 }
 CONTINUOUS = "continuous"  # the rate of blocks that the solver integrates; all other rates are sampled
-SOLVERS = ("ode1", "ode2", "ode3", "ode4")
+SOLVERS = ("ode1", "ode2", "ode3", "ode4")  # of fixed step
+VARIABLE = ("RK45", "Radau", "BDF", "LSODA")  # scipy's, which choose their steps
 SINGLE, MULTI = TASKINGS = ("single", "multi")
 DELAY = "delay"
 
 Index = tuple[Any, ...]  # integers, then slices, as numpy takes them
+
+
+class Tolerances(NamedTuple):
+    """How exact each step of a variable-step solver is: relative to a state, and in the state's unit."""
+
+    rtol: float = 1e-6
+    atol: float = 1e-9
+
+
+USUAL = Tolerances()  # where none are written
 
 
 class Task(NamedTuple):
@@ -118,7 +129,7 @@ class Graph:
     """All blocks, each after the blocks whose outputs its own need, and the exact time base.
 
     ``tasking`` is ``single`` (one order of execution a tick) or ``multi`` (each task by itself, the fastest
-    first; the wires have transitions then).
+    first; the wires have transitions then). ``tolerances`` are for a solver of variable step.
     """
 
     name: str
@@ -126,6 +137,7 @@ class Graph:
     solver: str = "ode4"
     step: Fraction | None = None
     tasking: str = SINGLE
+    tolerances: Tolerances = USUAL
 
     def __post_init__(self) -> None:
         self._by_path = {node.path: node for node in self.nodes}
@@ -160,7 +172,7 @@ class Graph:
         Of the wires of links, those from another computer lead out of it: their senders are there.
         """
         nodes = [node for node in self.nodes if node.computer == computer]
-        return Graph(self.name, nodes, self.solver, self.tick, self.tasking)
+        return Graph(self.name, nodes, self.solver, self.tick, self.tasking, self.tolerances)
 
     def ticks(self, time: Fraction) -> int:
         """Return a time as a number of base ticks; ValueError if it is not a whole one."""

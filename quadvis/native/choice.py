@@ -107,6 +107,8 @@ def choose(
             prepare(functions)
     refused = {kind.block.__name__: library().refusals[kind] for kind in kinds if kind in library().refusals}
     names = ", ".join(f"{name} ({why})" for name, why in refused.items())
+    if program.states and program.solver not in TABLEAUS:
+        names = ", ".join(filter(None, (names, f"the solver {program.solver}, which is scipy's")))
     return Choice(NATIVE, f"but interpreted: {names}" if names else "", types)
 
 
@@ -120,7 +122,7 @@ def _saved(program: Program, blocks: Sequence[Block], ticks: int) -> float:
             for op in ops
         )
         found += CALL * calls * max(0, ticks - task.offset) / task.every
-    if program.states:
+    if program.states and program.solver in TABLEAUS:
         stages = len(TABLEAUS[program.solver].nodes)
         calls = len(program.derivatives) + len(program.minor)
         found += ticks * stages * (STAGE + CALL * calls)

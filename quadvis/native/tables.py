@@ -267,7 +267,7 @@ class Tables:
         python = PythonCall(None, -1)
         ops = (*program.minor, *program.derivatives)
         functions = [self._function(op) for op in ops]
-        if any(function is None for function in functions):
+        if program.solver not in TABLEAUS or any(function is None for function in functions):
             self._ask(ALWAYS, python)
             return
         self.redo[self._instruct(ALWAYS, loop.INTEGRATE, 0)] = Redo(python, None)
@@ -349,6 +349,8 @@ def stage_numbers(solver: str, step: float) -> NDArray[np.float64]:
 
     In all formulas of `TABLEAUS` a stage depends on the slope of the stage before it and on no other.
     """
+    if solver not in TABLEAUS:
+        return np.zeros((0, 3))  # the interpreter integrates
     tableau = TABLEAUS[solver]
     found = np.zeros((len(tableau.nodes), 3))
     for stage, (node, weights) in enumerate(zip(tableau.nodes, tableau.stages, strict=True)):

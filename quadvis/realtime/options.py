@@ -11,7 +11,7 @@ from quadvis.diagram.times import read_duration
 from quadvis.document import YamlScalar
 from quadvis.errors import QuadvisError
 from quadvis.errors.caller import as_given
-from quadvis.graph.graph import MULTI, SINGLE, Graph, Task
+from quadvis.graph.graph import MULTI, SINGLE, VARIABLE, Graph, Task
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
 
 PRIORITY = 80
@@ -66,6 +66,9 @@ class RealTime:
         """Refuse a graph that cannot run in real time, or not with these settings."""
         if sys.platform != "linux":
             raise QuadvisError("a real-time run needs Linux, for its clock and its priorities")
+        if graph.solver in VARIABLE and any(node.block.interface.continuous for node in graph.nodes):
+            problem = f"the solver '{graph.solver}' takes as many steps as it needs, for which no clock waits"
+            raise QuadvisError(f"{problem}; choose one of fixed step, ode1 to ode4, for a real-time run")
         if graph.tasking == MULTI:
             _check_frames(graph)
         polled, period = self.polled() or 0, Schedule.of(graph).interval

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import isnan
 from typing import TYPE_CHECKING, Any
 
 from quadvis.diagram.requirements import Entry
@@ -14,6 +15,7 @@ from quadvis.units import Unit, format_quantity
 
 if TYPE_CHECKING:
     from quadvis.engine.profile import ProfileReport, Timed
+    from quadvis.run.accuracy import Accuracy
 
 SECOND, MILLISECOND, MICROSECOND, HERTZ = map(Unit.parse, ("s", "ms", "us", "Hz"))
 
@@ -88,6 +90,22 @@ def profile_lines(computer: str, profile: ProfileReport) -> list[str]:
     cost = f"{1e6 * profile.cost:.2g} us"
     title = f"{_with('profile', computer)}: every call timed, which costs about {cost} more a call in Python"
     return [title, *table(rows)]
+
+
+def accuracy_lines(found: Accuracy) -> list[str]:
+    """Return what a smaller step changes: a table, the largest change first, and the verdict."""
+    changed = [each for each in found.signals if each.difference > 0.0]
+    orders = ("order",) if found.tolerances is None else ("",)
+    rows: list[tuple[str, ...]] = [("signal", f"{found.less} changes it by", "of its range", "at", *orders)]
+    for each in changed:
+        order = "-" if isnan(each.order) else f"{each.order:.1f}"
+        order = order if found.tolerances is None else ""
+        difference = f"{each.difference:.3g}{'' if each.unit == '1' else f' {each.unit}'}"
+        rows.append((each.name, difference, f"{each.share:.2g}", f"{each.time:g} s", order))
+    lines = table(rows) if changed else []
+    if still := len(found.signals) - len(changed):
+        lines.append(f"{counted(still, 'signal')} the same to the bit")
+    return [*lines, *found.remarks, found.verdict]
 
 
 def not_judged(count: int) -> list[str]:

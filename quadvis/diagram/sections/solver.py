@@ -9,12 +9,19 @@ from quadvis.diagram.parameters import named_parameters
 from quadvis.diagram.sections.forms import QUANTITY, Schema, closed
 from quadvis.diagram.sections.section import Checked, FileSection
 from quadvis.diagram.times import read_step
-from quadvis.document import YamlNode
-from quadvis.errors import UNKNOWN, Faults, Place, Unknown
-from quadvis.graph.graph import SOLVERS
+from quadvis.document import YamlMap, YamlNode, YamlScalar
+from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known, quoted
+from quadvis.graph.graph import SOLVERS, VARIABLE, Tolerances
 
-SOLVER_KEYS = ("method", "step")
+SOLVER_KEYS = ("method", "step", "rtol", "atol")
+METHODS = (*SOLVERS, *VARIABLE)
 METHOD = "ode4"  # where none is written
+LEAST = 1e-13  # of rtol: below, rounding alone is larger
+MEANT = {  # what Simulink, and others, call these
+    "ode45": "RK45", "ode23": "RK45", "rk4": "ode4", "euler": "ode1", "heun": "ode2",
+    "ode15s": "BDF", "ode23s": "Radau", "ode23t": "Radau", "ode23tb": "Radau", "ode14x": "Radau",
+    "implicit": "Radau", "cvode": "BDF",
+}  # fmt: skip
 
 
 class SolverSpec(NamedTuple):
@@ -27,6 +34,7 @@ class SolverSpec(NamedTuple):
     step: Fraction | Unknown | None = None
     place: Place | None = None
     node: YamlNode | None = None
+    tolerances: Tolerances = Tolerances()
 
 
 class SolverSection(FileSection[SolverSpec]):
@@ -35,32 +43,78 @@ class SolverSection(FileSection[SolverSpec]):
     key = "solver"
     words = (
         "`{method: ode1 to ode4, step: 5 ms}` for continuous blocks; the step divides every period, "
-        "and may be a parameter, `$name`; `--set solver.step=...` replaces it"
+        "and may be a parameter, `$name`; `--set solver.step=...` replaces it; or a `method` of variable "
+        "step, RK45, Radau, BDF or LSODA, with `rtol` and `atol`"
     )
 
     def read(self, node: YamlNode | None, faults: Faults) -> SolverSpec:
-        """Return method and step."""
+        """Return method, step and tolerances."""
         fields = faults.collect(node.fields, (), SOLVER_KEYS, faults) if node is not None else None
         if fields is None:
             return SolverSpec(step=UNKNOWN if node is not None else None)
-        method = faults.collect(fields["method"].choice, SOLVERS) if "method" in fields else None
+        method = faults.collect(_method, fields["method"]) if "method" in fields else None
+        found = SolverSpec(method or METHOD, tolerances=_tolerances(fields, method or METHOD, faults))
         if "step" not in fields:
-            return SolverSpec(method or METHOD)
+            return found
         written = fields["step"]
         step = UNKNOWN if named_parameters(written) else faults.read(read_step, written)
-        return SolverSpec(method or METHOD, step, written.place, written)
+        return found._replace(step=step, place=written.place, node=written)
 
     def schema(self) -> Schema:
-        """Return the schema: method and step."""
+        """Return the schema: method, step and tolerances."""
         return closed(SOLVER_KEYS, {
-            "method": {"enum": list(SOLVERS), "description": "fixed-step solver, named as in Simulink"},
+            "method": {
+                "enum": list(METHODS),
+                "description": "ode1 to ode4: of fixed step, named as in Simulink; the others choose their "
+                "steps, as in scipy; for stiff equations Radau and BDF",
+            },
             "step": {**QUANTITY, "description": "such as 5 ms; it divides every period"},
+            "rtol": {**QUANTITY, "description": "of such a method: the error of a step, relative to a state"},
+            "atol": {**QUANTITY, "description": "of such a method: the error in the SI unit of each state"},
         })  # fmt: skip
 
     def resolved(self, diagram: Checked) -> Any:
         """Return method and step if anything is continuous."""
         graph = diagram.graph
-        return {"method": graph.solver, "step": f"{graph.step} s"} if graph.step is not None else None
+        if graph.step is None:
+            return None
+        tolerances = graph.tolerances._asdict() if graph.solver in VARIABLE else {}
+        return {"method": graph.solver, "step": f"{graph.step} s", **tolerances}
+
+
+def _method(node: YamlNode) -> str:
+    """Read a method; one that another program calls otherwise is suggested."""
+    meant = MEANT.get(node.value.lower()) if isinstance(node, YamlScalar) else None
+    if meant is not None:
+        raise node.fault(f"there is no method {quoted(node.text())}", f"did you mean '{meant}'?")
+    return node.choice(METHODS)
+
+
+def _tolerances(fields: YamlMap, method: str, faults: Faults) -> Tolerances:
+    """Read the tolerances, which a method of fixed step does not have."""
+    read: dict[str, float] = {}
+    for name in Tolerances._fields:
+        if name not in fields:
+            continue
+        node = fields[name]
+        if method not in VARIABLE:
+            remedy = f"leave it out, or choose one of {', '.join(VARIABLE)}"
+            faults.add(
+                node.place, f"'{name}' is for a method that chooses its steps, not for {method}", remedy
+            )
+            continue
+        value = faults.read(_tolerance, node)
+        if known(value):
+            read[name] = value
+    return Tolerances(**read)
+
+
+def _tolerance(node: YamlNode) -> float:
+    value = node.quantity()
+    if not (LEAST if node.key == "rtol" else 0.0) <= value < 1.0 or value == 0.0:
+        least = f"{LEAST:g}" if node.key == "rtol" else "0"
+        raise node.fault(f"'{node.key}' must be above {least} and below 1", "write such as 1e-6")
+    return value
 
 
 SOLVER = SolverSection()
