@@ -101,7 +101,7 @@ class Builder:
         connections = dict(self._connections(flat, flat.kind))
         return Draft(
             flat.path, flat.spec.place, flat.spec.kind, flat.kind, block, task, connections, flat.places,
-            units, flat.parameters, flat.stream, flat.spec.inherits, self._computer(flat),
+            units, flat.parameters, flat.stream, flat.spec.inherits, self._computer(flat), flat.condition,
         )  # fmt: skip
 
     def _choose_step(self) -> Fraction | Unknown | None:

@@ -21,7 +21,7 @@ from quadvis.diagram.unit_repair import follow_units
 from quadvis.diagram.values import shape_text
 from quadvis.errors import UNKNOWN, Faults, Place, known
 from quadvis.graph.graph import MULTI, SINGLE, Constant, Node, Task, Wire
-from quadvis.graph.order import execution_order
+from quadvis.graph.order import CONDITION, execution_order
 from quadvis.graph.tasking import with_transitions
 from quadvis.links.insertion import receivers_first
 
@@ -60,7 +60,11 @@ class WireCheck:
         # Of a block whose parameters are unknown only the declarations are looked at, which its class has.
         block = draft.block if known(draft.block) else cast(Block, draft.type)
         computer = draft.computer if known(draft.computer) else ""
-        node = Node(draft.path, draft.kind, block, task, inputs, stream=draft.stream, computer=computer)
+        condition = draft.condition if known(draft.condition) and draft.condition in self.drafts else ""
+        node = Node(
+            draft.path, draft.kind, block, task, inputs, stream=draft.stream, computer=computer,
+            condition=condition,
+        )  # fmt: skip
         node.sizes.update(block.entry_counts)
         for name, param in interface.params.items() if known(draft.block) else ():
             shape = getattr(getattr(draft.block, name), "shape", ())
@@ -169,7 +173,7 @@ class WireCheck:
 
     def _report_loop(self, loop: list[Key]) -> None:
         """Say the loop in the direction of the signal."""
-        path, port = loop[0]
+        path, port = next(each for each in loop if each[1] != CONDITION)
         steps = [f"{name}.{entered}" for name, entered in (loop[0], *reversed(loop))]
         remedy = "break it with 'across: delay' on one of these wires, or with a block that holds a state"
         place = self.drafts[path].connections[port].place

@@ -34,10 +34,8 @@ def warn_parameters(spec: FileSpec, faults: Faults) -> None:
     nodes = (*spec.nodes.values(), *timing_nodes(spec), *params)
     used: set[str] = {name for node in nodes for name in named_parameters(node)}
     for block in _blocks(spec):
-        inputs = block.inputs if block.inputs is not None and known(block.inputs) else {}
         parameters = block.parameters if known(block.parameters) else {}
-        wired = (node for given in inputs.values() for node in given.constants)
-        for node in (*parameters.values(), *block.groups, *wired):
+        for node in (*parameters.values(), *block.groups, *block.constants):
             used |= named_parameters(node)
     for link in spec[LINKS].values():
         for node in link.fields.values() if known(link) else ():

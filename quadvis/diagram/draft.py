@@ -45,6 +45,7 @@ class Draft:
     stream: str = ""  # the name of its noise
     inherits: bool = False  # whether the inputs are those of the block that it replaces
     computer: str | Unknown = ""
+    condition: str | Unknown = ""  # the block that says when this one runs
 
     def origin(self, name: str) -> Place:
         """Return where the value of a parameter or constant is written."""

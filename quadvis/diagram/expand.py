@@ -15,7 +15,8 @@ from quadvis.diagram.overrides import Overrides
 from quadvis.diagram.parameters import Params, substitute
 from quadvis.diagram.parts import Parts
 from quadvis.diagram.scope import FlatBlock, Scope
-from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec, InputSpec
+from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec
+from quadvis.diagram.sections.inputs import InputSpec
 from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.ports import PORTS
 from quadvis.diagram.settings import Settings

@@ -13,7 +13,8 @@ from quadvis.diagram.expand import Expansion
 from quadvis.diagram.group import Group
 from quadvis.diagram.parameters import named_parameters, whole_parameter
 from quadvis.diagram.scope import Scope
-from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec, InputSpec
+from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec
+from quadvis.diagram.sections.inputs import InputSpec
 from quadvis.diagram.sections.links import LINKS
 from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.ports import PORTS
@@ -151,6 +152,8 @@ def _named(node: object, scope: Scope) -> Iterator[str]:
 def _inputs(path: str, block: BlockSpec) -> Iterator[tuple[str, InputSpec]]:
     inputs = block.inputs if block.inputs is not None and known(block.inputs) else {}
     yield from ((f"the input '{path}.{port}'", given) for port, given in inputs.items())
+    if block.runs is not None and known(block.runs):
+        yield from ((f"a condition of '{path}'", given) for given in block.runs.signals)
 
 
 def _others(scope: Scope) -> Iterator[tuple[str, YamlNode]]:

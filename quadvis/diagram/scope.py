@@ -8,9 +8,11 @@ from functools import cached_property
 
 from quadvis.block import Block
 from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec
+from quadvis.diagram.sections.conditional import PartCondition
 from quadvis.diagram.spec import FileSpec
 from quadvis.document import YamlNode
 from quadvis.errors import Place, Unknown, known
+from quadvis.graph.graph import Wire
 
 
 @dataclass
@@ -36,6 +38,12 @@ class Scope:
         yield from (child for child in self.children.values() if known(child))
 
     @property
+    def runs(self) -> PartCondition | None:
+        """When the part runs, if not always and if that is known."""
+        runs = self.instance.runs if self.instance is not None else None
+        return runs if runs is not None and known(runs) else None
+
+    @property
     def subject(self) -> str:
         """How a fault names the part."""
         return f"block '{self.prefix[:-1]}'"
@@ -51,6 +59,8 @@ class FlatBlock:
     kind: type[Block] | Unknown
     parameters: dict[str, YamlNode | Unknown]
     places: Mapping[str, Place]  # of the names of the parameters
+    wires: Mapping[str, Wire] = field(default_factory=dict)  # that no file has, since the block is added
+    condition: str | Unknown = ""  # the block that says when this one runs
 
     @cached_property
     def rate(self) -> tuple[str, Place] | Unknown | None:

@@ -105,11 +105,14 @@ def _fitting(spec: FileSpec, variant: str, faults: Faults) -> Iterator[tuple[str
 
 
 def in_slot(base: BlockSpec, block: BlockSpec) -> BlockSpec:
-    """Return the block for a slot: without wires, rate or computer of its own it has those before it."""
+    """Return the block for a slot, with the wires, rate, computer and condition before it if it has none."""
     if block.inputs is None:
         block = block._replace(inputs=base.inputs, inherits=True)
     slot = base.slot if block.slot is None else block.slot
-    return block._replace(slot=slot, rate=block.rate or base.rate, at=block.at or base.at)
+    runs, condition = block.runs or base.runs, block.condition or base.condition
+    return block._replace(
+        slot=slot, rate=block.rate or base.rate, at=block.at or base.at, runs=runs, condition=condition
+    )
 
 
 class StandIn(NamedTuple):

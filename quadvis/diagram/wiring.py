@@ -11,7 +11,8 @@ from quadvis.diagram.expand import Expansion
 from quadvis.diagram.parameters import substitute
 from quadvis.diagram.reference import Reference
 from quadvis.diagram.scope import FlatBlock, Scope
-from quadvis.diagram.sections.blocks import BLOCKS, INSIDE, InputSpec
+from quadvis.diagram.sections.blocks import BLOCKS, INSIDE
+from quadvis.diagram.sections.inputs import InputSpec
 from quadvis.diagram.sections.ports import PORTS
 from quadvis.diagram.slots import StandIn
 from quadvis.document import YamlList, YamlNode
@@ -51,6 +52,7 @@ class Wiring:
         # The ports of parts are resolved once, so that a fault in them is reported once.
         self._found: dict[tuple[str, str], Source] = {}
         self._sought: set[tuple[str, str]] = set()
+        self.shown: Mapping[tuple[str, str], Wire] = {}  # outputs of parts that have blocks of their own
 
     def check_ports(self, scope: Scope) -> None:
         """Resolve the ports of every part, used or not."""
@@ -58,7 +60,7 @@ class Wiring:
             for port in child.spec[PORTS].inputs:
                 self._entry(child, port)
             for port in child.spec[PORTS].outputs:
-                self._export(child, port)
+                self.inner(child, port)
             self.check_ports(child)
 
     def ports(self, scope: Scope | None = None) -> Iterator[tuple[str, Wire]]:
@@ -83,6 +85,7 @@ class Wiring:
 
     def inputs(self, block: FlatBlock) -> Iterator[tuple[str, Source]]:
         """Yield the source of each input of a block."""
+        yield from ((port, Source(block.spec.place, wire)) for port, wire in block.wires.items())
         inputs = block.spec.inputs or {}
         counts = block.kind.entry_counts if known(block.kind) else {}
         single = block.kind.interface.inputs if known(block.kind) else {}
@@ -213,7 +216,15 @@ class Wiring:
         return self._found[key]
 
     def _export(self, scope: Scope, port: str) -> Source:
-        """Return the source of an output of a part."""
+        """Return the source of an output of a part: a signal in it, or what shows it while the part runs."""
+        reference = scope.spec[PORTS].outputs[port]
+        shown = self.shown.get((scope.prefix, port))
+        if shown is not None and known(reference):
+            return Source(reference.place, shown)
+        return self.inner(scope, port)
+
+    def inner(self, scope: Scope, port: str) -> Source:
+        """Return the signal in a part that is the source of an output."""
         reference = scope.spec[PORTS].outputs[port]
         if reference is UNKNOWN:
             return Source(scope.spec.place, UNKNOWN)

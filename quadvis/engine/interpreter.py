@@ -15,7 +15,7 @@ from quadvis.block import NO_FRAME, Block
 from quadvis.engine.layout import TIME
 from quadvis.engine.memory import SLOT, Memory
 from quadvis.engine.profile import Profile
-from quadvis.engine.program import COPY, Op, Program, TaskProgram
+from quadvis.engine.program import COPY, RESET, Op, Program, TaskProgram
 from quadvis.engine.solver import TABLEAUS, Solver, Vector
 from quadvis.engine.taps import MachineCall, Observer, Tap
 from quadvis.engine.variable_step import NoStep, VariableSolver
@@ -148,15 +148,23 @@ class Interpreter:
     def call(self, op: Op) -> Call:
         """Return the function that runs an operation: one call over the memory."""
         if op not in self._calls:
-            if op.method == COPY:
-                made = self.memory.copy(op.sources[0], op.targets[0])
-            else:
-                made = self.memory.call(getattr(self.selves[op.block], op.method), op.sources, op.targets)
-            if self.profile is not None and op.block >= 0:
-                made = self.profile.timed(made, op.block, op.method)
-            self._calls[op] = made
+            self._calls[op] = made = self._made(op)
             self._owners[id(made)] = op.block
         return self._calls[op]
+
+    def _made(self, op: Op) -> Call:
+        if op.method == COPY:
+            return self.memory.copy(op.sources[0], op.targets[0])
+        if op.method == RESET:
+            members = [self.selves[number] for number in self.program.members(op.block)]
+            return self.memory.reset(op.sources[0], op.targets, self.program.image, members)
+        made = self.memory.call(getattr(self.selves[op.block], op.method), op.sources, op.targets)
+        if self.profile is not None:
+            made = self.profile.timed(made, op.block, op.method)
+        gate = self.program.gate(op.block)
+        if gate is None:
+            return made
+        return self.memory.gated(made, gate, op.targets if op.method == "deriv" else ())
 
     def detach(self, observer: Tap | Observer) -> None:
         """End what `attach` has begun."""

@@ -14,9 +14,10 @@ from functools import cached_property
 
 from quadvis.block import Block, Shape
 from quadvis.engine.memory import SLOT, Record, Slot
-from quadvis.graph.graph import MULTI, Constant, Graph, Node, Task, Wire, selected
+from quadvis.graph.graph import DELAY, MULTI, Constant, Graph, Node, Task, Wire, selected
 
 TIME = Slot("float64", (), 0)
+NO_BLOCK = -1
 
 
 class Slots(Mapping[str, Slot]):
@@ -48,6 +49,7 @@ class Slots(Mapping[str, Slot]):
 class Placed:
     """One block of a program: its kind, its task, and the slots of its ports, slopes, and record.
 
+    ``condition`` is the number of the block that says when it runs, `NO_BLOCK` if it always does.
     ``record`` begins at ``position``; ``frames`` are the places of the states that hold frames; ``nan`` are
     the outputs in which NaN says "missing".
     """
@@ -62,6 +64,7 @@ class Placed:
     record: Record
     position: int
     nan: tuple[str, ...] = ()
+    condition: int = NO_BLOCK
 
     def field(self, name: str) -> Slot:
         """Return the slot of a parameter, a state or Work; KeyError if none has this name."""
@@ -84,7 +87,8 @@ class Layout:
 
     ``times`` are the slots of time of those tasks that do not have `TIME`.
     ``delays`` and ``latches`` are copies from slot to slot between an output and its readers, by the task at
-    whose ticks they are made: the producer's for a delay, the reader's for a latch.
+    whose ticks they are made: the producer's for a delay, the reader's for a latch. Of an output there are
+    several copies if some belong to the states under a condition: ``kept`` has these, by the condition.
     """
 
     def __init__(self, graph: Graph) -> None:
@@ -102,8 +106,11 @@ class Layout:
             for port, source in node.inputs.items()
             if isinstance(source, Constant)
         }
-        self.delays: dict[str, dict[Slot, Slot]] = {}
-        self.latches: dict[str, dict[Slot, Slot]] = {}
+        self._numbers = {node.path: number for number, node in enumerate(graph.nodes)}
+        self._copied: dict[tuple[str, Slot, str], Slot] = {}
+        self.delays: dict[str, list[tuple[Slot, Slot]]] = {}
+        self.latches: dict[str, list[tuple[Slot, Slot]]] = {}
+        self.kept: dict[str, list[Slot]] = {}
         for node in graph.nodes:
             for _, wire in node.wires():
                 self._whole(node, wire)
@@ -115,17 +122,37 @@ class Layout:
         slot = self._outputs[wire.block][wire.port]
         if not (wire.delayed or wire.latched):
             return slot
-        producer = self._graph[wire.block]
+        producer, inside = self._graph[wire.block], self._inside(node, wire)
         for copied, copies, task in (
             (wire.delayed, self.delays, producer.task),
             (wire.latched, self.latches, node.task),
         ):
-            if copied:
-                made = copies.setdefault(task.name, {})
-                if slot not in made:
-                    made[slot] = self._take(producer, wire.port)
-                slot = made[slot]
+            if not copied:
+                continue
+            key = task.name, slot, inside
+            if key not in self._copied:
+                self._copied[key] = made = self._take(producer, wire.port)
+                copies.setdefault(task.name, []).append((slot, made))
+                if inside:
+                    self.kept.setdefault(inside, []).append(made)
+            slot = self._copied[key]
         return slot
+
+    def _inside(self, node: Node, wire: Wire) -> str:
+        """Return the innermost condition of the producer under which the reader runs, too; "" if none is.
+
+        The conditions of one part at several rates stand side by side in it. What another thread reads does
+        not belong to the states of this one.
+        """
+        apart = self._graph.tasking == MULTI and node.task != self._graph[wire.block].task
+        if apart or wire.crossing != DELAY:
+            return ""
+        around = set(self._graph.around(node.path))
+        for path in self._graph.around(wire.block):
+            folder = path.rpartition("/")[0]
+            if path in around or (folder and node.path.startswith(f"{folder}/")):
+                return path
+        return ""
 
     def _signals(self) -> dict[str, Slots]:
         found = {}
@@ -159,6 +186,7 @@ class Layout:
             record,
             position,
             tuple(port for port in ports if ports[port].nan),
+            self._numbers.get(node.condition, NO_BLOCK),
         )
 
     def _record(self, node: Node) -> Record:

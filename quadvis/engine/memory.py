@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.block import Block, Shape, Sizes
+from quadvis.block import NO_FRAME, Block, Shape, Sizes
 from quadvis.block.returned import CALL
 from quadvis.block.signals import SCALARS
 from quadvis.engine.frames import Frames
@@ -184,6 +184,45 @@ class Memory:
             raw[end : end + size] = raw[start : start + size]
 
         return copy
+
+    def gated(self, call: Callable[[], None], gate: Slot, idle: Sequence[Slot]) -> Callable[[], None]:
+        """Return a call that is made while a slot is true; while it is false, some slots become zero."""
+        at, raw = gate.position * SLOT, self.raw
+        zeros = [(self._bytes(slot), bytes(slot.size * SLOT)) for slot in idle]
+
+        def run() -> None:
+            if raw[at]:
+                call()
+            else:
+                for place, nothing in zeros:
+                    raw[place] = nothing
+
+        return run
+
+    def reset(
+        self, flag: Slot, slots: Sequence[Slot], image: bytes, blocks: Sequence[Block]
+    ) -> Callable[[], None]:
+        """Return a call that, if ``flag`` is true, gives slots their values in ``image``, starts blocks."""
+        at, raw, frames = flag.position * SLOT, self.raw, self.frames
+        parts = [self._bytes(slot) for slot in slots if slot.scalar != "frame"]
+        initial = [(part, image[part]) for part in parts]
+        pictures = [Frames(frames, slot.position, slot.size) for slot in slots if slot.scalar == "frame"]
+        starts = [block.start for block in blocks if "start" in block.interface.arguments]  # type: ignore[attr-defined]
+
+        def run() -> None:
+            if raw[at]:
+                for place, value in initial:
+                    raw[place] = value
+                for picture in pictures:
+                    picture.fill([NO_FRAME] * len(picture))
+                for start in starts:
+                    start()
+
+        return run
+
+    @staticmethod
+    def _bytes(slot: Slot) -> slice:
+        return slice(slot.position * SLOT, (slot.position + slot.size) * SLOT)
 
     def fill(self, block: Block, record: Record, position: int, period: float) -> None:
         """Write a block's period, parameters and the initial values of its states from ``position`` on."""

@@ -15,20 +15,21 @@ from functools import cached_property
 from typing import NamedTuple
 
 from quadvis.block.random import stream_start
-from quadvis.engine.layout import TIME, Layout, Placed
+from quadvis.engine.layout import NO_BLOCK, TIME, Layout, Placed
 from quadvis.engine.memory import Memory, Slot
-from quadvis.graph.graph import SINGLE, USUAL, Constant, Graph, Node, Tolerances
+from quadvis.graph.graph import ACTIVE, RESTART, SINGLE, USUAL, Constant, Graph, Node, Tolerances
 from quadvis.machine.garbage import uncollected
 
-COPY = "copy"
-NO_BLOCK = -1
+COPY, RESET = "copy", "reset"
 PHASES = ("read", "output", "write", "update")
 
 
 class Op(NamedTuple):
     """One call of a block's method, from slots to slots; or the copy of one slot to another.
 
-    ``block`` is the block's number in the program, the order of execution; a copy has ``NO_BLOCK``.
+    ``block`` is the block's number in the program, the order of execution; a copy has ``NO_BLOCK``. A `RESET`
+    follows on the output of a condition: if the source is true, the targets, states of the blocks under the
+    condition, have their initial values again.
     """
 
     block: int
@@ -46,6 +47,7 @@ class TaskProgram(NamedTuple):
     ``outputs``: the blocks compute. ``finite``: the slots that must hold finite numbers then. ``writes``:
     blocks hand their inputs to the world outside. ``updates``: the blocks change their states. ``time`` is
     where the blocks read the time of the tick; one of the latches copies it, where it is the task's own.
+    ``resets`` set states back among the outputs.
     """
 
     name: str
@@ -61,6 +63,7 @@ class TaskProgram(NamedTuple):
     updates: tuple[Op, ...]
     finite: tuple[int, ...]
     time: Slot = TIME
+    resets: tuple[Op, ...] = ()
 
     @property
     def phases(self) -> dict[str, tuple[Op, ...]]:
@@ -130,6 +133,26 @@ class Program:
         """Return a task by its name."""
         return next(task for task in self.tasks if task.name == name)
 
+    @cached_property
+    def conditions(self) -> frozenset[int]:
+        """The blocks that say when others run."""
+        return frozenset(block.condition for block in self.blocks) - {NO_BLOCK}
+
+    def gate(self, block: int) -> Slot | None:
+        """Return the slot that is true when a block runs; None if it runs at all ticks of its task."""
+        condition = self.blocks[block].condition if block != NO_BLOCK else NO_BLOCK
+        if condition == NO_BLOCK or block in self.conditions:
+            return None
+        return self.blocks[condition].outputs[ACTIVE]
+
+    def members(self, condition: int) -> list[int]:
+        """Return the blocks under a condition, and those under conditions in it."""
+        found = {condition}
+        for number in range(condition + 1, len(self.blocks)):  # a condition is before its blocks
+            if self.blocks[number].condition in found:
+                found.add(number)
+        return sorted(found - {condition})
+
     def phase(self, name: str) -> tuple[tuple[TaskProgram, Op], ...]:
         """Return all calls of a phase in the order of one tick, each with its task.
 
@@ -141,8 +164,22 @@ class Program:
         found = [(task, op) for task in self.tasks for op in task.delays]
         for group in groups:
             found += [(task, op) for task in group for op in task.latches]
-            found += [*_in_order(group, "read"), *_in_order(group, "output")]
+            found += self._before(group)
         return tuple(found)
+
+    def _before(self, group: Sequence[TaskProgram]) -> Iterator[tuple[TaskProgram, Op]]:
+        """Yield the reads of some tasks, then the outputs.
+
+        Among these are resets, and the reads of blocks of which only then is known whether they run.
+        """
+        reads = _in_order(group, "read")
+        yield from (pair for pair in reads if self.gate(pair[1].block) is None)
+        late = [pair for pair in reads if self.gate(pair[1].block) is not None]
+        resets = [(task, op) for task in group for op in task.resets]
+        if not late and not resets:
+            yield from _in_order(group, "output")
+        else:
+            yield from sorted([*late, *_in_order(group, "output"), *resets], key=lambda pair: pair[1].block)
 
     def part(self, name: str) -> Program:
         """Return what the thread of one task runs.
@@ -160,7 +197,8 @@ class Program:
     def quiet(self, left_out: Set[int]) -> Program:
         """Return what runs without effects outside: without reads and writes, and without some blocks.
 
-        These are given by their numbers. Numbers that are not finite are not refused.
+        These are given by their numbers. Numbers that are not finite are not refused. All other blocks run,
+        whatever their conditions say.
         """
 
         def without(ops: Iterable[Op]) -> tuple[Op, ...]:
@@ -168,12 +206,14 @@ class Program:
 
         tasks = [
             task._replace(
-                reads=(), writes=(), finite=(), outputs=without(task.outputs), updates=without(task.updates)
+                reads=(), writes=(), finite=(), resets=(),
+                outputs=without(task.outputs), updates=without(task.updates),
             )
             for task in self.tasks
-        ]
+        ]  # fmt: skip
         derivatives, minor = without(self.derivatives), without(self.minor)
-        return replace(self, tasks=tuple(tasks), derivatives=derivatives, minor=minor)
+        blocks = tuple([replace(block, condition=NO_BLOCK) for block in self.blocks])
+        return replace(self, tasks=tuple(tasks), blocks=blocks, derivatives=derivatives, minor=minor)
 
     @cached_property
     def hash(self) -> str:
@@ -187,6 +227,7 @@ def make_program(graph: Graph, seed: int) -> Program:
     layout = Layout(graph)
     blocks = layout.blocks
     calls = _calls(graph, blocks, layout.times)
+    resets = dict(_resets(graph, layout))
     numbers: dict[str, list[int]] = {task.name: [] for task in graph.tasks}
     for number, block in enumerate(blocks):
         numbers[block.task].append(number)
@@ -203,14 +244,18 @@ def make_program(graph: Graph, seed: int) -> Program:
                 graph.ticks(task.period),
                 graph.ticks(task.offset),
                 task.continuous,
-                _copies(layout.delays.get(task.name, {})),
-                (*_copies({TIME: time} if time != TIME else {}), *_copies(layout.latches.get(task.name, {}))),
+                _copies(layout.delays.get(task.name, ())),
+                (
+                    *_copies([(TIME, time)] if time != TIME else ()),
+                    *_copies(layout.latches.get(task.name, ())),
+                ),
                 read,
                 output,
                 write,
                 update,
                 tuple(position for number in mine for position in _finite(blocks[number])),
                 time,
+                tuple(resets[number] for number in mine if number in resets),
             )
         )
     states = [(block.field(name), slope) for block in blocks for name, slope in block.slopes.items()]
@@ -238,8 +283,31 @@ def _in_order(tasks: Sequence[TaskProgram], phase: str) -> list[tuple[TaskProgra
     return sorted(((task, op) for task in tasks for op in task.phases[phase]), key=lambda pair: pair[1].block)
 
 
-def _copies(slots: Mapping[Slot, Slot]) -> tuple[Op, ...]:
-    return tuple(Op(NO_BLOCK, COPY, (source,), (target,)) for source, target in slots.items())
+def _copies(slots: Iterable[tuple[Slot, Slot]]) -> tuple[Op, ...]:
+    return tuple(Op(NO_BLOCK, COPY, (source,), (target,)) for source, target in slots)
+
+
+def _resets(graph: Graph, layout: Layout) -> Iterator[tuple[int, Op]]:
+    """Yield the resets under conditions, by the numbers of these.
+
+    What is reset are the states of the blocks of its rate, random streams excepted, and their delayed values.
+    """
+    numbers = {node.path: number for number, node in enumerate(graph.nodes)}
+    for path, nodes in graph.conditions.items():
+        placed = layout.blocks[numbers[path]]
+        targets = [slot for node in nodes for slot in _states(node, layout.blocks[numbers[node.path]])]
+        inside = [path, *(node.path for node in nodes)]
+        targets += [slot for each in inside for slot in layout.kept.get(each, ())]
+        if targets:
+            yield numbers[path], Op(numbers[path], RESET, (placed.outputs[RESTART],), tuple(targets))
+
+
+def _states(node: Node, block: Placed) -> Iterator[Slot]:
+    """Yield the slots of the states that a reset sets back."""
+    interface = node.block.interface
+    for name in interface.states:
+        if name not in interface.streams:
+            yield block.field(name)
 
 
 def _calls(graph: Graph, blocks: Sequence[Placed], times: Mapping[str, Slot]) -> dict[str, dict[int, Op]]:

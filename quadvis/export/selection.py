@@ -61,6 +61,9 @@ def selected_blocks(diagram: Diagram, name: str) -> ExportSelection:
         problem = f"the solver '{graph.solver}' cannot be exported"
         raise QuadvisError(sentence(problem, "choose one of fixed step, ode1 to ode4"))
     _refuse(chosen)
+    if conditional := [node for node in chosen if node.condition]:
+        problem = f"'{conditional[0].path}' runs under the condition '{conditional[0].condition}'"
+        raise QuadvisError(sentence(f"{problem}, and cannot be exported", "export a part that always runs"))
     inputs = _Inputs(diagram, name, chosen)
     nodes = [*inputs.nodes.values(), *(replace(node, inputs=inputs.wired(node)) for node in chosen)]
     step = graph.step if any(node.task.continuous for node in nodes) else None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -25,6 +25,7 @@ SOLVERS = ("ode1", "ode2", "ode3", "ode4")  # of fixed step
 VARIABLE = ("RK45", "Radau", "BDF", "LSODA")  # scipy's, which choose their steps
 SINGLE, MULTI = TASKINGS = ("single", "multi")
 DELAY = "delay"
+ACTIVE, RESTART = "active", "restart"  # outputs of a condition: whether its blocks run, and begin again
 
 Index = tuple[Any, ...]  # integers, then slices, as numpy takes them
 
@@ -90,8 +91,10 @@ class Constant(NamedTuple):
 class Node:
     """One block of a checked diagram. ``sizes`` fixes its symbolic shapes.
 
-    ``computer`` is the one that runs it, "" if the diagram has no computers. ``origin`` says of a block that
-    the checks have added what it is; ``hidden`` ones are no business of logs and pictures.
+    ``computer`` is the one that runs it, "" if the diagram has no computers. ``condition`` is the block with
+    the outputs `ACTIVE` and `RESTART` that says at which ticks it runs, "" if at all of its task, of which
+    that block is one, too; a block that is itself a condition runs at all of them. ``origin`` says of a
+    block that the checks have added what it is; ``hidden`` ones are no business of logs and pictures.
     """
 
     path: str
@@ -103,6 +106,7 @@ class Node:
     units: dict[str, tuple[Unit, ...]] = field(default_factory=dict)  # of the outputs, element by element
     stream: str = ""  # the name of its noise; its path if empty
     computer: str = ""
+    condition: str = ""
     origin: str = ""
     hidden: bool = False
 
@@ -147,6 +151,23 @@ class Graph:
 
     def __contains__(self, path: object) -> bool:
         return path in self._by_path
+
+    @cached_property
+    def conditions(self) -> Mapping[str, tuple[Node, ...]]:
+        """The blocks of each condition, those of conditions in it included, by the path of the condition.
+
+        A condition around which another one stands is itself one of the blocks of that one.
+        """
+        found: dict[str, list[Node]] = {node.condition: [] for node in self.nodes if node.condition}
+        for node in self.nodes:
+            for path in self.around(node.path):
+                found[path].append(node)
+        return {path: tuple(nodes) for path, nodes in found.items()}
+
+    def around(self, path: str) -> Iterator[str]:
+        """Yield the condition of a block, then those around this one."""
+        while path := self[path].condition:
+            yield path
 
     @cached_property
     def tasks(self) -> list[Task]:

@@ -6,12 +6,15 @@ from collections.abc import Iterator, Sequence
 
 from quadvis.graph.graph import Node
 
+CONDITION = "condition"
+
 
 def execution_order(nodes: Sequence[Node]) -> tuple[list[Node], list[list[tuple[str, str]]]]:
     """Return the nodes in an order that respects direct feedthrough, and the algebraic loops that forbid one.
 
-    A loop is a list of (block, input) pairs, each input driven by the next block in the list. Blocks keep the
-    diagram's order wherever the wires allow it.
+    A loop is a list of (block, input) pairs, each input driven by the next block in the list; `CONDITION` in
+    the place of an input stands for the condition under which the block runs. Blocks keep the diagram's order
+    wherever the wires allow it.
     """
     by_path = {node.path: node for node in nodes}
     done: set[str] = set()
@@ -50,3 +53,5 @@ def _needs(node: Node) -> Iterator[tuple[str, str]]:
     for port, wire in node.wires(node.block.interface.feedthrough):
         if not (wire.delayed or wire.earlier):
             yield port, wire.block
+    if node.condition:
+        yield CONDITION, node.condition

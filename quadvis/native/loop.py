@@ -26,7 +26,9 @@ CHECK = 1  # first slot, number of slots: these must be finite
 ROW = 2  # number of the tap, first slot, number of slots
 MOVE = 3  # first slot to read, first slot to write, number of slots; the two do not overlap
 INTEGRATE = 4
-PYTHON = 5  # what only Python can do; the operand itself is its number
+GATE = 5  # slot, number of instructions, number of slots, these slots: unless the first slot is true, the
+# instructions that follow are left out, and the other slots become zero
+PYTHON = 6  # what only Python can do; the operand itself is its number
 
 # Why the loop returned.
 DONE, FAILED, NOT_FINITE, FULL, ASKED, PAUSED = range(6)
@@ -92,8 +94,10 @@ def loop(
                         result = _row(tick, operands, operand, words, taps, ring)
                     elif kind == MOVE:
                         _move(words, operands[operand], operands[operand + 1], operands[operand + 2])
+                    elif kind == GATE:
+                        place += _left_out(operands, operand, words)
                     elif kind == INTEGRATE:
-                        result = _integrate(control, code, memory, places, stages, scratch)
+                        result = _integrate(control, code, operands, memory, words, places, stages, scratch)
                     else:
                         result = ASKED
                     if result != DONE:
@@ -136,6 +140,24 @@ def _call(code: Any, place: int, end: int) -> int:
     return place
 
 
+def _called(code: Any, place: int, end: int, operands: Any, words: Any) -> bool:
+    """Call functions one after the other, but none behind a gate that is shut; return whether none failed."""
+    place = _call(code, place, end)
+    while place < end and code[WIDTH * place] == GATE:
+        place += 1 + _left_out(operands, code[WIDTH * place + 1], words)
+        place = _call(code, place, end)
+    return place == end
+
+
+def _left_out(operands: Any, at: int, words: Any) -> int:
+    """Return how many instructions a gate leaves out."""
+    if words[operands[at]] != 0:
+        return 0
+    for index in range(at + 3, at + 3 + operands[at + 2]):
+        words[operands[index]] = 0
+    return int(operands[at + 1])
+
+
 def _copy(operands: Any, at: int, words: Any) -> None:
     """Copy slots, one after the other."""
     for index in range(at + 1, at + 1 + 2 * operands[at], 2):
@@ -169,7 +191,9 @@ def _row(tick: int, operands: Any, at: int, words: Any, taps: Any, ring: Any) ->
     return DONE
 
 
-def _integrate(control: Any, code: Any, memory: Any, places: Any, stages: Any, scratch: Any) -> int:
+def _integrate(
+    control: Any, code: Any, operands: Any, memory: Any, words: Any, places: Any, stages: Any, scratch: Any
+) -> int:
     """Carry the states over one step as `solver.Solver` does; if a call fails, leave memory as it was.
 
     Of the slopes of all stages the sum alone is kept, added up in the solver's order.
@@ -187,7 +211,7 @@ def _integrate(control: Any, code: Any, memory: Any, places: Any, stages: Any, s
         if stage > 0:
             memory[0] = time + stages[3 * stage]
             first = control[MINOR]
-        if _call(code, first, control[CALLS]) != control[CALLS]:
+        if not _called(code, first, control[CALLS], operands, words):
             result = FAILED
             break
         onward, weight = stages[3 * stage + 1], stages[3 * stage + 2]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from quadvis.engine.interpreter import Call, Interpreter
 from quadvis.engine.memory import SLOT, Slot
-from quadvis.engine.program import COPY, Op
+from quadvis.engine.program import COPY, RESET, Op, Program
 from quadvis.engine.solver import TABLEAUS
 from quadvis.engine.taps import Observer, Tap
 from quadvis.native import loop
@@ -82,6 +82,26 @@ class Redo:
     record: slice | None  # bytes of memory, of which the copy was made before
 
 
+@dataclass
+class _Gate:
+    """A gate, and how many instructions stand behind it; ``idle`` are zero while it is shut."""
+
+    slot: Slot
+    idle: Sequence[Slot] = ()
+    count: int = 0
+
+    @property
+    def operands(self) -> list[int]:
+        """Its numbers, as the loop takes them."""
+        zeros = [slot.position + index for slot in self.idle for index in range(slot.size)]
+        return [self.slot.position, self.count, len(zeros), *zeros]
+
+
+def _gate(program: Program, op: Op) -> Slot | None:
+    """Return what a call depends on: the condition of its block, or of a reset."""
+    return op.sources[0] if op.method == RESET else program.gate(op.block)
+
+
 class Tables:
     """The tables of a program; ``function`` gives the compiled method of a call, or None.
 
@@ -114,7 +134,10 @@ class Tables:
         self.redo: dict[int, Redo] = {}  # by instruction
         self.rings: list[Ring] = []
         self._fresh = True  # the next instruction begins a segment
-        self._first_minor = 0  # the instruction of the first call between two ticks
+        self._gate: Slot | None = None  # what the instructions that are being laid out depend on
+        self._gates: dict[int, _Gate] = {}  # by the instruction
+        self._open: _Gate | None = None  # the gate that the next instruction may stand behind
+        self._first_minor = self._first_derivative = 0  # instructions of the first calls between two ticks
         self._lay_out()
         self._finish()
 
@@ -136,8 +159,7 @@ class Tables:
 
     def _lay_out(self) -> None:
         program = self._interpreter.program
-        for task, op in program.phase("before"):
-            self._op((task.every, task.offset), op)
+        self._ops("before")
         handover = self._interpreter.handover
         if handover is not None and handover.machine is not None:
             self._machine(ALWAYS, handover.machine.address, handover.machine.places)
@@ -148,16 +170,22 @@ class Tables:
                 self._add((task.every, task.offset), loop.CHECK, first, count)
         self._fresh = True
         first = len(self._segments)
-        for task, op in program.phase("write"):
-            self._op((task.every, task.offset), op)
+        self._ops("write")
         self._fresh = True
         self._writes = first, len(self._segments)
         for observer in sorted(self._interpreter.observers, key=lambda each: not isinstance(each, Observer)):
             self._observer(observer)
-        for task, op in program.phase("update"):
-            self._op((task.every, task.offset), op)
+        self._ops("update")
         if program.states:
             self._solver()
+
+    def _ops(self, phase: str) -> None:
+        """Lay out the calls of a phase, each behind the gate of its block."""
+        program = self._interpreter.program
+        for task, op in program.phase(phase):
+            self._gate = _gate(program, op)
+            self._op((task.every, task.offset), op)
+        self._gate = None
 
     def _add(self, rhythm: Rhythm, kind: int, *operands: int) -> int:
         """Add an instruction with its numbers at a rhythm; return its place."""
@@ -168,10 +196,22 @@ class Tables:
         number = self._rhythms.setdefault(rhythm, len(self._rhythms))
         if self._fresh or self._segments[-1][0] != number:
             self._fresh = False
+            self._open = None
             self._segments.append([number, len(self._code), len(self._code)])
+        self._behind(self._gate)
         self._code.append((kind, operand))
         self._segments[-1][2] = len(self._code)
         return len(self._code) - 1
+
+    def _behind(self, gate: Slot | None, idle: Sequence[Slot] = ()) -> None:
+        """Let the next instruction stand behind a gate, the one before it if that is the same."""
+        if gate is None:
+            self._open = None
+        elif self._open is None or self._open.slot != gate or idle:
+            self._open = self._gates[len(self._code)] = _Gate(gate, idle)
+            self._code.append((loop.GATE, 0))
+        if self._open is not None:
+            self._open.count += 1
 
     def _copy(self, rhythm: Rhythm, source: int, target: int, size: int) -> None:
         """Add copies of slots: many at once, a few to those just before if there are any."""
@@ -180,6 +220,7 @@ class Tables:
             return
         before = len(self._code) - 1
         follows = not self._fresh and self._segments[-1][0] == self._rhythms.get(rhythm)
+        follows = follows and self._gate == (self._open.slot if self._open is not None else None)
         if not follows or before not in self._pairs:
             before = self._instruct(rhythm, loop.COPY, 0)
         self._pairs.setdefault(before, []).extend((source + index, target + index) for index in range(size))
@@ -189,7 +230,7 @@ class Tables:
             self._copy(rhythm, op.sources[0].position, op.targets[0].position, op.sources[0].size)
             return
         python = PythonCall(self._interpreter.call(op), op.block)
-        function = None if op.method == COPY else self._function(op)
+        function = None if op.method in (COPY, RESET) else self._function(op)
         if function is None:
             self._ask(rhythm, python)
             return
@@ -203,7 +244,8 @@ class Tables:
             record = slice(block.position * SLOT, (block.position + block.record.size) * SLOT)
             saved = (self._saved.ctypes.data - self._base) // SLOT
             self._copy(rhythm, block.position, saved, block.record.size)
-        number = self._instruct(rhythm, *self._call(function, op))
+        number = self._instruct(rhythm, loop.PYTHON, 0)
+        self._code[number] = self._call(function, op, number)
         if function.fallible:
             self.redo[number] = Redo(python, record)
 
@@ -220,8 +262,8 @@ class Tables:
         source, target = (field, op.targets[0]) if gives else (op.sources[0], field)
         return (source, target) if source[:2] == target[:2] else None
 
-    def _call(self, function: Function, op: Op) -> tuple[int, int]:
-        """Return the instruction of a call; `_finish` makes an address of its operand."""
+    def _call(self, function: Function, op: Op, number: int) -> tuple[int, int]:
+        """Return the instruction of a call, for its place; `_finish` makes an address of its operand."""
         block = self._interpreter.program.blocks[op.block]
         first = len(self._places)
         positions = [block.position, *(slot.position for slot in (*op.sources, *op.targets))]
@@ -232,7 +274,7 @@ class Tables:
             self._calls_timed.append((first, call))
             address, first = self._timed.address, len(self._places)
             self._places += places
-        self._calls.append((len(self._code), first))
+        self._calls.append((number, first))
         return address, first
 
     def _ask(self, rhythm: Rhythm, python: PythonCall) -> int:
@@ -271,10 +313,14 @@ class Tables:
             self._ask(ALWAYS, python)
             return
         self.redo[self._instruct(ALWAYS, loop.INTEGRATE, 0)] = Redo(python, None)
-        self._first_minor = len(self._code)
-        for function, op in zip(functions, ops, strict=True):
+        self._first_minor, self._open = len(self._code), None
+        for count, (function, op) in enumerate(zip(functions, ops, strict=True)):
             assert function is not None
-            self._code.append(self._call(function, op))
+            if count == len(program.minor):
+                self._first_derivative = len(self._code)
+            self._behind(program.gate(op.block), op.targets if op.method == "deriv" else ())
+            self._code.append(self._call(function, op, len(self._code)))
+        self._open = None
 
     def _finish(self) -> None:
         program, memory = self._interpreter.program, self._interpreter.memory
@@ -284,6 +330,9 @@ class Tables:
             call[PLACES] = self.places.ctypes.data + SLOT * first
         for number, first in self._calls:
             self.code[number, 1] = self.places.ctypes.data + SLOT * first
+        for number, gate in self._gates.items():
+            self.code[number, 1] = len(self._operands)
+            self._operands += gate.operands
         for number, pairs in self._pairs.items():
             self.code[number, 1] = len(self._operands)
             self._operands += (len(pairs), *chain.from_iterable(pairs))
@@ -313,8 +362,8 @@ class Tables:
         control[loop.STATES], control[loop.HELD] = len(program.states), len(held)
         control[loop.STAGES] = len(self.stages)
         control[loop.MINOR] = self._first_minor
-        control[loop.DERIVATIVES] = self._first_minor + len(program.minor)
-        control[loop.CALLS] = control[loop.DERIVATIVES] + len(program.derivatives)
+        control[loop.DERIVATIVES] = self._first_derivative
+        control[loop.CALLS] = len(self._code)
         # One element of a view costs a third of an array's.
         self.control: memoryview = memoryview(cast(Any, control))
         arrays: Sequence[NDArray[Any]] = (

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from quadvis.engine.layout import TIME
+from quadvis.engine.layout import NO_BLOCK, TIME
 from quadvis.engine.memory import Slot
-from quadvis.engine.program import NO_BLOCK, Op, Program
+from quadvis.engine.program import Op, Program
 from quadvis.machine.columns import table
 from quadvis.units import Unit, format_quantity
 
@@ -32,7 +32,8 @@ def program_lines(program: Program) -> list[str]:
         often = "every tick" if task.every == 1 else f"every {task.every} ticks"
         offset = f" from tick {task.offset} on" if task.offset else ""
         rows.append((f"task {task.name}", f"{often}{offset}, {_time(float(task.period))}", "", "", ""))
-        for phase, ops in (("delay", task.delays), ("latch", task.latches), *task.phases.items()):
+        before = ("delay", task.delays), ("latch", task.latches), ("reset", task.resets)
+        for phase, ops in (*before, *task.phases.items()):
             rows += _phase(phase, ops, names)
     for title, ops in (("derivatives", program.derivatives), ("minor steps", program.minor)):
         if ops:
@@ -68,6 +69,8 @@ def _phase(phase: str, ops: Iterable[Op], names: _Names) -> Iterator[Row]:
         reads = ", ".join(names.of(slot) for slot in op.sources)
         writes = ", ".join(names.of(slot).replace(f"{path}.", "", 1) for slot in op.targets)
         number = "" if op.block == NO_BLOCK else str(op.block)
+        gate = names.program.gate(op.block)
+        reads += f"{', ' if reads else ''}while {names.of(gate)}" if gate is not None else ""
         yield f"  {phase or op.method}", number, path or op.method, reads, f"-> {writes}" if writes else ""
 
 
@@ -81,6 +84,8 @@ class _Names:
         for block in program.blocks:
             for port, slot in block.outputs.items():
                 self._name(f"{block.path}.{port}", slot)
+            for field in block.record.fields if block.condition != NO_BLOCK else ():
+                self._name(f"{block.path}.{field.name}", block.field(field.name))
             for state, slot in block.slopes.items():
                 self._name(f"d/dt {block.path}.{state}", slot)
         for task in program.tasks:

@@ -24,15 +24,15 @@ Whole = NDArray[np.int64]
 def with_playback(graph: Graph, rows: Mapping[str, Slots]) -> Graph:
     """Return a graph in which the blocks that reach outside do nothing but give rows, by their path.
 
-    Each gives its rows (N, slots) in their order, one at each of its ticks. QuadvisError if one of them has
-    outputs between its ticks as well.
+    Each gives its rows (N, slots) in their order, one at each of its ticks, whatever its condition says,
+    since a log has a row of each tick. QuadvisError if one of them has outputs between its ticks as well.
     """
     replaced = {}
     for node in outside(graph):
         if node.task.continuous and (node.block.numeric or node.block.interface.continuous):
             problem = f"block {quoted(node.path)} reaches outside and moves between two ticks"
             raise QuadvisError(f"{problem}, which no log holds; give it a rate, or say numeric=False")
-        replaced[node.path] = replace(node, block=_played(node, rows.get(node.path)), inputs={})
+        replaced[node.path] = replace(node, block=_played(node, rows.get(node.path)), inputs={}, condition="")
     return replace(graph, nodes=[replaced.get(node.path, node) for node in graph.nodes])
 
 

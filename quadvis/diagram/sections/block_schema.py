@@ -9,10 +9,16 @@ from quadvis.block import Block, Declared, In, Param
 from quadvis.diagram.group import GROUP_KEY
 from quadvis.diagram.sections.forms import CONSTANT, NAME, SIGNAL, TEXT, VALUES, Schema, closed, map_of, ref
 from quadvis.graph.graph import CONTINUOUS, CROSSINGS
+from quadvis.graph.names import PATTERN
 from quadvis.library.describe import default_text, first_line
 
-BLOCK_KEYS = ("block", "part", "rate", "at", "slot", "stream", GROUP_KEY, "with", "in")
+CONDITION_KEYS = ("when", "triggered", "reset", "initial")  # of a part
+BLOCK_KEYS = (
+    "block", "part", "rate", "at", "slot", "stream", GROUP_KEY, "with", "in", *CONDITION_KEYS, "condition",
+)  # fmt: skip
 WIRE_KEYS = ("from", "across", "over", "initial")
+WHEN_KEYS = ("states", "outputs")  # beside those of a wire
+EDGES = ("rising", "falling", "either")
 GROUP_NAME: Schema = {"type": "string", "pattern": r"^\$[A-Za-z_][A-Za-z0-9_]*$"}
 MAPS: Schema = {"type": "object", "additionalProperties": {"type": "object"}}  # states and their values
 LIBRARY_BLOCK: Schema = {
@@ -31,7 +37,20 @@ def block_definitions(blocks: Mapping[str, type[Block]]) -> dict[str, Schema]:
         "over": {**TEXT, "description": "the link that carries it to another computer"},
         "initial": {**ref("value"), "description": "its value there before the first message"},
     }
+    held = {"enum": ["held", "reset"]}
+    when = wire | {
+        "states": {**held, "description": "what enabling does to the states"},
+        "outputs": {**held, "description": "what the outputs are while it is disabled"},
+    }
+    edge = wire | {"edge": {"enum": [*EDGES]}}
     return {
+        "when": {"anyOf": [SIGNAL, CONSTANT, *VALUES[1:], closed((*WIRE_KEYS, *WHEN_KEYS), when, ["from"])]},
+        "edge": {
+            "anyOf": [
+                {**TEXT, "pattern": rf"^(({'|'.join(EDGES)}) +)?{PATTERN}$"},
+                closed((*WIRE_KEYS, "edge"), edge, ["from"]),
+            ]
+        },
         "input": {"anyOf": [SIGNAL, CONSTANT, *VALUES[1:], closed(WIRE_KEYS, wire, ["from"])]},
         "block": _any_block(blocks),
         **{f"block:{name}": _one_block(block) for name, block in blocks.items()},
@@ -59,6 +78,14 @@ def _any_block(blocks: Mapping[str, type[Block]]) -> Schema:
         },
         "with": map_of({"anyOf": [ref("value"), MAPS]}, "parameters"),
         "in": map_of(ref("input"), "inputs: block.port, a constant, or {from: block.port, across: hold}"),
+        "when": {**ref("when"), "description": "of a part: it is enabled while this signal is true"},
+        "triggered": {**ref("edge"), "description": "of a part: it runs at the edges of this signal"},
+        "reset": {
+            **ref("edge"),
+            "description": "of a part: its edges set the states back",
+        },
+        "initial": map_of(ref("value"), "outputs of a part that has not run yet"),
+        "condition": {**TEXT, "description": "the block that says when this one runs, a logic.run_condition"},
     }
     cases = [
         {

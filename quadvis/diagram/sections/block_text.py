@@ -31,6 +31,8 @@ def resolved_block(node: Node, folder: Path, nodes: Mapping[str, Node]) -> dict[
         found["at"] = node.computer
     if node.stream not in ("", node.path):
         found["stream"] = node.stream
+    if node.condition:
+        found["condition"] = node.condition
     values = {
         name: _parameter(node, param, folder)
         for name, param in node.block.interface.params.items()

@@ -2,54 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 from quadvis.block import Block
-from quadvis.diagram.computed import is_computed
 from quadvis.diagram.entries import PATH, refuse_name, with_clean_names
 from quadvis.diagram.group import GROUP_KEY
-from quadvis.diagram.parameters import QUANTITY_KEYS
-from quadvis.diagram.reference import Reference, read_reference
-from quadvis.diagram.sections.block_schema import BLOCK_KEYS, WIRE_KEYS, block_definitions
+from quadvis.diagram.sections.block_schema import BLOCK_KEYS, block_definitions
 from quadvis.diagram.sections.block_text import resolved_block
+from quadvis.diagram.sections.conditional import CONDITION_KEYS, PartCondition, read_condition
 from quadvis.diagram.sections.forms import Schema, map_of, ref
+from quadvis.diagram.sections.inputs import InputSpec, read_input
 from quadvis.diagram.sections.section import DIAGRAM, PART, Checked, FileSection
-from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar
+from quadvis.document import YamlList, YamlMap, YamlNode
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown, closest, known
-from quadvis.graph.graph import CROSSINGS
-from quadvis.units import plain_text
 
 INSIDE = "in"  # the name of a part's inputs for its blocks
-
-
-class InputSpec(NamedTuple):
-    """The source of an input: a signal or a constant, and how it crosses between rates and computers.
-
-    For an input of any number, a list of signals is a tuple of their sources.
-    """
-
-    place: Place
-    source: Reference | YamlNode | Unknown | tuple[InputSpec, ...]
-    across: str | Unknown | None = None
-    across_place: Place | None = None
-    over: YamlNode | None = None
-    initial: YamlNode | None = None
-
-    @property
-    def entries(self) -> tuple[InputSpec, ...]:
-        """What an input of any number takes: each entry of a list, or the one source that is written."""
-        if isinstance(self.source, YamlList):
-            return tuple(InputSpec(node.place, node) for node in self.source.items())
-        return self.source if isinstance(self.source, tuple) else (self,)
-
-    @property
-    def constants(self) -> tuple[YamlNode, ...]:
-        """The values in it, which may name parameters."""
-        if isinstance(self.source, tuple):
-            return tuple(value for entry in self.source for value in entry.constants)
-        own = (self.source,) if isinstance(self.source, YamlNode) else ()
-        return own if self.initial is None else (*own, self.initial)
 
 
 class BlockSpec(NamedTuple):
@@ -69,6 +37,16 @@ class BlockSpec(NamedTuple):
     inputs: dict[str, InputSpec] | Unknown | None = None  # None: no 'in' was written
     stream: tuple[str, Place] | None = None  # the name of its noise, or of that of its inner blocks
     inherits: bool = False  # whether the inputs are those of the block that it replaces
+    runs: PartCondition | Unknown | None = None  # when a part runs, if not always
+    condition: tuple[str, Place] | Unknown | None = None  # the block that says when this one runs
+
+    @property
+    def constants(self) -> Iterator[YamlNode]:
+        """The values at its inputs and in its conditions, which may name parameters."""
+        for given in (*self.inputs.values(),) if self.inputs is not None and known(self.inputs) else ():
+            yield from given.constants
+        for signal in self.runs.signals if self.runs is not None and known(self.runs) else ():
+            yield from signal.constants
 
 
 Blocks = dict[str, BlockSpec | Unknown]
@@ -101,8 +79,10 @@ def read_block(name: str, place: Place, node: YamlNode, faults: Faults) -> Block
         parameters=UNKNOWN if given is UNKNOWN or "with" in doubled else given.values if given else {},
         parameter_places=_places(given) if given is not None and known(given) else {},
         inputs=UNKNOWN if "in" in doubled else inputs,
-        stream=faults.collect(_read_stream, fields["stream"]) if "stream" in fields else None,
+        stream=faults.collect(_read_path, fields["stream"]) if "stream" in fields else None,
         groups=_read_groups(fields[GROUP_KEY]) if GROUP_KEY in fields else (),
+        runs=read_condition(fields, faults) if any(key in fields for key in CONDITION_KEYS) else None,
+        condition=faults.collect(_read_path, fields["condition"]) if "condition" in fields else None,
     )
 
 
@@ -110,7 +90,7 @@ def _read_name(node: YamlNode) -> tuple[str, Place]:
     return node.text(), node.place
 
 
-def _read_stream(node: YamlNode) -> tuple[str, Place]:
+def _read_path(node: YamlNode) -> tuple[str, Place]:
     if PATH.fullmatch(node.text()) is None:
         raise node.wrong("a name, or names joined by '/'")
     return node.text(), node.place
@@ -134,48 +114,7 @@ def _read_inputs(node: YamlNode, faults: Faults) -> dict[str, InputSpec] | Unkno
     wired = faults.collect(with_clean_names, node, faults)
     if wired is None:
         return UNKNOWN
-    return {port: _read_input(value, faults) for port, value in wired.values.items()}
-
-
-def _read_input(node: YamlNode, faults: Faults) -> InputSpec:
-    """Read ``block.port``, ``{from: block.port, across: hold}``, ``1 m`` or ``{value: ..., unit: ...}``.
-
-    A list with a signal in it is one for an input of any number; a list of constants may be an array.
-    """
-    if isinstance(node, YamlList) and any(_names_signal(item) for item in node):
-        return InputSpec(node.place, tuple(_read_input(item, faults) for item in node))
-    is_value = isinstance(node, YamlMap) and any(key in node for key in QUANTITY_KEYS)
-    if isinstance(node, YamlMap) and is_value and "from" in node:
-        faults.add(node.place, "a signal and a value are given at once", "keep 'from' or 'value'")
-        return InputSpec(node.place, UNKNOWN)
-    if isinstance(node, YamlMap) and not is_value:
-        node = node.fields(WIRE_KEYS[:1], WIRE_KEYS[1:], faults)
-        source = read_reference(node["from"], faults) if "from" in node else UNKNOWN
-        across = node.get("across")
-        if across is not None:
-            crossing: str | Unknown | None = faults.read(across.choice, CROSSINGS)
-        else:
-            crossing = UNKNOWN if not {*node} <= {*WIRE_KEYS} else None  # under a key that is wrong
-        place = across.place if across is not None else None
-        return InputSpec(node.place, source, crossing, place, node.get("over"), node.get("initial"))
-    if isinstance(node, YamlScalar) and is_reference(node.value):
-        return InputSpec(node.place, read_reference(node, faults))
-    return InputSpec(node.place, node)
-
-
-def _names_signal(node: YamlNode) -> bool:
-    """Say whether an entry of a list is meant as a signal."""
-    if isinstance(node, YamlMap):
-        return not any(key in node for key in QUANTITY_KEYS)
-    return isinstance(node, YamlScalar) and is_reference(node.value)
-
-
-def is_reference(text: str) -> bool:
-    """Say whether an input's text is meant as a signal: no number, truth value, ``$name`` or arithmetic."""
-    is_name = (text[:1].isalpha() or text[:1] == "_") and text not in ("true", "false")
-    if not is_name or not ("$" in text or "(" in text or text.startswith("pi")):
-        return is_name
-    return not is_computed(text) and plain_text(text) == text
+    return {port: read_input(value, faults) for port, value in wired.values.items()}
 
 
 class BlocksSection(FileSection[Blocks]):
@@ -184,7 +123,8 @@ class BlocksSection(FileSection[Blocks]):
     key = "blocks"
     words = (
         "`name: {block: group.name, rate: ..., with: {parameters}, in: {inputs}}`, "
-        "or `part: file.yaml` in place of `block`"
+        "or `part: file.yaml` in place of `block`; a part may have `when`, `triggered`, `reset`, `initial`, "
+        "see below"
     )
     required = True
     kinds = (DIAGRAM, PART)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from quadvis.diagram.entries import named_entries
 from quadvis.diagram.parameters import QUANTITY_KEYS, read_constant
 from quadvis.diagram.reference import Reference, read_reference
-from quadvis.diagram.sections.blocks import InputSpec, is_reference
 from quadvis.diagram.sections.forms import CONSTANT, TEXT, VALUES, Schema, closed, list_of, map_of, ref
+from quadvis.diagram.sections.inputs import InputSpec, is_reference
 from quadvis.diagram.sections.section import PART, FileSection
 from quadvis.document import YamlMap, YamlNode, YamlScalar
 from quadvis.errors import Faults, Place, Unknown
