@@ -8,8 +8,8 @@ Source: lifting of multirate loops, Kranc (1957); Meyer and Burrus (1975).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -42,7 +42,8 @@ class Linear:
     """x+ = a x + b d, y = c x + d d over a hyperperiod ``period`` (s); x' = a x + b d if the period is 0.
 
     Its element of d disturbs each channel on the way to the channel's readers; y is the signal that comes
-    back.
+    back. ``parts`` says which of the parts under a condition run at the operating point; the others stand
+    still.
     """
 
     a: Matrix
@@ -52,6 +53,7 @@ class Linear:
     period: float
     states: tuple[str, ...]
     channels: tuple[Channel, ...]
+    parts: Mapping[str, bool] = field(default_factory=dict)
 
 
 def linearised(graph: Graph, cuts: Sequence[Cut], at: float, engine: str = AUTO) -> Linear:
@@ -80,7 +82,7 @@ def _linearised(graph: Graph, cuts: Sequence[Cut], at: float, wanted: str) -> Li
     with engine:
         announce("running to the operating point")
         probe = Probe(engine, cuts, at)
-        linear = _linearise(probe)
+        linear = replace(_linearise(probe), parts=probe.parts)
     if not looped and not linear.states:
         raise AnalysisError("there is nothing to analyse: the diagram has no loop and no state")
     return linear

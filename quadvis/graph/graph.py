@@ -25,6 +25,7 @@ SOLVERS = ("ode1", "ode2", "ode3", "ode4")
 SINGLE, MULTI = TASKINGS = ("single", "multi")
 DELAY = "delay"
 ACTIVE, RESTART = "active", "restart"  # outputs of a condition: whether its blocks run, and begin again
+FIXED = "fixed"  # its state: whether these outputs stay as they are
 
 Index = tuple[Any, ...]  # integers, then slices, as numpy takes them
 

@@ -56,7 +56,7 @@ _OPTIONS = {
 class DrawnBlock:
     """A box: `path` is its name with the parts around it ("vision/detector"), `kind` its type in YAML.
 
-    `lines` stand at its foot.
+    `lines` stand at its foot. A condition says of the part around it when that runs.
     """
 
     path: str
@@ -65,6 +65,7 @@ class DrawnBlock:
     outputs: tuple[str, ...]
     task: str
     lines: tuple[str, ...] = ()
+    is_condition: bool = False
 
 
 @dataclass(frozen=True)
