@@ -128,6 +128,7 @@ class Analysis:
             "hash": self.diagram.hash,
             "hyperperiod_s": self.period,
             "states": list(self.linear.states),
+            "parts": {part: "runs" if runs else "stands still" for part, runs in self.linear.parts.items()},
             "stable": self.stable,
             "passed": self.passed,
             "poles": [[float(pole.real), float(pole.imag)] for pole in self.poles],

@@ -8,8 +8,8 @@ Source: lifting of multirate loops, Kranc (1957); Meyer and Burrus (1975).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -42,7 +42,8 @@ class Linear:
     """x+ = a x + b d, y = c x + d d over a hyperperiod ``period`` (s); x' = a x + b d if the period is 0.
 
     Its element of d disturbs each channel on the way to the channel's readers; y is the signal that comes
-    back.
+    back. ``parts`` says which of the parts under a condition run at the operating point; the others stand
+    still.
     """
 
     a: Matrix
@@ -52,6 +53,7 @@ class Linear:
     period: float
     states: tuple[str, ...]
     channels: tuple[Channel, ...]
+    parts: Mapping[str, bool] = field(default_factory=dict)
 
 
 def linearised(graph: Graph, cuts: Sequence[Cut], at: float, engine: str = AUTO) -> Linear:
@@ -90,7 +92,8 @@ def _linearised(graph: Graph, blocks: set[str], cuts: Sequence[Cut], at: float, 
     use(engine, choose(engine, ticks, wanted, announce))
     with engine:
         announce("running to the operating point")
-        return _linearise(Probe(engine, cuts, at, blocks))
+        probe = Probe(engine, cuts, at, blocks)
+        return replace(_linearise(probe), parts=probe.parts)
 
 
 def _check_cuts(graph: Graph, looped: set[str], cuts: Sequence[Cut]) -> None:

@@ -17,7 +17,7 @@ from quadvis.engine.engine import Engine
 from quadvis.engine.layout import TIME, Placed
 from quadvis.engine.memory import Slot
 from quadvis.engine.taps import Observer
-from quadvis.graph.graph import Wire
+from quadvis.graph.graph import ACTIVE, FIXED, Graph, Wire
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -48,6 +48,30 @@ def silence(engine: Engine) -> None:
             engine.write(node.path, name, 0)
 
 
+def fix_conditions(engine: Engine) -> dict[str, bool]:
+    """Let each part under a condition run, or stand still, as it does now; return which of them run.
+
+    A part has the path of its condition without the last name.
+    """
+    found: dict[str, bool] = {}
+    for path in engine.graph.conditions:
+        if FIXED in engine.graph[path].block.interface.states:
+            engine.write(path, FIXED, True)
+        part = path.rpartition("/")[0] or path
+        found[part] = found.get(part, False) or engine.read(path, ACTIVE)
+    return found
+
+
+def standing_still(graph: Graph, engine: Engine) -> set[str]:
+    """Return the blocks that do not run, since their conditions are false."""
+    return {
+        node.path
+        for path, nodes in graph.conditions.items()
+        if not engine.read(path, ACTIVE)
+        for node in nodes
+    }
+
+
 class Probe:
     """Computes the effect of a hyperperiod on the memory; the run stands at its beginning, without noise.
 
@@ -63,6 +87,10 @@ class Probe:
         self.loop = blocks or {node.path for node in self.graph.nodes}
         self.tasks = {node.task for node in self.graph.nodes if node.path in self.loop}
         self.span = hyperperiod(self.graph, self.tasks)
+        begin = max([Fraction(at), *(task.offset for task in self.tasks)])
+        engine.run(self.span * -(-begin // (self.span * self.graph.tick)))
+        self.parts = fix_conditions(engine)
+        self._still = standing_still(self.graph, engine)
         self.names = dict(self._named())
         self.positions: Positions = np.array(sorted(self.names), np.intp)
         self.continuous = self._continuous()
@@ -74,8 +102,6 @@ class Probe:
         self._added = np.array([channel.added for channel in self.channels], np.intp)
         self._ticks = np.array([channel.tick for channel in self.channels], np.intp)
         self._moments = self._events()
-        begin = max([Fraction(at), *(task.offset for task in self.tasks)])
-        engine.run(self.span * -(-begin // (self.span * self.graph.tick)))
         self.keep()
 
     @property
@@ -172,11 +198,12 @@ class Probe:
     def _named(self) -> Iterator[tuple[int, str]]:
         """Yield the slots of real numbers of the blocks of the loop, with their names.
 
-        Instants and ages follow the clock, so they do not belong to the state.
+        Instants and ages follow the clock, so they do not belong to the state. Blocks that do not run have
+        none.
         """
         instants = instants_of(self.graph)
         for node, block in zip(self.graph.nodes, self.program.blocks, strict=True):
-            if node.path not in self.loop:
+            if node.path not in self.loop or node.path in self._still:
                 continue
             interface, path = node.block.interface, node.path
             for port, slot in block.outputs.items():
@@ -203,7 +230,7 @@ class Probe:
             [
                 position
                 for block in self.program.blocks
-                if block.path in self.loop
+                if block.path in self.loop and block.path not in self._still
                 for state in block.slopes
                 for position, _ in _elements(block.field(state), "")
             ],

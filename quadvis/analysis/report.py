@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -31,6 +31,7 @@ def analysis_lines(analysis: Analysis) -> Iterator[str]:
     count = len(analysis.linear.states)
     way = f"lifted over {format_quantity(analysis.period, SECOND)}" if analysis.period else "continuous"
     yield f"{diagram.name}{variant}: {count} states, {way}"
+    yield from part_lines(analysis.linear.parts)
     rows, more = _poles(analysis)
     yield from _indented([("closed loop poles", "frequency", "damping"), *rows])
     if more:
@@ -55,6 +56,13 @@ def analysis_lines(analysis: Analysis) -> Iterator[str]:
         yield f"FAILED: {missed} of {counted(count, 'margin')} not met"
     elif count:
         yield f"PASSED: {count} of {counted(count, 'margin')} met"
+
+
+def part_lines(parts: Mapping[str, bool]) -> Iterator[str]:
+    """Yield what is assumed of parts that do not always run."""
+    for runs, words in ((True, "runs"), (False, "stands still, its states are frozen")):
+        for name in (name for name, found in parts.items() if found == runs):
+            yield f"part '{name}' {words}, as at the operating point"
 
 
 def _indented(rows: list[tuple[str, ...]]) -> Iterator[str]:

@@ -96,8 +96,13 @@ class WireCheck:
         if self.tasking == MULTI:
             with_transitions(self.nodes.values())
         order, loops = execution_order(receivers_first(self.nodes.values()))
+        conditions = {node.condition for node in self.nodes.values()}
+        reported: set[str] = set()  # conditions, which lead to loops through many blocks of a part
         for loop in loops:
-            self._report_loop(loop)
+            mine = {path for path, _ in loop if path in conditions}
+            if not mine & reported:
+                self._report_loop(loop)
+            reported |= mine
         return order
 
     def _is_whole(self, link: DraftWire) -> bool:
@@ -172,9 +177,14 @@ class WireCheck:
                 self._fault(draft, across or connection.place, f"{ends}: {problem}", remedy)
 
     def _report_loop(self, loop: list[Key]) -> None:
-        """Say the loop in the direction of the signal."""
-        path, port = next(each for each in loop if each[1] != CONDITION)
-        steps = [f"{name}.{entered}" for name, entered in (loop[0], *reversed(loop))]
+        """Say the loop in the direction of the signal; what decides over itself begins at its condition."""
+        runs = next((number for number, (_, port) in enumerate(loop, 1) if port == CONDITION), 0) % len(loop)
+        loop = loop[runs:] + loop[:runs]
+        path, port = loop[0]
+        steps = [
+            name if entered == CONDITION else f"{name}.{entered}"
+            for name, entered in (loop[0], *reversed(loop))
+        ]
         remedy = "break it with 'across: delay' on one of these wires, or with a block that holds a state"
         place = self.drafts[path].connections[port].place
         self._fault(self.drafts[path], place, "algebraic loop: " + " -> ".join(steps), remedy)

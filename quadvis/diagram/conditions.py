@@ -1,7 +1,7 @@
 """Parts that do not always run: the blocks that say when they do, and those that show their outputs.
 
-A part with `when`, `triggered` or `reset` has a block `logic.run_condition` for each of its rates, and a block
-`logic.part_output` for each of its outputs, if it pauses. All checks see blocks and wires, and so does the
+A part with `when`, `triggered` or `reset` has a block `logic.run_condition` for each of its rates and, if it
+pauses, a block `logic.part_output` for each of its outputs. All checks see blocks and wires, and so does the
 resolved diagram.
 """
 
@@ -67,7 +67,7 @@ class Conditions:
     def _add_conditions(self, scope: Scope, runs: Mapping[Run, FlatBlock]) -> None:
         condition, instance = scope.runs, scope.instance
         assert condition is not None and instance is not None and scope.parent is not None
-        self._check(scope, condition, runs)
+        runs = self._fitting(scope, condition, runs)
         kind = self.expansion.catalogue.find(CONDITION)
         values = {
             "states": condition.states,
@@ -112,7 +112,7 @@ class Conditions:
                 self.faults.add(reference.place, problem, remedy)
                 continue
             run = _run(flat)
-            if not known(flat.kind) or run is None:
+            if not known(flat.kind) or run is None or run not in self._paths[scope.prefix]:
                 continue
             assert isinstance(source, Wire)
             kind = flat.kind.interface.outputs[source.port].signal.scalar
@@ -174,24 +174,29 @@ class Conditions:
             path += "_"
         return path
 
-    def _check(self, scope: Scope, condition: PartCondition, runs: Mapping[Run, FlatBlock]) -> None:
-        """Report blocks that cannot run under such a condition."""
-        if condition.triggered is not None:
-            place = condition.places["triggered"]
-            for (rate, _), flat in runs.items():
-                if rate == CONTINUOUS:
-                    problem = f"a triggered part runs at instants, and its block '{flat.path}' is continuous"
-                    remedy = "sample it (signal.discrete_integrator, method: zoh), or use 'when'"
-                    self.faults.add(place, problem, remedy)
-                    return
-            if len(runs) > 1:
-                rates = " and ".join(dict.fromkeys(f"'{rate}'" for rate, _ in runs))
-                problem = f"a triggered part has one rate, and this one has {rates}"
-                self.faults.add(place, problem, "give all of its blocks the rate of the trigger")
+    def _fitting(
+        self, scope: Scope, condition: PartCondition, runs: Mapping[Run, FlatBlock]
+    ) -> Mapping[Run, FlatBlock]:
+        """Return the rates at which a part can run under a condition; report blocks that cannot."""
         for flat in self._blocks.values() if condition.sets_back else ():
             if flat.path.startswith(scope.prefix) and known(flat.kind) and flat.kind.keep is not Block.keep:
                 problem = f"the states of '{flat.path}' lie outside of memory, and cannot be set back"
                 self.faults.add(condition.place, problem, "say 'states: held', and leave 'reset' out")
+        if condition.triggered is None:
+            return runs
+        place = condition.places["triggered"]
+        for (rate, _), flat in runs.items():
+            if rate == CONTINUOUS:
+                problem = f"a triggered part runs at instants, and its block '{flat.path}' is continuous"
+                remedy = "use a sampled one, such as signal.discrete_integrator, or write 'when'"
+                self.faults.add(place, problem, remedy)
+                return {}
+        if len(runs) > 1:
+            rates = " and ".join(dict.fromkeys(f"'{rate}'" for rate, _ in runs))
+            problem = f"a triggered part has one rate, and this one has {rates}"
+            self.faults.add(place, problem, "give all of its blocks the rate of the trigger")
+            return {}
+        return runs
 
     def _name_written(self) -> None:
         """Find the conditions that entries name by themselves, as those of a resolved diagram do."""
@@ -256,4 +261,9 @@ def with_conditions(expansion: Expansion, wiring: Wiring, faults: Faults) -> Non
             problem = f"'{word}' is for a part, and '{flat.spec.kind}' is a block"
             with faults.about(f"block '{flat.path}'"):
                 faults.add(runs.place, problem, "put the block into a part")
+    for scope in _scopes(expansion.root):
+        named = scope.instance.condition if scope.instance is not None else None
+        if named is not None and known(named):
+            with faults.about(scope.subject):
+                faults.add(named[1], "'condition' is for a block, and this is a part", "write 'when'")
     Conditions(expansion, wiring, faults).add()

@@ -6,8 +6,10 @@ from collections.abc import Iterable
 from typing import Any
 
 from quadvis.diagram.loader import read_part
+from quadvis.diagram.reference import Reference
 from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec
 from quadvis.diagram.sections.header import DOC
+from quadvis.diagram.sections.inputs import InputSpec
 from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.ports import PORTS
 from quadvis.diagram.spec import FileSpec
@@ -44,7 +46,7 @@ def part_description(name: str, width: int | None = None) -> str:
         ("inputs", _inputs(part)),
         ("outputs", [(port, f"from {_source(source)}") for port, source in part[PORTS].outputs.items()]),
         ("parameters", [(param, f"= {_text(value)}") for param, value in part[PARAMS].items()]),
-        ("blocks", [(block.name, block.kind) for block in _blocks(part)]),
+        ("blocks", [(block.name, f"{block.kind}{_runs(block)}") for block in _blocks(part)]),
     ):
         if rows:
             lines += [title, *(f"  {line}" for line in table(rows, width and width - 2)), ""]
@@ -81,6 +83,21 @@ def _inputs(part: FileSpec) -> list[tuple[str, str]]:
         (port, f"optional, {_text(ports.defaults[port].source)}" if port in ports.defaults else "")
         for port in ports.inputs
     ]
+
+
+def _runs(block: BlockSpec) -> str:
+    """Return when a part in the part runs, if not always."""
+    runs = block.runs
+    if runs is None or not known(runs):
+        return ""
+    found = [f"when {_signal(runs.when)}"] if runs.when is not None else []
+    edges = ("triggered", runs.triggered), ("reset", runs.reset)
+    found += [f"{word} {each.edge} {_signal(each.signal)}" for word, each in edges if each is not None]
+    return "".join(f", {words}" for words in found)
+
+
+def _signal(given: InputSpec) -> str:
+    return _source(given.source) if isinstance(given.source, Reference) else _text(given.source)
 
 
 def _source(reference: Any) -> str:

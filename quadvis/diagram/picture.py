@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+
+from quadvis.diagram.conditions import CONDITION, OUTPUT
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.sections.block_text import constant_text
 from quadvis.diagram.shown import main_parameters
 from quadvis.diagram.times import rate_text
 from quadvis.graph.graph import Constant, Node, Wire
-from quadvis.graph.names import wire_text
+from quadvis.graph.names import index_text, wire_text
 from quadvis.links.link import Link
 from quadvis.links.twin import ReceiverTwin
 from quadvis.output.draw import draw
@@ -24,8 +27,11 @@ def draw_diagram(diagram: Diagram, *, part: str = "", depth: int | None = None) 
     QuadvisError if there is no such part.
     """
     blocks, wires, constants = [], [], {}
+    passed = _passed(diagram)
     for path in diagram.listing:
         node = diagram.graph[path]
+        if path in passed:
+            continue
         twin = node.block
         if isinstance(twin, ReceiverTwin):
             # Its sender is left out: a link takes the signals and gives them on the other side.
@@ -36,27 +42,30 @@ def draw_diagram(diagram: Diagram, *, part: str = "", depth: int | None = None) 
             continue
         interface = node.block.interface
         shown = [port for port in interface.inputs if _is_drawn(node, port)]
-        blocks.append(_box(node, tuple(shown)))
+        blocks.append(_box(node, tuple(shown), passed))
         for port in shown:
             source = node.inputs[port]
             if isinstance(source, Wire):
-                wires.append(DrawnWire(wire_text(source), node.path, port, source.crossing))
+                wires.append(DrawnWire(_text(source, passed), node.path, port, source.crossing))
             else:
                 constants[node.path, port] = constant_text(node, port, source.value)
     tasks = {task.name: rate_text(task) for task in diagram.graph.tasks}
-    picture = DrawnPicture(blocks, wires, constants, diagram.ports)
+    shown_by = {f"{path}.y": source for path, source in passed.items()}
+    ports = {name: shown_by.get(signal, signal) for name, signal in diagram.ports.items()}
+    picture = DrawnPicture(blocks, wires, constants, ports)
     picture = part_alone(picture, part) if part else picture
     picture = folded(picture, depth) if depth is not None else picture
     title = f"{diagram.name}: {part}" if part else diagram.name
     return draw(title, picture.blocks, picture.wires, picture.constants, tasks)
 
 
-def _box(node: Node, inputs: tuple[str, ...]) -> DrawnBlock:
-    block = node.block
-    lines = tuple(map(_short, block.picture_lines()[:MOST_LINES]))
+def _box(node: Node, inputs: tuple[str, ...], passed: Mapping[str, str]) -> DrawnBlock:
+    block, is_condition = node.block, node.kind == CONDITION
+    own = (*_condition_lines(node, passed), *block.picture_lines())
+    outputs = () if is_condition else tuple(block.interface.outputs)
     return DrawnBlock(
-        node.path, node.kind, inputs, tuple(block.interface.outputs), node.task.name, lines,
-        main_parameters(node), block.symbol, block.picture_formula(), block.picture_signs(),
+        node.path, node.kind, inputs, outputs, node.task.name, tuple(map(_short, own[:MOST_LINES])),
+        main_parameters(node), block.symbol, block.picture_formula(), block.picture_signs(), is_condition,
     )  # fmt: skip
 
 
@@ -70,6 +79,32 @@ def _kind(link: Link) -> str:
     return f"{link.source} to {link.target}: {link.via}{speed}"
 
 
+def _passed(diagram: Diagram) -> dict[str, str]:
+    """Return the blocks that show outputs of parts, which are not drawn, and the signals that they show."""
+    found: dict[str, str] = {}
+    for node in diagram.graph.nodes:
+        source = node.inputs.get("u")
+        if node.kind == OUTPUT and isinstance(source, Wire) and not source.index:
+            found[node.path] = _text(source, found)
+    return found
+
+
+def _text(wire: Wire, passed: Mapping[str, str]) -> str:
+    """Return where a wire comes from, past the blocks that are not drawn."""
+    inner = passed.get(wire.block)
+    return wire_text(wire) if inner is None else inner + index_text(wire.index)
+
+
+def _condition_lines(node: Node, passed: Mapping[str, str]) -> Iterator[str]:
+    """Yield the signals on which a condition depends."""
+    for port in ("when", "trigger", "reset") if node.kind == CONDITION else ():
+        source = node.inputs[port]
+        if isinstance(source, Wire):
+            yield f"{port}: {_text(source, passed)}"
+
+
 def _is_drawn(node: Node, port: str) -> bool:
+    if node.kind == CONDITION and port.startswith("around_"):
+        return False
     source = node.inputs[port]
     return not isinstance(source, Constant) or source.value is not node.block.interface.inputs[port].default

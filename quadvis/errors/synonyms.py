@@ -37,6 +37,9 @@ _MEANT = {
     "in": "inputs input inport inports connections connect wires wire lines from signals inp",
     "out": "outputs output outport outports",
     "slot": "variant replaceable",
+    "when": "enable enabled enableif if enableport",
+    "triggered": "trigger triggerport on",
+    "reset": "resetport resettable",
     "from": "source src signal wire origin",
     "across": "crossing transition ratetransition via mode sampling",
     # solver, rates, values

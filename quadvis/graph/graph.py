@@ -26,6 +26,7 @@ VARIABLE = ("RK45", "Radau", "BDF", "LSODA")  # scipy's, which choose their step
 SINGLE, MULTI = TASKINGS = ("single", "multi")
 DELAY = "delay"
 ACTIVE, RESTART = "active", "restart"  # outputs of a condition: whether its blocks run, and begin again
+FIXED = "fixed"  # its state: whether these outputs stay as they are
 
 Index = tuple[Any, ...]  # integers, then slices, as numpy takes them
 

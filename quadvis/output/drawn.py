@@ -24,7 +24,8 @@ class DrawnBlock:
 
     `lines` stand at its foot, `main` are the lines of its main parameters. `symbol` and `formula` say how it
     is drawn instead of as a box with its type: a symbol of `quadvis.block.symbol`; one text, or numerator
-    and denominator. `signs` stand at inputs in the place of their names.
+    and denominator. `signs` stand at inputs in the place of their names. A condition says of the part around
+    it when that runs.
     """
 
     path: str
@@ -37,6 +38,7 @@ class DrawnBlock:
     symbol: str = ""
     formula: tuple[str, ...] = ()
     signs: Mapping[str, str] = field(default_factory=dict)
+    is_condition: bool = False
 
 
 @dataclass(frozen=True)

@@ -127,9 +127,12 @@ def folded(picture: DrawnPicture, depth: int) -> DrawnPicture:
 def _fold(
     path: str, inside: Sequence[DrawnBlock], inputs: tuple[str, ...], outputs: tuple[str, ...]
 ) -> DrawnBlock:
-    """Return the box of a part; its colour is that of the task of most of its blocks."""
+    """Return the box of a part, with its condition; its colour is that of the task of most of its blocks."""
     task = Counter(block.task for block in inside).most_common(1)[0][0]
-    return DrawnBlock(path, f"a part of {counted(len(inside), 'block')}", inputs, outputs, task)
+    own = [block for block in inside if block.is_condition and block.path.rpartition("/")[0] == path]
+    lines = dict.fromkeys(line for block in own for line in block.lines)  # one condition for each rate
+    kind = f"a part of {counted(len([each for each in inside if not each.is_condition]), 'block')}"
+    return DrawnBlock(path, kind, inputs, outputs, task, tuple(lines))
 
 
 def _parts(blocks: Sequence[DrawnBlock]) -> list[str]:

@@ -46,6 +46,14 @@ class RunCondition(Block):
         path: {block: signal.discrete_integrator, rate: fast, condition: runs, in: {u: wave.y}}
     """
 
+    def picture_lines(self) -> tuple[str, ...]:
+        """Return the choices that are not the usual ones."""
+        lines = [f"runs at {NAMES_OR_NEVER[self.trigger_on]} edges"] if self.trigger_on != NEVER else []
+        lines += [f"set back at {NAMES_OR_NEVER[self.reset_on]} edges"] if self.reset_on != NEVER else []
+        lines += ["states set back when enabled"] if self.states == RESET else []
+        lines += ["initial outputs while disabled"] if self.outputs == RESET else []
+        return tuple(lines)
+
     def output(
         self, when: bool, trigger: bool, reset: bool, around_enabled: bool, around_active: bool
     ) -> tuple[bool, bool, bool, bool]:

@@ -116,6 +116,7 @@ def _read_initial(node: YamlNode | None, faults: Faults) -> dict[str, InputSpec]
         if known(given.source) and not isinstance(given.source, YamlNode):
             problem = f"the initial value of '{port}' is a signal"
             faults.add(given.place, problem, "write a constant, such as '2 m' or 'true'")
+            found[port] = given._replace(source=UNKNOWN)
     return found
 
 
