@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 METHODS = ("start", "read", "output", "write", "update", "deriv")
 OUTSIDE = ("read", "write")
+EVENTS = (CROSSING, EVENT) = ("crossing", "event")  # always interpreted: a run calls them seldom
 PORTS = "ports"
 CHECKS = ("check", "check_written", "doubts")
 FILES = ("reads", "read_file", "verify_files")
@@ -37,7 +38,7 @@ RESERVED = {
     "open", "close", "write_safe", "keep", "put_back", "brings_code",
     PORTS, "named", "free_names", "picture_lines", "picture_formula", "picture_signs",
     "symbol", "ports_from", "with_ports", "made_for", "entry_counts", "with_entries",
-    *CHECKS, *FILES, *METHODS, *TAGS,
+    *CHECKS, *FILES, *METHODS, *EVENTS, *TAGS,
 }  # fmt: skip
 
 
@@ -53,6 +54,7 @@ class Interface:
     work: Mapping[str, Work]
     safe: Mapping[str, Safe]  # by the input that each value replaces
     arguments: Mapping[str, tuple[str, ...]]  # method -> the names that it asks for
+    events: Mapping[str, tuple[str, ...]]  # the same of ``crossing`` and ``event``; empty without them
 
     @cached_property
     def feedthrough(self) -> frozenset[str]:
@@ -151,6 +153,7 @@ def interface_of(cls: type[Block]) -> Interface:
                 problem = f"{cls.__name__}.{method} asks for '{name}', which is not one of its inputs"
                 raise TypeError(sentence(problem, suggestion(name, allowed)))
         arguments[method] = names
+    events = _event_methods(cls, inputs)
     for name in arguments_of_ports(cls) if hasattr(cls, PORTS) else ():
         known = {
             **of(Param),
@@ -176,7 +179,22 @@ def interface_of(cls: type[Block]) -> Interface:
     if outputs and "output" not in arguments:
         raise TypeError(f"{cls.__name__} declares outputs but has no output method")
     safe = _safe(cls, of(Safe).values(), inputs, arguments.get("write", ()))
-    return Interface(inputs, outputs, of(Param), of(Derived), states, of(Work), safe, arguments)
+    return Interface(inputs, outputs, of(Param), of(Derived), states, of(Work), safe, arguments, events)
+
+
+def _event_methods(cls: type[Block], inputs: Mapping[str, In]) -> dict[str, tuple[str, ...]]:
+    """Return what ``crossing`` and ``event`` ask for; TypeError if a class has one of them alone."""
+    found = {method: _asked(cls, method, inputs) for method in EVENTS if hasattr(cls, method)}
+    if len(found) == 1:
+        raise TypeError(f"{cls.__name__}: the methods {' and '.join(EVENTS)} go together")
+    if found and not cls.numeric:
+        raise TypeError(f"{cls.__name__} is not numeric, and only numeric blocks have events between ticks")
+    for method, names in found.items():
+        for name in names:
+            if name not in (*inputs, "time"):
+                problem = f"{cls.__name__}.{method} asks for '{name}', which is not one of its inputs"
+                raise TypeError(sentence(problem, suggestion(name, inputs)))
+    return found
 
 
 def _asked(cls: type[Block], method: str, inputs: Mapping[str, In]) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.block import NO_FRAME, Block
+from quadvis.engine.events import Chatter, EventSolver
 from quadvis.engine.layout import TIME
 from quadvis.engine.memory import SLOT, Memory
 from quadvis.engine.profile import Profile
@@ -112,6 +113,8 @@ class Interpreter:
         self._slopes = np.array(program.slopes, np.intp)
         self._held = slice(0, program.held * SLOT)
         self._solver = Solver(program.solver, float(program.period)) if program.solver in TABLEAUS else None
+        located = self._solver is not None and program.states and program.crossings
+        self._events = EventSolver(self) if located else None
         self._variable = VariableSolver(program, self.memory) if self._solver is None else None
         self.observers: list[Tap | Observer] = []
         self._rhythms = [(task.every, task.offset) for task in program.tasks]
@@ -285,6 +288,8 @@ class Interpreter:
         try:
             if self._variable is not None:
                 state = self._variable.advance(self.rates, self.tick)
+            elif self._events is not None:
+                state = self._events.advance(time, floats[self._states])
             else:
                 assert self._solver is not None
                 for call in self._derivatives:
@@ -292,6 +297,8 @@ class Interpreter:
                 state = self._solver.advance(self.rates, time, floats[self._states], floats[self._slopes])
         except MinorError as failure:
             return self._stop(failure.call, failure.error)
+        except Chatter as error:
+            return Stop(self.tick, (error.block,), error)
         except NoStep as error:
             return Stop(self.tick, (), error)
         except Exception as error:
@@ -310,15 +317,25 @@ class Interpreter:
         floats = self.memory.floats
         floats[TIME.position] = time
         floats[self._states] = state
+        self.run_calls(self._minor)
+        self.run_calls(self._derivatives)
+        return floats[self._slopes]
+
+    def run_calls(self, calls: Sequence[Call]) -> None:
+        """Run calls of blocks in their order; MinorError if one fails."""
         call: Call = _nothing
         try:
-            for call in self._minor:
-                call()
-            for call in self._derivatives:
+            for call in calls:
                 call()
         except Exception as error:
             raise MinorError(call, error) from error
-        return floats[self._slopes]
+
+    def asked(self, op: Op) -> Any:
+        """Return what a method of a block gives for the present values of its sources; MinorError."""
+        try:
+            return getattr(self.selves[op.block], op.method)(*(self.memory.read(slot) for slot in op.sources))
+        except Exception as error:
+            raise MinorError(self.call(op), error) from error
 
 
 class MinorError(Exception):

@@ -14,6 +14,7 @@ from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple
 
+from quadvis.block.interface import CROSSING, EVENT
 from quadvis.block.random import stream_start
 from quadvis.engine.layout import NO_BLOCK, TIME, Layout, Placed
 from quadvis.engine.memory import Memory, Slot
@@ -91,7 +92,9 @@ class Program:
     minor steps write over: time and the signals of the continuous task. ``states`` are the slots of the
     continuous states, ``slopes`` those of their derivatives, in one order. ``derivatives`` are the calls that
     give them; ``minor`` are the outputs on which they depend and which move between two ticks. A tick begins
-    with its time in ``time``.
+    with its time in ``time``. ``tolerances`` are those of a solver of variable step. ``crossings`` and
+    ``events`` are the methods of blocks with events between ticks, in one order, and ``renewed`` the outputs
+    that are computed anew after one.
     """
 
     name: str
@@ -110,6 +113,9 @@ class Program:
     tunables: tuple[Tunable, ...]
     time: Slot = TIME
     tolerances: Tolerances = USUAL
+    crossings: tuple[Op, ...] = ()
+    events: tuple[Op, ...] = ()
+    renewed: tuple[Op, ...] = ()
 
     @cached_property
     def _numbers(self) -> dict[str, int]:
@@ -191,8 +197,9 @@ class Program:
             return replace(self, tasks=(task,))
         alone = task._replace(delays=(), latches=())
         return replace(
-            self, tasks=(alone,), held=0, states=(), slopes=(), derivatives=(), minor=(), time=task.time
-        )
+            self, tasks=(alone,), held=0, states=(), slopes=(), derivatives=(), minor=(), time=task.time,
+            crossings=(), events=(), renewed=(),
+        )  # fmt: skip
 
     def quiet(self, left_out: Set[int]) -> Program:
         """Return what runs without effects outside: without reads and writes, and without some blocks.
@@ -213,7 +220,10 @@ class Program:
         ]  # fmt: skip
         derivatives, minor = without(self.derivatives), without(self.minor)
         blocks = tuple([replace(block, condition=NO_BLOCK) for block in self.blocks])
-        return replace(self, tasks=tuple(tasks), blocks=blocks, derivatives=derivatives, minor=minor)
+        return replace(
+            self, tasks=tuple(tasks), blocks=blocks, derivatives=derivatives, minor=minor,
+            crossings=without(self.crossings), events=without(self.events), renewed=without(self.renewed),
+        )  # fmt: skip
 
     @cached_property
     def hash(self) -> str:
@@ -258,6 +268,7 @@ def make_program(graph: Graph, seed: int) -> Program:
                 tuple(resets[number] for number in mine if number in resets),
             )
         )
+    crossings, events, renewed = _event_calls(graph, blocks)
     states = [(block.field(name), slope) for block in blocks for name, slope in block.slopes.items()]
     return Program(
         graph.name,
@@ -275,7 +286,35 @@ def make_program(graph: Graph, seed: int) -> Program:
         tuple(calls["output"][number] for number in _minor(graph.nodes) if number in calls["output"]),
         tuple(_tunables(graph, blocks)),
         tolerances=graph.tolerances,
+        crossings=crossings,
+        events=events,
+        renewed=renewed,
     )
+
+
+def _event_calls(
+    graph: Graph, blocks: Sequence[Placed]
+) -> tuple[tuple[Op, ...], tuple[Op, ...], tuple[Op, ...]]:
+    """Return what finds events between ticks, what they do, and what is to be computed anew after one."""
+    found: dict[str, list[Op]] = {CROSSING: [], EVENT: []}
+    renewed: list[Op] = []
+    changed: set[str] = set()
+    moving = _moving(graph.nodes)
+    for number, (node, block) in enumerate(zip(graph.nodes, blocks, strict=True)):
+        interface = node.block.interface
+        if not node.task.continuous:
+            continue
+        for method, names in interface.events.items():
+            sources = tuple(TIME if name == "time" else block.inputs[name] for name in names)
+            found[method].append(Op(number, method, sources, ()))
+        follows = node.block.numeric and "update" not in interface.arguments and not node.block.stepwise
+        follows = follows and not changed.isdisjoint(_sources(node, interface.feedthrough))
+        if interface.events or follows or node.path in moving:
+            changed |= {node.path} if interface.events or follows else set()
+            names = interface.arguments.get("output", ())
+            sources = tuple(TIME if name == "time" else block.inputs[name] for name in names)
+            renewed.append(Op(number, "output", sources, tuple(block.outputs.values())))
+    return tuple(found[CROSSING]), tuple(found[EVENT]), tuple(renewed) if found[CROSSING] else ()
 
 
 def _in_order(tasks: Sequence[TaskProgram], phase: str) -> list[tuple[TaskProgram, Op]]:
@@ -361,6 +400,8 @@ def _minor(nodes: Sequence[Node]) -> list[int]:
     needed: set[str] = set()
     for node in nodes:
         needed.update(_sources(node, node.block.interface.arguments.get("deriv", ())))
+        for names in node.block.interface.events.values() if node.task.continuous else ():
+            needed.update(_sources(node, names))
     moving = _moving(nodes)
     found: list[int] = []
     for number, node in reversed(list(enumerate(nodes))):

@@ -8,6 +8,7 @@ import numpy as np
 
 from quadvis.block import OWN_MODULES, Block, ParameterError
 from quadvis.block.returned import returned_wrongly
+from quadvis.engine.events import Chatter
 from quadvis.engine.interpreter import NOT_FINITE_OUTPUT, Stop
 from quadvis.engine.layout import TIME, Placed
 from quadvis.engine.memory import Memory
@@ -26,6 +27,10 @@ SMALLER_STEP = "a smaller solver step may help"
 def explained(stop: Stop, graph: Graph, program: Program, memory: Memory, marks: Marks) -> QuadvisError:
     """Return the error that a stop means, to be raised; ``marks`` may know the cause."""
     time = float(stop.tick * program.period)
+    if isinstance(stop.error, Chatter):
+        problem = f"{stop.error} of {float(program.period):g} s"
+        remedy = "it chatters; give it a hysteresis or a state of rest, or make the step smaller"
+        return RunError(sentence(problem, remedy), block=program.blocks[stop.blocks[0]].path, time=time)
     if isinstance(stop.error, NoStep):
         problem = f"the solver {program.solver} cannot go on: {_lowered(str(stop.error))}"
         remedy = "a state may go to infinity or jump; a larger 'rtol' or 'atol' may help"

@@ -62,6 +62,7 @@ def _tags(block: type[Block]) -> dict[str, str]:
     names = block.ports_from()
     tags |= {"ports": f"they depend on {', '.join(names)}"} if names else {}
     tags |= {"names": f"a diagram gives those of {block.free_names}"} if block.free_names else {}
+    tags |= {"events": "located between two ticks at 'rate: continuous'"} if block.interface.events else {}
     return tags | ({"device": _device(block)} if issubclass(block, Device) else {})
 
 

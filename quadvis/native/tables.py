@@ -309,7 +309,8 @@ class Tables:
         python = PythonCall(None, -1)
         ops = (*program.minor, *program.derivatives)
         functions = [self._function(op) for op in ops]
-        if program.solver not in TABLEAUS or any(function is None for function in functions):
+        other = program.solver not in TABLEAUS or bool(program.crossings)
+        if other or any(function is None for function in functions):
             self._ask(ALWAYS, python)
             return
         self.redo[self._instruct(ALWAYS, loop.INTEGRATE, 0)] = Redo(python, None)

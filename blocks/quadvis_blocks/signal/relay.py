@@ -14,7 +14,8 @@ class Relay(Block):
     """One of two values: on from an upper threshold, off from a lower one, between them as before.
 
     On while ``u >= on_at``, off while ``u <= off_at``, element by element. The output is one of the two
-    values from the first tick on.
+    values from the first tick on. At ``rate: continuous`` the instant at which it switches is located between
+    two ticks.
     """
 
     on_at = Param(0.5, type="float64[*?]", unit="a", tune=True, shown=True, doc="switches on at or above it")
@@ -67,6 +68,14 @@ class Relay(Block):
             for index in range(u.size):
                 on_at, off_at = element(self.on_at, index), element(self.off_at, index)
                 self.is_on.flat[index] = _switched(u.flat[index], self.is_on.flat[index], on_at, off_at)
+
+    def crossing(self, u: Any) -> Any:
+        """Return how far each element is from the threshold at which it switches next."""
+        return np.where(self.is_on, u - self.off_at, self.on_at - u)
+
+    def event(self, u: Any) -> None:
+        """Switch."""
+        self.update(u)
 
 
 def _switched(u: float, is_on: Any, on_at: float, off_at: float) -> bool:
