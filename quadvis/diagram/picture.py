@@ -36,7 +36,7 @@ def draw_diagram(diagram: Diagram, *, part: str = "", depth: int | None = None) 
             continue
         interface = node.block.interface
         shown = [port for port in interface.inputs if _is_drawn(node, port)]
-        blocks.append(_box(node, tuple(shown)))
+        blocks.append(drawn_block(node, tuple(shown)))
         for port in shown:
             source = node.inputs[port]
             if isinstance(source, Wire):
@@ -45,13 +45,19 @@ def draw_diagram(diagram: Diagram, *, part: str = "", depth: int | None = None) 
                 constants[node.path, port] = constant_text(node, port, source.value)
     tasks = {task.name: rate_text(task) for task in diagram.graph.tasks}
     picture = DrawnPicture(blocks, wires, constants, diagram.ports)
-    picture = part_alone(picture, part) if part else picture
-    picture = folded(picture, depth) if depth is not None else picture
+    picture = part_of(picture, part, depth)
     title = f"{diagram.name}: {part}" if part else diagram.name
     return draw(title, picture.blocks, picture.wires, picture.constants, tasks)
 
 
-def _box(node: Node, inputs: tuple[str, ...]) -> DrawnBlock:
+def part_of(picture: DrawnPicture, part: str, depth: int | None) -> DrawnPicture:
+    """Return a picture, or a part of it, with what lies deeper than ``depth`` as one box each."""
+    picture = part_alone(picture, part) if part else picture
+    return folded(picture, depth) if depth is not None else picture
+
+
+def drawn_block(node: Node, inputs: tuple[str, ...]) -> DrawnBlock:
+    """Return a block as it is drawn, with some of its inputs."""
     block = node.block
     lines = tuple(map(_short, block.picture_lines()[:MOST_LINES]))
     return DrawnBlock(

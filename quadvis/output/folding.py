@@ -129,7 +129,9 @@ def _fold(
 ) -> DrawnBlock:
     """Return the box of a part; its colour is that of the task of most of its blocks."""
     task = Counter(block.task for block in inside).most_common(1)[0][0]
-    return DrawnBlock(path, f"a part of {counted(len(inside), 'block')}", inputs, outputs, task)
+    faults = [words for block in inside for words in block.faulty.values()]
+    kind = f"a part of {counted(len(inside), 'block')}"
+    return DrawnBlock(path, kind, inputs, outputs, task, faulty={"": "; ".join(faults)} if faults else {})
 
 
 def _parts(blocks: Sequence[DrawnBlock]) -> list[str]:
