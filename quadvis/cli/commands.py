@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quadvis.cli.default_places import default_name, log_path, runs_folder
-from quadvis.errors import Fault, QuadvisError, RunError, counted, quoted
+from quadvis.errors import DiagramError, Fault, QuadvisError, RunError, counted, quoted
 from quadvis.machine.files import SVG, Kind, check_output, file_name, write_output
 from quadvis.machine.garbage import collected_from_now_on
 from quadvis.machine.shipped import PREFIX, named_file
@@ -436,13 +436,29 @@ def analyse(options: argparse.Namespace) -> int:
 
 
 def draw(options: argparse.Namespace) -> int:
-    """Write a diagram as SVG."""
+    """Write a diagram as SVG; one with faults, too, which are then reported."""
     from quadvis.diagram.picture import draw_diagram
 
-    diagram = _load(options)
     name = default_name(options, options.variant) + (f"-{file_name(options.part)}" if options.part else "")
+    output = options.output or f"{name}.svg"
+    try:
+        diagram = _load(options)
+    except DiagramError:
+        return _draw_with_faults(options, output)
     picture = draw_diagram(diagram, part=options.part or "", depth=options.depth)
-    return _write(picture, options.output or f"{name}.svg", SVG, diagram.inputs)
+    return _write(picture, output, SVG, diagram.inputs)
+
+
+def _draw_with_faults(options: argparse.Namespace, output: str) -> int:
+    """Write the picture of a diagram with faults, then raise them."""
+    from quadvis.diagram.load import draw_with_faults
+
+    picture, error = draw_with_faults(
+        options.file, variant=options.variant, settings=options.set, params=options.params,
+        own_blocks=not options.no_own_blocks, part=options.part or "", depth=options.depth,
+    )  # fmt: skip
+    _write(picture, output, SVG, [Path(options.file)])
+    raise error
 
 
 def export(options: argparse.Namespace) -> int:

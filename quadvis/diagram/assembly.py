@@ -15,6 +15,7 @@ from quadvis.diagram.conditions import with_conditions
 from quadvis.diagram.devices import check_devices, check_losses
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.doubts import warn_network, warn_parameters, warn_rates
+from quadvis.diagram.draft import Draft
 from quadvis.diagram.expand import Expansion, Kept
 from quadvis.diagram.flow import Cases
 from quadvis.diagram.foreign_code import check_code
@@ -26,6 +27,7 @@ from quadvis.diagram.matrices import matrix_files
 from quadvis.diagram.outputs import check_writers
 from quadvis.diagram.parts import Parts
 from quadvis.diagram.routing import Network
+from quadvis.diagram.scope import FlatBlock
 from quadvis.diagram.sections.computers import COMPUTERS
 from quadvis.diagram.sections.context import Context
 from quadvis.diagram.sections.expect import EXPECT
@@ -71,6 +73,10 @@ class Assembly:
         self.kept: dict[str, list[Kept]] = {}
         self.made: dict[str, list[Made]] = {}
         self.cases: Cases = {}
+        # What a picture of a diagram with faults is made of: its blocks, and the ports of parts.
+        self.flat: dict[str, FlatBlock] = {}
+        self.drafts: list[Draft] = []
+        self.part_ports: dict[str, str] = {}
         self._warned = 0  # files whose unused parameters are reported
         self._params = [path for file in params for path in (file.path, *file.bases)]
         self._bases: dict[int, Wiring] = {}  # of the diagrams on which others stand, by identity
@@ -93,6 +99,8 @@ class Assembly:
         wiring.check_ports(expansion.root)
         builder = Builder(spec, expansion, wiring, self.made, faults)
         drafts = builder.drafts()
+        ports = {name: wire_text(source) for name, source in wiring.ports()}
+        self.flat, self.drafts, self.part_ports = expansion.blocks, drafts, ports
         step = builder.step if known(builder.step) else None
         names = {*expansion.blocks, *expansion.root.children}
         network = Network(spec[COMPUTERS], spec[LINKS], expansion.root.params, names)
@@ -132,7 +140,6 @@ class Assembly:
         check_devices(drafts, faults)
         check_losses(spec[COMPUTERS], drafts, faults)
         check_code(drafts, self.catalogue.own_blocks, faults)
-        ports = {name: wire_text(source) for name, source in wiring.ports()}
         entries = {name: wire_text(source) for name, source in wiring.entries()}
         return Diagram(
             spec.name, spec.path, variant, graph, stop, seed, spec.values | context.values, listing,

@@ -13,7 +13,7 @@ from quadvis.diagram.bases import read_diagram, standing
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.loader import read_text
 from quadvis.diagram.settings import Files, Given, read_settings, setting_texts
-from quadvis.errors import DiagramError, Fault, Faults, Place
+from quadvis.errors import DiagramError, Fault, Faults, Place, QuadvisError
 from quadvis.errors.discretion import quoting_only
 from quadvis.library.catalogue import OwnBlocks
 from quadvis.machine.garbage import uncollected
@@ -52,6 +52,36 @@ def load(
             diagram, parameter_files=files, settings=texts, warnings=found, files=digests,
             own_blocks=bool(own_blocks),
         )  # fmt: skip
+
+
+def draw_with_faults(
+    path: str | Path,
+    *,
+    variant: str | None = None,
+    settings: Given = (),
+    params: Files = (),
+    own_blocks: OwnBlocks = True,
+    part: str = "",
+    depth: int | None = None,
+) -> tuple[str, DiagramError]:
+    """Return a picture of a diagram that has faults, as SVG, and all its faults.
+
+    DiagramError if so little can be read that there is nothing to draw. The arguments are those of `load`.
+    """
+    from quadvis.diagram.sketch import draw_faulty
+
+    faults = Faults()
+    assembly = None
+    try:
+        with quoting_only(_quotable(path, params, setting_texts(settings))), _reported_once(faults):
+            given, files = read_settings(settings, params, faults)
+            assembly = Assembly(read_diagram(named_file(path), faults), faults, files, own_blocks)
+            assembly.diagram(variant, given)
+    except DiagramError as error:
+        if assembly is None or not assembly.flat:
+            raise
+        return draw_faulty(assembly, error.faults, part=part, depth=depth), error
+    raise QuadvisError(f"'{path}' has no faults")
 
 
 def load_text(

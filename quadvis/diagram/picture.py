@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 
 from quadvis.diagram.conditions import CONDITION, OUTPUT
 from quadvis.diagram.diagram import Diagram
@@ -42,7 +43,7 @@ def draw_diagram(diagram: Diagram, *, part: str = "", depth: int | None = None) 
             continue
         interface = node.block.interface
         shown = [port for port in interface.inputs if _is_drawn(node, port)]
-        blocks.append(_box(node, tuple(shown), passed))
+        blocks.append(drawn_block(node, tuple(shown), passed))
         for port in shown:
             source = node.inputs[port]
             if isinstance(source, Wire):
@@ -52,14 +53,21 @@ def draw_diagram(diagram: Diagram, *, part: str = "", depth: int | None = None) 
     tasks = {task.name: rate_text(task) for task in diagram.graph.tasks}
     shown_by = {f"{path}.y": source for path, source in passed.items()}
     ports = {name: shown_by.get(signal, signal) for name, signal in diagram.ports.items()}
-    picture = DrawnPicture(blocks, wires, constants, ports)
-    picture = part_alone(picture, part) if part else picture
-    picture = folded(picture, depth) if depth is not None else picture
+    picture = part_of(DrawnPicture(blocks, wires, constants, ports), part, depth)
     title = f"{diagram.name}: {part}" if part else diagram.name
     return draw(title, picture.blocks, picture.wires, picture.constants, tasks)
 
 
-def _box(node: Node, inputs: tuple[str, ...], passed: Mapping[str, str]) -> DrawnBlock:
+def part_of(picture: DrawnPicture, part: str, depth: int | None) -> DrawnPicture:
+    """Return a picture, or a part of it, with what lies deeper than ``depth`` as one box each."""
+    picture = part_alone(picture, part) if part else picture
+    return folded(picture, depth) if depth is not None else picture
+
+
+def drawn_block(
+    node: Node, inputs: tuple[str, ...], passed: Mapping[str, str] = MappingProxyType({})
+) -> DrawnBlock:
+    """Return a block as it is drawn, with some of its inputs; blocks that are ``passed`` are not drawn."""
     block, is_condition = node.block, node.kind == CONDITION
     own = (*_condition_lines(node, passed), *block.picture_lines())
     outputs = () if is_condition else tuple(block.interface.outputs)

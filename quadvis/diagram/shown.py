@@ -41,7 +41,8 @@ def parameter_text(node: Node, param: Param) -> str:
         return f"{' x '.join(map(str, array.shape))} values"
     if array.dtype != float:
         return str(array.tolist()).lower()
-    units = node.units.get(param.name, ())
+    declared = () if any(unit.variables for unit in param.units) else param.units
+    units = node.units.get(param.name, declared)
     if array.ndim == 0:
         return _quantity(float(array), units)
     if len(set(units)) > 1:

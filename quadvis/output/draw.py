@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 from quadvis.output import elkjs as engine
@@ -16,6 +17,7 @@ from quadvis.output import layers, svg
 from quadvis.output.drawing import PILL_COLOURS, Drawing
 from quadvis.output.drawn import (
     ARROW,
+    FAULT,
     INDENT,
     LINE,
     MARGIN,
@@ -31,6 +33,7 @@ from quadvis.output.elkjs import LayoutError
 
 __all__ = ["DrawnBlock", "DrawnWire", "draw"]
 
+NOTES, NOTE = 900.0, 15.0  # least width of a picture with notes; from line to line of them
 MOST_BLOCKS, MOST_WIRES = 250, 750
 """The engine takes half a minute for so many."""
 
@@ -41,17 +44,19 @@ def draw(
     wires: Sequence[DrawnWire],
     constants: Mapping[tuple[str, str], str],
     tasks: Mapping[str, str],
+    notes: Sequence[str] = (),
 ) -> str:
     """Return the diagram as the text of an SVG file; equal arguments give equal text.
 
     The blocks come in reading order: a loop without a source outside starts at its first block. `constants`
     are the values set at inputs, by (block, port). `tasks` are the words of the legend by task name,
-    `CONTINUOUS` among them. Raises `QuadvisError` if the arguments contradict each other or the layout engine
-    is missing; a diagram that the engine cannot place gets a simpler layout.
+    `CONTINUOUS` among them. `notes` are the sentences of faults, which stand below the diagram. Raises
+    `QuadvisError` if the arguments contradict each other or the layout engine is missing; a diagram that the
+    engine cannot place gets a simpler layout.
     """
     drawing = Drawing(blocks, wires, constants, tasks)
     placed = {shape["id"]: shape for shape in _shapes(_laid_out(drawing))}
-    return _page(title, drawing, placed)
+    return _page(title, drawing, placed, notes)
 
 
 def _laid_out(drawing: Drawing) -> dict[str, Any]:
@@ -71,12 +76,17 @@ def _shapes(node: dict[str, Any]) -> Iterator[dict[str, Any]]:
         yield from _shapes(child)
 
 
-def _page(title: str, drawing: Drawing, placed: Mapping[str, dict[str, Any]]) -> str:
-    """Return title, legend and diagram: parts undermost, then wires, then boxes."""
+def _page(
+    title: str, drawing: Drawing, placed: Mapping[str, dict[str, Any]], notes: Sequence[str] = ()
+) -> str:
+    """Return title, legend, diagram and notes: parts undermost, then wires, then boxes."""
     legend, legend_width = _legend(drawing)
     root, top = placed["root"], MARGIN + 2 * LINE
     width = 2 * MARGIN + max(root["width"], legend_width, svg.text_width(title, TITLE, bold=True))
-    height = top + root["height"] + MARGIN
+    width = max(width, NOTES) if notes else width
+    texts = [line for note in notes for line in _wrapped(note, width - 2 * MARGIN)]
+    bottom = top + root["height"] + MARGIN
+    height = bottom + (len(texts) * NOTE + MARGIN if texts else 0.0)
     lines = [
         svg.opening(
             "svg",
@@ -102,7 +112,22 @@ def _page(title: str, drawing: Drawing, placed: Mapping[str, dict[str, Any]]) ->
         lines += _wire(drawing, number, placed[f"w{number}"])
     for number in range(len(drawing.blocks)):
         lines += _block(drawing, number, placed[f"b{number}"])
-    return "\n".join([*lines, "</g>", "</svg>", ""])
+    lines.append("</g>")
+    for number, text in enumerate(texts, 1):
+        lines.append(svg.text(text, MARGIN, bottom + number * NOTE, PORT, fill=FAULT))
+    return "\n".join([*lines, "</svg>", ""])
+
+
+def _wrapped(note: str, room: float) -> list[str]:
+    """Return a sentence in lines of which none is wider than the room."""
+    lines = [""]
+    for word in note.split(" "):
+        longer = f"{lines[-1]} {word}" if lines[-1] else word
+        if lines[-1] and svg.text_width(longer, PORT) > room:
+            lines.append(f"  {word}")
+        else:
+            lines[-1] = longer
+    return lines
 
 
 def _legend(drawing: Drawing) -> tuple[list[str], float]:
@@ -110,6 +135,8 @@ def _legend(drawing: Drawing) -> tuple[list[str], float]:
     entries = [(label, drawing.colours[task], 2) for task, label in drawing.tasks.items()]
     if any(mark.crossing for mark in drawing.marks.values()):
         entries.append(("how a wire crosses rates", PILL_COLOURS, 6))
+    if any(block.faulty for block in drawing.blocks):
+        entries.append(("a fault: see below", ("#ffffff", FAULT), 2))
     lines, x = [], 0.0
     for label, (fill, line), radius in entries:
         lines.append(svg.element("rect", x=x, y=0, width=20, height=12, rx=radius, fill=fill, stroke=line))
@@ -129,7 +156,7 @@ def _part(shape: Mapping[str, Any]) -> Iterator[str]:
 
 def _wire(drawing: Drawing, number: int, shape: Mapping[str, Any]) -> Iterator[str]:
     wire, (source, target) = drawing.wires[number], drawing.ends[number]
-    colour = drawing.colours_of(int(source[1:].partition(".")[0])).line
+    colour = FAULT if wire.fault else drawing.colours_of(int(source[1:].partition(".")[0])).line
     (section,) = shape["sections"]
     corners = [section["startPoint"], *section.get("bendPoints", ()), section["endPoint"]]
     x, y = corners[-1]["x"] + drawing.reach(target) + drawing.inset(target), corners[-1]["y"]
@@ -138,7 +165,8 @@ def _wire(drawing: Drawing, number: int, shape: Mapping[str, Any]) -> Iterator[s
     line = svg.points([start, *way[1:], (x, y)])
     end = f"{wire.target_block}.{wire.target_port}"
     yield svg.opening("g", class_="wire", data_source=wire.source, data_target=end)
-    yield svg.element("title", f"{wire.source} → {end}" + (f" ({wire.crossing})" if wire.crossing else ""))
+    words = f"{wire.source} → {end}" + (f" ({wire.crossing})" if wire.crossing else "")
+    yield svg.element("title", f"{words}: {wire.fault}" if wire.fault else words)
     yield svg.element("polyline", points=line, fill="none", stroke=colour, stroke_width=1.3)
     yield svg.element("polygon", points=svg.points([(x, y), (x - 7, y - 3), (x - 7, y + 3)]), fill=colour)
     for junction in shape.get("junctionPoints", ()):
@@ -149,11 +177,22 @@ def _wire(drawing: Drawing, number: int, shape: Mapping[str, Any]) -> Iterator[s
 def _block(drawing: Drawing, number: int, shape: Mapping[str, Any]) -> Iterator[str]:
     block, form, x, y = drawing.blocks[number], drawing.forms[number], shape["x"], shape["y"]
     yield svg.opening("g", class_="block", data_path=block.path)
-    yield svg.element("title", f"{block.path}: {block.kind}")
-    yield from form.elements(x, y, drawing.colours_of(number))
+    whole, colours = block.faulty.get("", ""), drawing.colours_of(number)
+    yield svg.element("title", f"{block.path}: {block.kind}" + (f": {whole}" if whole else ""))
+    yield from form.elements(x, y, replace(colours, line=FAULT, width=3.0) if whole else colours)
     for row, (inset, height) in enumerate(form.inputs):
         if mark := drawing.marks.get(f"b{number}.i{row}"):
             yield from _mark(mark, x, y + height, inset)
+        if words := block.faulty.get(block.inputs[row]):
+            yield from _spot(x + inset, y + height, words)
+    yield "</g>"
+
+
+def _spot(x: float, y: float, words: str) -> Iterator[str]:
+    """Yield the mark of a faulty input."""
+    yield svg.opening("g", class_="fault")
+    yield svg.element("title", words)
+    yield svg.element("circle", cx=x, cy=y, r=5, fill=FAULT, stroke="#ffffff", stroke_width=1)
     yield "</g>"
 
 

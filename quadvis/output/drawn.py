@@ -14,6 +14,7 @@ MARGIN, LINE, HEADER, ROW, INDENT, BETWEEN, ARROW = 24.0, 26.0, 38.0, 17.0, 7.0,
 FOOT = 13.0  # from line to line at the foot of a box
 MAIN = 14.0  # from line to line of the main parameters
 INK = "#111111"
+FAULT = "#c4161c"  # the colour of errors
 _LONGEST_MARK = 28
 _LONG_NUMBER = re.compile(r"\d+\.\d{7,}(?:e[-+]?\d+)?")
 
@@ -25,7 +26,7 @@ class DrawnBlock:
     `lines` stand at its foot, `main` are the lines of its main parameters. `symbol` and `formula` say how it
     is drawn instead of as a box with its type: a symbol of `quadvis.block.symbol`; one text, or numerator
     and denominator. `signs` stand at inputs in the place of their names. A condition says of the part around
-    it when that runs.
+    it when that runs. `faulty` are the sentences of its faults by port; that of "" is about the block itself.
     """
 
     path: str
@@ -39,16 +40,21 @@ class DrawnBlock:
     formula: tuple[str, ...] = ()
     signs: Mapping[str, str] = field(default_factory=dict)
     is_condition: bool = False
+    faulty: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class DrawnWire:
-    """A wire from `source` ("block.port" or "block.port[0]"); `crossing` says how it changes rates."""
+    """A wire from `source` ("block.port" or "block.port[0]"); `crossing` says how it changes rates.
+
+    `fault` says what is wrong with it.
+    """
 
     source: str
     target_block: str
     target_port: str
     crossing: str | None = None
+    fault: str = ""
 
 
 @dataclass(frozen=True)

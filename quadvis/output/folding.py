@@ -131,8 +131,11 @@ def _fold(
     task = Counter(block.task for block in inside).most_common(1)[0][0]
     own = [block for block in inside if block.is_condition and block.path.rpartition("/")[0] == path]
     lines = dict.fromkeys(line for block in own for line in block.lines)  # one condition for each rate
+    faults = [words for block in inside for words in block.faulty.values()]
     kind = f"a part of {counted(len([each for each in inside if not each.is_condition]), 'block')}"
-    return DrawnBlock(path, kind, inputs, outputs, task, tuple(lines))
+    return DrawnBlock(
+        path, kind, inputs, outputs, task, tuple(lines), faulty={"": "; ".join(faults)} if faults else {}
+    )
 
 
 def _parts(blocks: Sequence[DrawnBlock]) -> list[str]:

@@ -35,10 +35,11 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Colours:
-    """Fill and line of a block."""
+    """Fill and line of a block, and the width of the line."""
 
     fill: str
     line: str
+    width: float = 1.5
 
 
 class Form:
@@ -108,7 +109,13 @@ class Form:
         """Yield the box."""
         size = {"x": x, "y": y, "width": self.width, "height": self.height}
         yield svg.element(
-            "rect", **size, rx=3, fill=colours.fill, stroke=colours.line, stroke_width=1.5, class_="outline"
+            "rect",
+            **size,
+            rx=3,
+            fill=colours.fill,
+            stroke=colours.line,
+            stroke_width=colours.width,
+            class_="outline",
         )
 
     def labels(self, x: float, y: float) -> Iterator[str]:

@@ -88,8 +88,8 @@ class SumCircle(Outlined):
         """Yield circle and signs."""
         r = self.radius
         yield svg.element(
-            "circle", cx=x + r, cy=y + r, r=r, fill=colours.fill, stroke=colours.line, stroke_width=1.5,
-            class_="outline",
+            "circle", cx=x + r, cy=y + r, r=r, fill=colours.fill, stroke=colours.line,
+            stroke_width=colours.width, class_="outline",
         )  # fmt: skip
         for name, (_, height) in zip(self.block.inputs, self.inputs, strict=True):
             sign = self.block.signs.get(name, "")
@@ -127,7 +127,7 @@ class GainTriangle(Outlined):
         width, height = self.shape
         corners = svg.points([(x, y), (x + width, y + height / 2), (x, y + height)])
         yield svg.element(
-            "polygon", points=corners, fill=colours.fill, stroke=colours.line, stroke_width=1.5,
+            "polygon", points=corners, fill=colours.fill, stroke=colours.line, stroke_width=colours.width,
             stroke_linejoin="round", class_="outline",
         )  # fmt: skip
         yield svg.text(self.inside, x + 5, y + height / 2 + 4, PORT, class_="port")
@@ -146,7 +146,7 @@ class SignalBar(Outlined):
         width, height = self.shape
         yield svg.element(
             "rect", x=x, y=y, width=width, height=height, rx=1, fill=colours.line, stroke=colours.line,
-            stroke_width=1.5, class_="outline",
+            stroke_width=colours.width, class_="outline",
         )  # fmt: skip
 
 

@@ -238,4 +238,4 @@ blocks:
     paused = load(tmp_path / "pausing.yaml").run(keep=("*",), engine="python")["inside/x.y"]
     assert paused[:100] == pytest.approx(steady[:100], abs=1e-12)
     assert paused[100:200] == pytest.approx(np.full(100, steady[99]), abs=1e-12)  # as it was when it last ran
-    assert paused[200:] == pytest.approx(steady[100:201], abs=1e-9) and np.ptp(steady[100:201]) > 0.9
+    assert paused[200:300] == pytest.approx(steady[100:200], abs=1e-9) and np.ptp(steady[100:200]) > 0.9
