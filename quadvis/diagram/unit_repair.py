@@ -15,7 +15,7 @@ from quadvis.diagram.flow import Cases
 from quadvis.diagram.unit_flow import UnitFlow, words
 from quadvis.diagram.values import OpenUnits
 from quadvis.errors import Fault, Faults, Place
-from quadvis.errors.rules import ANGLES, ruled
+from quadvis.errors.rules import ANGLES, INTEGRALS, ruled
 from quadvis.graph.graph import Constant, Node
 from quadvis.units import Unit
 
@@ -79,6 +79,7 @@ def follow_units(
     for fault in (*blames, *found.faults):
         ratio = (ratios | found.ratios | found.given_ratios).get(fault.place)
         rule = ANGLES if ratio is not None and ratio.is_angle else ""
+        rule = rule or (INTEGRALS if fault.place in found.integrals else "")
         faults.append(replace(fault, remedy=ruled(fault.remedy, rule)))
     found.note()
     return found

@@ -13,7 +13,11 @@ ANGLES = (
     "an angle has a dimension of its own here, rad: an inertia is in kg*m^2/rad, "
     "a motor's constant in V*s/rad"
 )
-_RULES = (ANGLES,)
+INTEGRALS = (
+    "an integral is in its input's unit times s: let a rate of plain numbers be in 1/s, "
+    "by a factor such as 'k: 1 1/s'"
+)
+_RULES = (ANGLES, INTEGRALS)
 
 
 def ruled(remedy: str, rule: str) -> str:

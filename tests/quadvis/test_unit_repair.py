@@ -6,6 +6,7 @@ import pytest
 
 from quadvis.api import load_text
 from quadvis.errors import DiagramError, Fault
+from quadvis.errors.rules import INTEGRALS
 
 # A DC motor with a PI controller of its speed.
 MOTOR = """\
@@ -179,3 +180,30 @@ def test_an_angular_frequency_has_its_turns_in_the_remedy() -> None:
     (fault,) = faults(text + "rate: c, with: {frequency: 120 rad/s}}\n")
     assert fault.remedy == "write it as '120 / (2 * pi) Hz'"
     assert faults(text + "rate: c, with: {frequency: 120 / (2 * pi) Hz}}\n") == []
+
+
+VDP = """\
+quadvis: 1
+name: vdp
+solver: {method: ode4, step: 10 ms}
+stop_time: 1 s
+blocks:
+  slope: {block: math.expression, with: {y: "mu * (1 - x1^2) * x2 - x1", mu: 1}, in: {x1: x1.y, x2: x2.y}}
+  x1: {block: signal.integrator, with: {initial: 2}, in: {u: x2.y}}
+  x2: {block: signal.integrator, in: {u: slope.y}}
+"""
+
+
+def test_rates_of_plain_numbers_say_that_time_has_a_unit() -> None:
+    found = [fault.remedy for fault in faults(VDP)]
+    assert sum(remedy.endswith(INTEGRALS) for remedy in found) == 1
+    right = VDP.replace(
+        'y: "mu * (1 - x1^2) * x2 - x1"', 'first: k * x2, y: "k * (mu * (1 - x1^2) * x2 - x1)"'
+    )
+    assert faults(right.replace("mu: 1", "mu: 1, k: 1 1/s").replace("u: x2.y}", "u: slope.first}")) == []
+
+
+def test_a_speed_for_a_place_is_not_explained_by_it() -> None:
+    text = VDP.replace("initial: 2", "initial: 2 m").replace("u: slope.y", "u: 1 m/s^2")
+    assert faults(text)
+    assert not any(INTEGRALS in fault.remedy for fault in faults(text))
