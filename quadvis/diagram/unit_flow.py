@@ -27,6 +27,7 @@ class UnitFlow(Flow):
         # Of units that do not fit: what there is over what is wanted, of wires and of given values.
         self.ratios: dict[Place, Unit] = {}
         self.given_ratios: dict[Place, Unit] = {}
+        self.integrals: set[Place] = set()  # wires with the integral of a plain number, where none fits
         super().run()
 
     def note(self) -> None:
@@ -97,11 +98,18 @@ class UnitFlow(Flow):
             return True
         wanted = bindings.unit(link.declared.units, wrong)
         self.ratios[link.connection.place] = units[wrong] / wanted
+        if _of_time(units[wrong]) and _of_time(wanted) and self._is_integral(link):
+            self.integrals.add(link.connection.place)
         element = f"[{wrong}]" if len(units) > 1 else ""
         found = f"'{link.wire.source}' has {words(units[wrong])}"
         problem = f"input '{link.port}{element}' takes {words(wanted)}, {found}"
         self.fault(draft.path, link.connection.place, problem, "wire a signal of that unit")
         return False
+
+    def _is_integral(self, link: DraftWire) -> bool:
+        """Say whether a wire comes from a block whose output is in another unit times s."""
+        (unit, *_) = self.nodes[link.wire.block].block.interface.outputs[link.wire.port].units
+        return bool(unit.variables) and any(name == "s" and power > 0 for name, power in unit.dimension)
 
     def _given(self, path: str) -> Iterator[tuple[str, Declared, OpenUnits]]:
         """Yield the parameters and constants that are given, with the units in which they were written."""
@@ -203,3 +211,8 @@ class UnitFlow(Flow):
 def words(unit: Unit) -> str:
     """Return a unit as a message shows it."""
     return str(unit.reduced) if unit.exponents else "no unit"
+
+
+def _of_time(unit: Unit) -> bool:
+    """Say whether a unit is that of a plain number, or a power of s."""
+    return all(name == "s" for name, _ in unit.dimension)

@@ -15,10 +15,10 @@ from quadvis.diagram.flow import Cases
 from quadvis.diagram.unit_flow import UnitFlow, words
 from quadvis.diagram.values import OpenUnits
 from quadvis.errors import Fault, Faults, Place
+from quadvis.errors.rules import ANGLES, INTEGRALS, ruled
 from quadvis.graph.graph import Constant, Node
 from quadvis.units import Unit
 
-ANGLES = "an angle has a dimension of its own here, rad"
 MOST_WORK = 5_000  # blocks that are looked at in all trials together
 
 
@@ -78,8 +78,9 @@ def follow_units(
         found = trial
     for fault in (*blames, *found.faults):
         ratio = (ratios | found.ratios | found.given_ratios).get(fault.place)
-        rule = faults.once(ANGLES) if ratio is not None and _is_angle(ratio) else ""
-        faults.append(replace(fault, remedy="; ".join(filter(None, (fault.remedy, rule)))))
+        rule = ANGLES if ratio is not None and ratio.is_angle else ""
+        rule = rule or (INTEGRALS if fault.place in found.integrals else "")
+        faults.append(replace(fault, remedy=ruled(fault.remedy, rule)))
     found.note()
     return found
 
@@ -90,7 +91,9 @@ def _is_chain(flow: UnitFlow) -> bool:
     Values that do not fit the wires that they meet are reported where they stand, unless they lack only an
     angle.
     """
-    return _count(flow) > 1 and (bool(flow.ratios) or all(map(_is_angle, flow.given_ratios.values())))
+    return _count(flow) > 1 and (
+        bool(flow.ratios) or all(ratio.is_angle for ratio in flow.given_ratios.values())
+    )
 
 
 def _count(flow: UnitFlow) -> int:
@@ -130,7 +133,3 @@ def _blame(drafts: Mapping[str, Draft], value: _Value, count: int) -> Fault:
     problem = f"'{name}' has {words(value.unit)}, with which {count} units do not fit"
     remedy = f"all fit if it is in {words(right)}" if right.exponents else "all fit without a unit"
     return Fault(value.place, f"block '{path}'", problem, remedy)
-
-
-def _is_angle(ratio: Unit) -> bool:
-    return bool(ratio.exponents) and all(name == "rad" for name, _ in ratio.exponents)

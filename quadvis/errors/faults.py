@@ -12,6 +12,7 @@ from typing import ClassVar, NamedTuple, ParamSpec, TypeVar
 
 from quadvis.errors.characters import advice, character_name
 from quadvis.errors.discretion import is_foreign, without_quotes
+from quadvis.errors.rules import each_rule_once
 from quadvis.errors.unknown import UNKNOWN, Unknown
 from quadvis.errors.words import on_one_line, sentence
 
@@ -109,7 +110,8 @@ class DiagramError(QuadvisError):
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         """Keep the faults, sorted by place, without duplicates."""
-        self.faults: list[Fault] = sorted({fault.explained().discreet() for fault in faults})
+        distinct = sorted({fault.explained().discreet() for fault in faults})
+        self.faults: list[Fault] = list(each_rule_once(distinct))
         super().__init__("\n".join(str(fault) for fault in self.faults))
 
 
@@ -140,7 +142,6 @@ class Faults(list[Fault]):
         super().__init__()
         self.subject = ""
         self.warnings: list[Doubt] = []
-        self._explained: set[str] = set()
 
     def append(self, fault: Fault) -> None:
         """Keep a fault; raise `DiagramError` with all faults once they are too many."""
@@ -151,13 +152,6 @@ class Faults(list[Fault]):
     def add(self, place: Place, problem: str, remedy: str = "", *, subject: str | None = None) -> None:
         """Keep a fault about the present subject, or about ``subject``."""
         self.append(Fault(place, self.subject if subject is None else subject, problem, remedy))
-
-    def once(self, rule: str) -> str:
-        """Return a sentence that explains a rule the first time, and "" after that."""
-        if rule in self._explained:
-            return ""
-        self._explained.add(rule)
-        return rule
 
     def warn(self, place: Place, problem: str, remedy: str = "", *, subject: str | None = None) -> None:
         """Keep a warning; the diagram can still run."""

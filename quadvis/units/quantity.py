@@ -8,6 +8,7 @@ from fractions import Fraction
 from functools import lru_cache
 
 from quadvis.errors import quoted
+from quadvis.errors.rules import ANGLES, ruled
 from quadvis.units.grammar import LONGEST, UnitError
 from quadvis.units.unit import Unit, advised
 
@@ -262,8 +263,12 @@ def _require_dimension(text: str, written: Unit, unit: Unit) -> None:
     if not unit.dimension:
         raise UnitError(f"{quoted(text)} has a unit where none belongs", "write a number without unit")
     usual = [name for name in _ladder(str(unit)) if Unit.parse(name).scale >= 1e-3]
-    choice = " or ".join(usual or [str(unit)])
-    raise UnitError(f"{quoted(text)} is in {written}, not in {unit}", f"write it in {choice}")
+    remedy = f"write it in {' or '.join(usual or [str(unit)])}"
+    if (written / unit).is_angle:
+        number, _ = split_quantity(text)
+        turns = f"write it as '{number} / (2 * pi) Hz'" if str(unit) == "Hz" else ""
+        remedy = turns or ruled(remedy, ANGLES)
+    raise UnitError(f"{quoted(text)} is in {written}, not in {unit}", remedy)
 
 
 def _to_si(number: Fraction, unit: Unit, text: str) -> float:

@@ -111,6 +111,11 @@ class Unit:
         """Return whether a quantity can be converted from one unit to the other, such as m and mm."""
         return self.dimension == other.dimension
 
+    @property
+    def is_angle(self) -> bool:
+        """Whether it is a power of rad, such as what rad/s has more than 1/s."""
+        return bool(self.dimension) and all(name == "rad" for name, _ in self.dimension)
+
     @cached_property
     def reduced(self) -> Unit:
         """The same unit with fewer names, if a shorter product exists: s*N/kg/m is 1/s."""

@@ -141,7 +141,7 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
     values |= {
         f"{kind}_{key}": [0.0] * size if size else 0.0 for kind in ("initial", "safe") for key, size in SENT
     }
-    told = {"protocol": PROTOCOL} if name.startswith("hardware.message_") else {}
+    told = {"protocol": PROTOCOL} if name.startswith("hardware.message_") else PARAMETERS.get(name, {})
     if name.startswith("hardware.can_"):
         told = {"protocol": written(request.getfixturevalue("tmp_path")), "message": "actuator"}
         values["port"] = "can:virtual:conformance"
@@ -158,7 +158,6 @@ def subject(request: pytest.FixtureRequest, frames: list[Frame], centres: list[A
         values["initial"] = [0, 1, 0]
     if name in ("mavlink.attitude_target", "mavlink.rate_target", "mavlink.manual_control"):
         values |= {"initial": [0.0, 0.0, 0.1, 0.5], "safe": [0.1, 0.0, 0.0, 0.0]}
-    values |= PARAMETERS.get(name, {})
     required = [key for key, param in block.interface.params.items() if param.required]
     if {"file", "folder"} & {*required}:  # few blocks read or write files, and all tests come by here
         folder = request.getfixturevalue("tmp_path")

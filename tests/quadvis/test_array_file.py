@@ -63,7 +63,9 @@ def test_tables_have_columns_by_name(separator: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "contents", "words"),
     [
-        ("k.txt", b"1", "the arrays of a '.txt' file cannot be read; give one of .csv, .npy, .npz, .mat"),
+        ("k.dat", b"1", "the arrays of a '.dat' file cannot be read; give one of .csv, .txt, .npy, .npz"),
+        ("k.txt", b"K\n1 secret\n", "line 2 is no row of numbers"),
+        ("k.txt", b"K\n1 2\n3\nL\n1\n", "line 3 has 1 numbers, the row above has 2"),
         ("k.csv", b"1,2\n3\n", "its lines are not equally long rows of numbers"),
         ("k.csv", b"a,b\n1,secret\n", "its lines are not all rows of numbers"),
         ("k.csv", b"", "its lines are not equally long rows of numbers"),
@@ -87,8 +89,38 @@ def test_what_is_no_array_is_refused_unquoted(name: str, contents: bytes, words:
 )
 def test_arrays_that_are_no_numbers_are_refused(array: Any, tmp_path: Path) -> None:
     np.save(tmp_path / "k.npy", array)
-    with pytest.raises(QuadvisError, match=r"not finite|no real numbers|shape"):
-        read_arrays(str(tmp_path / "k.npy"))
+    with pytest.raises(QuadvisError, match=r"not finite|no numbers|no real numbers|shape"):
+        chosen(read_arrays(str(tmp_path / "k.npy")), None)
+
+
+NAMED = "# a model\nA\n0 1   # of rows\n-2 -3\n\nB\n0\n1\npoles\n-1+2i, -1-2i\n"
+
+
+def test_names_may_stand_above_the_rows_of_a_text(tmp_path: Path) -> None:
+    (tmp_path / "k.txt").write_text(NAMED.replace(", ", " "))
+    (tmp_path / "k.csv").write_text(NAMED.replace("0 1 ", "0, 1 ").replace("-2 -3", "-2, -3"))
+    for name in ("k.txt", "k.csv"):
+        found = read_arrays(str(tmp_path / name))
+        assert chosen(found, "A").tolist() == [[0, 1], [-2, -3]]
+        assert chosen(found, "B").tolist() == [[0], [1]]
+        assert found["poles"].tolist() == [[-1 + 2j, -1 - 2j]]
+        with pytest.raises(QuadvisError, match="array 'poles' has no real numbers"):
+            chosen(found, "poles")
+
+
+def test_a_column_below_its_name_is_a_table(tmp_path: Path) -> None:
+    (tmp_path / "k.csv").write_text("x\n1\n2\n")
+    found = read_arrays(str(tmp_path / "k.csv"))
+    assert (chosen(found, None).tolist(), chosen(found, "x").tolist()) == ([[1], [2]], [1, 2])
+
+
+def test_single_numbers_of_yaml_are_asked_for_by_name(tmp_path: Path) -> None:
+    (tmp_path / "k.yaml").write_text("K: [1, 2]\ndt: 0.1\nname: gains\n")
+    found = read_arrays(str(tmp_path / "k.yaml"))
+    assert chosen(found, None).tolist() == [1, 2]
+    (tmp_path / "p.yaml").write_text("poles: [-2, -1+3j, -1-3j]\n")
+    assert read_arrays(str(tmp_path / "p.yaml"))["poles"].tolist() == [-2, -1 + 3j, -1 - 3j]
+    assert float(chosen(found, "dt")) == 0.1
 
 
 def test_pickles_are_not_read(tmp_path: Path) -> None:
@@ -97,7 +129,7 @@ def test_pickles_are_not_read(tmp_path: Path) -> None:
         read_arrays(str(tmp_path / "k.npy"))
 
 
-@given(kind=st.sampled_from(["csv", "npy", "npz", "mat", "yaml"]), data=st.binary(max_size=200))
+@given(kind=st.sampled_from(["csv", "txt", "npy", "npz", "mat", "yaml"]), data=st.binary(max_size=200))
 def test_damaged_files_end_in_a_sentence(kind: str, data: bytes) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, f"k.{kind}")

@@ -6,6 +6,7 @@ import pytest
 
 from quadvis.api import load_text
 from quadvis.errors import DiagramError, Fault
+from quadvis.errors.rules import INTEGRALS
 
 # A DC motor with a PI controller of its speed.
 MOTOR = """\
@@ -40,7 +41,10 @@ blocks:
 expect:
   - {signal: speed.y, within: 20 rad/s}
 """
-ANGLES = "an angle has a dimension of its own here, rad"
+ANGLES = (
+    "an angle has a dimension of its own here, rad: an inertia is in kg*m^2/rad, "
+    "a motor's constant in V*s/rad"
+)
 
 
 def faults(text: str) -> list[Fault]:
@@ -139,3 +143,67 @@ def test_a_parameter_that_several_blocks_take_is_one_fault_at_its_value() -> Non
     (told,) = faults(head + axes)
     assert (told.place.line, told.place.column) == (3, 19)
     assert "with which 3 units do not fit; all fit if it is in rad/kg/m^2" in str(told)
+
+
+# A rotor in the units of the textbooks, which leave rad out: its speed is in 1/s.
+ROTOR = """\
+quadvis: 1
+name: rotor
+solver: {method: ode4, step: 1 ms}
+stop_time: 1 s
+blocks:
+  push: {block: signal.gain, with: {factor: 100 1/(kg*m^2)}, in: {u: 0.1 N*m}}
+  speed: {block: signal.integrator, in: {u: push.y}}
+expect:
+  - {signal: speed.y, below: 20 1/s}
+  - {signal: speed.y, of: 0 1/s, within: 20 1/s}
+figures: [{title: rotor, panels: [{title: speed, signals: speed.y, unit: 1/s}]}]
+"""
+
+
+def test_the_units_of_textbooks_fit_where_rad_is_nowhere() -> None:
+    assert faults(ROTOR) == []
+
+
+def test_the_first_use_of_rad_says_once_where_it_is_missing() -> None:
+    found = faults(ROTOR.replace("1/s", "rad/s"))
+    assert [fault.remedy.endswith(ANGLES) for fault in found] == [True, False, False, False]
+    assert [fault.remedy.partition(";")[0] for fault in found] == ["write it in 1/s"] * 3 + [
+        "give it a panel of its own"
+    ]
+
+
+def test_an_angular_frequency_has_its_turns_in_the_remedy() -> None:
+    text = (
+        "quadvis: 1\nname: sine\nrates: {c: 1 kHz}\nstop_time: 1 s\nblocks:\n  sine: {block: sources.sine, "
+    )
+    (fault,) = faults(text + "rate: c, with: {frequency: 120 rad/s}}\n")
+    assert fault.remedy == "write it as '120 / (2 * pi) Hz'"
+    assert faults(text + "rate: c, with: {frequency: 120 / (2 * pi) Hz}}\n") == []
+
+
+VDP = """\
+quadvis: 1
+name: vdp
+solver: {method: ode4, step: 10 ms}
+stop_time: 1 s
+blocks:
+  slope: {block: math.expression, with: {y: "mu * (1 - x1^2) * x2 - x1", mu: 1}, in: {x1: x1.y, x2: x2.y}}
+  x1: {block: signal.integrator, with: {initial: 2}, in: {u: x2.y}}
+  x2: {block: signal.integrator, in: {u: slope.y}}
+"""
+
+
+def test_rates_of_plain_numbers_say_that_time_has_a_unit() -> None:
+    found = [fault.remedy for fault in faults(VDP)]
+    assert sum(remedy.endswith(INTEGRALS) for remedy in found) == 1
+    right = VDP.replace(
+        'y: "mu * (1 - x1^2) * x2 - x1"', 'first: k * x2, y: "k * (mu * (1 - x1^2) * x2 - x1)"'
+    )
+    assert faults(right.replace("mu: 1", "mu: 1, k: 1 1/s").replace("u: x2.y}", "u: slope.first}")) == []
+
+
+def test_a_speed_for_a_place_is_not_explained_by_it() -> None:
+    text = VDP.replace("initial: 2", "initial: 2 m").replace("u: slope.y", "u: 1 m/s^2")
+    assert faults(text)
+    assert not any(INTEGRALS in fault.remedy for fault in faults(text))

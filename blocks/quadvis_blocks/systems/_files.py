@@ -1,46 +1,24 @@
-"""Matrices by name in files: .yaml, .npz, .mat, and texts in which a name stands above its rows."""
+"""Models of linear systems in files."""
 
 from __future__ import annotations
 
-import io
-import zipfile
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.document import YamlList, YamlNode, YamlScalar, parse_yaml
+from quadvis.block import ParameterError
+from quadvis.document.array_file import read_arrays, real
 from quadvis.errors import QuadvisError, quoted
-from quadvis.machine.inputs import read_input
 
-Matrices = Mapping[str, NDArray[np.float64]]
-MOST_BYTES = 10_000_000
-
-
-def read_model(path: str) -> Matrices:
-    """Return the matrices of a file by name, in SI units; QuadvisError says what is wrong with it."""
-    data = read_input(path, MOST_BYTES)
-    kind = path.rpartition(".")[2].lower()
-    if kind in ("yaml", "yml"):
-        found = _of_yaml(path, data)
-    elif kind in ("npz", "mat"):
-        found = _of_arrays(data, kind)
-    else:
-        found = _of_text(data.decode("utf-8", "replace"))
-    for name, matrix in found.items():
-        if not np.isfinite(matrix).all():
-            raise QuadvisError(f"{quoted(name)} has a number that is not finite")
-    return found
+Matrices = Mapping[str, NDArray[Any]]
+read_model = read_arrays  # one reader, so that a file is read once for blocks and for values of parameters
 
 
 def wanted(matrices: Matrices, *names: str) -> NDArray[np.float64]:
-    """Return the matrix that has one of these names; QuadvisError if there is none."""
-    for name in names:
-        if name in matrices:
-            return matrices[name]
-    has = ", ".join(matrices) or "nothing"
-    raise QuadvisError(f"there is no {quoted(names[0])}; it has {has}")
+    """Return the matrix that has one of these names; QuadvisError if there is none of real numbers."""
+    return real(*_found(matrices, names))
 
 
 def polynomials(matrices: Matrices) -> tuple[Any, Any]:
@@ -48,69 +26,55 @@ def polynomials(matrices: Matrices) -> tuple[Any, Any]:
     return wanted(matrices, "numerator", "num").ravel(), wanted(matrices, "denominator", "den").ravel()
 
 
-def _of_arrays(data: bytes, kind: str) -> dict[str, NDArray[np.float64]]:
-    if kind == "npz":
-        try:
-            with np.load(io.BytesIO(data), allow_pickle=False) as held:
-                arrays: dict[str, Any] = {name: held[name] for name in held.files}
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile):
-            raise QuadvisError("it is no archive of arrays of numbers") from None
-    else:
-        arrays = _of_matlab(data)
-    try:
-        return {name: np.atleast_1d(np.asarray(array, float)) for name, array in arrays.items()}
-    except (TypeError, ValueError):
-        raise QuadvisError("it has variables that are no real numbers") from None
+def matrix(matrices: Matrices, name: str) -> NDArray[np.float64]:
+    """Return the matrix of this name, in capitals or not, with two axes."""
+    return np.atleast_2d(wanted(matrices, name, name.lower()))
 
 
-def _of_matlab(data: bytes) -> dict[str, Any]:
-    from scipy.io import loadmat
-
-    try:
-        held = loadmat(io.BytesIO(data))
-    except Exception:  # of a file that is none, scipy raises errors of many kinds
-        raise QuadvisError("it is no MAT file of version 4 to 7.2") from None
-    return {name: value for name, value in held.items() if not name.startswith("__")}
+def model_of(matrices: Matrices, names: str) -> list[NDArray[np.float64]]:
+    """Return the matrices of these names, each of one letter; B is 0 if a file leaves it out."""
+    return [
+        np.zeros((1, 1)) if name == "B" and not {"B", "b"} & {*matrices} else matrix(matrices, name)
+        for name in names
+    ]
 
 
-def _of_yaml(path: str, data: bytes) -> dict[str, NDArray[np.float64]]:
-    root = parse_yaml(data.decode("utf-8", "replace"), path).mapping()
-    return {key.text(): np.atleast_1d(_array(node)) for key, node in root.pairs()}
+def given_model(block: Any, names: str, sampled: bool) -> list[NDArray[np.float64]]:
+    """Return the matrices of a block, by its parameters or by its ``file``; ParameterError if neither says.
+
+    ``sampled`` says that the model is one at the block's rate, with which the ``dt`` of a file must agree.
+    """
+    given = [np.asarray(getattr(block, name)) for name in names]
+    if not block.file:
+        if not any(np.any(each) for each in given):
+            raise ParameterError("A", f"A must be given, or a 'file' with {', '.join(names)}")
+        return given
+    if any(np.any(each) for each in given):
+        raise ParameterError("file", f"file must be left out where one of {', '.join(names)} is given")
+    held = block.read_file("file", read_model)
+    period = float(held["dt"].flat[0]) if "dt" in held else 0.0
+    if period > 0.0 and not sampled:
+        raise ParameterError("model", f"model must be discrete, since the file has one every {period:g} s")
+    if period > 0.0 and abs(block.period - period) > 1e-9 * period:
+        problem = f"file must have a model that is sampled every {block.period:g} s, as the block is"
+        raise ParameterError("file", f"{problem}, got {period:g} s")
+    return model_of(held, names)
 
 
-def _array(node: YamlNode) -> NDArray[np.float64]:
-    try:
-        return np.array(_numbers(node), float)
-    except ValueError:
-        raise node.wrong("a number, a list of numbers, or rows of one length") from None
+def roots(matrices: Matrices) -> tuple[list[complex], list[complex], float]:
+    """Return zeros, poles and gain of a file, which may leave out zeros and gain."""
+    found = [
+        _found(matrices, names)[1].ravel() if any(name in matrices for name in names) else np.array([])
+        for names in (("zeros", "z"), ("gain", "k"))
+    ]
+    poles = _found(matrices, ("poles", "p"))[1].ravel()
+    gain = float(real("gain", found[1])[0]) if found[1].size else 1.0
+    return [complex(zero) for zero in found[0]], [complex(pole) for pole in poles], gain
 
 
-def _numbers(node: YamlNode) -> Any:
-    if isinstance(node, YamlScalar):
-        return float(node.value)
-    if not isinstance(node, YamlList):
-        raise ValueError
-    return [_numbers(child) for child in node]
-
-
-def _of_text(text: str) -> dict[str, NDArray[np.float64]]:
-    rows: dict[str, list[list[float]]] = {}
-    name = ""
-    for number, line in enumerate(text.splitlines(), 1):
-        words = line.partition("#")[0].replace(",", " ").replace(";", " ").split()
-        if len(words) == 1 and words[0].isidentifier() and words[0].lower() not in ("nan", "inf", "infinity"):
-            name = words[0]
-            rows[name] = []
-        elif words:
-            rows.setdefault(name, []).append(_row(words, number, line, rows.get(name, [])))
-    return {name: np.array(values) for name, values in rows.items() if values}
-
-
-def _row(words: list[str], number: int, line: str, above: list[list[float]]) -> list[float]:
-    try:
-        row = [float(word) for word in words]
-    except ValueError:
-        raise QuadvisError(f"line {number} is no row of numbers: {quoted(line.strip())}") from None
-    if above and len(row) != len(above[0]):
-        raise QuadvisError(f"line {number} has {len(row)} numbers, the row above has {len(above[0])}")
-    return row
+def _found(matrices: Matrices, names: tuple[str, ...]) -> tuple[str, NDArray[Any]]:
+    for name in names:
+        if name in matrices:
+            return name, matrices[name]
+    has = ", ".join(matrices) or "nothing"
+    raise QuadvisError(f"there is no {quoted(names[0])}; it has {has}")

@@ -95,7 +95,7 @@ def predicted(block: Any, u: Any) -> Any:
     for row in range(found.size):
         total = 0.0
         for column in range(found.size):
-            total += block.A[row, column] * estimate[column]
+            total += block.transition[row, column] * estimate[column]
         for column in range(u.size):
             total += block.inputs[row, column] * u[column]
         found[row] = total
@@ -111,13 +111,13 @@ def spread(block: Any) -> Any:
         for column in range(size):
             total = 0.0
             for inner in range(size):
-                total += block.A[row, inner] * covariance[inner, column]
+                total += block.transition[row, inner] * covariance[inner, column]
             moved[row, column] = total
     for row in range(size):
         for column in range(row, size):
             total = block.Q[row, column]
             for inner in range(size):
-                total += moved[row, inner] * block.A[column, inner]
+                total += moved[row, inner] * block.transition[column, inner]
             found[row, column] = total
             found[column, row] = total
     return found

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, Derived, In, Out, Param, ParameterError, State, Work
+from quadvis.machine.inputs import read_once
+from quadvis_blocks.systems._files import given_model, model_of, read_model
 from quadvis_blocks.systems._kalman import corrected, corrected_steadily, predicted, spread, steady
 from quadvis_blocks.systems._riccati import refuse_indefinite
 from quadvis_blocks.systems._units import units_for, vector
@@ -22,7 +24,8 @@ class Kalman(Block):
     measurement of this tick. While ``valid`` is false the measurement does not count, and the estimate
     follows the model alone. With ``gain: varying`` the covariance begins at ``spread`` and is carried
     along; with ``steady`` the gain is that of infinite time, computed when the diagram is loaded, as in
-    an observer. Matrices are plain numbers in SI units; ``output_units`` says those of ``x``.
+    an observer. Matrices are plain numbers in SI units; ``output_units`` says those of ``x``. ``file`` holds
+    A, C and, unless it is 0, B in place of the parameters, as for `systems.state_space`.
 
     Measurements are whitened by the Cholesky factor of R and taken one by one in Joseph's form, which
     keeps the covariance symmetric to the bit and free of negative variances. Refused are a Q with a
@@ -31,11 +34,12 @@ class Kalman(Block):
     Source: D. Simon, Optimal State Estimation, sections 5.1, 6.1 (sequential) and 7.3 (steady).
     """
 
-    A = Param(type="float64[n,n]", doc="A of the model")
+    A = Param(ZERO, type="float64[n,n]", doc="A of the model")
     B = Param(ZERO, type="float64[h,m]", doc="B of the model; left out if nothing is known of its input")
-    C = Param(type="float64[p,n]", doc="C of the model, a row for each measurement")
-    Q = Param(type="float64[n,n]", doc="covariance of the noise of the states, symmetric")
-    R = Param(type="float64[p,p]", doc="covariance of the noise of the measurements, symmetric")
+    C = Param(ZERO, type="float64[p,n]", doc="C of the model, a row for each measurement")
+    file = Param("", type="file", doc="a file with A, C and B, in their place")
+    Q = Param(type="float64[q,q]", doc="covariance of the noise of the states, symmetric")
+    R = Param(type="float64[r,r]", doc="covariance of the noise of the measurements, symmetric")
     gain = Param("varying", choices=("steady", "varying"), doc="whether the gain is that of infinite time")
     spread = Param(
         (1e6,), type="float64[i]", min=0.0, doc="variances of the states at the start; one for all"
@@ -46,16 +50,17 @@ class Kalman(Block):
     y = In("float64[1?]", unit="b", doc="the measurement; of one also a scalar")
     valid = In("bool", default=True, doc="false where there is no measurement")
     x = Out("float64[1]", doc="the estimate of the states")
-    variances = Out("float64[n]", doc="the variances of the estimate, in SI units")
-    state = State("float64[n]", doc="the estimate before the measurement")
-    covariance = State("float64[n,n]", doc="its covariance")
-    estimate = Work("float64[n]")
-    remaining = Work("float64[n,n]")
-    inputs = Derived("float64[n,1]", doc="B")
-    whitening = Derived("float64[p,p]", doc="the inverse of the Cholesky factor of R")
-    seen = Derived("float64[p,n]", doc="that times C")
-    settled = Derived("float64[n,p]", doc="the steady gain for whitened measurements")
-    after = Derived("float64[n,n]", doc="the steady covariance after a measurement")
+    variances = Out("float64[1]", doc="the variances of the estimate, in SI units")
+    state = State("float64[1]", doc="the estimate before the measurement")
+    covariance = State("float64[1,1]", doc="its covariance")
+    estimate = Work("float64[1]")
+    remaining = Work("float64[1,1]")
+    transition = Derived("float64[1,1]", doc="A")
+    inputs = Derived("float64[1,1]", doc="B")
+    whitening = Derived("float64[1,1]", doc="the inverse of the Cholesky factor of R")
+    seen = Derived("float64[1,1]", doc="that times C")
+    settled = Derived("float64[1,1]", doc="the steady gain for whitened measurements")
+    after = Derived("float64[1,1]", doc="the steady covariance after a measurement")
 
     example = """
         height: {block: sources.ramp, rate: fast, with: {slope: 0.5 m/s}}
@@ -72,23 +77,41 @@ class Kalman(Block):
     """
 
     @classmethod
-    def ports(cls, A: Any, B: Any, C: Any, gain: int, output_units: str) -> dict[str, Any]:
+    def ports(cls, A: Any, B: Any, C: Any, gain: int, file: str, output_units: str) -> dict[str, Any]:
         """Return ports for the sizes of the model, and the methods of the gain."""
-        states, inputs = len(A), B.shape[1]
+        a, b, c = model_of(read_once(read_model, file), "ABC") if file else (A, B, C)
+        n, m, p = len(a), b.shape[1], len(c)
         methods = {"output": _steady_output, "update": _steady_update} if gain == STEADY else {}
+        derived = {
+            "transition": (n, n),
+            "inputs": (n, m),
+            "whitening": (p, p),
+            "seen": (p, n),
+            "settled": (n, p),
+            "after": (n, n),
+        }
         return methods | {
-            "u": In(vector(inputs), unit="a", default=[0.0] * inputs if inputs > 1 else 0.0, doc=cls.u.doc),
-            "y": In(vector(len(C)), unit="b", doc=cls.y.doc),
-            "x": Out(f"float64[{states}]", unit=units_for(output_units, states), doc=cls.x.doc),
-            "inputs": Derived(f"float64[{states},{inputs}]", doc=cls.inputs.doc),
+            "u": In(vector(m), unit="a", default=[0.0] * m if m > 1 else 0.0, doc=cls.u.doc),
+            "y": In(vector(p), unit="b", doc=cls.y.doc),
+            "x": Out(f"float64[{n}]", unit=units_for(output_units, n), doc=cls.x.doc),
+            "variances": Out(f"float64[{n}]", doc=cls.variances.doc),
+            "state": State(f"float64[{n}]", doc=cls.state.doc),
+            "covariance": State(f"float64[{n},{n}]", doc=cls.covariance.doc),
+            "estimate": Work(f"float64[{n}]"),
+            "remaining": Work(f"float64[{n},{n}]"),
+            **{
+                name: Derived(f"float64[{rows},{columns}]", doc=getattr(cls, name).doc)
+                for name, (rows, columns) in derived.items()
+            },
         }
 
     def check(self) -> None:
         """Refuse matrices that do not fit each other; compute what does not change."""
-        states, outputs = len(self.A), len(self.C)
-        b = np.zeros((states, self.B.shape[1])) if not np.any(self.B) else self.B
+        a, b, c = given_model(self, "ABC", sampled=True)
+        states, outputs = len(a), len(c)
+        b = b if np.any(b) else np.zeros((states, b.shape[1]))
         for name, matrix, shape in (
-            ("B", b, (states, b.shape[1])), ("C", self.C, (outputs, states)), ("A", self.A, (states, states)),
+            ("B", b, (states, b.shape[1])), ("C", c, (outputs, states)), ("A", a, (states, states)),
         ):  # fmt: skip
             if matrix.shape != shape or not np.isfinite(matrix).all():
                 found = " x ".join(map(str, matrix.shape))
@@ -101,14 +124,14 @@ class Kalman(Block):
             given = getattr(self, name)
             if len(given) not in (1, states) or not np.isfinite(given).all():
                 raise ParameterError(name, f"{name} must be {states} finite values, or one for all")
-        self.inputs = np.asarray(b, float)
+        self.transition, self.inputs = np.asarray(a, float), np.asarray(b, float)
         self.whitening = np.linalg.inv(np.linalg.cholesky(self.R))
-        self.seen = self.whitening @ self.C
+        self.seen = self.whitening @ c
         if not np.isfinite(self.seen).all():
             raise ParameterError("R", "R must be such that its inverse is finite")
         self.settled, self.after = np.zeros((states, outputs)), np.zeros((states, states))
         if self.gain == STEADY:
-            self.settled, self.after = steady(self.A, self.seen, self.Q)
+            self.settled, self.after = steady(a, self.seen, self.Q)
 
     def start(self) -> None:
         """Begin with the initial estimate and its variances."""

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 
 from quadvis.block import Block, Derived, In, Out, Param, ParameterError
+from quadvis.machine.inputs import read_once
+from quadvis_blocks.systems._files import given_model, model_of, read_model
 from quadvis_blocks.systems._models import Model
 from quadvis_blocks.systems._products import row_times
 from quadvis_blocks.systems._riccati import lqr_gain, refuse_indefinite
@@ -14,6 +16,7 @@ from quadvis_blocks.systems._sampling import ZOH, sampled
 from quadvis_blocks.systems._units import units_for, vector
 
 CONTINUOUS, SAMPLED, DISCRETE = range(3)
+ZERO = ((0.0,),)
 
 
 class Lqr(Block):
@@ -25,16 +28,20 @@ class Lqr(Block):
     loaded, and equals python-control's ``lqr`` and ``dlqr``. Matrices are plain numbers in SI units;
     ``output_units`` says the unit of ``u``, which is a scalar if B has one column.
 
+    ``file`` holds A and B in place of the parameters, as for `systems.state_space`, whose file it may be;
+    with ``dt`` (s) it is for ``model: discrete``.
+
     Refused are a Q with a negative eigenvalue, an R that is not positive definite, and an unstable mode that
     the input does not reach.
 
     Source: B. D. O. Anderson, J. B. Moore, Optimal Control: Linear Quadratic Methods, chapters 2 and 3.
     """
 
-    A = Param(type="float64[n,n]", doc="A of the model")
-    B = Param(type="float64[n,m]", doc="B of the model, a column for each input")
-    Q = Param(type="float64[n,n]", doc="weight of the states, symmetric")
-    R = Param(type="float64[m,m]", doc="weight of the inputs, symmetric")
+    A = Param(ZERO, type="float64[n,n]", doc="A of the model")
+    B = Param(ZERO, type="float64[n,m]", doc="B of the model, a column for each input")
+    file = Param("", type="file", doc="a file with A and B, in their place")
+    Q = Param(type="float64[p,p]", doc="weight of the states, symmetric")
+    R = Param(type="float64[q,q]", doc="weight of the inputs, symmetric")
     model = Param(
         "continuous", choices=("continuous", "sampled", "discrete"), doc="what A and B are, see above"
     )
@@ -54,9 +61,10 @@ class Lqr(Block):
     """
 
     @classmethod
-    def ports(cls, A: Any, B: Any, output_units: str) -> dict[str, Any]:
+    def ports(cls, A: Any, B: Any, file: str, output_units: str) -> dict[str, Any]:
         """Return ports for the sizes of the model."""
-        states, inputs = len(A), B.shape[1]
+        a, b = model_of(read_once(read_model, file), "AB") if file else (A, B)
+        states, inputs = len(a), b.shape[1]
         return {
             "x": In(vector(states), unit="a", doc=cls.x.doc),
             "target": In(
@@ -73,15 +81,17 @@ class Lqr(Block):
 
     def check(self) -> None:
         """Compute the gain; refuse a model and weights for which there is none."""
-        states, inputs = len(self.A), self.B.shape[1]
-        if len(self.B) != states:
-            raise ParameterError("B", f"B must have {states} rows, one for each state, got {len(self.B)}")
-        for name in "AB":
-            if not np.isfinite(getattr(self, name)).all():
+        a, b = given_model(self, "AB", sampled=self.model == DISCRETE)
+        states, inputs = len(a), b.shape[1]
+        if len(b) != states:
+            raise ParameterError("B", f"B must have {states} rows, one for each state, got {len(b)}")
+        if a.shape != (states, states):
+            raise ParameterError("A", f"A must be {states} x {states}, got {states} x {a.shape[1]}")
+        for name, matrix in (("A", a), ("B", b)):
+            if not np.isfinite(matrix).all():
                 raise ParameterError(name, f"{name} must be finite")
         refuse_indefinite("Q", np.asarray(self.Q), states)
         refuse_indefinite("R", np.asarray(self.R), inputs, positive=True)
-        a, b = self.A, self.B
         if self.model == SAMPLED:
             if np.isnan(self.period):
                 self.gain = np.zeros((inputs, states))

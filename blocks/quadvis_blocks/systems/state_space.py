@@ -8,7 +8,7 @@ import numpy as np
 
 from quadvis.block import Block, Derived, In, Out, Param, ParameterError, State
 from quadvis.machine.inputs import read_once
-from quadvis_blocks.systems._files import read_model, wanted
+from quadvis_blocks.systems._files import matrix, read_model
 from quadvis_blocks.systems._models import Model
 from quadvis_blocks.systems._of_control import matrices_of, method_of
 from quadvis_blocks.systems._products import row_times
@@ -122,9 +122,8 @@ class StateSpace(Sampled, Block):
 
 def _matrices(held: Any) -> tuple[Any, Any, Any, Any]:
     """Return the matrices of a file."""
-    a, b, c = (np.atleast_2d(wanted(held, name, name.lower())) for name in "ABC")
-    d = held.get("D", held.get("d", np.zeros((len(c), b.shape[1]))))
-    return a, b, c, np.atleast_2d(d)
+    a, b, c = (matrix(held, name) for name in "ABC")
+    return a, b, c, matrix(held, "D") if "D" in held or "d" in held else np.zeros((len(c), b.shape[1]))
 
 
 def _fitting(a: Any, b: Any, c: Any, d: Any) -> Model:
@@ -138,11 +137,11 @@ def _fitting(a: Any, b: Any, c: Any, d: Any) -> Model:
         "C": (outputs, states),
         "D": (outputs, inputs),
     }
-    for (name, shape), matrix in zip(wanted_shapes.items(), (a, b, c, d), strict=True):
-        if matrix.shape != shape:
-            wanted_words, found = (f"{rows} x {columns}" for rows, columns in (shape, matrix.shape))
+    for (name, shape), given in zip(wanted_shapes.items(), (a, b, c, d), strict=True):
+        if given.shape != shape:
+            wanted_words, found = (f"{rows} x {columns}" for rows, columns in (shape, given.shape))
             raise ParameterError(name, f"{name} must be {wanted_words}, got {found}")
-        if not np.isfinite(matrix).all():
+        if not np.isfinite(given).all():
             raise ParameterError(name, f"{name} must be finite")
     return Model(a, b, c, d)
 

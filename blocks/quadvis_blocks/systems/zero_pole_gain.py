@@ -8,6 +8,8 @@ import numpy as np
 
 from quadvis.block import Block, Param, ParameterError
 from quadvis.errors import QuadvisError, quoted
+from quadvis.machine.inputs import read_once
+from quadvis_blocks.systems._files import read_model, roots
 from quadvis_blocks.systems._lti import Lti, lti
 from quadvis_blocks.systems._models import of_roots, paired
 from quadvis_blocks.systems._of_control import method_of, roots_text
@@ -23,6 +25,8 @@ class ZeroPoleGain(Lti, Sampled, Block):
     complex ones in conjugate pairs, ``poles: -2, -1+3j, -1-3j``. It runs as a chain of sections of order 2,
     which is accurate for systems of high order. ``method``, direct feedthrough and start are those of
     `systems.transfer_function`; with ``discrete`` the zeros and poles are in z.
+    ``file`` holds ``zeros``, ``poles`` and ``gain`` (or ``z``, ``p``, ``k``) in place of the parameters, as
+    for `systems.transfer_function`; its gain is times the block's, which brings the unit.
     ``ZeroPoleGain.of(system)`` takes a system of python-control.
 
     Source: G. F. Franklin, J. D. Powell, M. Workman, Digital Control of Dynamic Systems, chapter 6.
@@ -30,6 +34,7 @@ class ZeroPoleGain(Lti, Sampled, Block):
 
     zeros = Param("", type="str", doc="the zeros, apart by commas or blanks; none by default")
     poles = Param("", type="str", doc="the poles")
+    file = Param("", type="file", doc="a file with zeros, poles and gain, in their place")
 
     example = """
         force: {block: sources.step, rate: continuous, with: {after: 2 N}}
@@ -53,14 +58,17 @@ class ZeroPoleGain(Lti, Sampled, Block):
         return cls(**given | method_of(system) | parameters)
 
     @classmethod
-    def ports(cls, zeros: str, poles: str, method: int) -> dict[str, Any]:
+    def ports(cls, zeros: str, poles: str, method: int, file: str) -> dict[str, Any]:
         """Return states for the poles."""
-        above, below = len(_roots("zeros", zeros)), len(_roots("poles", poles))
+        if file:
+            above, below = map(len, roots(read_once(read_model, file))[:2])
+        else:
+            above, below = len(_roots("zeros", zeros)), len(_roots("poles", poles))
         return lti(max(below, 1), method == CONTINUOUS, above == below or method in DIRECT)
 
     def check(self) -> None:
         """Refuse roots that are none, and a system that is not causal."""
-        zeros, poles = _roots("zeros", self.zeros), _roots("poles", self.poles)
+        zeros, poles, gain = self._given()
         if len(zeros) > len(poles):
             problem = f"zeros must be no more than poles, {len(poles)}, got {len(zeros)}"
             raise ParameterError("zeros", f"{problem}; add a pole, -N, as a filter")
@@ -70,14 +78,30 @@ class ZeroPoleGain(Lti, Sampled, Block):
                 if 0.0 in (*zeros, *poles):
                     problem = "method must be another one than matched, which needs a finite gain at 0"
                     raise ParameterError("method", f"{problem} other than 0")
-                exact = matched(zeros, poles, 1.0, self.period)
-            model = self.computed(of_roots(zeros, poles, 1.0), exact)
+                exact = matched(zeros, poles, gain, self.period)
+            model = self.computed(of_roots(zeros, poles, gain), exact)
         self.take(model, discrete=self.method != CONTINUOUS)
 
     def picture_formula(self) -> tuple[str, str]:
         """Return numerator and denominator as products."""
-        zeros, poles = _roots("zeros", self.zeros), _roots("poles", self.poles)
-        return of_factors(zeros, poles, self.gain, "z" if self.method == DISCRETE else "s")
+        zeros, poles, gain = self._given()
+        return of_factors(zeros, poles, gain * self.gain, "z" if self.method == DISCRETE else "s")
+
+    def _given(self) -> tuple[list[complex], list[complex], float]:
+        """Return zeros, poles and gain, by the parameters or by the file."""
+        if not self.file:
+            return _roots("zeros", self.zeros), _roots("poles", self.poles), 1.0
+        if self.zeros or self.poles:
+            raise ParameterError("file", "file must be left out where zeros or poles are given")
+        held = self.read_file("file", read_model)
+        self.suits(held)
+        zeros, poles, gain = roots(held)
+        for name, found in (("zeros", zeros), ("poles", poles)):
+            if not paired(found):
+                raise ParameterError(
+                    "file", f"file must have the conjugate of each complex number of its {name}"
+                )
+        return zeros, poles, gain
 
 
 def _roots(name: str, text: str) -> list[complex]:

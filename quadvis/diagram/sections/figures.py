@@ -37,6 +37,7 @@ from quadvis.diagram.times import SECOND
 from quadvis.diagram.unit_flow import words
 from quadvis.document import YamlList, YamlMap, YamlNode, YamlScalar, parse_yaml
 from quadvis.errors import UNKNOWN, DiagramError, Fault, Faults, Place, Unknown, known, quoted
+from quadvis.errors.rules import ANGLES, ruled
 from quadvis.graph.graph import Wire
 from quadvis.output.figures import Figure, Panel, Trace
 from quadvis.output.stretch import NANOSECONDS, stamp
@@ -176,7 +177,8 @@ class FigureReader:
         text, unit = found.selection.text, found.selection.unit
         if not shown.dimension_equals(unit):
             problem = f"'{text}' has {words(unit)}, the panel is in {words(shown)}"
-            self.faults.add(node.place, problem, "give it a panel of its own")
+            rule = ANGLES if (unit / shown).is_angle else ""
+            self.faults.add(node.place, problem, ruled("give it a panel of its own", rule))
 
 
 def _some(node: YamlNode) -> list[YamlNode]:

@@ -116,3 +116,19 @@ blocks:
 def test_a_model_that_cannot_be_is_refused(wrong: dict[str, Any], problem: str) -> None:
     with pytest.raises(ParameterError, match=problem):
         Kalman(**MOTION | wrong)
+
+
+def test_the_model_may_stand_in_a_file(tmp_path: Path) -> None:
+    a, b, c = [[1.0, 0.1], [0.0, 1.0]], [[0.0], [0.1]], [[1.0, 0.0]]
+    weights: dict[str, Any] = {"Q": [[1e-4, 0.0], [0.0, 1e-2]], "R": [[0.04]]}
+    (tmp_path / "m.yaml").write_text(f"A: {a}\nB: {b}\nC: {c}\ndt: 0.1\n")
+    held, given = (
+        Kalman(file=str(tmp_path / "m.yaml"), **weights, period=0.1),
+        Kalman(A=a, B=b, C=c, **weights),
+    )
+    signals: dict[str, Any] = {"y": [0.0, 1.0, 3.0], "u": [1.0, 0.0, 2.0], "rate": "10 Hz"}
+    assert np.array_equal(drive(held, **signals).x, drive(given, **signals).x)
+    with pytest.raises(ParameterError, match="A must be given, or a 'file' with A, B, C"):
+        Kalman(**weights)
+    with pytest.raises(ParameterError, match=r"file must have a model that is sampled every 0\.2 s"):
+        Kalman(file=str(tmp_path / "m.yaml"), **weights, period=0.2)

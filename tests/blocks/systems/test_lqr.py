@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import control
@@ -64,3 +65,32 @@ def test_weights_that_rounding_makes_negative_are_taken() -> None:
 def test_a_design_that_cannot_be_is_refused(wrong: dict[str, Any], problem: str) -> None:
     with pytest.raises(ParameterError, match=problem):
         Lqr(**DOUBLE | wrong)
+
+
+@pytest.mark.parametrize("kind", ["txt", "npz", "yaml"])
+def test_the_model_may_stand_in_a_file(kind: str, tmp_path: Path) -> None:
+    path = str(tmp_path / f"cart.{kind}")
+    if kind == "npz":
+        np.savez(path, A=CART["A"], B=CART["B"], C=np.eye(4))
+    else:
+        rows = {name: "\n".join(" ".join(map(str, row)) for row in CART[name]) for name in "AB"}
+        yaml = f"A: {CART['A']}\nB: {CART['B']}\n"
+        Path(path).write_text(yaml if kind == "yaml" else f"A\n{rows['A']}\nB\n{rows['B']}\n")
+    block = Lqr(file=path, Q=CART["Q"], R=CART["R"])
+    assert block.gain == pytest.approx(np.array(K_CART), rel=1e-8)
+    assert drive(block, x=[[1.0, 0.0, 0.0, 0.0]]).u == pytest.approx([3.1622776601683795])
+
+
+def test_a_model_is_given_once_and_at_its_rate(tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text("A: [[0.5]]\nB: [[1]]\ndt: 0.1\n")
+    weights: dict[str, Any] = {"file": str(tmp_path / "m.yaml"), "Q": [[1.0]], "R": [[1.0]]}
+    wanted = control.dlqr([[0.5]], [[1.0]], [[1.0]], [[1.0]])[0]
+    assert Lqr(**weights, model="discrete", period=0.1).gain == pytest.approx(wanted)
+    with pytest.raises(ParameterError, match="file must be left out where one of A, B is given"):
+        Lqr(**weights, A=[[1.0]])
+    with pytest.raises(ParameterError, match=r"model must be discrete, since the file has one every 0\.1 s"):
+        Lqr(**weights)
+    with pytest.raises(ParameterError, match=r"file must have a model that is sampled every 0\.2 s"):
+        Lqr(**weights, model="discrete", period=0.2)
+    with pytest.raises(ParameterError, match="A must be given, or a 'file' with A, B"):
+        Lqr(Q=[[1.0]], R=[[1.0]])

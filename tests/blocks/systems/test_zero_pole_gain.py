@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import control
 import numpy as np
 import pytest
+import scipy.io
 import scipy.signal
 
 from quadvis.block import ParameterError
@@ -81,3 +83,28 @@ def test_a_system_of_python_control_becomes_a_block() -> None:
 def test_what_is_no_system_is_refused(wrong: dict[str, Any], problem: str) -> None:
     with pytest.raises(ParameterError, match=problem):
         ZeroPoleGain(**wrong)
+
+
+@pytest.mark.parametrize("kind", ["txt", "npz", "mat", "yaml"])
+def test_the_roots_may_stand_in_a_file(kind: str, tmp_path: Path) -> None:
+    path, poles = tmp_path / f"g.{kind}", [-2.0, -1 + 3j, -1 - 3j]
+    if kind == "npz":
+        np.savez(path, z=np.array([-1.0]), p=np.array(poles), k=5.0)
+    elif kind == "mat":
+        scipy.io.savemat(path, {"z": [[-1.0]], "p": np.array(poles)[:, None], "k": 5.0})
+    else:
+        path.write_text("zeros\n-1\npoles\n-2 -1+3j -1-3j\ngain\n5\n" if kind == "txt" else
+            "zeros: [-1]\npoles: [-2, -1+3j, -1-3j]\ngain: 5\n")  # fmt: skip
+    held = drive(ZeroPoleGain(file=str(path)), u=1.0, rate="100 Hz", steps=101)
+    given = drive(ZeroPoleGain(zeros="-1", poles="-2 -1+3j -1-3j", gain=5.0), u=1.0, rate="100 Hz", steps=101)
+    assert held.y == pytest.approx(given.y, rel=1e-12)
+    with pytest.raises(ParameterError, match="file must be left out where zeros or poles are given"):
+        ZeroPoleGain(file=str(path), poles="-1")
+
+
+def test_a_file_with_half_a_pair_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "g.txt").write_text("poles\n-1+3j -2\ngain\n1\n")
+    with pytest.raises(
+        ParameterError, match="file must have the conjugate of each complex number of its poles"
+    ):
+        ZeroPoleGain(file=str(tmp_path / "g.txt"))
