@@ -24,8 +24,10 @@ from quadvis.realtime.guardian import (
     Watch,
     guard,
     looked,
+    supervisor_lifeline,
 )
 from quadvis.realtime.heartbeat import Patience
+from quadvis.realtime.lifeline import Lifeline
 from quadvis.realtime.outlet import Outlet, OutputPort
 from quadvis.realtime.schedule import NANOSECONDS
 from quadvis.realtime.shared_ports import SharedPorts
@@ -55,6 +57,7 @@ class Guard:
     ) -> None:
         self._ports: tuple[OutputPort, ...] = ()
         self._looked = looked(words)
+        self._lifeline = Lifeline(supervisor_lifeline(words))
         self._link, self._theirs = context.Pipe()
         setup = GuardianSetup(
             (),
@@ -70,10 +73,12 @@ class Guard:
         self._started = self._lost = False
 
     def start(self) -> None:
-        """Start it: it waits for its ports."""
+        """Start it: it waits for its ports; this thread is the one that calls `close`."""
+        self._lifeline.make()
         with launching():
             self.process.start()
         self._started = True
+        self._lifeline.hold()  # and it looks there once it has its ports
         self._theirs.close()
 
     def open(self, ports: Sequence[OutputPort], announce: Announce) -> None:
@@ -120,16 +125,25 @@ class Guard:
         if not self._started:
             return []
         self._started = False
+        try:
+            if self._ends():
+                return []
+        finally:
+            self._lifeline.release()
+        shared = SharedPorts()
+        commands = [port for port in self._ports if not port.news]
+        return [sentence for port in commands for sentence in _in_its_place(port, shared)]
+
+    def _ends(self) -> bool:
+        """Let its process end, orderly if possible; return whether it was."""
         self._say(Order.CLOSE)
         held = max([port.held for port in self._ports], default=0) / NANOSECONDS
         self.process.join(0 if self._lost else END + held)
         if self.process.exitcode == 0:
-            return []
+            return True
         self.process.kill()
         self.process.join()
-        shared = SharedPorts()
-        commands = [port for port in self._ports if not port.news]
-        return [sentence for port in commands for sentence in _in_its_place(port, shared)]
+        return False
 
     def _receive(self) -> Any:
         try:

@@ -27,6 +27,7 @@ from quadvis.machine.interrupts import leave_to_parent
 from quadvis.machine.mailbox import Mailbox
 from quadvis.machine.ports import ChannelError, PortError
 from quadvis.realtime.heartbeat import Heartbeat, Patience, Sign
+from quadvis.realtime.lifeline import SIZE, Vigil
 from quadvis.realtime.lives import Lives
 from quadvis.realtime.news import NewsOutlet, news_of
 from quadvis.realtime.options import HIGHEST, RealTime
@@ -122,9 +123,14 @@ def looked(words: Any) -> Any:
     return memoryview(words).cast("B").cast("q")[-1:]
 
 
+def supervisor_lifeline(words: Any) -> Any:
+    """Return the words before that: the lifeline of the supervisor."""
+    return memoryview(words).cast("B").cast("q")[-1 - SIZE : -1]
+
+
 def words_for(ports: int) -> int:
     """Return the number of words of the guardian of so many ports."""
-    return ports * OUTBOX + 1
+    return ports * OUTBOX + SIZE + 1
 
 
 def _newest_frame(box: Mailbox) -> bytes | None:
@@ -144,6 +150,7 @@ class Guardian:
         self._hearts = [Heartbeat(patience, time.monotonic_ns) for patience in setup.patiences]
         self._supervisor, self._applications, self._vital = Lives(), Lives(), Lives()
         self._supervisor.watch(setup.supervisor)
+        self._vigil = Vigil(supervisor_lifeline(setup.words), setup.standing.priority)
         shortest = min([patience.allowed // LOOKS for patience in setup.patiences], default=LONGEST_LOOK)
         self._look_every = min(max(shortest, SHORTEST_LOOK), LONGEST_LOOK)
         self._held = max([port.held for port in setup.ports], default=0)
@@ -213,8 +220,8 @@ class Guardian:
         self._supervisor.look()
         self._applications.look()
         self._vital.look()
-        host_lost = self._supervisor.any_ended and self._setup.on_host_loss == SAFE
-        if host_lost or self._vital.any_ended:
+        host_lost = self._supervisor.any_ended or self._vigil.has_ended
+        if (host_lost and self._setup.on_host_loss == SAFE) or self._vital.any_ended:
             self._make_safe()
         if self.told_to_end and not self.safe:
             self._make_safe(Alarm("the guardian was told to end"))
@@ -280,6 +287,7 @@ class Guardian:
         due = min([outlet.due for outlet in self._outlets if outlet.is_open], default=now + LONGEST_LOOK)
         until = min(due, now + self._look_every)
         sources: list[Any] = [*self._supervisor.descriptors, *self._applications.descriptors]
+        sources += self._vigil.descriptors
         sources += [descriptor for heart in self._hearts for descriptor in heart.descriptors]
         sources += [self._link] if self._listening else []
         select.select(sources, [], [], max(0, until - now) / NANOSECONDS)

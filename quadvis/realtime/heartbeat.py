@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
@@ -11,9 +9,8 @@ from typing import Any
 
 from quadvis.diagram.sections.overload import STOP, OverloadLimits
 from quadvis.realtime import control
-from quadvis.realtime.lifeline import Lifeline
+from quadvis.realtime.lifeline import Vigil
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
-from quadvis.realtime.system import raise_thread
 
 
 @dataclass(frozen=True)
@@ -63,21 +60,12 @@ class Heartbeat:
         self.patience, self._now = patience, now
         self._control = memoryview(patience.words).cast("B").cast("q")
         self._done, self._seen = 0, 0
-        self._has_died = False
-        self._cut = -1  # a descriptor that becomes readable when the loop's thread has ended
+        self._vigil: Vigil | None = None
 
     def hold_on(self, priority: int) -> None:
         """Take the lifeline of a loop that has started: its end is then seen in the moment of its death."""
-        if self._cut < 0 and self._control[control.START]:
-            self._cut = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
-            threading.Thread(target=self._wait_for_end, args=(priority,), daemon=True).start()
-
-    def _wait_for_end(self, priority: int) -> None:
-        if priority:
-            raise_thread(priority)
-        Lifeline(self._control[control.LIFELINE]).wait()
-        self._has_died = True
-        os.eventfd_write(self._cut, 1)
+        if self._vigil is None and self._control[control.START]:
+            self._vigil = Vigil(self._control[control.LIFELINE], priority)
 
     def look(self) -> Sign:
         """Return what the loop does."""
@@ -99,7 +87,11 @@ class Heartbeat:
     @property
     def descriptors(self) -> list[int]:
         """What becomes readable when the loop dies, for ``select``."""
-        return [self._cut] if self._cut >= 0 and not self._has_died else []
+        return self._vigil.descriptors if self._vigil is not None else []
+
+    @property
+    def _has_died(self) -> bool:
+        return self._vigil is not None and self._vigil.has_ended
 
     @property
     def complaint(self) -> str:

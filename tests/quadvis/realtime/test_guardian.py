@@ -27,6 +27,7 @@ from quadvis.realtime.guardian import (
     Standing,
     Watch,
     outboxes,
+    supervisor_lifeline,
     words_for,
 )
 from quadvis.realtime.heartbeat import Patience
@@ -48,11 +49,10 @@ class Rig:
     def __init__(self, lines: list[Pty], on_host_loss: str = SAFE, lasting: bool = True) -> None:
         self.ptys = lines
         self.control = np.zeros(control.WORDS, np.int64)
-        self.loop_ends = threading.Event()
-        held = threading.Event()
-        threading.Thread(target=self.live, args=(held,), daemon=True).start()
-        held.wait()
         self.words = np.zeros(words_for(len(lines)), np.int64)
+        self.loop_ends, self.host_ends = threading.Event(), threading.Event()
+        self.live(self.control[control.LIFELINE], self.loop_ends)
+        self.live(supervisor_lifeline(self.words), self.host_ends)
         self.link, theirs = Pipe()
         self.started: list[subprocess.Popen[bytes]] = []
         self.supervisor = self.process()
@@ -69,13 +69,19 @@ class Rig:
         self.guardian = Guardian(setup)
         self.boxes = outboxes(self.words)
 
-    def live(self, held: threading.Event) -> None:
-        """Be the thread of the loop."""
-        line = Lifeline(self.control[control.LIFELINE])
+    @staticmethod
+    def live(words: Any, end: threading.Event) -> None:
+        """Have a thread live until it is to end."""
+        line, held = Lifeline(words), threading.Event()
         line.make()
-        line.hold()
-        held.set()
-        self.loop_ends.wait()
+
+        def hold() -> None:
+            line.hold()
+            held.set()
+            end.wait()
+
+        threading.Thread(target=hold, daemon=True).start()
+        held.wait()
 
     def process(self) -> subprocess.Popen[bytes]:
         """Start a process that does nothing."""
@@ -239,6 +245,19 @@ def test_the_death_of_the_host_means_what_the_diagram_says(rig: Any, word: str) 
     made.until(lambda: made.guardian._supervisor.any_ended)
     made.guardian.look()
     assert made.guardian.safe == (word == SAFE)
+    made.application.kill()
+    made.stays_safe()
+
+
+@pytest.mark.parametrize("word", [CONTINUE, STOP, SAFE])
+def test_it_is_noticed_while_the_process_of_the_host_still_gives_its_memory_back(rig: Any, word: str) -> None:
+    made = rig(on_host_loss=word)
+    made.follow()
+    made.host_ends.set()
+    made.until(lambda: made.guardian._vigil.has_ended)
+    made.guardian.look()
+    assert made.guardian.safe == (word == SAFE)
+    assert made.supervisor.poll() is None
     made.application.kill()
     made.stays_safe()
 
