@@ -34,6 +34,8 @@ from quadvis.errors.characters import (
 # length of the file explains.
 MAX_NODES, LEAST_CHARACTERS = 100_000, 4
 MAX_DEPTH = 50
+# Repeated keys of a map, after which the rest of the file is not read: it takes long and says no more.
+MOST_REPEATED = 1000
 
 # Control characters, line breaks that editors do not count, and signs that reorder the visible text.
 FORBIDDEN = re.compile(
@@ -224,8 +226,17 @@ class Composer:
         node.key = key.value
         if key.value in parent.keys:
             level.doubles.append((key, node))
+            if len(level.doubles) > MOST_REPEATED:
+                raise self._repeated(parent, level.doubles)
         else:
             parent.keys[key.value], parent.values[key.value] = key, node
+
+    def _repeated(self, parent: YamlMap, doubles: list[tuple[YamlScalar, YamlNode]]) -> DiagramError:
+        """Return the faults of a map that is not worth being read to its end."""
+        refuse_repeated(parent, doubles, self.faults)
+        place = doubles[-1][0].place
+        problem = f"more than {MOST_REPEATED} keys of one map are repeated"
+        return DiagramError([*self.faults, Fault(place, "", problem, "keep one of each")])
 
     def _check_escapes(self, event: Any) -> None:
         escaped = FORBIDDEN.search(event.value)

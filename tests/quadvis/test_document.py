@@ -293,7 +293,7 @@ HOSTILE: dict[str, str | bytes] = {
     "utf_32": "a: 1".encode("utf-32"),
     "surrogate": b"a: \xed\xa0\x80", "overlong": b"a: \xc0\x80", "noise": bytes(range(256)) * 100,
     "inner_mark": "a: \ufeffb", "next_line": "a: \x85b", "large": "a: b\n" * 250_000,
-    "wide": "[" + "a," * 200_000 + "]",
+    "wide": "[" + "a," * 200_000 + "]", "long": "-\n" * 150_000,
     "empty": "", "blank": " \n" * 1000, "comments": "# x\n" * 100_000, "null": "---\n...\n",
     "two": "--- a\n--- b",
     "many": "---\n" * 100_000, "directives": "".join(f"%TAG !a{i}! b\n" for i in range(50_000)),

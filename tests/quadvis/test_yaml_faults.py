@@ -169,6 +169,14 @@ def test_a_doubled_key_is_one_fault(text: str, expected: str) -> None:
     assert said(text) == [expected]
 
 
+def test_after_a_thousand_doubled_keys_of_a_map_the_rest_is_not_read() -> None:
+    before, after = "- b: 1\n  b: 2\n- a: 1\n", "- c: 1\n  c: 2\n"
+    few, many = (before + "  a: 1\n" * count for count in (1000, 1001))
+    assert len(said(few + after)) == len(said(few)) + 1 == 3
+    last = "1004:3: more than 1000 keys of one map are repeated; keep one of each"
+    assert said(many + after) == [*said(few), last]
+
+
 def test_what_stands_below_a_doubled_key_is_read_unless_it_describes_another_thing() -> None:
     faults = Faults()
     text = "a: {b: {x: 1}, c: 2}\na: {d: 3, b: {y: 1}}\ne: {k: sine, w: 1}\ne: {k: step, v: 1}"
