@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import hashlib
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -36,7 +37,10 @@ SOME = (
 
 
 def library(rig: Rig, folder: Path) -> tuple[dict[str, Any], dict[str, Op]]:
-    """Return the methods of a rig's block as functions of addresses, and their calls."""
+    """Return the methods of a rig's block as functions of addresses, and their calls.
+
+    The folder has the compiled code, each text once: rigs that differ in values alone have the same.
+    """
     placed, arguments = rig.placed, rig.interface.arguments
     ops = {
         method: Op(0, method, tuple(sources(placed, names)), tuple(targets(placed, method).values()))
@@ -52,9 +56,12 @@ def library(rig: Rig, folder: Path) -> tuple[dict[str, Any], dict[str, Op]]:
             f'__attribute__((visibility("default"))) int call_{method}(char **p) '
             f"{{ char *error = 0; return {name}((char *)&error, {listed}); }}"
         )
-    (folder / "blocks.c").write_text("\n".join(lines))
-    made = folder / "blocks.so"
-    subprocess.run(["gcc", *OPTIONS, str(folder / "blocks.c"), "-o", str(made), "-lm"], check=True)
+    text = "\n".join(lines)
+    made = folder / f"{hashlib.sha256(text.encode()).hexdigest()}.so"
+    if not made.exists():
+        source = made.with_suffix(".c")
+        source.write_text(text)
+        subprocess.run(["gcc", *OPTIONS, str(source), "-o", str(made), "-lm"], check=True)
     loaded = ctypes.CDLL(str(made))
     return {method: loaded[f"call_{method}"] for method in ops}, ops
 
@@ -109,10 +116,8 @@ def check(name: str, folder: Path) -> None:
         key: known[key] for key, param in kind.interface.params.items() if param.required and key in known
     }
     (subject,) = Subject(kind, given, INPUTS.get(name, {})).of_any_number((3,))
-    for number, rig in enumerate(rigs(subject, missing=True)):
-        place = folder / str(number)
-        place.mkdir()
-        functions, ops = library(rig, place)
+    for rig in rigs(subject, missing=True):
+        functions, ops = library(rig, folder)
         with rig.engine:
             for step in range(STEPS):
                 rig.feed(step)
