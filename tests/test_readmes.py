@@ -249,8 +249,18 @@ RUNS = [
 ]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("command", RUNS, ids=str)
+# This one is compiled and computed for a minute; tests/quadvis/analysis has quicker ones of its kind.
+LONG = ("analyse diagrams/hover.yaml --variant fused_geometric --engine native",)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        pytest.param(command, marks=pytest.mark.long if str(command) in LONG else pytest.mark.slow)
+        for command in RUNS
+    ],
+    ids=str,
+)
 def test_a_command_ends_as_its_readme_says(
     command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -263,6 +273,10 @@ def test_a_command_ends_as_its_readme_says(
     before = _contents(tmp_path / "diagrams")
     assert main(command.words) == (1 if FAILS in command.line else 0), capsys.readouterr()
     assert _contents(tmp_path / "diagrams") == before, "a diagram writes over what lies beside it"
+
+
+def test_what_a_person_tries_stands_in_a_readme() -> None:
+    assert {*LONG} <= {*map(str, RUNS)}
 
 
 def _contents(folder: Path) -> dict[Path, bytes]:

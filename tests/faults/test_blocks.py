@@ -46,11 +46,12 @@ BETWEEN = """
     at: target
     in: {{u: spoils.y, stamp: control.stamp}}
 """
+AT = r"1\.[5-9]\d*"  # ticks may have been lost
 WORDS = {
-    "nan": r"block 'spoils', port 'y', t = 1\.5 s: .*nan",
-    "raise": r"block 'spoils', t = 1\.5 s: ValueError: no such luck in .*spoils\.py:\d+",
-    "inf": r"block 'spoils', port 'y', t = 1\.5 s: .*inf",
-    "shape": r"block 'spoils', port 'y', t = 1\.5 s: ",
+    "nan": rf"block 'spoils', port 'y', t = {AT} s: .*nan",
+    "raise": rf"block 'spoils', t = {AT} s: ValueError: no such luck in .*spoils\.py:\d+",
+    "inf": rf"block 'spoils', port 'y', t = {AT} s: .*inf",
+    "shape": rf"block 'spoils', port 'y', t = {AT} s: ",
 }
 
 
@@ -94,25 +95,29 @@ class Slow(Block, numeric=False):
         self.steps += 1
 '''
 MOST = 6  # ticks that the slow task may miss
-LIMITS = f"{{max: 1000000, consecutive: 100, tasks: {{sight: {{max: {MOST}, startup: 5}}}}}}"
+LIMITS = f"{{max: 1000000, consecutive: 1000, tasks: {{sight: {{max: {MOST}, startup: 5}}}}}}"
+TOO_OFTEN = rf"overload limit \({MOST}\) exceeded with \d+ overruns"
+VITAL = "computers: {vision_pc: {on_loss: stop}}"  # or the others fly on without it, to the stop time
 
 
 def test_06_a_task_that_is_too_slow_is_counted_by_itself_and_ends_the_flight_once_it_is_too_often(
     tmp_path: Path,
 ) -> None:
     slow = "  slow: {block: own.slow, rate: sight, at: vision_pc}"
-    made = {"blocks": slow, "own": {"slow": SLOW}, "overload": LIMITS}
+    made = {"blocks": slow, "own": {"slow": SLOW}, "overload": LIMITS, "more": VITAL}
     with Bench(tmp_path, made=made) as bench:
         bench.flies()
         code, _, told = bench.ended()
         bench.left_safe()
-    assert code == 1, told
+    assert code == 1 and re.search(TOO_OFTEN, told), told
     no_trace(told)
     log = bench.log
+    assert log.end is not None and log.end < 100  # the stop time is 140 s
     missed, at = log["_times/vision_pc/sight.overruns"], log.times("_times/vision_pc/sight.overruns")
     at_start = missed[at <= 1.5][-1]
     assert at_start >= 2  # and that ended nothing
     assert missed[-1] - at_start >= MOST - 1
+    share = missed[-1] / len(missed)  # of its ticks; the others miss what the machine makes them miss
     for task in ("imu", "control"):
-        steps = len(log[f"_times/target/{task}.overruns"])
-        assert log[f"_times/target/{task}.overruns"][-1] < 0.1 * steps
+        overruns = log[f"_times/target/{task}.overruns"]
+        assert overruns[-1] / len(overruns) < share, task

@@ -24,6 +24,7 @@ from tests.quadvis.host.targets import running_target
 pytestmark = [pytest.mark.faults, pytest.mark.slow, linux]
 
 PERIOD = 0.05  # s of the commands
+LATE = 1.0  # s of commands that a busy machine may have missed last
 SIGNAL = "gate.y"
 # A host as people write them: it flies the bench, and prints the times of the commands that it sees.
 HOST = f"""
@@ -90,9 +91,9 @@ def test_16_a_target_does_without_its_host_what_it_should_and_its_log_fills_the_
         for name in ("QUADVIS_HOME", "XDG_RUNTIME_DIR"):
             monkeypatch.setenv(name, lab.environment[name])
         with host(bench, lab.environment) as (process, seen):
+            lost = bench.time
             os.kill(process.pid, signal.SIGKILL)
             process.wait()
-            lost = bench.time
             assert process.stdout is not None
             for line in process.stdout:  # what it had still printed
                 seen.take(line)
@@ -117,7 +118,7 @@ def test_16_a_target_does_without_its_host_what_it_should_and_its_log_fills_the_
     assert seen.agrees(log)
     times = log.times(SIGNAL)
     if policy != "continue":
-        assert lost - 0.2 < times[-1]
+        assert lost - LATE < times[-1]
         return
     assert again.agrees(log) and again.times[0] > seen.times[-1] + PERIOD  # a gap there was
     gap = (times > seen.times[-1] + PERIOD / 2) & (times < again.times[0] - PERIOD / 2)

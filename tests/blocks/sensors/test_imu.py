@@ -33,21 +33,21 @@ def test_biases_add_to_angles_and_rates() -> None:
 
 
 def test_white_noise_has_its_deviation_on_each_channel_and_no_memory() -> None:
-    result = measure(steps=10000, drift=0.0)
+    result = measure(steps=2500, drift=0.0)
     errors = np.column_stack((result.roll - 0.1, result.pitch + 0.2, result.gyro - RATES))
     expected = np.array([0.1, 0.1, 0.5, 0.5, 0.5]) * DEGREE
-    assert errors.std(axis=0) == pytest.approx(expected, rel=4 / math.sqrt(2 * 10000))
-    assert np.abs(np.corrcoef(errors.T) - np.eye(5)).max() < 4 / 100
-    assert abs(np.corrcoef(errors[1:, 0], errors[:-1, 0])[0, 1]) < 4 / 100
+    assert errors.std(axis=0) == pytest.approx(expected, rel=4 / math.sqrt(2 * 2500))
+    assert np.abs(np.corrcoef(errors.T) - np.eye(5)).max() < 4 / 50
+    assert abs(np.corrcoef(errors[1:, 0], errors[:-1, 0])[0, 1]) < 4 / 50
 
 
 @pytest.mark.slow
 def test_the_drift_has_its_deviation_and_correlation_time() -> None:
-    result = measure(steps=100000, angle_noise=0.0, drift_time=2.0)
+    result = measure(steps=10000, angle_noise=0.0, drift_time=0.2)
     drift = result.roll - 0.1
-    samples = 1000 / (2 * 2.0)
+    samples = 100 / (2 * 0.2)
     assert drift.std() == pytest.approx(0.2 * DEGREE, rel=4 / math.sqrt(2 * samples))
-    lagged = np.corrcoef(drift[200:], drift[:-200])[0, 1]
+    lagged = np.corrcoef(drift[20:], drift[:-20])[0, 1]
     assert lagged == pytest.approx(math.exp(-1.0), abs=4 / math.sqrt(samples))
     assert abs(np.corrcoef(result.roll, result.pitch)[0, 1]) < 4 / math.sqrt(samples)
 
@@ -64,12 +64,12 @@ def test_the_drift_is_there_from_the_first_sample() -> None:
 
 @pytest.mark.slow
 def test_the_rates_drift_apart_from_each_other_and_from_the_angles() -> None:
-    quiet = QUIET | {"drift": 0.1, "drift_time": 2.0}
-    result = measure(steps=100000, **quiet, rate_drift=0.02)
+    quiet = QUIET | {"drift": 0.1, "drift_time": 0.2}
+    result = measure(steps=10000, **quiet, rate_drift=0.02)
     drift = result.gyro - RATES
-    samples = 1000 / (2 * 2.0)
+    samples = 100 / (2 * 0.2)
     assert drift.std(axis=0) == pytest.approx([0.02] * 3, rel=4 / math.sqrt(2 * samples))
-    lagged = [np.corrcoef(channel[200:], channel[:-200])[0, 1] for channel in drift.T]
+    lagged = [np.corrcoef(channel[20:], channel[:-20])[0, 1] for channel in drift.T]
     assert lagged == pytest.approx([math.exp(-1.0)] * 3, abs=4 / math.sqrt(samples))
     together = np.corrcoef(np.column_stack((drift, result.roll, result.pitch)).T)
     assert np.abs(together - np.eye(5)).max() < 4 / math.sqrt(samples)
@@ -193,8 +193,8 @@ def test_scale_delay_and_errors_reach_the_force_too() -> None:
     assert forces(**QUIET, scale=1.3) == pytest.approx(1.3 * plain)
     assert forces(**QUIET, delay=0.04)[10:] == pytest.approx(plain[6:-4])
     assert forces(**QUIET, force_bias=tuple(bias)) == pytest.approx(plain + bias)
-    noise = forces(steps=10000, **{**QUIET, "force_noise": 0.1}) - forces(steps=10000, **QUIET)
-    assert noise.std(axis=0) == pytest.approx(np.full(3, 0.1), rel=4 / math.sqrt(2 * 10000))
+    noise = forces(steps=2500, **{**QUIET, "force_noise": 0.1}) - forces(steps=2500, **QUIET)
+    assert noise.std(axis=0) == pytest.approx(np.full(3, 0.1), rel=4 / math.sqrt(2 * 2500))
 
 
 def test_signs_of_the_biases_of_the_force_leave_those_of_the_others_alone() -> None:

@@ -48,10 +48,10 @@ def test_the_target_is_seen_on_every_kind_of_ceiling_and_nowhere_else(name):
     assert (errors < 0.3).all() and (errors < 6 * sigmas).all()
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize(("count", "seed"), mostly_slow([(5, 6), (40, 4)], quick=0, slow=1))
 @pytest.mark.parametrize("name", KINDS)
-def test_99_of_100_pictures_are_seen_rightly_on_every_kind_of_ceiling(name):
-    right, followed, errors, sigmas = judge(name, 40, seed=4)
+def test_99_of_100_pictures_are_seen_rightly_on_every_kind_of_ceiling(name, count, seed):
+    right, followed, errors, sigmas = judge(name, count, seed)
     assert right >= 1 - MISSED.get(name, 0.01)
     if KINDS[name].shown:
         assert followed >= 0.95
@@ -60,7 +60,7 @@ def test_99_of_100_pictures_are_seen_rightly_on_every_kind_of_ceiling(name):
         assert np.mean((errors > 0.3) & (errors > 4 * sigmas)) <= SILENT
 
 
-@pytest.mark.parametrize("scenes", mostly_slow([30, 1000]))
+@pytest.mark.parametrize("scenes", mostly_slow([30, 150, 1000], slow=1))
 def test_coloured_discs_are_never_taken_for_a_part_of_the_target(scenes):
     rng = np.random.default_rng(7)
     for _ in range(scenes):

@@ -53,8 +53,10 @@ def test_every_condition_is_mastered(name):
     assert rms <= COMBINED
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("size", "count"), [((320, 240), 40), ((640, 480), 12)])
+@pytest.mark.parametrize(
+    ("size", "count"),
+    mostly_slow([((320, 240), 12), ((640, 480), 4), ((320, 240), 40), ((640, 480), 12)], quick=0, slow=2),
+)
 @pytest.mark.parametrize("name", CONDITIONS)
 def test_in_every_condition_99_of_100_pictures_are_seen_rightly(name, size, count):
     right, rms = judge(size, CONDITIONS[name], count, seed=2)

@@ -28,7 +28,7 @@ def picture(seed):
 
 
 @pytest.mark.parametrize("stiff", [0.0, 1.0])
-@pytest.mark.parametrize("seed", mostly_slow(range(40), quick=2))
+@pytest.mark.parametrize("seed", mostly_slow(range(40), quick=2, slow=8))
 def test_arrays_and_loops_see_the_same_to_the_bit(seed, stiff):
     rng, pixels, centres, radii = picture(seed)
     for by_arrays, by_loops in zip(

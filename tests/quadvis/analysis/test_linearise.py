@@ -401,7 +401,7 @@ def test_what_no_block_reads_is_not_disturbed_slot_by_slot(monkeypatch: pytest.M
 GUARDED = [("blackout", None), ("landing", "robust"), ("takeover", "robust"), ("blackout", "robust")]
 
 
-@pytest.mark.parametrize(("name", "variant"), mostly_slow(GUARDED, 1))
+@pytest.mark.parametrize(("name", "variant"), mostly_slow(GUARDED, quick=0, slow=2))
 def test_a_hover_under_the_failsafe_is_stable(name: str, variant: str | None) -> None:
     analysis = quadvis.load(DIAGRAMS / f"{name}.yaml", variant=variant).analyse()
     assert analysis.stable and not [state for state in analysis.linear.states if "stamp" in state]

@@ -281,7 +281,8 @@ def wrong_values(message: ProtocolMessage, told: DeviceProtocol, count: int, see
     [
         ("text", 20_000),
         ("bytes", 20_000),
-        pytest.param("text", 1_000_000, marks=pytest.mark.slow),
+        pytest.param("text", 200_000, marks=pytest.mark.slow),
+        pytest.param("text", 1_000_000, marks=pytest.mark.long),
         pytest.param("bytes", 200_000, marks=pytest.mark.slow),
     ],
 )
