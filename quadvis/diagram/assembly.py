@@ -14,7 +14,7 @@ from quadvis.diagram.check import WireCheck
 from quadvis.diagram.conditions import with_conditions
 from quadvis.diagram.devices import check_devices, check_losses
 from quadvis.diagram.diagram import Diagram
-from quadvis.diagram.doubts import warn_network, warn_parameters, warn_rates
+from quadvis.diagram.doubts import warn_jumps, warn_network, warn_parameters, warn_rates
 from quadvis.diagram.draft import Draft
 from quadvis.diagram.expand import Expansion, Kept
 from quadvis.diagram.flow import Cases
@@ -116,6 +116,7 @@ class Assembly:
         for file in files[self._warned :]:
             warn_parameters(file, faults)
         self._warned = len(files)
+        warn_jumps(drafts, graph, faults)
         if not self.variants:
             self.warn_unused()
             warn_network(spec, graph, faults)

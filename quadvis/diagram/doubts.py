@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
+from quadvis.diagram.draft import Draft
 from quadvis.diagram.parameters import named_parameters
 from quadvis.diagram.parts import Parts
 from quadvis.diagram.sections.blocks import BLOCKS, BlockSpec
@@ -15,7 +16,7 @@ from quadvis.diagram.sections.variants import VARIANTS
 from quadvis.diagram.spec import FileSpec
 from quadvis.diagram.timing import timing_nodes
 from quadvis.errors import Faults, known
-from quadvis.graph.graph import Graph
+from quadvis.graph.graph import VARIABLE, Graph
 from quadvis.links.endpoints import links_of
 
 
@@ -63,6 +64,41 @@ def warn_network(spec: FileSpec, graph: Graph, faults: Faults) -> None:
         if known(computer) and name not in used:
             remedy = f"leave it out, or write 'at: {name}' in a block"
             faults.warn(computer.place, f"no block runs on the computer '{name}'", remedy)
+
+
+def warn_jumps(drafts: Sequence[Draft], graph: Graph, faults: Faults) -> None:
+    """Warn of blocks on loops of the solver whose jumps are not located between two ticks."""
+    if faults:
+        return  # the graph lacks what is wrong
+    places = {draft.path: draft.place for draft in drafts}
+    located = graph.solver not in VARIABLE
+    for node in graph.nodes:
+        events = bool(node.block.interface.events)
+        jumps = node.block.jumps and not events
+        if not node.task.continuous or not (jumps or (events and not located)) or node.path not in places:
+            continue
+        if not _is_integrated_loop(graph, node.path):
+            continue
+        problem = f"'{node.kind}' jumps on a loop that the solver integrates, and the instant is not located"
+        remedy = "take a small step, and look at 'quadvis check --accuracy'"
+        if events:
+            problem = f"{graph.solver} sees the events of '{node.kind}' at ticks only"
+            remedy = "choose ode1 to ode4, which locate them"
+        with faults.about(f"block '{node.path}'"):
+            faults.warn(places[node.path], problem, remedy)
+
+
+def _is_integrated_loop(graph: Graph, path: str) -> bool:
+    """Return whether a way through blocks of the continuous task leads from a block back to itself."""
+    waiting, seen = [path], set[str]()
+    while waiting:
+        for _, wire in graph[waiting.pop()].wires():
+            if wire.block == path:
+                return True
+            if wire.block not in seen and wire.block in graph and graph[wire.block].task.continuous:
+                seen.add(wire.block)
+                waiting.append(wire.block)
+    return False
 
 
 def warn_rates(spec: FileSpec, parts: Parts, faults: Faults) -> None:

@@ -153,3 +153,55 @@ def test_a_warning_leaves_the_exit_code(
         (warning,) = json.loads(captured.out)["warnings"]
         assert (warning["line"], warning["column"], warning["file"]) == (3, 16, "case.yaml")
         assert "warning" not in captured.err
+
+
+STICK = """\
+quadvis: 1
+name: stick
+solver: {method: METHOD, step: 1 ms}
+stop_time: 1 s
+blocks:
+  drag: {block: signal.friction, rate: continuous, with: {coulomb: 1 m/s^2}, in: {u: SPEED}}
+  force: {block: signal.sum, rate: continuous, with: {signs: +-}, in: {u: [2 m/s^2, drag.y]}}
+  speed: {block: signal.integrator, in: {u: force.y}}
+"""
+BANG = """\
+quadvis: 1
+name: bang
+solver: {method: METHOD, step: 1 ms}
+stop_time: 1 s
+blocks:
+  relay:
+    block: signal.relay
+    rate: continuous
+    with: {on_at: 0.1 m, off_at: -0.1 m, on_value: -1 m/s, off_value: 1 m/s}
+    in: {u: x.y}
+  x: {block: signal.integrator, in: {u: relay.y}}
+"""
+LOCATED = "; take a small step, and look at 'quadvis check --accuracy'"
+
+
+def warnings(folder: Path, text: str) -> list[str]:
+    """Return what a diagram is warned of."""
+    file = folder / "case.yaml"
+    file.write_text(text)
+    return [str(each).partition("warning: ")[2] for each in load(file).warnings]
+
+
+@pytest.mark.parametrize("method", ["ode4", "Radau"])
+def test_a_jump_on_a_loop_of_the_solver_is_a_warning(method: str, tmp_path: Path) -> None:
+    words = (
+        "block 'drag': 'signal.friction' jumps on a loop that the solver integrates, and the instant is not "
+    )
+    text = STICK.replace("METHOD", method).replace("SPEED", "speed.y")
+    assert warnings(tmp_path, text) == [f"{words}located{LOCATED}"]
+
+
+def test_a_jump_outside_of_loops_is_none(tmp_path: Path) -> None:
+    assert not warnings(tmp_path, STICK.replace("METHOD", "ode4").replace("SPEED", "1 m/s"))
+
+
+def test_events_that_are_located_are_no_warning_and_others_are(tmp_path: Path) -> None:
+    assert not warnings(tmp_path, BANG.replace("METHOD", "ode4"))
+    words = "block 'relay': BDF sees the events of 'signal.relay' at ticks only; choose ode1 to ode4, which "
+    assert warnings(tmp_path, BANG.replace("METHOD", "BDF")) == [f"{words}locate them"]

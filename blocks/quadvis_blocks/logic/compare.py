@@ -18,6 +18,7 @@ class Compare(Block):
     nor more.
     """
 
+    jumps = True
     operator = Param(
         "<", choices=OPERATORS, doc="how they must compare; in quotes, since YAML knows > itself"
     )

@@ -16,6 +16,7 @@ class Friction(Block):
     around speed 0, by at most one step of the solver times its acceleration.
     """
 
+    jumps = True
     coulomb = Param(
         1.0, type="float64[*?]", unit="b", min=0.0, tune=True, shown=True, doc="the force at any speed"
     )

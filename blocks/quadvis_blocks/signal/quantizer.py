@@ -17,6 +17,7 @@ class Quantizer(Block):
     otherwise; so -u gives -y.
     """
 
+    jumps = True
     interval = Param(
         1.0, type="float64[*?]", unit="a", above=0.0, tune=True, shown=True, doc="the size of a step"
     )
