@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from quadvis.version import __version__
 
 if TYPE_CHECKING:
+    from quadvis.analysis.identify import identify
     from quadvis.api import Diagram, load
     from quadvis.host.target import Target
     from quadvis.output.log_reader import Log, read_log
@@ -21,6 +22,7 @@ __all__ = [
     "RealTime",
     "Target",
     "__version__",
+    "identify",
     "load",
     "read_log",
     "replay",
@@ -31,6 +33,7 @@ __all__ = [
 _HOMES = {
     "Diagram": "api",
     "Target": "host.target",
+    "identify": "analysis.identify",
     "load": "api",
     "Log": "output.log_reader",
     "read_log": "output.log_reader",

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from quadvis.analysis.analyse import Analysis
+from quadvis.analysis.identified import Identified
 from quadvis.analysis.margins import Complexes, Loop
 from quadvis.analysis.probe import Vector
 from quadvis.analysis.report import degrees
@@ -77,6 +78,25 @@ def _save(figure: Figure, path: Path, inputs: Iterable[Path]) -> None:
         lambda file: figure.savefig(file, format="png", dpi=120, metadata={"Software": None}),
         inputs,
     )
+
+
+def save_fit(found: Identified, path: Path, inputs: Iterable[Path] = ()) -> None:
+    """Draw the recorded output of an identified system, and what the model makes of the same input.
+
+    QuadvisError if the file would replace an input, or a file that is no picture.
+    """
+    times, measured, simulated = found.simulated
+    with blank_sheet(WIDTH, 4.5, STYLE, layout="constrained") as figure:
+        figure.suptitle(f"{found.names[0]} to {found.names[1]}")
+        axes = figure.subplots()
+        axes.plot(times, measured, color=COLOURS[0], label="recorded")
+        axes.plot(times, simulated, color=COLOURS[1], label="model")
+        if found.samples[1] >= 2:
+            axes.axvline(float(times[found.samples[0]]), **HELP)
+        axes.set_title(_words(f"fit {found.fit:.1f} %" + " after the line" * (found.samples[1] >= 2)))
+        axes.set(xlabel="time (s)", ylabel=found.names[1])
+        axes.legend(loc="upper right", frameon=True, framealpha=0.9, edgecolor="none")
+        _save(figure, path, inputs)
 
 
 def _words(*lines: str) -> str:

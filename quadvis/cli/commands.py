@@ -435,6 +435,32 @@ def analyse(options: argparse.Namespace) -> int:
     return 0 if analysis.passed else FAILED
 
 
+def identify(options: argparse.Namespace) -> int:
+    """Find a transfer function from a recording, and print it with the block that it makes."""
+    from quadvis.analysis.identify import identify as find
+    from quadvis.analysis.plots import save_fit
+    from quadvis.analysis.progress import watched
+    from quadvis.analysis.questions import read_time
+    from quadvis.machine.status_line import AnalysisLine
+
+    with AnalysisLine() as progress, watched(progress):
+        found = find(
+            options.log, input=options.input, output=options.output, order=options.order,
+            zeros=options.zeros, delay=options.delay, discrete=options.discrete,
+            after=read_time(options.after) or 0.0, validation=options.validation,
+        )  # fmt: skip
+    if options.plot:
+        save_fit(found, Path(options.plot), [Path(options.log)])
+    if options.json:
+        _print_json(found.facts() | {"plot": options.plot})
+        return 0
+    print("\n".join(found.lines()))
+    print(f"blocks:\n{found.block()}")
+    if options.plot:
+        print(f"plot: {options.plot}")
+    return 0
+
+
 def draw(options: argparse.Namespace) -> int:
     """Write a diagram as SVG; one with faults, too, which are then reported."""
     from quadvis.diagram.picture import draw_diagram

@@ -143,6 +143,21 @@ expect: [{expectation, label, kind, unit, limit, found, met, lack (why nothing i
 Exit code: 0 stable, with all margins that the diagram expects; 1 not stable, or a margin is not met;
 2 bad input, or a loop that cannot be linearised."""
 
+IDENTIFY_HELP = """\
+examples:
+  quadvis identify runs/motor.mcap --input drive.y --output motor.y --order 2 --zeros 0
+  quadvis identify bench.csv --input voltage --output speed --order 1 --delay --after '2 s'
+
+The model has its noise on the output. Least squares seek the coefficients with which the simulated output is
+nearest to the recorded one: scipy's least_squares from the coefficients of ARX models. The input is held
+between its samples. Standard deviations are those of white noise; the fit is 100 % if the output is met and
+0 % if it is no nearer than its mean. The block that is printed can be pasted under 'blocks'.
+--json prints one object: input, output, unit, period_s (0: continuous), delay_s, numerator, denominator,
+numerator_deviation, denominator_deviation (highest powers first), poles: [[real, imaginary]], fit_percent,
+fit_own_percent (of what was fitted), noise, colour (the correlation of neighbouring residuals), samples,
+block, plot.
+Exit code: 0 found, 2 bad input, or a recording that does not determine the model."""
+
 
 KEYS_HELP = """\
 new makes a key pair, show prints all public keys and fingerprints, allow and revoke change the list of hosts
@@ -221,6 +236,9 @@ def parser() -> Parser:
     _engine_option(analyse)
     analyse.add_argument("--json", action="store_true", help="print one JSON object instead of the tables")
     analyse.add_argument("--output", "-o", metavar="FOLDER", help="write plots there, as PNG")
+    _identify_options(
+        add("identify", commands.identify, "find a transfer function from a recording", IDENTIFY_HELP)
+    )
     draw = add("draw", commands.draw, "draw a diagram as SVG")
     _diagram_options(draw)
     draw.add_argument("--part", metavar="PART", help="draw the inside of this part, such as control")
@@ -377,6 +395,22 @@ def _setting_options(parser: Parser) -> None:
 def _set_option(parser: Parser) -> None:
     words = "replace a parameter, such as control/roll.bandwidth='2 rad/s'; may be repeated"
     parser.add_argument("--set", action="append", default=[], metavar="BLOCK.PARAM=VALUE", help=words)
+
+
+def _identify_options(parser: Parser) -> None:
+    parser.add_argument("log", metavar="LOG", help="log of a run, or a file .csv, .parquet, .mat or .npz")
+    parser.add_argument("--input", required=True, metavar="SIGNAL", help="what drives it, such as drive.y")
+    parser.add_argument("--output", required=True, metavar="SIGNAL", help="what answers, such as motor.y")
+    parser.add_argument("--order", required=True, type=positive, metavar="N", help="the number of poles")
+    words = "the number of zeros, at most as many as poles; default: one less"
+    parser.add_argument("--zeros", type=int, metavar="M", help=words)
+    parser.add_argument("--delay", action="store_true", help="seek a dead time of whole samples, too")
+    parser.add_argument("--discrete", action="store_true", help="in powers of z; default: of s, continuous")
+    parser.add_argument("--after", metavar="T", help="leave out what is earlier, such as '2 s'")
+    words = "the share of the samples, at the end, that is not fitted and judges the model; default 1/3"
+    parser.add_argument("--validation", type=float, default=1.0 / 3.0, metavar="SHARE", help=words)
+    parser.add_argument("--plot", metavar="PNG", help="draw the recorded and the simulated output there")
+    parser.add_argument("--json", action="store_true", help="print one JSON object instead of the text")
 
 
 def _plot_options(plot: Parser) -> None:
