@@ -27,6 +27,14 @@ def draw_diagram(diagram: Diagram, *, part: str = "", depth: int | None = None) 
     With ``depth`` what lies deeper is drawn as one box each: with 1 the parts of the diagram itself.
     QuadvisError if there is no such part.
     """
+    picture, tasks = picture_of(diagram)
+    picture = part_of(picture, part, depth)
+    title = f"{diagram.name}: {part}" if part else diagram.name
+    return draw(title, picture.blocks, picture.wires, picture.constants, tasks)
+
+
+def picture_of(diagram: Diagram) -> tuple[DrawnPicture, dict[str, str]]:
+    """Return all that is drawn of a diagram, and the words of the legend by task."""
     blocks, wires, constants = [], [], {}
     passed = _passed(diagram)
     for path in diagram.listing:
@@ -53,9 +61,7 @@ def draw_diagram(diagram: Diagram, *, part: str = "", depth: int | None = None) 
     tasks = {task.name: rate_text(task) for task in diagram.graph.tasks}
     shown_by = {f"{path}.y": source for path, source in passed.items()}
     ports = {name: shown_by.get(signal, signal) for name, signal in diagram.ports.items()}
-    picture = part_of(DrawnPicture(blocks, wires, constants, ports), part, depth)
-    title = f"{diagram.name}: {part}" if part else diagram.name
-    return draw(title, picture.blocks, picture.wires, picture.constants, tasks)
+    return DrawnPicture(blocks, wires, constants, ports), tasks
 
 
 def part_of(picture: DrawnPicture, part: str, depth: int | None) -> DrawnPicture:
