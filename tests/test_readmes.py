@@ -289,6 +289,7 @@ def test_the_licences_that_the_package_names_go_with_it() -> None:
     texts = [(ROOT / file).read_text(encoding="utf-8") for file in project["license-files"]]
     assert [text.partition("\n")[0].strip("# ") for text in texts] == [
         "BSD 3-Clause License",
+        "Third-party works in quadvis",
         "Eclipse Public License - v 2.0",
         "The MIT License (MIT)",
     ]

@@ -592,11 +592,12 @@ def cache(options: argparse.Namespace) -> int:
 
 
 def new(options: argparse.Namespace) -> int:
-    """Write the skeleton of a block, an output device or a diagram."""
-    from quadvis.library.skeleton import KINDS, new_block, new_diagram
+    """Write the skeleton of a block, an output device, a diagram or a project."""
+    from quadvis.library.skeleton import KINDS, new_block, new_diagram, new_project
 
     name, kind = options.name, options.kind
-    for path in new_block(name, kind) if kind in KINDS else new_diagram(name):
+    made = {"diagram": new_diagram, "project": new_project}
+    for path in new_block(name, kind) if kind in KINDS else made[kind](name):
         print(path)
     return 0
 

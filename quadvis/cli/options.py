@@ -300,9 +300,13 @@ def parser() -> Parser:
     cache = add("cache", commands.cache, "say where compiled blocks are kept, and how large they are")
     cache.add_argument("--clear", action="store_true", help="remove them all")
     add_target_commands(add, _setting_options, _engine_option)
-    new = add("new", commands.new, "write the skeleton of a block, an output device or a diagram")
-    new.add_argument("kind", choices=("block", "device", "diagram"))
-    new.add_argument("name", metavar="NAME", help="a block or device as group.block, a diagram as FILE.yaml")
+    new = add("new", commands.new, "write the skeleton of a block, an output device, a diagram or a project")
+    new.add_argument("kind", choices=("block", "device", "diagram", "project"))
+    new.add_argument(
+        "name",
+        metavar="NAME",
+        help="group.block of a block or device, FILE.yaml of a diagram, the folder of a project",
+    )
     _key_options(
         add("keys", wire.keys, "make and show keys, and say which hosts a target lets in", KEYS_HELP)
     )

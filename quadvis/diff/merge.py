@@ -11,12 +11,22 @@ from typing import NamedTuple
 
 from quadvis.diff.align import aligned
 from quadvis.diff.flat import plain
-from quadvis.document.source import LIST, MAP, SCALAR, SourceText, SourceValue
+from quadvis.diff.merged_entries import (
+    MergedEntry,
+    data_of,
+    entries,
+    head_of,
+    moved,
+    nothing,
+    placed,
+    replaced,
+    under,
+)
+from quadvis.document.source import LIST, MAP, SCALAR, SourceText
 from quadvis.errors import DiagramError, quoted
 
 OURS, THEIRS = "ours", "theirs"
 MARKS = f"<<<<<<< {OURS}", "=======", f">>>>>>> {THEIRS}"
-Data = tuple[object, ...]
 
 
 class Merged(NamedTuple):
@@ -26,20 +36,10 @@ class Merged(NamedTuple):
     conflicts: tuple[str, ...]
 
 
-class MergedEntry(NamedTuple):
-    """An entry of a map or list on one side: its value, and its lines with what stands before them."""
-
-    source: SourceText
-    value: SourceValue
-    lines: tuple[str, ...]
-    data: Data
-    column: int
-
-
 def merge(base: str, ours: str, theirs: str) -> Merged:
     """Merge two texts that come from a third one; DiagramError if one of them is no YAML."""
     sources = [SourceText(text, name) for text, name in ((base, "base"), (ours, OURS), (theirs, THEIRS))]
-    roots = [MergedEntry(each, each.root, (), _data(each.root), 0) for each in sources]
+    roots = [MergedEntry(each, each.root, (), data_of(each.root), 0) for each in sources]
     merging = _Merging()
     kinds = {each.value.kind for each in roots}
     if len(kinds) > 1 or SCALAR in kinds:
@@ -58,50 +58,6 @@ def merge(base: str, ours: str, theirs: str) -> Merged:
     return Merged(text, tuple(merging.conflicts))
 
 
-def _data(value: SourceValue) -> Data:
-    """Return what a value means, for comparison."""
-    if value.kind == SCALAR:
-        return (value.value, bool(value.style))
-    if value.kind == LIST:
-        return (LIST, *map(_data, value.children))
-    return (MAP, *sorted((key.value, _data(each)) for key, each in value.pairs))
-
-
-def _entries(whole: MergedEntry) -> list[tuple[str, MergedEntry]]:
-    """Return the entries of a map or list by key, each with its lines; those of a list have no key."""
-    source, value = whole.source, whole.value
-    pairs = value.pairs if value.kind == MAP else [(each, each) for each in value.children]
-    found = []
-    if not value.is_block:
-        for key, each in pairs:
-            head = f"{source.written(key)}:" if value.kind == MAP else "-"
-            lines: tuple[str, ...] = (f"{' ' * whole.column}{head} {plain(source, each)}",)
-            found.append((key.value, MergedEntry(source, each, lines, _data(each), whole.column)))
-        return found
-    first = value.line if whole.lines or value.line == 0 else 0
-    after = _after_key(whole, first)
-    for key, each in pairs:
-        last = max(each.last, key.line)
-        lines = tuple(source.lines[after : last + 1])
-        if value.kind == MAP and lines and after == key.line:
-            lines = (" " * key.column + lines[0][key.column :], *lines[1:])  # without a dash before it
-        name = key.value if value.kind == MAP else ""
-        found.append((name, MergedEntry(source, each, lines, _data(each), value.column)))
-        after = last + 1
-    return found
-
-
-def _after_key(whole: MergedEntry, first: int) -> int:
-    """Return the first line that belongs to the entries of a map or list, comments before them included."""
-    source, line = whole.source, first
-    while line > 0 and whole.lines:
-        above = source.comments.get(line - 1)
-        if not source.is_blank(line - 1) and (above is None or not above.alone):
-            break
-        line -= 1
-    return line
-
-
 class _Merging:
     """One merge; `conflicts` grows."""
 
@@ -110,7 +66,7 @@ class _Merging:
 
     def inside(self, sides: Sequence[MergedEntry], path: str) -> list[str]:
         """Return the lines of the entries of three maps or lists; those of `ours` are in blocks."""
-        base, ours, theirs = (_entries(each) for each in sides)
+        base, ours, theirs = (entries(each) for each in sides)
         column = sides[1].value.column if sides[1].value.is_block else sides[1].column
         if sides[1].value.kind == LIST:
             return [line for each in self._list(base, ours, theirs, path, column) for line in each]
@@ -127,12 +83,12 @@ class _Merging:
             there = ours or theirs
             assert there is not None
             if base is None:
-                return _moved(there, column)
+                return moved(there, column)
             if there.data == base.data:
                 return []
             return self._conflict(base, ours, theirs, path, column)
         if base is not None and ours.lines == base.lines:
-            return _moved(theirs, column)
+            return moved(theirs, column)
         if base is not None and theirs.lines == base.lines:
             return list(ours.lines)
         alike = base is not None and base.value.kind == ours.value.kind == theirs.value.kind
@@ -141,7 +97,7 @@ class _Merging:
         if ours.data == theirs.data or (base is not None and theirs.data == base.data):
             return list(ours.lines)
         if base is not None and ours.data == base.data:
-            return _moved(theirs, column)
+            return moved(theirs, column)
         return self._both(base, ours, theirs, path, column)
 
     def _both(
@@ -151,19 +107,24 @@ class _Merging:
         known = len(self.conflicts)
         kinds = {each.value.kind for each in (base, ours, theirs) if each is not None}
         if len(kinds) == 1 and SCALAR not in kinds:
-            start = base or MergedEntry(ours.source, _nothing(ours.value), ours.lines, (), ours.column)
+            start = base or MergedEntry(ours.source, nothing(ours.value), ours.lines, (), ours.column)
             if ours.value.is_block:
-                head = _head(ours)
-                if base is not None and base.value.is_block and theirs.value.is_block and head == _head(base):
-                    head = tuple(_moved(theirs, ours.column)[: len(_head(theirs))])
+                head = head_of(ours)
+                if (
+                    base is not None
+                    and base.value.is_block
+                    and theirs.value.is_block
+                    and head == head_of(base)
+                ):
+                    head = tuple(moved(theirs, ours.column)[: len(head_of(theirs))])
                 inner = MergedEntry(ours.source, ours.value, ours.lines, ours.data, ours.value.column)
-                made = self.inside([_at(start, inner), inner, _at(theirs, inner)], path)
+                made = self.inside([placed(start, inner), inner, placed(theirs, inner)], path)
                 if any(line.strip() for line in made):
-                    return _under(head, made, ours)
+                    return under(head, made, ours)
                 return self._conflict(base, ours, theirs, path, column)  # nothing is left of it
             text = self._flow(start, ours, theirs, path)
             if text is not None and ours.value.line == ours.value.last:
-                return _replaced(ours, text)
+                return replaced(ours, text)
         if len(self.conflicts) == known:
             return self._conflict(base, ours, theirs, path, column)
         return _marked(ours, theirs, column)
@@ -172,7 +133,7 @@ class _Merging:
         """Return a map in brackets that both have changed, None with a conflict, and for a list."""
         if ours.value.kind != MAP:
             return None
-        sides = [dict(_entries(each)) for each in (base, ours, theirs)]
+        sides = [dict(entries(each)) for each in (base, ours, theirs)]
         texts: list[str] = []
         known = len(self.conflicts)
         keys = {key.value: each.source.written(key) for each in (theirs, ours) for key, _ in each.value.pairs}
@@ -197,13 +158,13 @@ class _Merging:
             if datas[2] == datas[0] or datas[1] == datas[2]:
                 yield [line for each in mine for line in each.lines]
             elif datas[1] == datas[0]:
-                yield [line for each in other for line in _moved(each, column)]
+                yield [line for each in other for line in moved(each, column)]
             elif len(old) == len(mine) == len(other):
                 for number, each in enumerate(zip(old, mine, other, strict=True), places[0].start):
                     yield self._entry(each, f"{path}[{number}]", column)
             elif not old and all(each.value.kind == MAP for each in (*mine, *other)):
                 new = [each for each in other if each.data not in datas[1]]
-                yield [line for each in (*mine, *new) for line in _moved(each, column)]
+                yield [line for each in (*mine, *new) for line in moved(each, column)]
             else:
                 yield self._stretch(mine, other, f"{path}[{places[0].start}]", column)
 
@@ -213,7 +174,7 @@ class _Merging:
         self.conflicts.append(
             f"{path}: both sides change how many elements there are; keep those that are meant"
         )
-        lines = [[line for each in side for line in _moved(each, column)] for side in (ours, theirs)]
+        lines = [[line for each in side for line in moved(each, column)] for side in (ours, theirs)]
         return [MARKS[0], *lines[0], MARKS[1], *lines[1], MARKS[2]]
 
     def _conflict(
@@ -232,7 +193,7 @@ class _Merging:
 
 def _marked(ours: MergedEntry | None, theirs: MergedEntry | None, column: int) -> list[str]:
     """Return the lines of both sides between the marks of git."""
-    other = _moved(theirs, column) if theirs is not None else []
+    other = moved(theirs, column) if theirs is not None else []
     return [MARKS[0], *(ours.lines if ours else ()), MARKS[1], *other, MARKS[2]]
 
 
@@ -251,51 +212,6 @@ def _order(ours: list[str], theirs: list[str]) -> list[str]:
             before = [found.index(each) for each in theirs[:number] if each in found]
             found.insert(before[-1] + 1 if before else 0, key)
     return found
-
-
-def _moved(entry: MergedEntry, column: int) -> list[str]:
-    """Return the lines of an entry, indented as those are that begin in a column."""
-    shift = column - entry.column
-    if shift >= 0:
-        return [" " * shift + line if line.strip() else line for line in entry.lines]
-    return [line[-shift:] if not line[:-shift].strip() else line for line in entry.lines]
-
-
-def _nothing(like: SourceValue) -> SourceValue:
-    return SourceValue(like.kind, like.start, like.line, like.column, flow=True)
-
-
-def _at(entry: MergedEntry, like: MergedEntry) -> MergedEntry:
-    """Return an entry whose inner lines stand in the column of those of `like`."""
-    column = entry.value.column if entry.value.is_block else like.column
-    return MergedEntry(entry.source, entry.value, entry.lines, entry.data, column)
-
-
-def _head(entry: MergedEntry) -> tuple[str, ...]:
-    """Return the lines of a map or list in blocks before those of its entries: comments, and its key."""
-    begin = _after_key(entry, entry.value.line)
-    return entry.lines[: len(entry.lines) - (entry.value.last - begin + 1)]
-
-
-def _under(head: Sequence[str], inner: list[str], ours: MergedEntry) -> list[str]:
-    """Return the line of a key or a dash with the lines under it."""
-    first = ours.source.lines[ours.value.line]
-    dash = first[: ours.value.column].rstrip()
-    if dash.endswith("-") and not head:
-        place = next(
-            number for number, line in enumerate(inner) if line.strip() and line.lstrip()[0] not in "#<"
-        )
-        inner[place] = first[: ours.value.column] + inner[place][ours.value.column :]
-    return [*head, *inner]
-
-
-def _replaced(ours: MergedEntry, text: str) -> list[str]:
-    """Return the lines of an entry with another value in brackets."""
-    value = ours.value
-    line = ours.source.lines[value.line]
-    end = value.end - value.start + value.column
-    changed = f"{line[: value.column]}{text}{line[end:]}"
-    return [changed if each.endswith(line.lstrip()) else each for each in ours.lines]
 
 
 def merge_or_none(base: str, ours: str, theirs: str) -> Merged | None:

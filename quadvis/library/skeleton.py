@@ -1,4 +1,4 @@
-"""Write skeletons that run at once, for `quadvis new`: of a block, of an output device, of a diagram."""
+"""Write skeletons that run at once, for `quadvis new`: a block, an output device, a diagram, a project."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from typing import NamedTuple
 from quadvis.errors import QuadvisError
 from quadvis.library.catalogue import STANDARD, Catalogue
 from quadvis.library.device_skeleton import DEVICE, DEVICE_GIVEN, DEVICE_TEST
+from quadvis.library.project_skeleton import FILES, PLAIN
 from quadvis.machine.files import Kind, reason, write_output
+from quadvis.version import __version__
 
 SKELETON = Kind("the skeleton")
 # Names that the skeletons import.
@@ -188,6 +190,22 @@ def new_diagram(file: str) -> list[Path]:
     _refuse_existing(path)
     _write(path, DIAGRAM.format(name=path.stem))
     return [path]
+
+
+def new_project(name: str) -> list[Path]:
+    """Write a folder with a diagram, a calibration, a block, tests and CI; return the paths of its files.
+
+    QuadvisError if the name cannot be that of a diagram, or if there is such a folder.
+    """
+    folder = Path(name)
+    if re.fullmatch(r"[A-Za-z_]\w*", folder.name, re.ASCII) is None or keyword.iskeyword(folder.name):
+        raise QuadvisError(f"'{folder.name}' cannot name a project; use letters, digits and '_'")
+    _refuse_existing(folder)
+    words = {"name": folder.name, "version": __version__}
+    made = {folder / path.format(**words): text for path, text in FILES.items()}
+    for path, text in made.items():
+        _write(path, text if text in PLAIN else text.format(**words))
+    return list(made)
 
 
 def _refuse_existing(*paths: Path) -> None:

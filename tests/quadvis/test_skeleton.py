@@ -10,8 +10,10 @@ from pathlib import Path
 import pytest
 
 from quadvis.api import load
+from quadvis.diagram.key_order import key_ranks
+from quadvis.document.style import formatted
 from quadvis.errors import QuadvisError
-from quadvis.library.skeleton import new_block, new_diagram
+from quadvis.library.skeleton import new_block, new_diagram, new_project
 
 
 @pytest.fixture(autouse=True)
@@ -150,3 +152,43 @@ def test_a_place_that_cannot_be_written_is_a_sentence(project: Path) -> None:
     Path("blocks").write_text("a file in the way")
     with pytest.raises(QuadvisError, match=r"cannot write 'blocks/signal/my_filter\.py'"):
         new_block("signal.my_filter")
+
+
+def test_a_new_project_meets_what_it_expects_in_the_house_style(project: Path) -> None:
+    paths = new_project("tank")
+    assert Path("tank/tank.yaml") in paths and all(path.is_file() for path in paths)
+    assert not any("{" in path.name for path in paths)
+    assert load("tank/tank.yaml").run().passed
+    for path in paths:
+        if path.suffix == ".yaml":
+            text = path.read_text()
+            assert formatted(text, str(path), key_ranks) == text
+    ruff = [sys.executable, "-m", "ruff", "check", "--select", "E,F,I,UP", "--line-length", "100", "tank"]
+    done = subprocess.run(ruff, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.slow
+def test_the_tests_of_a_new_project_pass(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    new_project("some/tank_2")
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q"], cwd="some/tank_2", capture_output=True, text=True
+    )
+    assert (done.returncode, "5 passed" in done.stdout) == (0, True), done.stdout
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("2nd", "'2nd' cannot name a project; use letters, digits and '_'"),
+        ("my-loop", "'my-loop' cannot name a project"),
+        ("class", "'class' cannot name a project"),
+        ("there", "'there' is there already; choose another name, or remove it"),
+    ],
+)
+def test_a_project_that_cannot_be_is_refused(name: str, sentence: str, project: Path) -> None:
+    (project / "there").mkdir()
+    with pytest.raises(QuadvisError, match=sentence):
+        new_project(name)
+    assert [path.name for path in project.iterdir()] == ["there"]
