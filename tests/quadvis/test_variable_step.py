@@ -107,7 +107,8 @@ def test_robertsons_reactions_are_those_of_scipy(method: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "method", [pytest.param("Radau", marks=SLOW), pytest.param("BDF", marks=SLOW), "LSODA"]
+    "method",
+    [pytest.param("Radau", marks=SLOW), pytest.param("BDF", marks=SLOW), pytest.param("LSODA", marks=SLOW)],
 )
 def test_van_der_pols_oscillator_of_1000_is_that_of_scipy(method: str) -> None:
     def slopes(_: float, state: np.ndarray) -> list[float]:
