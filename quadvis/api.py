@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from quadvis.diagram import load as loading
 from quadvis.diagram.diagram import Diagram as Checked
 from quadvis.diagram.settings import Files, Given
+from quadvis.errors import counted
 from quadvis.library.catalogue import OwnBlocks
 
 if TYPE_CHECKING:
@@ -28,7 +29,14 @@ if TYPE_CHECKING:
 
 
 class Diagram(Checked):
-    """A diagram without a fault, with what can be done with it."""
+    """A diagram without a fault, with what can be done with it. A notebook shows it as its picture."""
+
+    def __repr__(self) -> str:
+        variant = f" ({self.variant})" if self.variant else ""
+        return f"<Diagram {self.name}{variant}: {counted(len(self.listing), 'block')}>"
+
+    def _repr_svg_(self) -> str:
+        return self.draw(depth=1)
 
     def run(
         self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -243,3 +244,8 @@ def test_rows_in_memory_are_packed(tmp_path: Path) -> None:
     # Each of 20,001 ticks has two rows, of 1 and 3 numbers, and two stamps.
     assert len(result["all.y"]) == 20_001
     assert kept < 1.3 * 20_001 * 8 * (1 + 3 + 2) + 1e6
+
+
+def test_a_diagram_is_told_shortly_and_shown_as_its_picture(diagram: Diagram) -> None:
+    assert re.fullmatch(r"<Diagram [^:]+: \d+ blocks>", repr(diagram))
+    assert diagram._repr_svg_() == diagram.draw(depth=1)
