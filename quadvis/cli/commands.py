@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from quadvis.cli.default_places import default_name, log_path, runs_folder
 from quadvis.errors import DiagramError, Fault, QuadvisError, RunError, counted
-from quadvis.machine.files import SVG, Kind, check_output, file_name, write_output
+from quadvis.machine.files import PDF, SVG, Kind, check_output, file_name, write_output
 from quadvis.machine.garbage import collected_from_now_on
 from quadvis.machine.shipped import PREFIX, named_file
 
@@ -388,9 +388,13 @@ def analyse(options: argparse.Namespace) -> int:
 
 
 def draw(options: argparse.Namespace) -> int:
-    """Write a diagram as SVG; one with faults, too, which are then reported."""
+    """Write a diagram as SVG, or as a book; one with faults, too, which are then reported."""
     from quadvis.diagram.picture import draw_diagram
 
+    if options.book is not None:
+        return _draw_book(options)
+    if options.paper is not None:
+        raise QuadvisError("--paper is for a book; add --book FILE.pdf")
     name = default_name(options, options.variant) + (f"-{file_name(options.part)}" if options.part else "")
     output = options.output or f"{name}.svg"
     try:
@@ -399,6 +403,19 @@ def draw(options: argparse.Namespace) -> int:
         return _draw_with_faults(options, output)
     picture = draw_diagram(diagram, part=options.part or "", depth=options.depth)
     return _write(picture, output, SVG, diagram.inputs)
+
+
+def _draw_book(options: argparse.Namespace) -> int:
+    """Write the pictures of a diagram and of its parts as a PDF."""
+    from quadvis.diagram.book import draw_book
+
+    for given, name in ((options.part, "--part"), (options.depth, "--depth"), (options.output, "--output")):
+        if given is not None:
+            raise QuadvisError(f"--book draws the whole and each part; leave out {name}")
+    diagram = _load(options)
+    write_output(options.book, PDF, draw_book(diagram, options.paper or ""), diagram.inputs)
+    print(options.book)
+    return 0
 
 
 def _draw_with_faults(options: argparse.Namespace, output: str) -> int:

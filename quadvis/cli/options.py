@@ -197,6 +197,10 @@ def parser() -> Parser:
     draw.add_argument("--depth", type=positive, metavar="N", help=words)
     words = "default NAME.svg, with the variant and the part in it; '-' for standard output"
     draw.add_argument("--output", "-o", metavar="PATH", help=words)
+    words = "write a PDF: the whole on the first page, then each part on a page of its own"
+    draw.add_argument("--book", metavar="FILE.pdf", help=words)
+    words = "paper of the book; the smaller one on which all is legible, if left out"
+    draw.add_argument("--paper", choices=("a4", "a3"), help=words)
     export = add(
         "export", commands.export, "write a log's signals, or a part, for other programs", EXPORT_HELP
     )

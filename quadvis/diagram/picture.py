@@ -23,6 +23,14 @@ def draw_diagram(diagram: Diagram, *, part: str = "", depth: int | None = None) 
     With ``depth`` what lies deeper is drawn as one box each: with 1 the parts of the diagram itself.
     QuadvisError if there is no such part.
     """
+    picture, tasks = picture_of(diagram)
+    picture = part_of(picture, part, depth)
+    title = f"{diagram.name}: {part}" if part else diagram.name
+    return draw(title, picture.blocks, picture.wires, picture.constants, tasks)
+
+
+def picture_of(diagram: Diagram) -> tuple[DrawnPicture, dict[str, str]]:
+    """Return all that is drawn of a diagram, and the words of the legend by task."""
     blocks, wires, constants = [], [], {}
     for path in diagram.listing:
         node = diagram.graph[path]
@@ -44,10 +52,7 @@ def draw_diagram(diagram: Diagram, *, part: str = "", depth: int | None = None) 
             else:
                 constants[node.path, port] = constant_text(node, port, source.value)
     tasks = {task.name: rate_text(task) for task in diagram.graph.tasks}
-    picture = DrawnPicture(blocks, wires, constants, diagram.ports)
-    picture = part_of(picture, part, depth)
-    title = f"{diagram.name}: {part}" if part else diagram.name
-    return draw(title, picture.blocks, picture.wires, picture.constants, tasks)
+    return DrawnPicture(blocks, wires, constants, diagram.ports), tasks
 
 
 def part_of(picture: DrawnPicture, part: str, depth: int | None) -> DrawnPicture:

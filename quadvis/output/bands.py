@@ -15,7 +15,7 @@ from collections import defaultdict
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from typing import TypeVar
 
-from quadvis.output.boxes import Box, Net, Point, in_bands, in_columns
+from quadvis.output.boxes import LEAST_WIDTH, Box, Net, Point, in_bands, in_columns
 
 TRACK, EDGE = 9.0, 14.0  # pixels between wires, and around boxes and wires
 FAR = 1e9
@@ -26,11 +26,11 @@ _Key = TypeVar("_Key", bound=Hashable)
 class Sheet:
     """Connected boxes with their places relative to ``x``, ``y`` and, after `route`, the nets' ways."""
 
-    def __init__(self, boxes: Sequence[Box], nets: Sequence[Net]) -> None:
+    def __init__(self, boxes: Sequence[Box], nets: Sequence[Net], least: float = LEAST_WIDTH) -> None:
         self.boxes, self.nets = boxes, nets
         self.x = self.y = 0.0
         self.is_open = any(net.is_terminal for net in nets)
-        self.bands = in_bands(in_columns(boxes, nets), nets)
+        self.bands = in_bands(in_columns(boxes, nets), nets, least)
         self.channels: dict[tuple[int, int], dict[Net, tuple[float, float]]] = defaultdict(dict)
         self.corridors: dict[int, dict[Net, list[tuple[int, int] | None]]] = defaultdict(dict)
         self.margin: dict[Net, tuple[float, float]] = {}

@@ -114,11 +114,16 @@ def _order(
     return done[::-1]
 
 
-def in_bands(columns: Sequence[Sequence[Box]], nets: Sequence[Net]) -> list[list[list[Box]]]:
-    """Split columns that are too high, fold the row of columns into bands, and stack the boxes."""
+def in_bands(
+    columns: Sequence[Sequence[Box]], nets: Sequence[Net], least: float = LEAST_WIDTH
+) -> list[list[list[Box]]]:
+    """Split columns that are too high, fold the row of columns into bands, and stack the boxes.
+
+    Bands that are narrower than ``least`` (pixels) are not folded.
+    """
     area = sum((box.width + 3 * GAP) * (box.height + GAP) for column in columns for box in column)
     highest = max(LEAST_HEIGHT, math.sqrt(area / ASPECT))
-    widest = max(LEAST_WIDTH, math.sqrt(area * ASPECT))
+    widest = max(least, math.sqrt(area * ASPECT))
     bands: list[list[list[Box]]] = [[]]
     across = 0.0
     for column in columns:

@@ -60,7 +60,7 @@ def part_alone(picture: DrawnPicture, part: str) -> DrawnPicture:
 
     QuadvisError if there is no such part.
     """
-    known = _parts(picture.blocks)
+    known = parts_of(picture.blocks)
     if part not in known:
         remedy = suggestion(part, known) or "it has no parts"
         raise QuadvisError(f"the diagram has no part {quoted(part)}; {remedy}")
@@ -134,7 +134,7 @@ def _fold(
     return DrawnBlock(path, kind, inputs, outputs, task, faulty={"": "; ".join(faults)} if faults else {})
 
 
-def _parts(blocks: Sequence[DrawnBlock]) -> list[str]:
+def parts_of(blocks: Sequence[DrawnBlock]) -> list[str]:
     """Return the paths of all parts, outer ones first."""
     found: dict[str, None] = {}
     for block in blocks:

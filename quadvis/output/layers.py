@@ -16,16 +16,19 @@ from itertools import pairwise
 from typing import Any
 
 from quadvis.output.bands import EDGE, Sheet
-from quadvis.output.boxes import ASPECT, GAP, Box, Net, Point
+from quadvis.output.boxes import ASPECT, GAP, LEAST_WIDTH, Box, Net, Point
 
 TITLE = 30.0  # pixels that a part leaves free above its boxes
 
 Shape = dict[str, Any]
 
 
-def layout(graph: Shape) -> Shape:
-    """Return a graph in ELK's JSON format with positions filled in; equal graphs get equal positions."""
-    root = _Level(graph)
+def layout(graph: Shape, least: float = LEAST_WIDTH) -> Shape:
+    """Return a graph in ELK's JSON format with positions filled in; equal graphs get equal positions.
+
+    Rows that are narrower than ``least`` (pixels) are not folded.
+    """
+    root = _Level(graph, least=least)
     trails = dict(root.trails([]))
     for edge in graph["edges"]:
         _take(trails, edge["sources"][0], edge["targets"][0])
@@ -43,8 +46,8 @@ def layout(graph: Shape) -> Shape:
 class _Level:
     """The inside of a part, or of the whole diagram, and the nets of wires on it."""
 
-    def __init__(self, node: Shape, top: float = EDGE) -> None:
-        self.top = top
+    def __init__(self, node: Shape, top: float = EDGE, least: float = LEAST_WIDTH) -> None:
+        self.top, self.row = top, least
         self.least = _least_width(node)
         self.boxes: list[Box] = []
         self.inner: dict[str, _Level] = {}  # by the ids of the boxes that are parts
@@ -53,7 +56,7 @@ class _Level:
         for child in node.get("children", ()):
             ports = child.get("ports")
             if ports is None:
-                self.inner[child["id"]] = _Level(child, TITLE)
+                self.inner[child["id"]] = _Level(child, TITLE, least)
                 self.boxes.append(Box(child["id"]))
                 continue
             box = Box(child["id"], child["width"], child["height"])
@@ -82,7 +85,7 @@ class _Level:
                 box.width, box.height = level.width, level.height
                 box.ports = {net.port: net.height for net in level.nets.values() if net.is_terminal}
                 box.reach = dict.fromkeys(box.ports, 0.0)
-        sheets = [Sheet(boxes, nets) for boxes, nets in self._groups()]
+        sheets = [Sheet(boxes, nets, self.row) for boxes, nets in self._groups()]
         self.width, self.height = self._pack(sheets)
         for sheet in sheets:
             sheet.route(self.width)
