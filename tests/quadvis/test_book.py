@@ -130,7 +130,7 @@ def test_a_book_has_no_part_of_its_own(option: list[str], capsys: pytest.Capture
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "variant"), [("takeover", "fused"), ("flight", None), ("hover", None)])
+@pytest.mark.parametrize(("name", "variant"), [("takeover", "robust"), ("flight", None), ("hover", None)])
 def test_the_largest_diagrams_are_legible_on_a3(name: str, variant: str | None) -> None:
     diagram = quadvis.load(ROOT / "diagrams" / f"{name}.yaml", variant=variant)
     read = Read(draw_book(diagram))
