@@ -11,11 +11,13 @@ from pathlib import Path
 from documentation.block_pages import block_page, contents, group_page
 from documentation.block_pictures import pictures
 from documentation.diagram_pages import diagram_files, diagram_page, diagram_picture, users_of
+from documentation.error_index import error_page
 from documentation.generator import render
 from documentation.link_check import broken_links
 from documentation.markdown import from_docstring
-from documentation.site_map import LIBRARY, ROOT, page_of, relinked
+from documentation.site_map import GUIDES, LIBRARY, ROOT, page_of, relinked
 from documentation.staging import Staging
+from documentation.words import words
 from quadvis.block import Block
 from quadvis.library.catalogue import Catalogue
 
@@ -27,8 +29,15 @@ READMES = (
     "tests/faults/README.md",
 )
 ORPHAN = "---\norphan: true\n---\n\n"  # for Sphinx: a page that no table of contents has
+GUIDE_PAGES = {
+    "Begin": ["first_flight", "concepts", "coming_from"],
+    "How to": [
+        "own_block", "own_craft", "own_camera", "own_protocol", "tuning", "sweeps", "real_time", "fmu",
+    ],
+}  # fmt: skip
 CONTENTS = {
-    "The pages": ["diagrams/index", "blocks/index", "quadvis/index", "tests/faults/index"],
+    **{caption: [f"guides/{name}" for name in names] for caption, names in GUIDE_PAGES.items()},
+    "Look up": ["diagrams/index", "blocks/index", "errors", "quadvis/index", "tests/faults/index"],
 }
 
 
@@ -51,6 +60,7 @@ def build_site(
         say(f"page of {name}")
     _write_diagrams(staging, files, set(blocks), cache / "pictures")
     if names is None:
+        staging.write("errors.md", error_page())
         _write_documents(staging, set(blocks))
     else:
         staging.write("index.md", "# Blocks\n" + _groups(blocks))
@@ -96,7 +106,8 @@ def _write_diagrams(staging: Staging, files: Iterable[str], blocks: set[str], ca
 
 def _write_documents(staging: Staging, blocks: set[str]) -> None:
     """Write the READMEs, and all files to which they lead, one after the other."""
-    waiting, seen = list(READMES), set(READMES)
+    documents = [*READMES, *(f"{GUIDES}/{name}.md" for pages in GUIDE_PAGES.values() for name in pages)]
+    waiting, seen = list(documents), set(documents)
     while waiting:
         path = waiting.pop()
         page = page_of(path)
@@ -106,7 +117,9 @@ def _write_documents(staging: Staging, blocks: set[str]) -> None:
             staging.write(page, (ROOT / path).read_bytes())
             continue
         text, leads_to = relinked((ROOT / path).read_text(encoding="utf-8"), path)
-        head = "" if path in READMES else ORPHAN
+        if path == f"{GUIDES}/coming_from.md":
+            text += words(blocks)
+        head = "" if path in documents else ORPHAN
         staging.write(page, head + text + _contents(page, blocks))
         waiting += sorted(leads_to - seen)
         seen |= leads_to
