@@ -161,6 +161,11 @@ def foreign_words(ours: str) -> list[str]:
     return _MEANT.get(ours, "").split()
 
 
+def foreign_names() -> dict[str, list[str]]:
+    """Return the plain words of other programs for each of ours that has any."""
+    return {ours: foreign_words(ours) for ours in _MEANT}
+
+
 def plain_word(word: str) -> str:
     """Return a word as it is looked up."""
     return re.sub(r"[-_ ]", "", word).casefold()

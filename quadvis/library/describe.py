@@ -39,31 +39,36 @@ def first_line(block: type[Block]) -> str:
 
 def description(name: str, block: type[Block], width: int | None = None) -> str:
     """Return a block's docstring, ports, parameters and states as text, with an example of its use."""
-    interface = block.interface
     lines = [name, "", *(inspect.getdoc(block) or "").splitlines(), ""]
-    if tags := _tags(block):
-        lines += [*(f"{tag}: {reason}" for tag, reason in tags.items()), ""]
-    feedthrough = interface.feedthrough
-    for title, rows in (
-        ("inputs", [_input_row(port, port.name in feedthrough) for port in interface.inputs.values()]),
-        ("outputs", [_output_row(port) for port in interface.outputs.values()]),
-        ("parameters", [_param_row(param) for param in interface.params.values()]),
-        ("states", [_state_row(state) for state in interface.states.values()]),
-    ):
+    if unlike := tags(block):
+        lines += [*(f"{tag}: {reason}" for tag, reason in unlike.items()), ""]
+    for title, rows in declarations(block).items():
         if rows:
             lines += [title, *(f"  {line}" for line in table(rows, width and width - 2)), ""]
     lines += ["in a diagram", *(f"  {line}" for line in example(name, block))]
     return "\n".join(lines)
 
 
-def _tags(block: type[Block]) -> dict[str, str]:
+def declarations(block: type[Block]) -> dict[str, list[tuple[str, ...]]]:
+    """Return a block's inputs, outputs, parameters and states as rows of texts, the name first."""
+    interface = block.interface
+    feedthrough = interface.feedthrough
+    return {
+        "inputs": [_input_row(port, port.name in feedthrough) for port in interface.inputs.values()],
+        "outputs": [_output_row(port) for port in interface.outputs.values()],
+        "parameters": [_param_row(param) for param in interface.params.values()],
+        "states": [_state_row(state) for state in interface.states.values()],
+    }
+
+
+def tags(block: type[Block]) -> dict[str, str]:
     """Return what makes the block unlike others, in words, and why."""
-    tags = {tag.replace("_", " "): reason for tag in TAGS if (reason := getattr(block, tag))}
+    found = {tag.replace("_", " "): reason for tag in TAGS if (reason := getattr(block, tag))}
     names = block.ports_from()
-    tags |= {"ports": f"they depend on {', '.join(names)}"} if names else {}
-    tags |= {"names": f"a diagram gives those of {block.free_names}"} if block.free_names else {}
-    tags |= {"events": "located between two ticks at 'rate: continuous'"} if block.interface.events else {}
-    return tags | ({"device": _device(block)} if issubclass(block, Device) else {})
+    found |= {"ports": f"they depend on {', '.join(names)}"} if names else {}
+    found |= {"names": f"a diagram gives those of {block.free_names}"} if block.free_names else {}
+    found |= {"events": "located between two ticks at 'rate: continuous'"} if block.interface.events else {}
+    return found | ({"device": _device(block)} if issubclass(block, Device) else {})
 
 
 def _device(block: type[Device]) -> str:
@@ -203,7 +208,7 @@ def facts(name: str, block: type[Block]) -> dict[str, Any]:
         "states": plain(interface.states.values()),
         "feedthrough": sorted(interface.feedthrough),
         "numeric": block.numeric,
-        "tags": _tags(block),
+        "tags": tags(block),
         "safe": {name: param.name for name, param in interface.safe.items()},
     }
 
