@@ -46,7 +46,7 @@ class Ran(Protocol):
 
 
 @dataclass(frozen=True)
-class Form:
+class ModelForm:
     """What is sought: denominator of ``order``, numerator with ``zeros``, continuous or in z."""
 
     order: int
@@ -78,7 +78,7 @@ def identify(
     of whole samples is sought, too. Samples before ``after`` (s) are left out; the last share ``validation``
     of them is not fitted, and judges the model. QuadvisError if the recording does not determine it.
     """
-    form = Form(order, order - 1 if zeros is None else zeros, discrete)
+    form = ModelForm(order, order - 1 if zeros is None else zeros, discrete)
     if order < 1 or not 0 <= form.zeros <= order:
         problem = f"a transfer function of order {order} cannot have {counted(form.zeros, 'zero')}"
         raise QuadvisError(f"{problem}; give an order of 1 or more and at most as many zeros")
@@ -108,7 +108,7 @@ class Stretched:
     """The samples that are fitted or simulated: all of them, or the ``first`` ones."""
 
     data: Experiment
-    form: Form
+    form: ModelForm
     count: int = 0
 
     def first(self, share: float) -> Stretched:
@@ -153,7 +153,7 @@ class Stretched:
         return np.asarray(np.nan_to_num(np.clip(columns, -HUGE, HUGE), nan=HUGE), np.float64)
 
 
-def _sampled(form: Form, power: int, below: Vector, period: float) -> tuple[Vector, Vector]:
+def _sampled(form: ModelForm, power: int, below: Vector, period: float) -> tuple[Vector, Vector]:
     """Return the filter of ``s^power / below``, or ``z^power / below``, between samples of a held input."""
     if form.discrete:
         above = np.zeros(form.order + 1)

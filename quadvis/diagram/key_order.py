@@ -20,11 +20,20 @@ FILE = _singly(
     "seed", "overload", "on_host_loss", "computers", "links", "files", "ports", "blocks", "variants", "log",
     "expect", "summary", "figures", "analyse",
 )  # fmt: skip
-BLOCK: Groups = (("slot",), ("block", "part"), ("group", "at", "rate", "stream"), ("with",), ("in",))
+CONDITIONS = ("when", "triggered", "reset", "initial", "condition")
+BLOCK: Groups = (
+    ("slot",),
+    ("block", "part"),
+    ("group", "at", "rate", "stream"),
+    CONDITIONS,
+    ("with",),
+    ("in",),
+)
 WIRE = _singly("from", "across", "over", "initial")
 QUANTITY = _singly("value", "unit")
 STRETCH = ("of", "after", "before")
-EXPECTATION: Groups = (("signal", "margin", "limit", "age"), STRETCH, tuple(EXPECTATIONS))
+JUDGED = ("signal", "margin", "limit", "age", "transfer", "sensitivity", "complementary_sensitivity")
+EXPECTATION: Groups = (JUDGED, STRETCH, tuple(EXPECTATIONS))
 ENTRY: Groups = (("signal",), STRETCH, ("show", "unit"))
 PANEL: Groups = (
     ("title",),
@@ -38,7 +47,7 @@ ORDERS: dict[Path, Groups] = {
     (): FILE,
     ("base",): _singly("file", "variant"),
     ("ports",): _singly("in", "out"),
-    ("solver",): _singly("method", "step"),
+    ("solver",): _singly("method", "step", "rtol", "atol"),
     ("rates", ANY): _singly("rate", "offset"),
     ("blocks", ANY): BLOCK,
     ("blocks", ANY, "in", ANY): WIRE,
@@ -54,7 +63,8 @@ ORDERS: dict[Path, Groups] = {
     ("figures", ELEMENT, "panels", ELEMENT): PANEL,
     ("figures", ELEMENT, "panels", ELEMENT, "signals", ELEMENT): _singly("signal", "label"),
     ("figures", ELEMENT, "signals", ELEMENT): _singly("signal", "label"),
-    ("analyse",): _singly("at", "cuts", "limits"),
+    ("analyse",): _singly("at", "cuts", "transfer", "limits"),
+    ("analyse", "transfer", ANY): _singly("from", "to", "open"),
     ("analyse", "limits", ANY): _singly("vary", "from", "to"),
 }  # fmt: skip
 

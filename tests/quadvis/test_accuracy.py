@@ -121,7 +121,7 @@ def test_a_step_that_is_too_large_ends_with_one(tmp_path: Path, capsys: pytest.C
 
 
 def test_a_jump_between_two_steps_is_named_by_the_order() -> None:
-    found = load_text(DRIVEN.replace("AT", "0.3337 s").replace("100 ms", "10 ms")).accuracy()
+    found = load_text(DRIVEN.replace("AT", "0.331 s").replace("100 ms", "10 ms")).accuracy()
     assert found.worst is not None and found.worst.order < 3.0
     assert "not 4 as ode4 has: something jumps between two steps" in found.verdict
 

@@ -242,7 +242,7 @@ def test_check_reports_all_faults_of_the_file_at_their_places(tmp_path: Path) ->
     with pytest.raises(DiagramError) as caught:
         quadvis.load(tmp_path / "x.yaml")
     places = [(Path(fault.place.file).name, fault.place.line) for fault in caught.value.faults]
-    assert places == [("imu.yaml", line) for line in (13, 14, 15, 17)]
+    assert places == [("imu.yaml", line) for line in (13, 14, 16, 22)]
     assert all(fault.subject == "block 'imu', protocol 'lab_imu'" for fault in caught.value.faults)
     (tmp_path / "x.yaml").write_text(head + entry.replace("imu.yaml", "imv.yaml"))
     with pytest.raises(DiagramError) as caught:
