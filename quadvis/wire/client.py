@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as Timeout
 from contextlib import contextmanager, suppress
+from functools import partial
 from typing import Any
 
 from quadvis.wire.address import WireAddress
@@ -239,15 +240,9 @@ class Client:
             self._beat()
         if socket == STREAM and state == CONNECTED:
             with self._lock:
-                topics = sorted({topic for each in self._subscriptions for topic in each.topics})
-            if topics:
-                self.send("subscribe", topics=topics).add_done_callback(self._resubscribed)
-
-    def _resubscribed(self, future: Future[Reply]) -> None:
-        error = None if future.cancelled() else future.result().error
-        if error is not None:
-            for each in self._subscriptions:
-                each.end(error)
+                asking = [*self._subscriptions]
+            if topics := sorted({topic for each in asking for topic in each.topics}):
+                self.send("subscribe", topics=topics).add_done_callback(partial(_resubscribed, asking))
 
     def _fail(self, error: WireError) -> None:
         with self._lock:
@@ -290,3 +285,11 @@ class Client:
         with self._lock:
             self._token, self.operates = "", False
         self._on_lost(error)
+
+
+def _resubscribed(asking: Sequence[Subscription], future: Future[Reply]) -> None:
+    """End the subscriptions that have been refused; later ones are none of them."""
+    error = None if future.cancelled() else future.result().error
+    if error is not None:
+        for each in asking:
+            each.end(error)
