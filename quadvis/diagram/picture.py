@@ -112,7 +112,7 @@ def _text(wire: Wire, passed: Mapping[str, str]) -> str:
 def _condition_lines(node: Node, passed: Mapping[str, str]) -> Iterator[str]:
     """Yield the signals on which a condition depends."""
     for port in ("when", "trigger", "reset") if node.kind == CONDITION else ():
-        source = node.inputs[port]
+        source = node.inputs.get(port)  # not there if it is faulty
         if isinstance(source, Wire):
             yield f"{port}: {_text(source, passed)}"
 

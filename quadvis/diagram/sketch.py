@@ -127,7 +127,8 @@ class _Sketch:
         if fault.problem.startswith(_LOOP):
             for name in fault.problem.removeprefix(_LOOP).split(" -> "):
                 path, _, port = name.rpartition(".")
-                self.boxes[path].faulty.setdefault(port, words)
+                if path in self.boxes:  # a condition stands there, too, by its name alone
+                    self.boxes[path].faulty.setdefault(port, words)
             return
         box.faulty.setdefault(self._port(box, fault), words)
 

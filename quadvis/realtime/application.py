@@ -20,6 +20,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from multiprocessing import parent_process
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import ForkingPickler
 from typing import Any, NamedTuple
 
 from quadvis.diagram.load import load_text
@@ -317,6 +318,7 @@ def perform(setup: Setup) -> None:
     leave_to_parent()
     threading.Thread(target=_end_with_parent, args=(application,), daemon=True).start()
     IS_COMMAND.set(setup.is_command)
+    no_memory = ForkingPickler.dumps(Ending.of(MemoryError()))  # made while there is some
     try:
         ending = application.run()
     except (Ended, Interrupted) as error:
@@ -324,7 +326,10 @@ def perform(setup: Setup) -> None:
     except Exception as error:
         ending = application.failed(error)
     with suppress(OSError):  # the supervisor may have ended
-        setup.link.send(ending)
+        try:
+            setup.link.send(ending)
+        except MemoryError:
+            setup.link.send_bytes(no_memory)
     application.add_tail()
 
 

@@ -44,16 +44,22 @@ class PartOutput(Block):
             return made | {"initial": None, "numeric": False, "output": cls.show}
         default = False if kind == BOOL else 0
         words = "the output while the part does not show it"
-        return made | {"initial": In(signal, default=default, doc=words), "output": cls.choose}
+        output = cls.choose if kind == BOOL else cls.count
+        return made | {"initial": In(signal, default=default, doc=words), "output": output}
 
     def output(self, u: Any, initial: Any, shown: bool) -> Any:
         """Return the number, or the initial one."""
         return copied(u) if shown else copied(initial)
 
     def choose(self, u: Any, initial: Any, shown: bool) -> Any:
-        """Return the truth value or whole number, or the initial one."""
-        found = u if shown else initial
-        return found if isinstance(found, (bool, int)) else found.copy()
+        """Return the truth value, or the initial one."""
+        if isinstance(u, bool):
+            return u if shown else initial
+        return u.copy() if shown else initial.copy()
+
+    def count(self, u: Any, initial: Any, shown: bool) -> Any:
+        """Return the whole number, or the initial one."""
+        return 1 * u if shown else 1 * initial
 
     def show(self, u: Any, shown: bool) -> Any:
         """Return the picture, or none."""

@@ -27,6 +27,8 @@ def compiles(subject: Subject) -> None:
     if not subject.block.numeric:
         return
     for rig in rigs(subject, missing=True):
+        if not rig.block.numeric:  # as its parameters are
+            continue
         calls = _compiled(rig)
         with rig.engine:
             for step in range(STEPS):
