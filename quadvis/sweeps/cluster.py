@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from typing import Any
 
 from quadvis.errors import QuadvisError, RunError, quoted
 from quadvis.sweeps.parcel import Parcel, difference, software
-from quadvis.sweeps.pool import IDLE
+from quadvis.sweeps.pool import results_of
 from quadvis.sweeps.worker import Job, Row
 
 PATIENCE = 10.0  # s in which the scheduler must answer and have a worker
@@ -78,18 +77,9 @@ def _check_workers(client: Any, address: str) -> None:
 def _rows(futures: Sequence[Any]) -> Iterator[Row | None]:
     from distributed import KilledWorker
 
-    done: SimpleQueue[Any] = SimpleQueue()
-    for future in futures:
-        future.add_done_callback(done.put)
-    left = len(futures)
-    while left:
-        try:
-            found: Sequence[Row] = done.get(timeout=IDLE).result()
-        except Empty:
-            yield None
-            continue
-        except KilledWorker:
-            problem = "some jobs have lost one worker after the other, perhaps for lack of memory"
-            raise RunError(f"{problem}; try fewer workers on each machine") from None
-        left -= 1
-        yield from found
+    try:
+        for found in results_of(futures):
+            yield from (None,) if found is None else found
+    except KilledWorker:
+        problem = "some jobs have lost one worker after the other, perhaps for lack of memory"
+        raise RunError(f"{problem}; try fewer workers on each machine") from None

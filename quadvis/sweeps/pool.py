@@ -10,10 +10,11 @@ from __future__ import annotations
 import multiprocessing
 import os
 from collections.abc import Generator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.process import BaseProcess
 from queue import Empty, SimpleQueue
+from typing import Any
 
 from quadvis.errors import RunError
 from quadvis.errors.caller import IS_COMMAND
@@ -49,17 +50,7 @@ def perform_all(jobs: Sequence[Job], workers: int) -> Generator[Row | None, None
     try:
         with launching():
             futures = [executor.submit(perform, job) for job in jobs]  # this starts the processes
-        done: SimpleQueue[Future[Row]] = SimpleQueue()
-        for future in futures:
-            future.add_done_callback(done.put)
-        left = len(futures)
-        while left:
-            try:
-                row = done.get(timeout=IDLE).result()
-                left -= 1
-            except Empty:
-                row = None
-            yield row
+        yield from results_of(futures)
         finished = True
     except BrokenProcessPool:
         problem = "a worker process was killed, perhaps by the system for lack of memory"
@@ -74,3 +65,21 @@ def perform_all(jobs: Sequence[Job], workers: int) -> Generator[Row | None, None
         executor.shutdown(wait=True, cancel_futures=True)
         for child in children:
             child.join()
+
+
+def results_of(futures: Sequence[Any]) -> Generator[Any, None, None]:
+    """Yield the results of futures as they come, and None after a second without one.
+
+    They are those of ``concurrent.futures``, or what has the same methods.
+    """
+    done: SimpleQueue[Any] = SimpleQueue()
+    for future in futures:
+        future.add_done_callback(done.put)
+    left = len(futures)
+    while left:
+        try:
+            found = done.get(timeout=IDLE).result()
+            left -= 1
+        except Empty:
+            found = None
+        yield found
