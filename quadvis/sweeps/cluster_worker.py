@@ -14,10 +14,9 @@ from distributed import WorkerPlugin
 from quadvis.errors import QuadvisError
 from quadvis.errors.caller import IS_COMMAND
 from quadvis.sweeps.parcel import Parcel, difference, moved, moved_back, moved_job
-from quadvis.sweeps.worker import Job, Row, forget, perform
+from quadvis.sweeps.worker import Job, Row, perform
 
 _parcels: dict[str, tuple[Parcel, Path]] = {}  # by key
-_last: list[str] = []  # the key of the parcel of the last jobs
 _running = threading.Lock()  # a diagram is loaded once for successive runs
 
 
@@ -49,8 +48,5 @@ def perform_there(jobs: tuple[Job, ...], parcel: str) -> list[Row]:
     if problem := difference(found.software):
         raise QuadvisError(f"a worker of the cluster {problem}")
     with _running, chdir(moved(found.directory, folder)):
-        if _last[:] != [parcel]:
-            forget()  # its files may have the names of earlier ones
-            _last[:] = [parcel]
         IS_COMMAND.set(found.is_command)
         return [moved_back(perform(moved_job(job, folder)), folder) for job in jobs]

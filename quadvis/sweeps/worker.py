@@ -145,7 +145,7 @@ def _limit(diagram: Diagram, selection: Selection, statistic: str) -> float | No
     return None
 
 
-_loaded: tuple[tuple[Configuration, Mapping[str, str]], Diagram] | None = None
+_loaded: tuple[tuple[str, Configuration, Mapping[str, str]], Diagram] | None = None
 
 
 def begin(is_command: bool) -> None:
@@ -181,19 +181,13 @@ def perform(job: Job) -> Row:
     return Row(job.index, digest, units, found, passed, result.lost, wall=result.wall)
 
 
-def forget() -> None:
-    """Load the diagram of the next run anew."""
-    global _loaded
-    _loaded = None
-
-
 def diagram_of(job: Job) -> Diagram:
-    """Return the diagram of a run; successive runs of one configuration and the same files share it.
+    """Return the diagram of a run; successive runs of one configuration, directory and files share it.
 
     QuadvisError if a file has changed since the sweep began, because one table is about one diagram.
     """
     global _loaded
-    asked = job.configuration, job.files
+    asked = os.getcwd(), job.configuration, job.files
     if _loaded is None or _loaded[0] != asked:
         loaded = job.configuration.load()
         for path, digest in loaded.files.items():
