@@ -175,14 +175,15 @@ def _projected(stretch: Stretched, denominator: Vector, lag: int) -> tuple[Vecto
     return found, stretch.output - columns @ found
 
 
+def _cost(stretch: Stretched, denominator: Vector, lag: int) -> float:
+    """Return the squared error that is left with a denominator."""
+    rest = _projected(stretch, denominator, lag)[1]
+    return float(rest @ rest)
+
+
 def _search(stretch: Stretched, lag: int, starts: list[Vector]) -> Vector:
     """Return the denominator with the smallest error that is found from several starts."""
-
-    def cost(denominator: Vector) -> float:
-        rest = _projected(stretch, denominator, lag)[1]
-        return float(rest @ rest)
-
-    ranked = sorted(starts, key=cost)[:STARTS]
+    ranked = sorted(starts, key=lambda start: _cost(stretch, start, lag))[:STARTS]
     found = []
     for start in ranked:
         sizes = np.where(np.abs(start) > 1e-12, np.abs(start), 1.0)
@@ -196,21 +197,18 @@ def _search(stretch: Stretched, lag: int, starts: list[Vector]) -> Vector:
 
 def _best_delay(stretch: Stretched) -> tuple[int, Vector]:
     """Return the dead time (periods of the grid) with the smallest error, and its denominator."""
-
-    def cost(denominator: Vector, lag: int) -> float:
-        rest = _projected(stretch, denominator, lag)[1]
-        return float(rest @ rest)
-
     trials: list[tuple[float, int, Vector]] = []
     for lag in range(min(MOST_DELAYS, stretch.size // 4) + 1):
         announce(f"a delay of {counted(lag, 'sample')}")
         starts = [*_starts(stretch, lag, 4), *(trial[2] for trial in trials[-1:])]
-        trials.append(min(((cost(start, lag), lag, start) for start in starts), key=lambda trial: trial[0]))
+        trials.append(
+            min(((_cost(stretch, start, lag), lag, start) for start in starts), key=lambda trial: trial[0])
+        )
     likely = sorted(trials, key=lambda trial: trial[0])[:STARTS]
     found = []
     for _, lag, start in likely:
         denominator = _search(stretch, lag, [start, *_starts(stretch, lag, 4)])
-        found.append((cost(denominator, lag), lag, denominator))
+        found.append((_cost(stretch, denominator, lag), lag, denominator))
     _, lag, denominator = min(found, key=lambda trial: trial[0])
     return lag, denominator
 

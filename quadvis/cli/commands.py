@@ -437,6 +437,7 @@ def analyse(options: argparse.Namespace) -> int:
 
 def identify(options: argparse.Namespace) -> int:
     """Find a transfer function from a recording, and print it with the block that it makes."""
+    from quadvis.analysis.identify import VALIDATION
     from quadvis.analysis.identify import identify as find
     from quadvis.analysis.plots import save_fit
     from quadvis.analysis.progress import watched
@@ -447,7 +448,8 @@ def identify(options: argparse.Namespace) -> int:
         found = find(
             options.log, input=options.input, output=options.output, order=options.order,
             zeros=options.zeros, delay=options.delay, discrete=options.discrete,
-            after=read_time(options.after) or 0.0, validation=options.validation,
+            after=read_time(options.after) or 0.0,
+            validation=VALIDATION if options.validation is None else options.validation,
         )  # fmt: skip
     if options.plot:
         save_fit(found, Path(options.plot), [Path(options.log)])

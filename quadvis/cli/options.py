@@ -416,7 +416,7 @@ def _identify_options(parser: Parser) -> None:
     parser.add_argument("--discrete", action="store_true", help="in powers of z; default: of s, continuous")
     parser.add_argument("--after", metavar="T", help="leave out what is earlier, such as '2 s'")
     words = "the share of the samples, at the end, that is not fitted and judges the model; default 1/3"
-    parser.add_argument("--validation", type=float, default=1.0 / 3.0, metavar="SHARE", help=words)
+    parser.add_argument("--validation", type=float, metavar="SHARE", help=words)
     parser.add_argument("--plot", metavar="PNG", help="draw the recorded and the simulated output there")
     parser.add_argument("--json", action="store_true", help="print one JSON object instead of the text")
 
