@@ -21,7 +21,9 @@ from quadvis.engine.interpreter import Interpreter, MinorError
 from quadvis.engine.layout import TIME
 from quadvis.engine.program import Program
 from quadvis.engine.solver import ORDERS
+from quadvis.units import Unit, format_quantity
 
+SECOND = Unit.parse("s")
 DELTA = 1e-5  # of a central difference, relative to values above 1
 RESTING = 1e-9  # of a pole's size: poles with less damping are those of oscillations that may go on
 REACH = 3.0  # of h p: beyond, no formula is stable to the left of the origin
@@ -60,21 +62,13 @@ class TooLargeStep(NamedTuple):
     def problem(self) -> str:
         """What is wrong, in words."""
         whose = f"for '{self.pole.block}', whose fastest pole is at {self.pole.shown}"
-        stable = f"{self.solver} is stable up to {_time(self.limit)}"
-        return f"the solver's step of {_time(self.step)} is too large {whose} ({stable})"
+        stable = f"{self.solver} is stable up to {format_quantity(self.limit, SECOND, 3)}"
+        return f"the solver's step of {format_quantity(self.step, SECOND, 3)} is too large {whose} ({stable})"
 
     def facts(self) -> dict[str, Any]:
         """Return it as plain data."""
         pole = self.pole.value
         return {"block": self.pole.block, "pole": [pole.real, pole.imag], "stable_to_s": self.limit}
-
-
-def _time(seconds: float) -> str:
-    """Return a time as text, with three digits."""
-    for name, scale in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
-        if seconds >= scale:
-            return f"{seconds / scale:.3g} {name}"
-    return f"{seconds * 1e9:.3g} ns"
 
 
 @lru_cache(maxsize=1024)
