@@ -63,7 +63,7 @@ class _Survey(NamedTuple):
             if end > len(data):
                 break
             if kind == mcap.CHUNK:
-                chunks.append(position)
+                chunks.append((position, end))
             elif kind == mcap.MESSAGE_INDEX:
                 indexes[int.from_bytes(data[body : body + 2], "little")] = body + 6, end
             position = end
@@ -73,18 +73,13 @@ class _Survey(NamedTuple):
         }
         channels = {}
         # The first chunk describes the channels; the indexes of the last one may be cut off.
-        for start in {*chunks[:1], *chunks[-1:]}:
-            for record in mcap.RecordScan(mcap.MAGIC + data[start : _end(data, start)]).records():
+        for start, until in {*chunks[:1], *chunks[-1:]}:
+            for record in mcap.RecordScan(mcap.MAGIC + data[start:until]).records():
                 if isinstance(record, mcap.ChannelRecord):
                     channels[record.topic] = record.number
                 elif isinstance(record, mcap.MessageRecord):
                     last[record.channel] = max(record.time, last.get(record.channel, -1))
         return _Survey(position, channels, last)
-
-
-def _end(data: mmap.mmap, position: int) -> int:
-    """Return where a whole record ends."""
-    return position + mcap.HEAD.size + int(mcap.HEAD.unpack_from(data, position)[1])
 
 
 def _chunks(rows: list[ChannelRows]) -> bytes:
