@@ -9,10 +9,9 @@ from pathlib import Path
 from quadvis.document import read_yaml
 from quadvis.document.style import formatted
 from quadvis.document.tree import YamlMap
-from quadvis.machine.files import Kind, write_output
+from quadvis.machine.files import YAML, write_output
 from quadvis.machine.inputs import read_input
 
-YAML_FILE = Kind("the file")
 FAILED = 1
 
 
@@ -39,5 +38,5 @@ def _one(path: str, options: argparse.Namespace) -> bool:
     else:
         print(path)
     if not (options.check or options.diff):
-        write_output(Path(path), YAML_FILE, found)
+        write_output(Path(path), YAML, found)
     return True

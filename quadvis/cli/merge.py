@@ -9,10 +9,9 @@ from pathlib import Path
 
 from quadvis.diff.merge import merge_or_none
 from quadvis.errors import QuadvisError
-from quadvis.machine.files import Kind, write_output
+from quadvis.machine.files import YAML, write_output
 from quadvis.machine.inputs import read_input
 
-YAML_FILE = Kind("the file")
 FAILED = 1
 
 
@@ -23,7 +22,7 @@ def merge(options: argparse.Namespace) -> int:
     found = merge_or_none(*texts)
     if found is None:
         return _by_lines(*paths)
-    write_output(Path(options.ours), YAML_FILE, found.text)
+    write_output(Path(options.ours), YAML, found.text)
     for sentence in found.conflicts:
         print(f"conflict: {sentence}", file=sys.stderr)
     return FAILED if found.conflicts else 0

@@ -55,6 +55,7 @@ JPG = Kind("the picture", (b"\xff\xd8\xff",))
 PDF = Kind("the document", (b"%PDF-",))
 PLOT = Kind("the plot", PNG.heads)
 SVG = Kind("the drawing", (b"<svg", b"<?xml"))
+YAML = Kind("the file")
 
 _NOTHING: Mapping[Identity, Path] = MappingProxyType({})
 _read = ContextVar("files that are read now", default=_NOTHING)

@@ -9,7 +9,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from quadvis.output.pdf import Page, Typeface, number, pdf
-from quadvis.output.svg_pdf import BOLD, PLAIN, operators, texts
+from quadvis.output.svg_pdf import BOLD, PLAIN, SVG, operators, shift, texts
 
 PAPERS = {"a4": (841.89, 595.28), "a3": (1190.55, 841.89)}  # points, the long side across
 EDGE, FOOT, FOOT_TYPE = 14.0, 16.0, 8.0  # points: free at each side; the line at the bottom and its type
@@ -17,7 +17,6 @@ LEAST = 6.0  # points: the smallest type that is legible
 LARGEST = 0.75  # points for a pixel: the size that a drawing has by itself
 SHARED = 80.0  # pixels that two sheets of one drawing have in common
 
-_SVG = "{http://www.w3.org/2000/svg}"
 _FILES = {PLAIN: "DejaVuSans.ttf", BOLD: "DejaVuSans-Bold.ttf"}
 Area = tuple[float, float, float, float]  # left, top, right, bottom in pixels
 
@@ -38,7 +37,7 @@ class Leaf:
     def __post_init__(self) -> None:
         self.root = ElementTree.fromstring(self.drawing)
         self.width, self.height = (float(self.root.get(side, "0")) for side in ("width", "height"))
-        sizes = [float(text.get("font-size", "0")) for text in self.root.iter(f"{_SVG}text")]
+        sizes = [float(text.get("font-size", "0")) for text in self.root.iter(f"{SVG}text")]
         self.least_scale = LEAST / min(sizes)
 
     def scale(self, paper: str) -> float:
@@ -54,7 +53,7 @@ class Leaf:
         """Yield the places that lead to other sheets, and the titles of these."""
         for group, (left, top) in _groups(self.root, 0.0, 0.0):
             title = self.links.get(group.get("data-path", ""))
-            shape = group.find(f"{_SVG}rect")
+            shape = group.find(f"{SVG}rect")
             if title is None or shape is None:
                 continue
             x, y, width, height = (float(shape.get(name, "0")) for name in ("x", "y", "width", "height"))
@@ -176,8 +175,9 @@ def _groups(
     element: ElementTree.Element, left: float, top: float
 ) -> Iterator[tuple[ElementTree.Element, tuple[float, float]]]:
     """Yield all groups with the place from which they count."""
-    for group in element.findall(f"{_SVG}g"):
-        moved = group.get("transform", "").removeprefix("translate(").removesuffix(")").split()
-        x, y = (left + float(moved[0]), top + float(moved[1])) if moved else (left, top)
+    for group in element.findall(f"{SVG}g"):
+        x, y = (
+            place + float(moved) for place, moved in zip((left, top), shift(group) or ("0", "0"), strict=True)
+        )
         yield group, (x, y)
         yield from _groups(group, x, y)

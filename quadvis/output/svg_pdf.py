@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 from quadvis.output.pdf import Typeface, colour, number
 
-_SVG = "{http://www.w3.org/2000/svg}"
+SVG = "{http://www.w3.org/2000/svg}"
 _BEND = 0.5523  # of a circle that is made of four curves
 _MOVE = re.compile(r"translate\(([-\d.]+) ([-\d.]+)\)")
 PLAIN, BOLD = "F", "B"  # the names of the typefaces
@@ -17,10 +17,10 @@ PLAIN, BOLD = "F", "B"  # the names of the typefaces
 def operators(root: ElementTree.Element, faces: Mapping[str, Typeface]) -> Iterator[str]:
     """Yield the operators that draw an SVG file, in its own coordinates: y goes down."""
     for element in root:
-        tag = element.tag.removeprefix(_SVG)
+        tag = element.tag.removeprefix(SVG)
         if tag == "g":
-            found = _MOVE.fullmatch(element.get("transform", ""))
-            yield f"q 1 0 0 1 {found[1]} {found[2]} cm" if found else "q"
+            found = shift(element)
+            yield f"q 1 0 0 1 {found[0]} {found[1]} cm" if found else "q"
             yield from operators(element, faces)
             yield "Q"
         elif tag == "text":
@@ -29,9 +29,15 @@ def operators(root: ElementTree.Element, faces: Mapping[str, Typeface]) -> Itera
             yield from _shape(element, _PATHS[tag](element))
 
 
+def shift(group: ElementTree.Element) -> tuple[str, str] | None:
+    """Return how far a group is moved, to the right and down; None if it is not."""
+    found = _MOVE.fullmatch(group.get("transform", ""))
+    return None if found is None else (found[1], found[2])
+
+
 def texts(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
     """Yield the name of a typeface and each text that is set in it."""
-    for element in root.iter(f"{_SVG}text"):
+    for element in root.iter(f"{SVG}text"):
         yield _face(element), element.text or ""
 
 
