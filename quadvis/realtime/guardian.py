@@ -220,7 +220,7 @@ class Guardian:
         self._supervisor.look()
         self._applications.look()
         self._vital.look()
-        host_lost = self._supervisor.any_ended or self._vigil.has_ended
+        host_lost = self._supervisor.any_ended or self._vigil.has_ended()
         if (host_lost and self._setup.on_host_loss == SAFE) or self._vital.any_ended:
             self._make_safe()
         if self.told_to_end and not self.safe:

@@ -91,7 +91,7 @@ class Heartbeat:
 
     @property
     def _has_died(self) -> bool:
-        return self._vigil is not None and self._vigil.has_ended
+        return self._vigil is not None and self._vigil.has_ended()
 
     @property
     def complaint(self) -> str:

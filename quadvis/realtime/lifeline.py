@@ -10,6 +10,7 @@ import ctypes
 import errno
 import os
 import threading
+from contextlib import suppress
 from typing import Any
 
 from quadvis.realtime.system import raise_thread
@@ -56,17 +57,27 @@ class Vigil:
 
     def __init__(self, words: Any, priority: int = 0) -> None:
         self._cut = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
-        self.has_ended = False
+        self._seen = False
         threading.Thread(target=self._wait, args=(Lifeline(words), priority), daemon=True).start()
 
     def _wait(self, line: Lifeline, priority: int) -> None:
         if priority:
             raise_thread(priority)
         if line.wait():
-            self.has_ended = True
             os.eventfd_write(self._cut, 1)
+
+    def has_ended(self) -> bool:
+        """Whether the thread has ended."""
+        if not self._seen:
+            with suppress(BlockingIOError):
+                os.eventfd_read(self._cut)
+                self._seen = True
+        return self._seen
 
     @property
     def descriptors(self) -> list[int]:
-        """What becomes readable at the end, for ``select``; none after it."""
-        return [] if self.has_ended else [self._cut]
+        """What becomes readable at the end, for ``select``; none once `has_ended` has reported it.
+
+        An end between the two thus wakes ``select`` at once.
+        """
+        return [] if self._seen else [self._cut]

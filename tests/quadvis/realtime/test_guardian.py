@@ -254,7 +254,7 @@ def test_it_is_noticed_while_the_process_of_the_host_still_gives_its_memory_back
     made = rig(on_host_loss=word)
     made.follow()
     made.host_ends.set()
-    made.until(lambda: made.guardian._vigil.has_ended)
+    made.until(made.guardian._vigil.has_ended)
     made.guardian.look()
     assert made.guardian.safe == (word == SAFE)
     assert made.supervisor.poll() is None

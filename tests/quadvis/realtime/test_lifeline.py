@@ -34,10 +34,11 @@ def test_it_is_let_go_when_its_holder_is_killed() -> None:
     holder.start()
     mine.recv()
     vigil = Vigil(words)
-    assert select.select(vigil.descriptors, [], [], 0.05)[0] == [] and not vigil.has_ended
+    assert select.select(vigil.descriptors, [], [], 0.05)[0] == [] and not vigil.has_ended()
     assert holder.pid is not None
     os.kill(holder.pid, signal.SIGKILL)
-    assert select.select(vigil.descriptors, [], [], 60)[0] and wait_for(lambda: vigil.has_ended)
+    assert wait_for(lambda: select.select(vigil.descriptors, [], [], 0)[0])
+    assert select.select(vigil.descriptors, [], [], 0)[0] and vigil.has_ended() and vigil.has_ended()
     assert vigil.descriptors == []
     holder.join()
 
