@@ -107,6 +107,7 @@ def main() -> int:
         ready = select.select([states, server, *([peer] if peer else [])], [], [])[0]
         if server in ready:
             peer, received, cli = server.accept()[0], bytearray(), False
+            peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # as the real one
         if peer in ready:
             found = peer.recv(1 << 16)
             if not found:
