@@ -68,7 +68,7 @@ def run_on_several(diagram: Diagram, log: Path | None, options: argparse.Namespa
         several.start()
         try:
             with ProgressLine(diagram.duration) as progress:
-                several.wait(progress)
+                several.wait(progress, progress.say)
         except KeyboardInterrupt:
             several.stop()
             raise
@@ -76,18 +76,21 @@ def run_on_several(diagram: Diagram, log: Path | None, options: argparse.Namespa
         folder.mkdir(parents=True, exist_ok=True)
         logs = several.logs(folder)
         outcome = several.judge(logs)
-        tasks = [task for target in met.values() for task in target.Tasks]
+        tasks = [task for target in several.those_left for task in target.Tasks]
     verdicts = [verdict.facts() for verdict in outcome.verdicts]
+    complaints = several.complaints
+    passed = outcome.passed and not complaints
     if options.json:
-        facts = {"Passed": outcome.passed, "Verdicts": verdicts, "Tasks": tasks, "logs": str(folder)}
-        print(json.dumps({"diagram": diagram.name, "targets": places} | facts))
-        return 0 if outcome.passed else FAILED
+        facts = {"Passed": passed, "Verdicts": verdicts, "Tasks": tasks, "Problem": "; ".join(complaints)}
+        print(json.dumps({"diagram": diagram.name, "targets": places} | facts | {"logs": str(folder)}))
+        return 0 if passed else FAILED
     print(f"{diagram.name} on {', '.join(f'{name} ({place})' for name, place in places.items())}")
-    print("\n".join(_lines(verdicts, tasks, outcome.passed)))
+    print("\n".join(_lines(verdicts, tasks, passed)))
     for name, offset in several.offsets.items():
         print(f"  clock of {name}: known to {format_quantity(offset.error / 1e9, SECOND, 2)}")
     print(f"logs: {folder}")
-    return 0 if outcome.passed else FAILED
+    print("".join(f"{complaint}\n" for complaint in complaints), end="", file=sys.stderr)
+    return 0 if passed else FAILED
 
 
 def _wait(tg: Target, diagram: Diagram) -> None:

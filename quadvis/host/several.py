@@ -6,11 +6,11 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,10 @@ LEAD = 0.5  # s from the order to start until the first tick
 ALIGN = 1.0  # s between two looks at the clocks
 LOOK = 0.2  # s between two looks at the status
 FEW = 4  # pings of one look
+RUNNING = ("running", "stopping")
+LOST = "lost"
+
+Found = TypeVar("Found")
 
 
 class Several:
@@ -36,8 +40,11 @@ class Several:
 
     A target may be several computers. This process is their operator from ``with`` on. All begin at one
     instant. As long as they run, the clocks of the targets are compared with that of this host, and their
-    ticks are kept at its pace; so times and ages mean the same everywhere, within the error of ``offsets``,
-    which are by the names of the targets' computers, joined.
+    ticks are kept at its pace; so times and ages mean the same everywhere, within the error of ``offsets``.
+
+    A target of whose computers the diagram says ``on_loss: continue`` may be lost: the others fly on, and
+    ``lost`` says why. Both are by the names of the targets' computers, joined. ``complaints`` are sentences
+    about all that has failed and has not ended the flight.
     """
 
     def __init__(self, diagram: Diagram, targets: Mapping[str, Target]) -> None:
@@ -59,8 +66,16 @@ class Several:
         self.offsets: dict[str, Offset] = {}
         self._pool = ThreadPoolExecutor(len(self.targets), "target")
         self._stack = ExitStack()
+        self.lost: dict[str, str] = {}
+        self.complaints: list[str] = []
+        self._spare = {name for name, computers in self.computers.items() if _is_spare(diagram, computers)}
         self._ended = threading.Event()
         self._first: dict[str, Offset] = {}
+
+    @property
+    def those_left(self) -> list[Target]:
+        """The targets that are not lost."""
+        return [target for name, target in self.targets.items() if name not in self.lost]
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
@@ -84,7 +99,8 @@ class Several:
 
     def start(self) -> None:
         """Let all begin at one instant, and keep their ticks at one pace from then on."""
-        self._first = self.offsets = self._measured()
+        self._first = self._all(lambda name, target: _offset(target, PINGS))
+        self.offsets = dict(self._first)
         instant = time.monotonic_ns() + int(LEAD * 1e9)
         self._all(
             lambda name, target: target.request(
@@ -96,28 +112,49 @@ class Several:
     def stop(self) -> None:
         """Stop all that run."""
         self._ended.set()
-        self._all(lambda name, target: target.stop() if target.Status == "running" else None)
+        self._all(_stop)
 
-    def wait(self, progress: Callable[[float, float], None] = lambda reached, spent: None) -> None:
-        """Wait until all have ended; if one ends early, stop the others. QuadvisError says why that was."""
+    def wait(
+        self,
+        progress: Callable[[float, float], None] = lambda reached, spent: None,
+        announce: Callable[[str], None] = lambda sentence: None,
+    ) -> None:
+        """Wait until all have ended; QuadvisError says why one that the others need has ended early.
+
+        The others have been stopped then. ``announce`` gets a sentence about each that they do without.
+        """
         began = time.monotonic()
         while True:
-            found = self._all(lambda name, target: target.status())
-            running = [each for each in found.values() if each["Status"] in ("running", "stopping")]
-            problems = [f"{name}: {each['Problem']}" for name, each in found.items() if each["Problem"]]
-            if problems:
-                self.stop()
-                raise QuadvisError("; ".join(problems))
-            if not running:
+            found = self._all(_seen)
+            losses = {name: f"{name}: {each['Problem']}" for name, each in found.items() if _is_lost(each)}
+            if len(losses) == len(found) or not losses.keys() <= self._spare:
                 self._ended.set()
+                self._all(_tried(_stop))
+                raise QuadvisError("; ".join([*self.lost.values(), *losses.values()]))
+            for name, loss in losses.items():
+                self.lost[name] = loss
+                announce(loss)
+                found.pop(name)
+            if not any(each["Status"] in RUNNING for each in found.values()):
+                self._ended.set()
+                late = [f"{name}: {each['Problem']}" for name, each in found.items() if each["Problem"]]
+                self.complaints = [*self.lost.values(), *late]
                 return
             progress(min(each["ExecTime"] for each in found.values()), time.monotonic() - began)
             time.sleep(LOOK)
 
     def logs(self, folder: Path) -> dict[str, Path]:
-        """Copy the newest log of each target to a folder; return the paths by computer."""
-        paths = self._all(lambda name, target: target.fetchlog(path=folder / f"{name}.mcap"))
-        return {each: paths[name] for name, computers in self.computers.items() for each in computers}
+        """Copy the newest log of each target to a folder; return the paths by computer.
+
+        One that is lost may not be there any more to give its log.
+        """
+
+        def fetch(name: str, target: Target) -> Path:
+            return target.fetchlog(path=folder / f"{name}.mcap")
+
+        paths = self._all(fetch) | self._all(_tried(fetch), self.lost)
+        found = {each: paths[name] for name, computers in self.computers.items() for each in computers}
+        return {name: path for name, path in found.items() if path is not None}
 
     def judge(self, logs: Mapping[str, Path]) -> Outcome:
         """Return the verdicts on the whole flight, from the logs of all computers."""
@@ -129,23 +166,67 @@ class Several:
         judging.read(Together(self.diagram, {name: read[path] for name, path in logs.items()}))
         return judging.outcome()
 
-    def _measured(self, pings: int = PINGS) -> dict[str, Offset]:
-        return self._all(lambda name, target: measure(lambda: int(target.request("clock")), pings))
-
     def _align(self) -> None:
         """Keep the ticks of all targets at the pace of this host's clock, until the end."""
-        while not self._ended.wait(ALIGN):
-            try:
-                self.offsets = self._measured(FEW)
-                for name, found in self.offsets.items():
-                    self.targets[name].request("align", shift=found.offset - self._first[name].offset)
-            except QuadvisError:  # the end, or a host that is lost: `wait` says so
-                return
 
-    def _all(self, call: Callable[[str, Target], Any]) -> dict[str, Any]:
-        """Return what a call gives for each target, all at the same time."""
-        futures = {name: self._pool.submit(call, name, target) for name, target in self.targets.items()}
+        def align(name: str, target: Target) -> Offset:
+            found = _offset(target, FEW)
+            target.request("align", shift=found.offset - self._first[name].offset)
+            return found
+
+        while not self._ended.wait(ALIGN):
+            for name, found in self._all(_tried(align)).items():
+                if found is not None:  # it has ended, or is lost: `wait` says so
+                    self.offsets[name] = found
+
+    def _all(
+        self, call: Callable[[str, Target], Found], names: Iterable[str] | None = None
+    ) -> dict[str, Found]:
+        """Return what a call gives for each target that is not lost, or for those named, all at one time."""
+        chosen = [name for name in self.targets if name not in self.lost] if names is None else names
+        futures = {name: self._pool.submit(call, name, self.targets[name]) for name in chosen}
         return {name: future.result() for name, future in futures.items()}
+
+
+def _tried(call: Callable[[str, Target], Found]) -> Callable[[str, Target], Found | None]:
+    """Return a call that gives None where the other one fails."""
+
+    def tried(name: str, target: Target) -> Found | None:
+        with suppress(QuadvisError):
+            return call(name, target)
+        return None
+
+    return tried
+
+
+def _offset(target: Target, pings: int) -> Offset:
+    return measure(lambda: int(target.request("clock")), pings)
+
+
+def _stop(name: str, target: Target) -> None:
+    if target.Status == "running":
+        target.stop()
+
+
+def _seen(name: str, target: Target) -> dict[str, Any]:
+    """Return the status of a target; one that does not answer has a problem, and no times."""
+    try:
+        return target.status()
+    except QuadvisError as error:
+        return {"Status": LOST, "Problem": str(error)}
+
+
+def _is_lost(status: Mapping[str, Any]) -> bool:
+    """Whether a target has come to an end before the stop time."""
+    if status["Status"] in RUNNING or not status["Problem"]:
+        return False
+    return bool(status["Status"] == LOST or status["ExecTime"] + status["SampleTime"] < status["StopTime"])
+
+
+def _is_spare(diagram: Diagram, computers: Iterable[str]) -> bool:
+    """Whether the diagram says that the others fly on without all of these."""
+    specs = [diagram.computer(name) for name in computers]
+    return all(spec is not None and spec.is_dispensable for spec in specs)
 
 
 def _joined(names: Iterable[str]) -> str:
@@ -153,17 +234,17 @@ def _joined(names: Iterable[str]) -> str:
 
 
 class Together:
-    """The signals of several logs, each with the blocks of its computer."""
+    """The signals of several logs, each with the blocks of its computer; none of a computer without a log."""
 
     def __init__(self, diagram: Diagram, logs: Mapping[str, Log]) -> None:
         self._diagram, self._logs = diagram, logs
 
-    def _log(self, name: str) -> Log:
+    def _log(self, name: str) -> Log | None:
         head = name.partition("[")[0]
         path = self._diagram.ports.get(head, head).rpartition(".")[0]
         if path not in self._diagram.graph:
             raise QuadvisError(f"there is no signal {quoted(name)}")
-        return self._logs[self._diagram.graph[path].computer]
+        return self._logs.get(self._diagram.graph[path].computer)
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -171,22 +252,26 @@ class Together:
         return {name: unit for log in self._logs.values() for name, unit in log.units.items()}
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        return self._log(name)[name]
+        log = self._log(name)
+        return np.empty(0) if log is None else log[name]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.units)
 
     def times(self, name: str) -> NDArray[np.float64]:
         """Return the times (s) of a signal's rows."""
-        return self._log(name).times(name)
+        log = self._log(name)
+        return np.empty(0) if log is None else log.times(name)
 
     def rate(self, name: str) -> str:
         """Return the name of the rate of a signal's block."""
-        return self._log(name).rate(name)
+        log = self._log(name)
+        return "" if log is None else log.rate(name)
 
     def stamps(self, name: str) -> NDArray[np.int64]:
         """Return the stamps (ns) of its rows."""
-        return self._log(name).stamps(name)
+        log = self._log(name)
+        return np.empty(0, np.int64) if log is None else log.stamps(name)
 
 
 def read_places(texts: Iterable[str]) -> dict[str, str]:

@@ -17,7 +17,7 @@ from quadvis.host.several import Several, read_places
 from quadvis.host.target import Target
 from quadvis.wire.hosts import allow
 from quadvis.wire.keys import new_key
-from tests.processes import linux
+from tests.processes import linux, wait_for
 from tests.punctual import LATE, MISSED
 from tests.quadvis.host.targets import running_target
 
@@ -95,6 +95,100 @@ def test_two_targets_fly_one_diagram(tmp_path: Path, monkeypatch: pytest.MonkeyP
             targets[name] = stack.enter_context(Target(name))
         several = stack.enter_context(Several(quadvis.load(written(tmp_path)), targets))
         check_flight(several, tmp_path)
+
+
+@pytest.mark.slow
+def test_the_flight_goes_on_without_a_machine_that_it_can_do_without(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = written(tmp_path)
+    path.write_text(path.read_text().replace("b: {}", "b: {on_loss: continue}"))
+    with ExitStack() as stack:
+        labs = {name: stack.enter_context(running_target(name=name)) for name in ("a", "b")}
+        targets = {}
+        for name, lab in labs.items():
+            for key in ("QUADVIS_HOME", "XDG_RUNTIME_DIR"):
+                monkeypatch.setenv(key, lab.environment[key])
+            targets[name] = stack.enter_context(Target(name))
+        several = stack.enter_context(Several(quadvis.load(path), targets))
+        several.load()
+        several.start()
+        wait_for(lambda: targets["b"].ExecTime > 0.2)
+        labs["b"].process.kill()
+        said: list[str] = []
+        several.wait(announce=said.append)
+        logs = several.logs(tmp_path)
+        outcome = several.judge(logs)
+    assert list(several.lost.values()) == said == several.complaints and said[0].startswith("b: ")
+    assert list(logs) == ["a"] and list(several.lost) == ["b"] and several.those_left == [targets["a"]]
+    assert quadvis.read_log(logs["a"]).times("wave.y")[-1] > 2.5
+    echo, age = outcome.verdicts
+    assert not np.isnan(echo.found) and str(age).startswith("NOT MET") and "nothing to judge" in str(age)
+
+
+class Scripted:
+    """A target with statuses that are given; one that is none does not answer."""
+
+    def __init__(self, *statuses: tuple[str, float, str] | None) -> None:
+        self.statuses, self.stops = list(statuses), 0
+
+    def status(self) -> dict[str, object]:
+        found = self.statuses.pop(0) if len(self.statuses) > 1 else self.statuses[0]
+        if found is None:
+            raise QuadvisError("lab has not answered 'status' in 3 s")
+        state, time, problem = found
+        return {
+            "Status": state, "ExecTime": time, "Problem": problem, "StopTime": 3.0, "SampleTime": 0.01,
+        }  # fmt: skip
+
+    @property
+    def Status(self) -> str:
+        return str(self.status()["Status"])
+
+    def stop(self) -> None:
+        self.stops += 1
+
+
+RUNS, ENDS = ("running", 1.0, ""), ("stopped", 2.99, "")
+FAILS, LATE_FAILURE = ("stopped", 1.2, "the camera is gone"), ("stopped", 2.99, "the camera is gone")
+
+
+@pytest.mark.parametrize("spare", [False, True])
+@pytest.mark.parametrize("end", [FAILS, None])
+def test_what_the_loss_of_a_target_means_is_what_the_diagram_says(
+    tmp_path: Path, spare: bool, end: tuple[str, float, str] | None
+) -> None:
+    path = written(tmp_path)
+    if spare:
+        path.write_text(path.read_text().replace("b: {}", "b: {on_loss: continue}"))
+    a, b = Scripted(RUNS, RUNS, RUNS, ENDS if spare else RUNS), Scripted(RUNS, end)
+    several = Several(quadvis.load(path), {"a": cast(Target, a), "b": cast(Target, b)})
+    why = "b: the camera is gone" if end else "b: lab has not answered 'status' in 3 s"
+    if spare:
+        several.wait()
+        assert several.complaints == [why] and several.lost == {"b": why} and a.stops == 0
+    else:
+        with pytest.raises(QuadvisError, match=why):
+            several.wait()
+        assert a.stops == 1
+
+
+def test_what_fails_at_the_end_fails_the_flight_and_loses_nobody(tmp_path: Path) -> None:
+    a, b = Scripted(RUNS, ENDS), Scripted(RUNS, LATE_FAILURE)
+    several = Several(quadvis.load(written(tmp_path)), {"a": cast(Target, a), "b": cast(Target, b)})
+    several.wait()
+    assert several.complaints == ["b: the camera is gone"] and not several.lost
+
+
+def test_without_anybody_left_the_flight_ends(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    path.write_text(
+        path.read_text().replace("a: {}, b: {}", "a: {on_loss: continue}, b: {on_loss: continue}")
+    )
+    a, b = Scripted(RUNS, None), Scripted(RUNS, RUNS, FAILS)
+    several = Several(quadvis.load(path), {"a": cast(Target, a), "b": cast(Target, b)})
+    with pytest.raises(QuadvisError, match=r"a: lab has not answered .*; b: the camera is gone"):
+        several.wait()
 
 
 ADDRESSES = {"host": "10.77.61.1", "a": "10.77.61.2", "b": "10.77.61.3"}
