@@ -88,6 +88,7 @@ def _checked(parser: Parser, words: Sequence[str]) -> list[str]:
             named = [str(each) for each in place.choices]
             remedy = suggestion(word, named) or f"choose from {', '.join(map(quoted, named))}"
             raise QuadvisError(sentence(f"{_name(place)} cannot be {quoted(word)}", remedy))
+        _check_value(place, _name(place), word)
     given = {word.partition("=")[0] for word in found}
     lacking = [
         *(_name(place) for place in needed[len(placed) :]),
@@ -133,12 +134,13 @@ def _option(parser: Parser, word: str, waiting: list[str]) -> list[str]:
 
 
 def _check_value(action: argparse.Action, name: str, value: str) -> None:
-    """Refuse a value that an option does not take; ArgumentTypeError of its type is what is wrong."""
+    """Refuse a value that an argument does not take; ArgumentTypeError of its type is what is wrong."""
+    example = f"; write {name} {_name(action)}" if action.option_strings else ""
     try:
         if action.type is not None:
             action.type(value)  # type: ignore[operator]
     except argparse.ArgumentTypeError as error:
-        raise QuadvisError(f"{name}: {error}; write {name} {_name(action)}") from None
+        raise QuadvisError(f"{name}: {error}{example}") from None
     except ValueError:
         kind, such = ("number", "0.5") if action.type is float else ("whole number", "3")
         raise QuadvisError(f"{name}: {quoted(value)} is not a {kind}; write one, such as {such}") from None

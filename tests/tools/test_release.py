@@ -61,6 +61,14 @@ def test_what_is_missing_or_superfluous_is_named(tmp_path: Path) -> None:
     ]
 
 
+def test_stages_may_be_named() -> None:
+    parser = release.argparse.ArgumentParser()
+    release.declare(parser)
+    assert parser.parse_args([]).stages == [] and parser.parse_args(["check"]).stages == ["check"]
+    found = run_script(TOOL, "upload")
+    assert found.returncode == 2 and "there is no stage 'upload'; there are build, check, try" in found.stderr
+
+
 def test_stages_need_what_is_built(tmp_path: Path) -> None:
     found = run_script(TOOL, "check", "-o", tmp_path)
     assert found.returncode == 1 and "is not there; run 'tools/release build' before" in found.stderr
