@@ -415,10 +415,10 @@ def test_a_signal_is_seen_as_the_log_has_it(tg: Target, diagram: Path) -> None:
     tg.stop()
     log = tg.getlog()
     assert isinstance(log, Log)
-    for time, values in seen:
+    for moment, values in seen:
         for name, value in values.items():
             place = np.flatnonzero(log[name] == value)
-            assert len(place) and np.abs(log.times(name)[place] - time).min() < 1.0
+            assert len(place) and np.abs(log.times(name)[place] - moment).min() < 1.0
 
 
 def test_two_scopes_that_trigger_each_other_lose_nothing(tg: Target, diagram: Path) -> None:
@@ -596,7 +596,7 @@ def test_pictures_of_a_run_are_shown_to_who_asks_and_change_nothing(
     assert tg.request("pictures") == ["eyes/camera.frame"]
     assert first["stamp"] == pytest.approx((first["sequence"] - 1) / 10)  # ten frames a second
     assert first["time"] == pytest.approx(first["stamp"] + 0.1)  # and their latency
-    assert 0 < time.time_ns() - first["began"] - first["time"] * 1e9
+    assert time.time_ns() - first["began"] > first["time"] * 1e9
     wait_for(lambda: tg.request("picture", signal="eyes/camera.frame")["sequence"] > first["sequence"])
     with pytest.raises(QuadvisError, match=r"no signal with pictures; did you mean 'eyes/camera\.frame'"):
         tg.request("picture", signal="eyes/camera.frme")
