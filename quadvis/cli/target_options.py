@@ -8,6 +8,7 @@ from typing import Any
 
 from quadvis.cli import target_commands as commands
 from quadvis.cli.arguments import Parser
+from quadvis.cli.bridge import add_bridge
 
 Add = Callable[..., Parser]
 
@@ -54,8 +55,10 @@ def add_target_commands(add: Add, diagram_settings: Callable[[Parser], None], en
     words = "where; default 22280, 0 for any free one"
     web.add_argument("--port", type=int, default=22280, metavar="N", help=words)
     web.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")
+    bridge = add_bridge(add)
     console = add("console", commands.console, "read such commands line by line")
-    for each in (load, start, stop, unload, status, get, given, scope, log, sets, profile, web, console):
+    talking = (load, start, stop, unload, status, get, given, scope, log, sets, profile, web, bridge, console)
+    for each in talking:
         words = "a target by its name or address; default: one on this machine, which is started if needed"
         each.add_argument("--target", metavar="NAME", help=words)
 

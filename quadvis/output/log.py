@@ -27,7 +27,7 @@ from quadvis.errors import RunError, counted
 from quadvis.machine.files import LOG, open_output
 from quadvis.output.mcap_messages import ChannelRows, message_chunks, message_size
 from quadvis.output.mcap_writer import McapWriter
-from quadvis.output.recording import SLOT, Buffer, RecordedBlock, Rows, Slots
+from quadvis.output.recording import SLOT, Buffer, RecordedBlock, RecordedPort, Rows, Slots
 from quadvis.output.sink import Sink
 
 FLUSH = 0.05  # s after which rows are handed to the operating system
@@ -38,6 +38,7 @@ PATIENCE = 2.0  # s that a run waits for a slow disk in total, before rows are l
 FORMAT = "1"
 DIAGRAM, FILES, METADATA, SUMMARY = "diagram.yaml", "files.json", "quadvis", "summary"
 CHANGES = "changes"  # the name of the records of parameters that were tuned
+PACKAGE = "quadvis_msgs/msg/"  # of the names of messages
 HIDDEN = "hidden"  # key of a channel that is no signal of the diagram
 PORTS = "ports"  # key of the facts of a run: the sources of the ports of parts, as JSON
 
@@ -82,7 +83,7 @@ class LogWriter:
         if files:
             self._file.add_attachment(FILES, "application/json", files.encode())
         self._file.add_metadata(METADATA, {"format": FORMAT, **facts})
-        names = _message_names(block.path for block in blocks)
+        names = message_names(block.path for block in blocks)
         self._ids = list(map(self._describe, blocks, names, definitions))
         self._sink.hand_on()
         self._due = monotonic() + FLUSH
@@ -91,9 +92,8 @@ class LogWriter:
             raise RunError(self._refusal)
 
     def _describe(self, block: RecordedBlock, name: str, definition: str) -> int:
-        fields = json.dumps([[port.name, port.type, port.shape, port.unit] for port in block.ports])
-        described = {"fields": fields, "rate": block.rate, **({HIDDEN: "true"} if block.hidden else {})}
-        return self._file.add_channel(block.path, f"quadvis_msgs/msg/{name}", definition, described)
+        described = {**channel_facts(block), **({HIDDEN: "true"} if block.hidden else {})}
+        return self._file.add_channel(block.path, PACKAGE + name, definition, described)
 
     def write(self, block: int, time: int, row: Buffer) -> None:
         """Write one row: the outputs of `blocks[block]` at `time` (ns of the run) as in memory."""
@@ -228,11 +228,17 @@ def ports_of(metadata: Mapping[str, str]) -> dict[str, str]:
     return {str(port): str(source) for port, source in found.items()} if isinstance(found, dict) else {}
 
 
+def channel_facts(block: RecordedBlock) -> dict[str, str]:
+    """Return what a channel says of its block: its ports as JSON, and its rate."""
+    fields = json.dumps([[port.name, port.type, port.shape, port.unit] for port in block.ports])
+    return {"fields": fields, "rate": block.rate}
+
+
 def message_definition(block: RecordedBlock) -> str:
     """Return the `ros2msg` definition of a row: bools travel as int64, arrays flat in C order."""
     if not block.size:
         raise ValueError(f"'{block.path}' has no outputs to log")
-    names = unique((_field_name(port.name) for port in block.ports), "_")
+    names = field_names(block.ports)
     lines = []
     for port, name in zip(block.ports, names, strict=True):
         size = f"[{port.size}]" if port.shape else ""
@@ -244,11 +250,16 @@ def message_definition(block: RecordedBlock) -> str:
     return "".join(lines)
 
 
-def _message_names(paths: Iterable[str]) -> list[str]:
+def message_names(paths: Iterable[str]) -> list[str]:
     """Return names that ROS accepts for messages: "/vision/detector" becomes "VisionDetector"."""
     words = (re.findall("[A-Za-z0-9]+", path) for path in paths)
     names = ("".join(word[:1].upper() + word[1:] for word in found) for found in words)
     return unique((name if name[:1].isalpha() else f"Block{name}" for name in names), "X")
+
+
+def field_names(ports: Iterable[RecordedPort]) -> list[str]:
+    """Return the names of the fields of a message with these ports."""
+    return unique((_field_name(port.name) for port in ports), "_")
 
 
 def _field_name(name: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import threading
+import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
@@ -92,6 +93,7 @@ class Helm:
         self._begun = self._stopped = self._safe = False
         self._state = STARTING
         self._instant: int | None = None
+        self._began: int | None = None
         self.shift = 0
         self._progress: Progress = Stand()
         self._stop_time: Fraction | float | None = None
@@ -111,6 +113,11 @@ class Helm:
     def time(self) -> float:
         """The time of this tick (s)."""
         return self._progress.time
+
+    @property
+    def began(self) -> int | None:
+        """The instant of tick 0 (ns since 1970, as this computer knew it then); None before it is set."""
+        return self._began
 
     def times(self) -> Mapping[str, tuple[TaskTimes, ...]]:
         """Return the times of the tasks up to now, by computer ("" in a diagram without computers)."""
@@ -199,6 +206,10 @@ class Helm:
     def instant(self) -> int | None:
         """When the run is to begin (ns); None for as soon as it is ready."""
         return self._instant
+
+    def start_at(self, start: int) -> None:
+        """Note when tick 0 is due, on the monotonic clock (ns)."""
+        self._began = start + time.time_ns() - time.monotonic_ns()
 
     @property
     def is_stopped(self) -> bool:

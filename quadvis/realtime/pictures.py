@@ -25,14 +25,19 @@ PLACES = 3
 OFTEN = 100_000_000  # ns from one picture to the next, at least
 LIFE = 3_000_000_000  # ns that a wish lasts without another question
 
-_SHAPE = struct.Struct("<3q")  # height, width, sequence
+_SHAPE = struct.Struct("<4qd")  # height, width, sequence, tick, stamp
 
 
 class Picture(NamedTuple):
-    """A picture (height, width, 3), blue-green-red, and its number among those of its signal."""
+    """A picture (height, width, 3), blue-green-red, and its number among those of its signal.
+
+    ``tick`` is the base tick at which it was on its wire, ``stamp`` the middle of its exposure (s, run time).
+    """
 
     pixels: NDArray[np.uint8]
     sequence: int
+    tick: int
+    stamp: float
 
 
 def picture_signals(graph: Graph) -> list[tuple[str, str]]:
@@ -76,7 +81,7 @@ class PictureBox:
         if pixels.nbytes == 0 or pixels.nbytes > ROOM:
             return
         self._next = clock.now() + OFTEN
-        head = _SHAPE.pack(pixels.shape[0], pixels.shape[1], frame.sequence)
+        head = _SHAPE.pack(*pixels.shape[:2], frame.sequence, tick, frame.stamp)
         self._mailbox.put(head + pixels.tobytes(), number)
 
     # for the supervisor
@@ -93,6 +98,6 @@ class PictureBox:
         found = self._mailbox.newest(number + 1, number - 1)
         if found is None:
             return None
-        height, width, sequence = _SHAPE.unpack_from(found.payload)
+        height, width, sequence, tick, stamp = _SHAPE.unpack_from(found.payload)
         pixels = np.frombuffer(found.payload, np.uint8, height * width * 3, _SHAPE.size)
-        return Picture(pixels.reshape(height, width, 3), sequence)
+        return Picture(pixels.reshape(height, width, 3), sequence, tick, stamp)

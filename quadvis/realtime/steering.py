@@ -121,6 +121,11 @@ class Steering:
         """When the members are to begin (ns); None for as soon as they are ready."""
         return self._helm.instant if self._helm is not None else None
 
+    def began(self, start: int) -> None:
+        """Note when tick 0 is due, on the monotonic clock (ns)."""
+        if self._helm is not None:
+            self._helm.start_at(start)
+
     def attend(self) -> None:
         """Do as `look`, if somebody waits: rows are handed on for a while, and nobody is to wait for that."""
         asked = self._helm is not None and self._helm.is_asked

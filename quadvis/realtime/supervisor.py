@@ -271,6 +271,7 @@ class _Supervisor:
         """Let all applications run, from one instant on."""
         self._steering.begin()
         start = self._steering.instant or time.monotonic_ns() + LEAD
+        self._steering.began(start)
         for member in self._members:
             member.begin(start)
 

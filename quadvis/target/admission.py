@@ -77,7 +77,7 @@ def sources_of(diagram: Diagram) -> dict[str, str]:
 def _check_paths(node: Node, tree: Path) -> None:
     """Refuse a block that reads or writes outside the folder of the application."""
     for param in node.block.interface.params.values():
-        if not param.is_file:
+        if not param.is_file or not getattr(node.block, param.name):  # "" is no file
             continue
         path = os.path.realpath(getattr(node.block, param.name))
         inside = path.startswith(os.path.realpath(tree) + os.sep)

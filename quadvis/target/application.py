@@ -51,7 +51,9 @@ class Application:
         self.bundle, self.diagram = bundle, diagram
         self.parameters = Parameters(diagram)
         self.newest = NewestValues(diagram)
-        self.scopes = ApplicationScopes(diagram, store.scope_folder(bundle.name), publish)
+        self.scopes = ApplicationScopes(
+            diagram, store.scope_folder(bundle.name), publish, lambda: self._began
+        )
         self.watches = Watches(self.newest, publish, wants)
         self.profiler = Profiler()
         self.result: Result | None = None
@@ -123,6 +125,11 @@ class Application:
         return READY if session.helm.state == READY else LOADING
 
     # from loaded to stopped
+
+    @property
+    def _began(self) -> int | None:
+        """The instant of tick 0 of its run (ns since 1970)."""
+        return self._session.helm.began if self._session is not None else None
 
     def prepare(self) -> Future[Any]:
         """Start the processes; the Future is done when they are ready to run."""
@@ -295,6 +302,13 @@ class Application:
 
         session.helm.tune(group).add_done_callback(done)
         return told
+
+    @property
+    def pictures(self) -> list[str]:
+        """The names of the signals that are pictures."""
+        from quadvis.target.picture import picture_names
+
+        return picture_names(self.diagram)
 
     def picture(self, signal: str) -> Future[Any]:
         """Return the newest picture of a signal as JPEG; QuadvisError if nothing runs."""

@@ -321,6 +321,10 @@ class Kernel:
         """Return the newest picture of a signal as JPEG."""
         return self._loaded.picture(signal)
 
+    def pictures(self) -> list[str]:
+        """Return the names of the signals that are pictures."""
+        return self._loaded.pictures
+
     def drawing(self) -> Future[Any]:
         """Return the picture of the diagram as SVG."""
         return self._loaded.drawing()

@@ -45,14 +45,18 @@ class NewestValues:
         return self._signals.names
 
     def facts(self) -> list[dict[str, Any]]:
-        """Return what there is to know of each signal."""
+        """Return what there is to know of each signal; ``also`` has its names at the ports of parts."""
+        also: dict[str, list[str]] = {}
+        for alias, source in self._diagram.ports.items():
+            also.setdefault(source, []).append(alias)
         found = []
         for path, outputs in self.ports.items():
             node = self._diagram.graph[path]
             for port in outputs:
                 doc = node.block.interface.outputs[port.name].doc
+                name = f"{path}.{port.name}"
                 found.append({
-                    "name": f"{path}.{port.name}", "type": port.type, "shape": list(port.shape),
+                    "name": name, "also": also.get(name, []), "type": port.type, "shape": list(port.shape),
                     "unit": port.unit, "task": node.task.name, "period": float(node.task.period),
                     "computer": node.computer, "block": node.kind, "doc": doc,
                 })  # fmt: skip

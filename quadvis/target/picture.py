@@ -18,12 +18,18 @@ LOOK = 0.02
 QUALITY = 80
 
 
+def picture_names(diagram: Diagram) -> list[str]:
+    """Return the names of the signals that are pictures."""
+    return [f"{path}.{port}" for path, port in picture_signals(diagram.graph)]
+
+
 def encoded(diagram: Diagram, helm: Helm, signal: str) -> dict[str, Any]:
     """Return the newest picture of a signal: ``format``, ``data``, ``width``, ``height``, ``sequence``.
 
-    QuadvisError if the signal is no picture, or if none comes in time.
+    ``time`` is that of its tick, ``stamp`` the middle of its exposure (s, run time), ``began`` that of tick 0
+    (ns since 1970, UTC). QuadvisError if the signal is no picture, or if none comes in time.
     """
-    names = [f"{path}.{port}" for path, port in picture_signals(diagram.graph)]
+    names = picture_names(diagram)
     wanted = diagram.ports.get(signal, signal)
     if wanted not in names:
         problem = f"{quoted(signal)} is no signal with pictures"
@@ -38,6 +44,7 @@ def encoded(diagram: Diagram, helm: Helm, signal: str) -> dict[str, Any]:
     height, width = found.pixels.shape[:2]
     return {
         "format": "jpeg", "data": _jpeg(found), "width": width, "height": height, "sequence": found.sequence,
+        "time": float(found.tick * diagram.graph.tick), "stamp": found.stamp, "began": helm.began,
     }  # fmt: skip
 
 

@@ -38,11 +38,14 @@ class ShownScope(NamedTuple):
 class ApplicationScopes:
     """The scopes of an application. They stay when it is stopped and started again.
 
-    ``settle`` is called by the session; the other methods by the thread of the wire.
+    ``settle`` is called by the session; the other methods by the thread of the wire. ``began()`` is the
+    instant of tick 0 of the run (ns since 1970).
     """
 
-    def __init__(self, diagram: Diagram, folder: Path, publish: Publish) -> None:
-        self._publish = publish
+    def __init__(
+        self, diagram: Diagram, folder: Path, publish: Publish, began: Callable[[], int | None] = lambda: None
+    ) -> None:
+        self._publish, self._began = publish, began
         self._lock = threading.Lock()
         self._packages: dict[int, Package] = {}  # the newest of each scope
         self._tick = float(diagram.graph.tick)
@@ -80,9 +83,9 @@ class ApplicationScopes:
         self._packages[package.scope] = package
         array = np.column_stack((package.times, package.samples))
         rows = max(1, PART // array.shape[1])
-        parts = -(-len(array) // rows)
+        parts, began = -(-len(array) // rows), self._began()
         for part in range(parts):
-            header = self._header(package) | {"part": part, "parts": parts}
+            header = self._header(package) | {"began": began, "part": part, "parts": parts}
             self._publish(f"scope/{package.scope}", header, array[part * rows : (part + 1) * rows])
 
     # by the verbs

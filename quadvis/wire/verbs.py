@@ -157,7 +157,10 @@ _DECLARED = (
           Argument("offset", _COUNT, "where the piece begins, from 0"),
           Argument("data", argument.BYTES, "the piece")), changes=True),
     Verb("drawing", 3, "the diagram of the application as SVG", "a text"),
-    Verb("picture", 3, "the newest picture of a signal that is one", "a map: format, data",
+    Verb("pictures", 3, "the signals that are pictures", "a list of names"),
+    Verb("picture", 3, "the newest picture of a signal that is one",
+         "a map: format, data, width, height, sequence, time (of its tick, s), stamp (of its exposure, s), "
+         "began (the instant of tick 0, ns since 1970)",
          (Argument("signal", _NAME, "its name"),)),
     Verb("subscribe", 4, "receive the data of topics", "a list of all topics subscribed to",
          (_TOPICS,), socket=STREAM),
@@ -176,7 +179,12 @@ TOPICS = (
         "the newest numbers of the signals of a 'watch' as an array, when there are new ones; `set` is its "
         "mark, `without` has the places of signals that have no numbers yet",
     ),
-    Topic("scope/", 3, "packages of samples of a scope, by its number"),
+    Topic(
+        "scope/",
+        3,
+        "packages of samples of a scope, by its number: rows of a time (s) and the values of `names`; "
+        "`began` is the instant of tick 0 (ns since 1970)",
+    ),
 )
 
 

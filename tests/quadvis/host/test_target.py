@@ -2,6 +2,7 @@ import json
 import re
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -414,10 +415,10 @@ def test_a_signal_is_seen_as_the_log_has_it(tg: Target, diagram: Path) -> None:
     tg.stop()
     log = tg.getlog()
     assert isinstance(log, Log)
-    for time, values in seen:
+    for moment, values in seen:
         for name, value in values.items():
             place = np.flatnonzero(log[name] == value)
-            assert len(place) and np.abs(log.times(name)[place] - time).min() < 1.0
+            assert len(place) and np.abs(log.times(name)[place] - moment).min() < 1.0
 
 
 def test_two_scopes_that_trigger_each_other_lose_nothing(tg: Target, diagram: Path) -> None:
@@ -458,6 +459,18 @@ def test_packages_of_a_scope_follow_one_another(tg: Target, diagram: Path) -> No
         np.concatenate([each.samples[:, 0] for each in found]), np.sin(2 * np.pi * times), atol=1e-9
     )
     assert [each.sequence for each in found] == list(range(found[0].sequence, found[0].sequence + 8))
+
+
+def test_samples_say_when_their_run_began(tg: Target, diagram: Path) -> None:
+    tg.load(diagram)
+    scope = tg.addscope(signals=["wave.y"], NumSamples=10).start()
+    began: list[int] = []
+    tg.subscribe(f"scope/{scope.number}", lambda header, _: began.append(header["began"]))
+    before = time.time_ns()
+    tg.start()
+    wait_for(lambda: len(began) > 2)
+    assert before < began[0] < time.time_ns()
+    assert len(set(began)) == 1
 
 
 def test_a_scope_tells_what_is_wrong(tg: Target, diagram: Path) -> None:
@@ -580,6 +593,10 @@ def test_pictures_of_a_run_are_shown_to_who_asks_and_change_nothing(
     pixels = cv2.imdecode(np.frombuffer(first["data"], np.uint8), cv2.IMREAD_COLOR)
     assert pixels.shape == (first["height"], first["width"], 3)
     assert pixels.std() > 5  # four circles on a ceiling, and not one colour
+    assert tg.request("pictures") == ["eyes/camera.frame"]
+    assert first["stamp"] == pytest.approx((first["sequence"] - 1) / 10)  # ten frames a second
+    assert first["time"] == pytest.approx(first["stamp"] + 0.1)  # and their latency
+    assert time.time_ns() - first["began"] > first["time"] * 1e9
     wait_for(lambda: tg.request("picture", signal="eyes/camera.frame")["sequence"] > first["sequence"])
     with pytest.raises(QuadvisError, match=r"no signal with pictures; did you mean 'eyes/camera\.frame'"):
         tg.request("picture", signal="eyes/camera.frme")

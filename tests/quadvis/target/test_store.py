@@ -174,6 +174,11 @@ def test_a_diagram_that_names_a_file_outside_is_refused(store: Store, tmp_path: 
         admit(other, store.place(other))
 
 
+def test_a_file_that_is_not_named_lies_nowhere(store: Store) -> None:
+    bundle = sent(store, ROOT / "diagrams" / "motor.yaml")  # its transfer functions could have one
+    assert admit(store.bundle("motor"), store.place(bundle)).hash == bundle.hash
+
+
 def test_another_text_than_the_hash_says_is_refused(store: Store) -> None:
     bundle = sent(store, HOVER)
     other = ApplicationBundle.read(bundle.plain() | {"text": bundle.text.replace("seed: 2", "seed: 3")})

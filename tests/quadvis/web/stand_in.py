@@ -154,8 +154,10 @@ class StandIn:
             for name, port in node.block.interface.outputs.items():
                 if port.signal.scalar == "frame":
                     continue
+                signal = f"{node.path}.{name}"
                 found.append({
-                    "name": f"{node.path}.{name}", "unit": str(node.unit(name)),
+                    "name": signal, "unit": str(node.unit(name)),
+                    "also": [port for port, source in self.diagram.ports.items() if source == signal],
                     "shape": list(node.shape(name)),
                     "type": port.signal.scalar, "doc": port.doc, "task": node.task.name,
                     "period": float(node.task.period or 0), "computer": "", "block": node.kind,

@@ -78,7 +78,7 @@ NOT_FROM_LEVEL = {
     3: {"parameters", "getparam", "listparamsets", "getparamset", "addscope", "remscope"},
     4: {"signals", "getsignal", "setscope", "startscope", "stopscope", "trigger", "setview", "scopes",
         "getscope",
-        "picture", "drawing", "applications", "clock", "getprofilerdata", "watch"},
+        "pictures", "picture", "drawing", "applications", "clock", "getprofilerdata", "watch"},
 }  # fmt: skip
 ALWAYS = {"hello", "status", "subscribe", "unsubscribe"}
 

@@ -1,0 +1,1 @@
+"""Bridges from a target to viewers of others: Foxglove, and PlotJuggler."""
