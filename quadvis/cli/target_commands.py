@@ -13,6 +13,7 @@ from quadvis.cli.commands import FAILED, _print_json
 from quadvis.errors import QuadvisError, quoted
 
 if TYPE_CHECKING:
+    from quadvis.host.profiler import ProfilerData
     from quadvis.host.target import Target
 
 
@@ -162,18 +163,23 @@ def sets(options: argparse.Namespace) -> int:
 def profile(options: argparse.Namespace) -> int:
     """Start or stop the profiler, or print what it has found, and write it as a trace."""
     with _target(options) as tg:
-        if options.action == "start":
-            when = "" if tg.startProfiler() else ", those of blocks in the next run"
-            print(f"{tg.name}: the profiler is on; the times of tasks are taken from now on{when}")
+        if options.seconds is not None:
+            _show_profile(tg.profile(options.seconds), options.output)
+        elif options.action == "start":
+            tg.startProfiler()
+            print(f"{tg.name}: the profiler is on")
         elif options.action == "stop":
             tg.stopProfiler()
             print(f"{tg.name}: the profiler is off")
         else:
-            found = tg.getProfilerData()
-            print(found)
-            if options.output:
-                print(f"trace: {found.write(options.output)}")
+            _show_profile(tg.getProfilerData(), options.output)
     return 0
+
+
+def _show_profile(found: ProfilerData, output: str | None) -> None:
+    print(found)
+    if output:
+        print(f"trace: {found.write(output)}")
 
 
 def console(options: argparse.Namespace) -> int:

@@ -49,7 +49,9 @@ def add_target_commands(add: Add, diagram_settings: Callable[[Parser], None], en
     sets.add_argument("names", nargs="*", metavar="NAME", help="names of sets")
     profile = add("profile", commands.profile, "time the tasks and blocks of a target's application")
     profile.add_argument("action", choices=("start", "stop", "show"), nargs="?", default="show")
-    words = "with show: write a trace for Perfetto or chrome://tracing there"
+    words = "start it, stop it after so many seconds, and show what it has found"
+    profile.add_argument("--seconds", type=float, metavar="S", help=words)
+    words = "with show or --seconds: write a trace for Perfetto or chrome://tracing there"
     profile.add_argument("--output", "-o", metavar="PATH.json", help=words)
     web = add("web", commands.web, "serve the live page of a target to browsers on this machine")
     words = "where; default 22280, 0 for any free one"

@@ -13,7 +13,7 @@ from quadvis.block import Block
 from quadvis.engine.clock import Clock, Unpaced
 from quadvis.engine.interpreter import Call, Executor, Interpreter, Stop
 from quadvis.engine.memory import Memory, Slot
-from quadvis.engine.profile import Profile, ProfileReport, Timed
+from quadvis.engine.profile import Profile, ProfileReport, TimedMethod
 from quadvis.engine.program import Program, make_program
 from quadvis.engine.stability import Marks, StatePole, poles
 from quadvis.engine.stops import cannot, explained
@@ -190,29 +190,35 @@ class Engine:
             self._guarded(number, "write_safe")
         self._executor.leave_writes()
 
-    def measure(self) -> None:
-        """Time every call of a block, from the first tick on; before another executor is chosen."""
-        self._interpreter.measure()
+    def measure(self, profile: Callable[[], Profile] | None = None) -> None:
+        """Time every call of a block, from the first tick on; before another executor is chosen.
+
+        With ``profile``, which gives one to each thread, calls are timed only as `time_calls` says.
+        """
+        self._interpreter.measure(profile or (lambda: Profile(len(self.program.blocks))))
+        if profile is None:
+            self.time_calls(1)
+
+    def time_calls(self, measurement: int) -> None:
+        """Time the calls of blocks from the next tick on if the number of the measurement is odd.
+
+        With an even one they are timed no more. `measure` comes before it.
+        """
+        self._executor.time_calls(measurement)
+
+    @property
+    def timed_methods(self) -> list[list[TimedMethod]]:
+        """The methods that each profile times, by their numbers, now that the engine is prepared."""
+        blocks = self.program.blocks
+        return [
+            [TimedMethod(blocks[block].path, method, blocks[block].task) for block, method in profile.methods]
+            for profile in self._interpreter.profiles
+        ]
 
     def profile(self) -> ProfileReport:
-        """Return the times of the calls."""
-        methods: list[Timed] = []
-        calls: list[tuple[int, int, int]] = []
-        for profile in self._interpreter.profiles:
-            places: dict[tuple[int, str], int] = {}
-            for block, method, count, total, least, most in profile:
-                placed = self.program.blocks[block]
-                places[block, method] = len(methods)
-                methods.append(
-                    Timed(placed.path, method, placed.task, count, total / 1e9, least / 1e9, most / 1e9)
-                )
-            calls += [(places[call[:2]], *call[2:]) for call in profile.calls()]
-        first = min((begin for _, begin, _ in calls), default=0)
-        shifted = sorted((begin - first, number, taken) for number, begin, taken in calls)
-        return ProfileReport(
-            tuple(methods), tuple((number, begin, taken) for begin, number, taken in shifted),
-            Profile.cost(), first,
-        )  # fmt: skip
+        """Return the times of the calls since `measure`."""
+        pairs = zip(self._interpreter.profiles, self.timed_methods, strict=True)
+        return ProfileReport.of(pairs, 1) or ProfileReport((), (), Profile.cost())
 
     def snapshot(self) -> Snapshot:
         """Return the whole state between two ticks.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import isnan
 from typing import Any, NamedTuple, Protocol
 
@@ -60,6 +60,9 @@ class Executor(Protocol):
     def detach(self, observer: Tap | Observer) -> None:
         """End what `attach` has begun."""
 
+    def time_calls(self, measurement: int) -> None:
+        """Time the calls of blocks from now on if the number of the measurement is odd; else no more."""
+
 
 class Handover(NamedTuple):
     """What a task does for others once its outputs are there; ``machine`` does the same as machine code."""
@@ -82,6 +85,18 @@ class _Moment:
     blocks: tuple[int, ...]
 
 
+@dataclass
+class _Calls:
+    """The calls of a program as they are made when first needed; with a ``profile`` they are timed."""
+
+    profile: Profile | None = None
+    made: dict[Op, Call] = field(default_factory=dict)
+    moments: dict[tuple[bool, ...], _Moment] = field(default_factory=dict)
+    derivatives: list[Call] = field(default_factory=list)
+    minor: list[Call] = field(default_factory=list)
+    events: EventSolver | None = None
+
+
 class Interpreter:
     """Runs a program with the blocks bound to its memory.
 
@@ -96,10 +111,9 @@ class Interpreter:
             self.memory.bind(block, placed.record, placed.position, placed.frames)
             for block, placed in zip(blocks, program.blocks, strict=True)
         ]
-        self._calls: dict[Op, Call] = {}
         self._owners: dict[int, int] = {}  # the block of a call, by the call's identity
         self.handover: Handover | None = None
-        self.profile: Profile | None = None
+        self._new_profile: Callable[[], Profile] | None = None
         self.profiles: list[Profile] = []  # its own, and those of its parts
         self._bind()
 
@@ -107,19 +121,33 @@ class Interpreter:
         """Make ready to run the program from its first tick on."""
         program = self.program
         self.tick = 0
-        self._derivatives = [self.call(op) for op in program.derivatives]
-        self._minor = [self.call(op) for op in program.minor]
         self._states = np.array(program.states, np.intp)
         self._slopes = np.array(program.slopes, np.intp)
         self._held = slice(0, program.held * SLOT)
         self._solver = Solver(program.solver, float(program.period)) if program.solver in TABLEAUS else None
-        located = self._solver is not None and program.states and program.crossings
-        self._events = EventSolver(self) if located else None
         self._variable = VariableSolver(program, self.memory) if self._solver is None else None
         self.observers: list[Tap | Observer] = []
         self._rhythms = [(task.every, task.offset) for task in program.tasks]
-        self._moments: dict[tuple[bool, ...], _Moment] = {}
         self._writes = True
+        self._timed: _Calls | None = None
+        self._plain = self._made_calls(_Calls())
+
+    def _made_calls(self, calls: _Calls) -> _Calls:
+        """Make those between two ticks, and use them from now on."""
+        program = self.program
+        self._use(calls)
+        calls.derivatives.extend(self.call(op) for op in program.derivatives)
+        calls.minor.extend(self.call(op) for op in program.minor)
+        if self._solver is not None and program.states and program.crossings:
+            calls.events = EventSolver(self)
+        self._use(calls)
+        return calls
+
+    def _use(self, calls: _Calls) -> None:
+        """Run these calls; what a tick looks for has no other indirection."""
+        self._calls, self._moments = calls.made, calls.moments
+        self._derivatives, self._minor = calls.derivatives, calls.minor
+        self._events, self.profile = calls.events, calls.profile
 
     def part(self, name: str, handover: Handover | None = None) -> Interpreter:
         """Return an interpreter for the thread of one task, over the same memory.
@@ -128,25 +156,39 @@ class Interpreter:
         """
         made = copy(self)
         made.program, made.handover = self.program.part(name), handover
-        if self.profile is not None:
-            made.measure()
         made._bind()
         return made
 
     def apart(self, program: Program) -> Interpreter:
         """Return an interpreter for another program over the same memory, which times no calls."""
         made = copy(self)
-        made.program, made.handover, made.profile = program, None, None
-        made._calls, made._owners = {}, {}
+        made.program, made.handover, made._new_profile = program, None, None
+        made._owners = {}
         made._bind()
         return made
 
-    def measure(self) -> None:
-        """Time every call of a block from now on."""
-        self.profile = Profile()
-        self.profiles.append(self.profile)
-        self._calls, self._owners = {}, {}
-        self._bind()
+    def measure(self, profile: Callable[[], Profile]) -> None:
+        """Make it possible to time the calls of blocks; ``profile`` gives one to this and to each part."""
+        self._new_profile = profile
+
+    @property
+    def can_time(self) -> bool:
+        """True if calls can be timed."""
+        return self._new_profile is not None
+
+    def time(self, on: bool) -> None:
+        """Run timed calls from now on, or plain ones, within the measurement that there is."""
+        if on and self._timed is None:
+            assert self._new_profile is not None
+            self.profiles.append(self._new_profile())
+            self._timed = self._made_calls(_Calls(self.profiles[-1]))
+        self._use(self._timed if on and self._timed is not None else self._plain)
+
+    def time_calls(self, measurement: int) -> None:
+        """Time the calls of blocks from now on if the number of the measurement is odd; else no more."""
+        self.time(measurement % 2 == 1)
+        if self._timed is not None and self._timed.profile is not None:
+            self._timed.profile.begin(measurement)
 
     def call(self, op: Op) -> Call:
         """Return the function that runs an operation: one call over the memory."""
@@ -172,7 +214,7 @@ class Interpreter:
     def detach(self, observer: Tap | Observer) -> None:
         """End what `attach` has begun."""
         self.observers.remove(observer)
-        self._moments.clear()
+        self._forget_moments()
 
     def attach(self, observer: Tap | Observer) -> None:
         """Have rows taken from now on, or something done at the ticks of a task."""
@@ -180,12 +222,16 @@ class Interpreter:
         rhythm = self.rhythm(observer)
         if rhythm not in self._rhythms:
             self._rhythms.append(rhythm)
-        self._moments.clear()
+        self._forget_moments()
 
     def leave_writes(self) -> None:
         """Hand nothing to the world outside any more."""
         self._writes = False
-        self._moments.clear()
+        self._forget_moments()
+
+    def _forget_moments(self) -> None:
+        for calls in filter(None, (self._plain, self._timed)):
+            calls.moments.clear()
 
     def rhythm(self, observer: Tap | Observer) -> tuple[int, int]:
         """Return after how many ticks an observer is due again, and its first tick."""
@@ -194,12 +240,15 @@ class Interpreter:
         return task.every * observer.every, task.offset
 
     def prepare(self) -> None:
-        """Make the calls of the first ticks of each task."""
-        tick = self.tick
-        for number in range(PREPARED):
-            for every, offset in self._rhythms:
-                self.tick = offset + number * every
-                self._moment()
+        """Make the calls of the first ticks of each task, timed ones, too, if they may be wanted."""
+        tick, before = self.tick, self.profile is not None
+        for timed in (False, True) if self.can_time else (False,):
+            self.time(timed)
+            for number in range(PREPARED):
+                for every, offset in self._rhythms:
+                    self.tick = offset + number * every
+                    self._moment()
+        self.time(before)
         self.tick = tick
 
     def run(self, until: int) -> Stop | None:

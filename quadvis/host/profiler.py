@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,9 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from quadvis.errors import QuadvisError
+from quadvis.errors.caller import as_given
+
 if TYPE_CHECKING:
     from quadvis.engine.profile import ProfileReport
+    from quadvis.host.target import Target
 
+LOOK = 0.2  # s between two looks whether a run that is timed goes on
 PIECE = 10_000  # steps or calls in one message
 NANOSECONDS = 1e9
 
@@ -84,6 +90,25 @@ class ProfilerData:
 
     def __str__(self) -> str:
         return self.report()
+
+
+def profiled(target: Target, duration: str | float) -> ProfilerData:
+    """Time what a target runs for so long, see `Target.profile`."""
+    from quadvis.diagram.times import read_duration
+    from quadvis.document import YamlScalar
+
+    text = duration if isinstance(duration, str) else f"{duration} s"
+    seconds = float(read_duration(YamlScalar(text, False, as_given("--seconds", "duration"), 0, 0)))
+    if target.Status != "running":
+        raise QuadvisError(f"nothing runs on {target.name}, so there is nothing to time; start it first")
+    target.startProfiler()
+    try:
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0 and target.Status == "running":
+            time.sleep(min(left, LOOK))
+    finally:
+        target.stopProfiler()
+    return target.getProfilerData()
 
 
 def profiler_data(request: Callable[..., Any]) -> ProfilerData:

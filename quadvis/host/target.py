@@ -301,20 +301,29 @@ class Target:
 
     # profiler
 
-    def startProfiler(self) -> bool:
-        """Take the times of tasks' steps from now on, and of blocks' calls from the next run on.
+    def startProfiler(self) -> None:
+        """Take the times of tasks' steps and of blocks' calls from now on, while the application flies on.
 
-        Before a run has begun, that run is the next one; return whether it is. Timing the calls makes it
-        slower, by what `getProfilerData` says; timing the steps costs nothing.
+        If none runs, the next run is timed from its start on. Timing a call makes it longer, by what
+        `getProfilerData` says; timing the steps costs nothing.
         """
-        return bool(self._connection.operate("startprofiler", deadline=LOADING)["blocks"])
+        self._connection.operate("startprofiler")
 
     def stopProfiler(self) -> None:
-        """Take no more times; what was found stays until the next run."""
-        self._connection.operate("stopprofiler", deadline=LOADING)
+        """Take no more times, so that timing costs none any more; what was found stays until the next run."""
+        self._connection.operate("stopprofiler")
+
+    def profile(self, duration: str | float = 2.0) -> ProfilerData:
+        """Start the profiler for so long (s, or a text such as "2 s"), and return what it has found.
+
+        It ends earlier if the run does. QuadvisError if no application runs.
+        """
+        from quadvis.host.profiler import profiled
+
+        return profiled(self, duration)
 
     def getProfilerData(self) -> ProfilerData:
-        """Return what was found in the newest run; times of blocks come when it has ended.
+        """Return what was found in the newest run up to now, or until the profiler was stopped.
 
         ``print`` it for a report; its method `write` makes a trace for Perfetto.
         """

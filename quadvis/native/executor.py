@@ -43,7 +43,7 @@ class NativeExecutor:
         self.memory: Memory = interpreter.memory
         self._function = function
         self._run = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(address)
-        self._tables: Tables | None = None
+        self._tables: dict[bool, Tables] = {}  # with timed calls, and with plain ones
         self._writes = True
         self._reached = -1  # the tick for which the tables are ready, if nothing else has moved it
         self._last = last_exact(interpreter.program.period)
@@ -60,40 +60,51 @@ class NativeExecutor:
     def attach(self, observer: Tap | Observer) -> None:
         """Have rows taken from now on, or something done at the ticks of a task."""
         self.interpreter.attach(observer)
-        self._tables = None
+        self._tables.clear()
 
     def leave_writes(self) -> None:
         """Hand nothing to the world outside any more."""
         self.interpreter.leave_writes()
         self._writes = False
-        if self._tables is not None:
-            self._tables.leave_writes()
+        for tables in self._tables.values():
+            tables.leave_writes()
 
     def detach(self, observer: Tap | Observer) -> None:
         """End what `attach` has begun."""
         self.interpreter.detach(observer)
-        self._tables = None
+        self._tables.clear()
+
+    def time_calls(self, measurement: int) -> None:
+        """Time the calls of blocks from now on if the number of the measurement is odd; else no more."""
+        self.interpreter.time_calls(measurement)
+        self._reached = -1
 
     def prepare(self) -> None:
-        """Make the tables."""
-        self._made()
+        """Make the tables, those with timed calls, too, if they may be wanted."""
+        before = self.interpreter.profile is not None
+        for timed in (False, True) if self.interpreter.can_time else (False,):
+            self.interpreter.time(timed)
+            self._made()
+        self.interpreter.time(before)
 
     def _made(self) -> Tables:
-        if self._tables is None:
-            self._tables = Tables(self.interpreter, self._function, self._clock)
+        """Return the tables for the present calls of the interpreter."""
+        timed = self.interpreter.profile is not None
+        if timed not in self._tables:
+            self._tables[timed] = made = Tables(self.interpreter, self._function, self._clock)
             self._reached = -1
             if not self._writes:
-                self._tables.leave_writes()
-        return self._tables
+                made.leave_writes()
+        return self._tables[timed]
 
     def run(self, until: int) -> Stop | None:
         """Run all ticks before ``until``; None if nothing failed."""
         if until > self._last:
             assert self._clock is None, "whoever gives a clock asks `last_exact` first"
             return self.interpreter.run(until)
-        tables = self._made()
-        turn = until if self._clock else max(1, INSTRUCTIONS // max(1, len(tables.code)))
         while self.tick < until:
+            tables = self._made()
+            turn = until if self._clock else max(1, INSTRUCTIONS // max(1, len(tables.code)))
             stop = self._turn(tables, min(until, self.tick + turn))
             if stop is not None:
                 return stop
@@ -118,6 +129,8 @@ class NativeExecutor:
                 if result == loop.PAUSED:
                     assert self._clock is not None
                     self._clock.answer(control[loop.PAUSE])
+                    if self._made() is not tables:  # calls are timed from now on, or no more
+                        return None
                     continue
                 stop = self._answer(tables, result, control[loop.PLACE])
                 if stop is not None:

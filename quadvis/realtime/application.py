@@ -15,7 +15,7 @@ import signal
 import threading
 import time
 import traceback
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from multiprocessing import parent_process
@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 from quadvis.diagram.load import load_text
 from quadvis.diagram.sections.on_host_loss import CONTINUE
 from quadvis.engine.engine import Engine
-from quadvis.engine.profile import ProfileReport
+from quadvis.engine.profile import TimedMethod
 from quadvis.engine.program import Tunable
 from quadvis.errors import QuadvisError, RunError
 from quadvis.errors.caller import IS_COMMAND
@@ -48,6 +48,7 @@ from quadvis.realtime.lifeline import Lifeline
 from quadvis.realtime.options import RealTime
 from quadvis.realtime.pacer import Ended, Pacer
 from quadvis.realtime.pictures import PictureBox, picture_signals
+from quadvis.realtime.profiles import ProfileBox, ProfileRoom
 from quadvis.realtime.reports import Reports
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
 from quadvis.realtime.streams import RowStream
@@ -64,8 +65,9 @@ class Setup:
 
     ``computer`` is the one whose blocks it runs, "" in a diagram without computers. ``ladder`` has the
     priorities of its tasks. ``rooms`` are those of the notes, ``box`` that of the parameter box; ``pictures``
-    are the words of the picture box, if there is one. ``lines`` has the words of its links in memory, by
-    their names. ``tail`` says where rows belong that no supervisor has taken.
+    are the words of the picture box, if there is one, and ``profiles`` those of its blocks' times, with their
+    size, if somebody may ask for them. ``lines`` has the words of its links in memory, by their names.
+    ``tail`` says where rows belong that no supervisor has taken.
     """
 
     text: str
@@ -86,6 +88,7 @@ class Setup:
     last_ticks: LastTicks
     box: int
     pictures: Any
+    profiles: tuple[Any, ProfileRoom] | None
     tail: LogTail | None
 
 
@@ -102,11 +105,15 @@ class Supply(NamedTuple):
 
 @dataclass(frozen=True)
 class Ready:
-    """The application can begin: what the system has granted, which engine runs, where parameters are."""
+    """The application can begin: what the system has granted, which engine runs, where parameters are.
+
+    ``methods`` are those whose calls can be timed, for each thread.
+    """
 
     grants: Grants
     engine: Choice
     tunables: tuple[Tunable, ...] = ()
+    methods: Sequence[Sequence[TimedMethod]] = ()
 
 
 @dataclass(frozen=True)
@@ -126,7 +133,6 @@ class Ending:
     exit_code: int = RunError.exit_code
     asked: bool = False
     unsafe: str = ""
-    profile: ProfileReport | None = None
     through: bool = False
 
     @staticmethod
@@ -203,8 +209,9 @@ class _Application:
         names, overload = [task.name for task in part.tasks], diagram.overload_of(setup.computer)
         limits, clock = [overload.of(name) for name in names], MonotonicClock()
         pacer = self._pacer = Pacer(
-            schedule, names, limits, shared, clock, lambda: engine.hold_safe(), setup.computer
-        )
+            schedule, names, limits, shared, clock, lambda: engine.hold_safe(), setup.computer,
+            lambda number: engine.time_calls(number),
+        )  # fmt: skip
         supply: Supply = setup.link.recv()
         with ExitStack() as stack:
             carriers = open_carriers(part, {**setup.lines, **supply.lines})
@@ -214,8 +221,8 @@ class _Application:
             setup.devices.bind(engine, supply.ports, Reports(setup.link, clock).take)
             captures = stack.enter_context(Captures(engine, clock))
             captures.start()
-            if setup.wishes.profile:
-                engine.measure()
+            if setup.profiles is not None:
+                engine.measure(ProfileBox(*setup.profiles).new)
             choice = choose(engine, diagram.ticks, setup.engine, setup.link.send, paced=True)
             native = choice.engine == NATIVE and diagram.ticks <= last_exact(engine.period)
             crew = self._crew(part, choice if native else Choice(PYTHON), pacer)
@@ -240,7 +247,7 @@ class _Application:
             grants.refused += [note for carrier in carriers.values() for note in carrier.notes]
             Lifeline(shared.control[control.LIFELINE]).hold()
             engine_chosen = Choice(choice.engine, choice.reason)
-            setup.link.send(Ready(grants, engine_chosen, engine.program.tunables))
+            setup.link.send(Ready(grants, engine_chosen, engine.program.tunables, engine.timed_methods))
             self._start = clock.start = setup.link.recv()  # all applications begin at one instant
             shared.control[control.START] = self._start
             ticks = shared.control[control.TICKS]
@@ -296,13 +303,12 @@ class _Application:
         if not self._through:
             return ending
         usual = self._ending()
-        return replace(ending, unsafe=usual.unsafe, profile=usual.profile, through=True)
+        return replace(ending, unsafe=usual.unsafe, through=True)
 
     def _ending(self) -> Ending:
         """Return how a run ends that has begun."""
-        assert self._engine is not None and self._pacer is not None
-        profile = self._engine.profile() if self._setup.wishes.profile else None
-        return Ending(unsafe=self._pacer.unsafe, profile=profile)
+        assert self._pacer is not None
+        return Ending(unsafe=self._pacer.unsafe)
 
     def add_tail(self) -> None:
         """Add to the log what a supervisor that has died could not."""

@@ -26,7 +26,8 @@ RESTING = 7  # by the loop: when it began to wait for tasks that run by themselv
 LIFELINE = slice(8, 8 + lifeline.SIZE)  # of the loop's thread
 TICKS = LIFELINE.stop  # by the supervisor, before the start: at how many ticks the run ends
 SHIFT = TICKS + 1  # by the supervisor: how much (ns) later than after its start each tick is due
-WORDS = SHIFT + 1
+MEASUREMENT = SHIFT + 1  # by the supervisor: the number of the measurement of blocks' times, see `profiles`
+WORDS = MEASUREMENT + 1
 
 
 class SharedMemory:

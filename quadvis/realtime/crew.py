@@ -22,6 +22,7 @@ from quadvis.realtime import dispatch
 from quadvis.realtime.clocks import BASE, for_thread
 from quadvis.realtime.crew_words import crew_words
 from quadvis.realtime.dispatch import AT_ONCE, AT_REST, HEAD, IDLE, ROW
+from quadvis.realtime.overload import MEASURED
 from quadvis.realtime.pacer import Pacer
 from quadvis.realtime.words import address_of, whole_words
 
@@ -119,6 +120,10 @@ class Crew(TaskExecutors):
         """Return whether a task has failed."""
         return bool(self._crew[dispatch.FAULT])
 
+    def measure(self, number: int, measurement: int) -> None:
+        """Time the calls of a task's blocks from now on if the number of the measurement is odd."""
+        self._executors[number].time_calls(measurement)
+
     def busy(self, number: int) -> bool:
         """Return whether a task runs, or is about to: it is released, and waits for no other one."""
         row = HEAD + ROW * number
@@ -146,7 +151,10 @@ class Crew(TaskExecutors):
 
     def _interpreted(self, number: int) -> Stop | None:
         part, gate = self._executors[number], self._gates[number]
-        while gate.enter() == GO:
+        while (pause := gate.enter()) in (GO, MEASURED):
+            if pause == MEASURED:
+                gate.answer(pause)
+                continue
             part.tick = gate.tick
             stop = part.run(part.tick + 1)
             if stop is not None:
@@ -176,10 +184,10 @@ class _Gate:
     """Where the thread of a task waits until it is released; see `quadvis.native.clock.MachineClock`."""
 
     def __init__(self, crew: Any, number: int, pacer: Pacer) -> None:
-        self._own = whole_words(1)
+        self._own = whole_words(2)  # its number, and that of the measurement
         self._own[0] = number
         self._pacer = pacer
-        self._crew = crew._crew
+        self._crew, self._measure = crew._crew, partial(crew.measure, number)
         self._row = HEAD + ROW * number
         self._clock: Any = for_thread(pacer.clock.words)  # of its machine code
 
@@ -211,5 +219,7 @@ class _Gate:
         return [address_of(each) for each in (plan, tasks, noted, self._clock, crew, self._own)]
 
     def answer(self, pause: int) -> None:
-        """End the thread."""
-        raise _Quit
+        """Begin or end a measurement, or end the thread."""
+        if pause != MEASURED:
+            raise _Quit
+        self._measure(self._own[1])

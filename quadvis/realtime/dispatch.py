@@ -26,14 +26,14 @@ from quadvis.realtime import plan as plans
 from quadvis.realtime.clocks import unshifted
 from quadvis.realtime.grid import deadline, due_in, first_from
 from quadvis.realtime.notes import put_release, put_times
-from quadvis.realtime.overload import ENDING, missed, worse
+from quadvis.realtime.overload import ENDING, MEASURED, missed, worse
 from quadvis.realtime.times import bin_of, count
 
 # Words of the head: how many tasks; how the threads are to end; that one has failed; by how much (ns) ticks
-# are due later than by the start; a mutex, functions of C.
-COUNT, QUIT, FAULT, SHIFT = range(4)
-MUTEX, LOCK, UNLOCK, POST, REST = range(4, 9)
-HEAD = 9
+# are due later than by the start; the number of the measurement; a mutex, functions of C.
+COUNT, QUIT, FAULT, SHIFT, MEASUREMENT = range(5)
+MUTEX, LOCK, UNLOCK, POST, REST = range(5, 10)
+HEAD = 10
 # Words of a task's row, which the fastest does not use: what it does; its tick, and up to which tick it was
 # dispatched; begin of its step, after the unshifted start, and its lateness; for how many tasks its start
 # waits; that it was released at this tick; its semaphore; where its delays stand.
@@ -54,7 +54,7 @@ def release(plan: Any, shared: Any, tasks: Any, noted: Any, crew: Any, memory: A
     """
     answer = GO
     lock(crew)
-    crew[SHIFT] = shared[control.SHIFT]
+    crew[SHIFT], crew[MEASUREMENT] = shared[control.SHIFT], shared[control.MEASUREMENT]
     for task in range(1, crew[COUNT]):
         row, rhythm = HEAD + ROW * task, plans.HEAD + plans.ROW * task
         every, offset, start = plan[rhythm + plans.EVERY], plan[rhythm + plans.OFFSET], crew[row + SEEN]
@@ -163,7 +163,8 @@ def _copy(crew: Any, memory: Any, at: int) -> None:
 def enter(plan: Any, tasks: Any, noted: Any, clock: Any, crew: Any, own: Any) -> int:
     """Count the step of the task ``own[0]`` that has ended; wait until it is released.
 
-    Return `GO`, and its step has begun, or `ENDING`.
+    Return `GO`, and its step has begun, or `ENDING`; or `MEASURED`, and it is to be called again, once
+    ``own[1]``, the number of the measurement of its thread, is another one.
     """
     row = HEAD + ROW * own[0]
     if crew[row + BEGUN] != 0:
@@ -178,6 +179,9 @@ def enter(plan: Any, tasks: Any, noted: Any, clock: Any, crew: Any, own: Any) ->
         if ready:
             break
         rest(crew, crew[row + SEMAPHORE])
+    if crew[MEASUREMENT] != own[1]:
+        own[1] = crew[MEASUREMENT]
+        return MEASURED
     instant = unshifted(clock)
     crew[row + BEGUN] = max(1, instant)
     crew[row + LATE] = instant - crew[SHIFT] - deadline(plan, crew[row + TICK])
@@ -202,7 +206,8 @@ def _leave(plan: Any, tasks: Any, noted: Any, crew: Any, task: int, instant: int
 def gate(steering: Any, plan: Any, tasks: Any, noted: Any, clock: Any, crew: Any, own: Any) -> None:
     """Wait as the clock of the compiled loop of a task, whose control words are ``steering``."""
     steering[loop.PAUSE] = enter(plan, tasks, noted, clock, crew, own)
-    steering[loop.TICK] = crew[HEAD + ROW * own[0] + TICK]
+    if steering[loop.PAUSE] == GO:
+        steering[loop.TICK] = crew[HEAD + ROW * own[0] + TICK]
 
 
 def lock(crew: Any) -> None:

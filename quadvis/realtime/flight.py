@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from quadvis.engine.profile import ProfileReport
 from quadvis.errors import counted
 from quadvis.native.choice import Choice
+from quadvis.realtime.profiles import BlockTimes
 from quadvis.realtime.system import Grants
 from quadvis.realtime.times import TaskTimes
 
@@ -17,9 +17,9 @@ class Share:
     """What one computer did in a real-time run; ``computer`` is "" in a diagram without computers.
 
     ``ticks`` is the number of its ticks, those left out included. ``unsafe`` says why its outputs have held
-    their safe values before the end, if they have. ``profile`` is that of its blocks, if it was asked for,
-    ``start`` the instant of the start on the monotonic clock (ns). ``problem`` says what has failed without
-    an end to the flight, such as a device that was gone at the stop time; "" if nothing did.
+    their safe values before the end, if they have. ``blocks`` are the times of its blocks, if they were asked
+    for. ``problem`` says what has failed without an end to the flight, such as a device that was gone at the
+    stop time; "" if nothing did.
     """
 
     computer: str
@@ -28,8 +28,7 @@ class Share:
     tasks: tuple[TaskTimes, ...]
     ticks: int
     unsafe: str = ""
-    profile: ProfileReport | None = None
-    start: int = 0
+    blocks: BlockTimes | None = None
     problem: str = ""
 
     def facts(self) -> dict[str, Any]:

@@ -14,9 +14,11 @@ from typing import NamedTuple, Protocol
 
 from quadvis.diagram.times import read_duration
 from quadvis.document import YamlScalar
+from quadvis.engine.profile import started
 from quadvis.engine.tuning import NewValue
 from quadvis.errors import QuadvisError
 from quadvis.realtime.pictures import Picture
+from quadvis.realtime.profiles import BlockTimes
 from quadvis.realtime.times import TaskTimes
 
 STARTING, READY, RUNNING, ENDED = STATES = ("starting", "ready", "running", "ended")
@@ -37,6 +39,9 @@ class Progress(Protocol):
     def times(self) -> Mapping[str, tuple[TaskTimes, ...]]:
         """Return the times of the tasks of each computer."""
 
+    def block_times(self) -> Mapping[str, BlockTimes]:
+        """Return the times of the blocks of each computer, if they were asked for."""
+
     def picture(self, path: str, port: str) -> Picture | None:
         """Return the newest picture of a signal; None if there is none."""
 
@@ -48,10 +53,15 @@ class Stand:
     tick: int = 0
     time: float = 0.0
     found: Mapping[str, tuple[TaskTimes, ...]] = field(default_factory=dict)
+    blocks: Mapping[str, BlockTimes] = field(default_factory=dict)
 
     def times(self) -> Mapping[str, tuple[TaskTimes, ...]]:
         """Return the times of the tasks of each computer."""
         return self.found
+
+    def block_times(self) -> Mapping[str, BlockTimes]:
+        """Return the times of the blocks of each computer."""
+        return self.blocks
 
     def picture(self, path: str, port: str) -> Picture | None:
         """Return None."""
@@ -94,7 +104,7 @@ class Helm:
         self._state = STARTING
         self._instant: int | None = None
         self._began: int | None = None
-        self.shift = 0
+        self.shift = self.measurement = 0
         self._progress: Progress = Stand()
         self._stop_time: Fraction | float | None = None
         self.stop_time = stop_time
@@ -122,6 +132,20 @@ class Helm:
     def times(self) -> Mapping[str, tuple[TaskTimes, ...]]:
         """Return the times of the tasks up to now, by computer ("" in a diagram without computers)."""
         return self._progress.times()
+
+    def measure(self, on: bool) -> None:
+        """Let the calls of blocks be timed from the next steps on, anew, or no more; the run goes on.
+
+        Meanwhile each call takes a little longer, see `ProfileReport.cost`.
+        """
+        with self._lock:
+            began = started(self.measurement)
+            self.measurement = began + 2 if on else began + 1
+            self._call()
+
+    def block_times(self) -> Mapping[str, BlockTimes]:
+        """Return what was found since `measure`, by computer ("" in a diagram without computers)."""
+        return self._progress.block_times()
 
     def picture(self, path: str, port: str) -> Picture | None:
         """Return the newest picture of a signal; None if there is none.
@@ -257,7 +281,7 @@ class Helm:
         """Note that the run has ended; who still waits for a tick gets an error."""
         now = self._progress
         with self._lock:
-            self._progress = Stand(now.tick, now.time, now.times())
+            self._progress = Stand(now.tick, now.time, now.times(), now.block_times())
             self._state = ENDED
             late, self._wanted = self._wanted, []
             if self._wake >= 0:

@@ -28,6 +28,7 @@ from quadvis.realtime.lifeline import Lifeline
 from quadvis.realtime.note_taker import NoteTaker
 from quadvis.realtime.options import RealTime
 from quadvis.realtime.pictures import Picture, PictureBox, picture_signals
+from quadvis.realtime.profiles import BlockTimes, ProfileBox, ProfileRoom
 from quadvis.realtime.ring import RecordRing, Words
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
 from quadvis.realtime.streams import RowStream, StreamTaps, nothing, room_for, streams_of
@@ -85,10 +86,14 @@ class Member:
         self._last_ticks = last_ticks
         self._picture_signals = picture_signals(part) if watched else []
         pictures = context.RawArray("q", PictureBox.size()) if self._picture_signals else None
+        room = ProfileRoom.of(part, whole=wishes.profile)
+        profiles = (context.RawArray("q", room.words), room) if watched or wishes.profile else None
+        self._profiles = ProfileBox(*profiles) if profiles is not None else None
+        self.measure(int(wishes.profile))
         setup = Setup(
             diagram.resolved, str(diagram.path.parent), diagram.path.name, diagram.own_blocks,
             IS_COMMAND.get(), computer, engine, wishes, ladder, rooms, streams, words, self._theirs, devices,
-            lines, last_ticks, box, pictures, self._tail(),
+            lines, last_ticks, box, pictures, profiles, self._tail(),
         )  # fmt: skip
         self._pictures = PictureBox(pictures) if pictures is not None else None
         self._schedule = Schedule.of(part)
@@ -130,6 +135,17 @@ class Member:
     def shift(self, shift: int) -> None:
         """Let each tick be due so much (ns) later than by the start."""
         self._control[control.SHIFT] = shift
+
+    def measure(self, measurement: int) -> None:
+        """Let the calls of blocks be timed while the number of the measurement is odd."""
+        self._control[control.MEASUREMENT] = measurement
+
+    def block_times(self) -> BlockTimes | None:
+        """Return what the measurement that began last has found; None if nothing yet."""
+        if self._profiles is None or self.ready is None:
+            return None
+        report = self._profiles.report(self.ready.methods, self._control[control.MEASUREMENT])
+        return None if report is None else BlockTimes(report, report.first - self._control[control.START])
 
     def has_picture(self, path: str, port: str) -> bool:
         """Return whether a signal is a picture of this computer."""
@@ -322,7 +338,7 @@ class Member:
     def share(self) -> Share:
         """Return what the computer did, after the run."""
         assert self.ready is not None
-        ending = self.ending or Ending()
+        ending, found = self.ending or Ending(), self.block_times()
         return Share(
             self.computer,
             self.ready.engine,
@@ -330,8 +346,7 @@ class Member:
             self.times(),
             self.ticks,
             ending.unsafe,
-            ending.profile,
-            int(self._control[control.START]),
+            found,
             self.loss or (ending.problem if ending.through else ""),
         )
 

@@ -32,8 +32,8 @@ from quadvis.realtime.plan import (
 )  # fmt: skip
 
 # Why a wait pauses: the run is to end; too many overruns end it, or make it safe; a signal has come; a task
-# that runs by itself has failed.
-ENDING, OVERLOADED, UNSAFE, SIGNAL, FAULTED = range(1, 6)
+# that runs by itself has failed; a measurement of blocks' times begins or is over.
+ENDING, OVERLOADED, UNSAFE, SIGNAL, FAULTED, MEASURED = range(1, 7)
 STOPS, SAVES = ACTIONS.index(STOP), ACTIONS.index(SAFE)
 
 

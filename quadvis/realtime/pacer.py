@@ -35,7 +35,8 @@ class Pacer:
     tasks that were due there have an overrun.
 
     ``names`` and ``limits`` are those of the tasks, ``computer`` is the name of theirs for messages. ``save``
-    is called where overruns are to make the outputs safe; ``unsafe`` says then why. The interpreter asks
+    is called where overruns are to make the outputs safe; ``unsafe`` says then why. ``measure`` takes the
+    number of a measurement of blocks' times that begins or is over. The interpreter asks
     `wait`; the compiled loop calls the machine code at ``address``, which does the same
     (`quadvis.native.clock.MachineClock`).
     """
@@ -49,8 +50,9 @@ class Pacer:
         clock: Timekeeper,
         save: Callable[[], None] | None = None,
         computer: str = "",
+        measure: Callable[[int], None] | None = None,
     ) -> None:
-        self._names, self._limits, self._save = names, limits, save
+        self._names, self._limits, self._save, self._measure = names, limits, save, measure
         self._of = f" of '{computer}'" if computer else ""
         self.unsafe = ""
         self._plan = make_plan(schedule, limits, shared.notes.rooms)
@@ -118,6 +120,8 @@ class Pacer:
             raise self._fault()
         if pause == overload.OVERLOADED:
             raise self._overload()
+        if pause == overload.MEASURED and self._measure is not None:
+            self._measure(self._plan[plans.MEASUREMENT])
         if pause == overload.UNSAFE:
             self.unsafe = f"t = {self._missed:.9g} s: {self._exceeded()}"
             if self._save is not None:

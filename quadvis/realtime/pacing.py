@@ -21,7 +21,7 @@ from quadvis.realtime.clocks import follow, now, signalled, sleep
 from quadvis.realtime.dispatch import at_rest, release
 from quadvis.realtime.grid import deadline, due_in, following, latest
 from quadvis.realtime.notes import put_group, put_left_out, put_times
-from quadvis.realtime.overload import ENDING, FAULTED, OVERLOADED, SIGNAL, missed, worse
+from quadvis.realtime.overload import ENDING, FAULTED, MEASURED, OVERLOADED, SIGNAL, missed, worse
 from quadvis.realtime.plan import (
     BEGUN,
     COUNTED_TO,
@@ -32,6 +32,7 @@ from quadvis.realtime.plan import (
     IN_A_ROW,
     INSTANT,
     LATE,
+    MEASUREMENT,
     NOTED,
     NOTES_ROOM,
     OFFSET,
@@ -61,6 +62,9 @@ def wait(
         follow(clock, shared[control.SHIFT])
         instant = now(clock)
         plan[WAITING], plan[INSTANT], plan[COUNTED_TO] = following(plan, tick, instant), instant, tick
+    if shared[control.MEASUREMENT] != plan[MEASUREMENT]:
+        plan[MEASUREMENT] = shared[control.MEASUREMENT]
+        return MEASURED
     chosen, instant = plan[WAITING], plan[INSTANT]
     if chosen < end:
         due = deadline(plan, chosen)

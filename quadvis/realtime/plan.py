@@ -25,7 +25,8 @@ STARTING = 13  # the last step was one of the first
 # An overrun too many: its task, which limit, how many there were, the tick.
 EXCEEDED, LIMIT, FOUND, MISSED = range(14, 18)
 TAKEN = 18  # the number of the group of parameters that was taken last
-HEAD = 19
+MEASUREMENT = 19  # the number of the measurement that has begun or ended last
+HEAD = 20
 
 # Words of a task's row: what is given, and what the pacer keeps.
 EVERY, OFFSET, MAX, CONSECUTIVE, STARTUP, ACTION = range(6)

@@ -15,6 +15,7 @@ from quadvis.native.executor import last_exact
 from quadvis.realtime.helm import ENDLESS, READY, RUNNING, Helm
 from quadvis.realtime.member import Member
 from quadvis.realtime.pictures import Picture
+from quadvis.realtime.profiles import BlockTimes
 from quadvis.realtime.ring import IN_ORDER, Words
 from quadvis.realtime.times import TaskTimes
 from quadvis.realtime.tuner import BEFORE, Tuner
@@ -42,6 +43,7 @@ class Steering:
         self._begun = False
         self._reached = 0
         self._shift, self._moved = 0, time.monotonic_ns()
+        self._measurement = 0
         self._late = _most_late(diagram.graph)
         self.ticks = diagram.ticks
         if helm is not None:
@@ -81,6 +83,11 @@ class Steering:
     def times(self) -> Mapping[str, tuple[TaskTimes, ...]]:
         """Return the times of the tasks of each computer."""
         return {member.computer: member.times() for member in self._members}
+
+    def block_times(self) -> Mapping[str, BlockTimes]:
+        """Return what the measurement that began last has found, by computer."""
+        found = {member.computer: member.block_times() for member in self._members}
+        return {computer: times for computer, times in found.items() if times is not None}
 
     def picture(self, path: str, port: str) -> Picture | None:
         """Return the newest picture of a signal."""
@@ -138,6 +145,10 @@ class Steering:
             return
         if self._helm.shift != self._shift:
             self._approach(self._helm.shift)
+        if self._helm.measurement != self._measurement:
+            self._measurement = self._helm.measurement
+            for member in self._members:
+                member.measure(self._measurement)
         self._tuner.answer()
         for wanted in self._helm.take():
             self._tuner.offer(wanted, self.tick)

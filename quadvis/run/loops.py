@@ -159,7 +159,7 @@ class Paced:
         ticks = {share.computer: share.ticks for share in flight.shares}
         for tap in taps:
             tap.end(ticks[self._diagram.graph[tap.block].computer])
-        self.profiles = {share.computer: share.profile for share in flight.shares if share.profile}
+        self.profiles = {share.computer: share.blocks.report for share in flight.shares if share.blocks}
         return flight.engine, flight
 
 

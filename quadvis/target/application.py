@@ -136,7 +136,6 @@ class Application:
         assert self._session is None or not self._session.running
         self.newest.clear()
         self.scopes.begin()
-        self.profiler.clear()
         self.problem, self.result, self.said = "", None, []
         self._session = Session(
             self.diagram, self.bundle.engine, self._store.next_log(self.name), self.log_samples,
@@ -216,20 +215,6 @@ class Application:
             raise QuadvisError("the log cannot change in a run: stop it first")
         self.log_samples = samples
         self._prepare_again()
-
-    def profile(self, on: bool) -> bool:
-        """Start or stop the profiler; return whether it has the times of blocks of the run that is next.
-
-        A run that goes on gives the times of its tasks alone: the calls of its blocks were not made ready.
-        """
-        if on:
-            self.profiler.start()
-        else:
-            self.profiler.stop()
-        session = self._session
-        if session is not None and session.is_profiled != on:
-            self._prepare_again()
-        return self._session is None or self._session.is_profiled or not self.running
 
     def _prepare_again(self) -> None:
         """Begin anew if what waits for its start was begun in another way."""

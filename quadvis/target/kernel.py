@@ -156,15 +156,13 @@ class Kernel:
         """Bound the log of the next run."""
         return self._worker.submit(self._loaded.set_log, MaxLogSamples)
 
-    def startprofiler(self) -> Future[Any]:
-        """Take the times of tasks from now on, and those of blocks from the next run on."""
-        application = self._loaded
-        return self._worker.submit(lambda: {"blocks": application.profile(True)})
+    def startprofiler(self) -> None:
+        """Take the times of tasks and blocks from now on."""
+        self._loaded.profiler.start()
 
-    def stopprofiler(self) -> Future[Any]:
+    def stopprofiler(self) -> None:
         """Take no more times; what was found stays."""
-        application = self._loaded
-        return self._worker.submit(lambda: application.profile(False) and None)
+        self._loaded.profiler.stop()
 
     def getprofilerdata(self, task: int | None, computer: int | None, first: int, count: int) -> Any:
         """Return what the profiler has found: all but single steps and calls, or some of these."""

@@ -8,46 +8,64 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.engine.profile import ProfileReport
 from quadvis.errors import QuadvisError
-from quadvis.realtime.flight import Flight
+from quadvis.realtime.helm import Helm
+from quadvis.realtime.profiles import BlockTimes
 
 MOST = 200_000  # steps of a task that are kept, the first ones
 Steps = NDArray[np.int64]  # (N, 4): a tick, lateness and execution time of its step (ns), overruns so far
 
 
 class Profiler:
-    """What was found in the newest run since the profiler was started.
+    """What was found in the newest run while the profiler was on.
 
-    Steps are taken from a run that goes on: its loop notes them anyway. Calls of blocks are timed in a run
-    that begins while the profiler is on (`is_on`), and are there when it has ended. The session's thread
-    gives, others ask.
+    Both are taken from a run that goes on: its loop notes its steps anyway, and times the calls of blocks as
+    long as the profiler is on. The session's thread gives steps, others ask.
     """
 
     def __init__(self) -> None:
-        self.is_on = False
+        self._is_on = False
+        self._helm: Helm | None = None
         self._lock = threading.Lock()
         self._steps: dict[tuple[str, str], list[Steps]] = {}  # by computer and task
-        self._reports: dict[str, tuple[ProfileReport, int]] = {}  # by computer, with the begin from the start
+        self._blocks: dict[str, BlockTimes] = {}  # by computer
+
+    def follow(self, helm: Helm) -> None:
+        """Look at a new run, and forget the one before."""
+        with self._lock:
+            self._clear()
+            self._helm = helm
+            if self._is_on:
+                helm.measure(True)
 
     def start(self) -> None:
         """Begin anew."""
-        self.clear()
-        self.is_on = True
+        with self._lock:
+            self._clear()
+            self._is_on = True
+            if self._helm is not None:
+                self._helm.measure(True)
 
     def stop(self) -> None:
         """Take no more; what was found stays."""
-        self.is_on = False
-
-    def clear(self) -> None:
-        """Forget what was found, before another run."""
         with self._lock:
-            self._steps.clear()
-            self._reports.clear()
+            self._look()
+            if self._is_on and self._helm is not None:
+                self._helm.measure(False)
+            self._is_on = False
+
+    def _clear(self) -> None:
+        self._steps.clear()
+        self._blocks.clear()
+
+    def _look(self) -> None:
+        """Take the times of blocks up to now."""
+        if self._is_on and self._helm is not None:
+            self._blocks.update(self._helm.block_times())
 
     def take(self, computer: str, task: str, times: Steps) -> None:
         """Take the times of steps of a task."""
-        if not self.is_on or not len(times):
+        if not self._is_on or not len(times):
             return
         with self._lock:
             kept = self._steps.setdefault((computer, task), [])
@@ -55,18 +73,15 @@ class Profiler:
             if room > 0:
                 kept.append(times[:room].copy())
 
-    def end(self, flight: Flight | None) -> None:
-        """Take the times of blocks from a run that has ended, if it was profiled."""
-        with self._lock:
-            for share in flight.shares if flight is not None else ():
-                if share.profile is not None:
-                    self._reports[share.computer] = share.profile, share.profile.first - share.start
-
     def facts(self, tick: float) -> dict[str, Any]:
-        """Return what there is, without single steps and calls; ``tick`` is the base tick (s)."""
+        """Return what there is, without single steps and calls; ``tick`` is the base tick (s).
+
+        `steps` and `calls` are those that there were then, and steps that have come since.
+        """
         with self._lock:
+            self._look()
             return {
-                "on": self.is_on,
+                "on": self._is_on,
                 "tick": tick,
                 "tasks": [
                     {"computer": computer, "task": task, "steps": sum(map(len, kept))}
@@ -75,7 +90,7 @@ class Profiler:
                 "blocks": [
                     {"computer": computer, "cost": report.cost, "offset": offset,
                      "calls": len(report.calls), "methods": [list(each) for each in report.methods]}
-                    for computer, (report, offset) in self._reports.items()
+                    for computer, (report, offset) in self._blocks.items()
                 ],
             }  # fmt: skip
 
@@ -89,8 +104,8 @@ class Profiler:
     def calls(self, place: int, first: int, count: int) -> list[list[int]]:
         """Return calls of the computer with a place in `facts`: the method's place, begin, time (ns)."""
         with self._lock:
-            report, _ = _at(list(self._reports.values()), place, "computer")
-            return [list(each) for each in report.calls[first : first + count]]
+            times = _at(list(self._blocks.values()), place, "computer")
+            return [list(each) for each in times.report.calls[first : first + count]]
 
 
 def _at(found: list[Any], place: int, what: str) -> Any:

@@ -29,7 +29,7 @@ class Session:
 
     ``samples`` is how many of the fastest task the log is to have, infinite for all; ``wraps`` counts how
     often it has begun anew. The log of a run that never began is removed. ``profiler`` gets the times of
-    tasks, and those of blocks if it is on when the run begins to be made.
+    tasks, and asks for those of blocks.
 
     ``result`` is there if it has come to an end in order, ``problem`` says why if not. ``announce`` takes
     sentences, ``settle`` the first tick of which rows may still come, and ``ended`` is called when all is
@@ -57,7 +57,8 @@ class Session:
         self.problem = ""
         self._engine, self._taps, self._samples = engine, taps, samples
         self._wrapped: WrappedLog | None = None
-        self._profiler, self.is_profiled = profiler, profiler.is_on
+        self._profiler = profiler
+        profiler.follow(self.helm)
         self._announce, self._settle, self._ended = announce, settle, ended
         self._thread = threading.Thread(target=self._perform, name="session", daemon=True)
         self._thread.start()
@@ -92,8 +93,7 @@ class Session:
 
     def _perform(self) -> None:
         try:
-            wishes = RealTime(profile=self.is_profiled)
-            loop = Paced(self.diagram, self._engine, self._announce, wishes, self.helm)
+            loop = Paced(self.diagram, self._engine, self._announce, RealTime(), self.helm)
             opened = self._open if math.isfinite(self._samples) else None
             self.result = recorded(
                 self.diagram,
@@ -104,7 +104,6 @@ class Session:
                 open_log=opened,
                 timed=self._profiler.take,
             )
-            self._profiler.end(self.result.flight)
             self.problem = "; ".join(self.result.flight.problems if self.result.flight else ())
         except QuadvisError as error:
             self.problem = "; ".join([str(error), *getattr(error, "__notes__", ())])

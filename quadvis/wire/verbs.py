@@ -95,8 +95,7 @@ _DECLARED = (
     Verb("align", 0, "move the ticks of the run, slowly, to where they are due by the host's clock", "nil",
          (Argument("shift", _SHIFT, "by how much in all since the start (ns)"),), LEASED),
     Verb("stop", 1, "stop the application, which stays loaded", "nil", (), LEASED, CHANGES),
-    Verb("startprofiler", 1, "take the times of tasks, and of blocks from the next run on",
-         "a map: blocks (whether the run that goes on or waits gives those of blocks)", (), LEASED, CHANGES),
+    Verb("startprofiler", 1, "take the times of tasks and blocks from now on", "nil", (), LEASED, CHANGES),
     Verb("stopprofiler", 1, "take no more times; what was found stays", "nil", (), LEASED, CHANGES),
     Verb("getprofilerdata", 3, "what the profiler has found in the newest run",
          "a map: on, tick (s), tasks, blocks; of a task a list of tick, lateness, execution time (ns), "

@@ -11,9 +11,10 @@ from quadvis.api import load_text
 from quadvis.cli import main
 from quadvis.engine import profile
 from quadvis.engine.engine import Engine
-from quadvis.engine.profile import Profile, record
+from quadvis.engine.profile import Profile, ProfileReport, Timed, TimedMethod, record
 from quadvis.errors import RunError
 from quadvis.native.choice import choose, use
+from quadvis.run.report import profile_lines
 
 TEXT = """\
 quadvis: 1
@@ -67,12 +68,44 @@ def test_a_call_that_fails_fails_as_without_a_profile(kind: str) -> None:
 
 def test_calls_beyond_the_room_are_counted_and_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(profile, "EVENTS", 2)
-    made = Profile()
+    made = Profile(8)
+    made.begin(1)
     number, words = made.words(7, "output")
-    for begin, taken in ((1, 30), (40, 10), (60, 20)):
+    for begin, taken in ((5, 30), (40, 10), (60, 20)):
         record(words, made.events, number, begin, taken)
-    assert list(made) == [(7, "output", 3, 60, 10, 30)]
-    assert list(made.calls()) == [(7, "output", 1, 30), (7, "output", 40, 10)]
+    report = ProfileReport.of([(made, [TimedMethod("far.gain", "output", "fast")])], 1)
+    assert report is not None
+    assert report.methods == (Timed("far.gain", "output", "fast", 3, 60e-9, 10e-9, 30e-9),)
+    assert (report.calls, report.first) == (((0, 0, 30), (0, 35, 10)), 5)
+
+
+def test_a_report_is_of_one_measurement() -> None:
+    """A thread that has not seen a new one yet still has the numbers of the one before."""
+    made, named = Profile(1), [TimedMethod("gain", "output", "fast")]
+    number, words = made.words(0, "output")
+
+    def calls(measurement: int) -> int | None:
+        report = ProfileReport.of([(made, named)], measurement)
+        return None if report is None else report.methods[0].calls
+
+    made.begin(1)
+    assert calls(1) is None  # nothing has been called
+    record(words, made.events, number, 1, 1)
+    assert [calls(1), calls(2), calls(3), calls(4)] == [1, 1, None, None]
+    made.begin(2)
+    assert [calls(1), calls(2), calls(3)] == [1, 1, None]
+    made.begin(3)
+    assert calls(3) is None
+    record(words, made.events, number, 1, 1)
+    assert [calls(2), calls(3), calls(4)] == [None, 1, 1]
+
+
+def test_1_call_in_100_takes_longer_than_p99() -> None:
+    methods = tuple(Timed(block, "output", "fast", 1000, 1e-3, 1e-6, 1e-3) for block in ("a", "b"))
+    calls = tuple((place, 0, (number + 1) * 1000) for number in range(1000) for place in (0, 1))
+    _, head, *rows = profile_lines("", ProfileReport(methods, (*calls, (0, 0, 10**9)), 1e-6))
+    place = head.split().index("p99")
+    assert [row.split()[2 * place - 2] for row in rows] == ["991", "990"]
 
 
 def test_the_command_prints_a_table_and_writes_a_trace(
@@ -83,7 +116,7 @@ def test_the_command_prints_a_table_and_writes_a_trace(
     assert main(["run", "timed.yaml", "--log", "", "--profile", "trace.json", "--engine", "python"]) == 0
     lines = capsys.readouterr().out.splitlines()
     start = next(number for number, line in enumerate(lines) if "profile: every call timed" in line)
-    assert lines[start + 1].split() == ["block", "calls", "min", "mean", "max", "share"]
+    assert lines[start + 1].split() == ["block", "calls", "min", "mean", "p99", "max", "share"]
     rows = [line.split() for line in lines[start + 2 : start + 4]]
     assert {row[0]: row[1] for row in rows} == {"wave": "51", "lag": "22"}
     assert sum(float(row[-2]) for row in rows) == pytest.approx(100, abs=0.2)

@@ -3,15 +3,18 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import quadvis
+from quadvis.cli import main
+from quadvis.engine.profile import Timed
 from quadvis.errors import QuadvisError
 from quadvis.host.local import _answers
+from quadvis.host.profiler import ProfilerData
 from quadvis.host.properties import PROPERTIES
 from quadvis.host.target import Target
 from quadvis.output.log_reader import Log
@@ -361,17 +364,22 @@ def test_a_bounded_log_has_the_newest_samples(tg: Target, diagram: Path) -> None
     assert tg.LogMode == "Normal"
 
 
-def test_the_profiler_times_tasks_at_once_and_blocks_from_the_next_run_on(
+def test_the_profiler_times_tasks_and_blocks_while_the_application_flies_on(
     tg: Target, diagram: Path, tmp_path: Path
 ) -> None:
     tg.load(diagram)
+    with pytest.raises(QuadvisError, match="nothing runs on lab, so there is nothing to time"):
+        tg.profile("1 s")
     tg.start()
     wait_for(lambda: tg.ExecTime > 0.2)
-    assert tg.startProfiler() is False  # blocks come with the next run
-    wait_for(lambda: sum(len(each.ticks) for each in tg.getProfilerData().tasks) > 30)
+    tg.startProfiler()
+    wait_for(lambda: any(each.calls > 30 for each in blocks_of(tg.getProfilerData())))  # already meanwhile
+    tg.stopProfiler()
+    found = tg.get_profiler_data()
+    at = tg.ExecTime
+    wait_for(lambda: tg.ExecTime > at + 0.1)
+    assert str(tg.getProfilerData()) == str(found)
     tg.stop()
-    found = tg.getProfilerData()
-    assert found.profiles == {}
     log = tg.getlog()
     assert isinstance(log, Log)
     assert {each.task for each in found.tasks} == {"fast", "slow"}
@@ -382,28 +390,66 @@ def test_the_profiler_times_tasks_at_once_and_blocks_from_the_next_run_on(
         for name, values in (("tet", each.execution), ("lateness", each.lateness)):
             logged = log[f"_times/{each.task}.{name}"][place : place + len(values)]
             np.testing.assert_allclose(values, logged, atol=1e-12)
-    tg.start()
-    wait_for(lambda: tg.ExecTime > 0.3)
-    assert "profile" not in str(tg.getProfilerData())
-    tg.stop()
-    found = tg.get_profiler_data()
-    steps = {each.task: each for each in found.tasks}
-    methods = {(each.block, each.method): each for each in found.profiles[""].methods}
-    # The calls of the warm ticks before the start are among them.
-    assert len(steps["fast"].ticks) <= methods["wave", "output"].calls <= len(steps["fast"].ticks) + 10
+    methods = {(each.block, each.method): each for each in blocks_of(found)}
+    assert methods["wave", "output"].calls <= log.times("_times/fast.tet").size
     assert methods["law", "output"].total > 0
     assert "wave" in found.report() and "fast" in found.report()
     trace = json.loads(found.write(tmp_path / "trace.json").read_text())["traceEvents"]
-    calls = [each for each in trace if each["name"] == "wave.output"][-len(steps["fast"].ticks) :]
-    drawn = [each for each in trace if each.get("cat") == "step" and each["tid"] == calls[0]["tid"]]
-    for call, step in zip(calls, drawn, strict=True):  # they are on one clock
-        assert step["ts"] - 1 <= call["ts"] <= step["ts"] + step["dur"] + 1
-    tg.stopProfiler()
+    calls = [each for each in trace if each["name"] == "wave.output"]
+    steps = [each for each in trace if each.get("cat") == "step" and each["tid"] == calls[0]["tid"]]
+    shared = [each for each in calls if steps[0]["ts"] <= each["ts"] <= steps[-1]["ts"]]
+    assert len(shared) > 20
+    for call in shared:  # they are on one clock
+        assert any(step["ts"] - 1 <= call["ts"] <= step["ts"] + step["dur"] + 1 for step in steps)
+
+
+def test_a_run_is_timed_from_its_start_if_the_profiler_is_on_before(tg: Target, diagram: Path) -> None:
+    tg.load(diagram)
+    tg.startProfiler()
+    tg.start()
+    wait_for(lambda: tg.ExecTime > 0.2)
+    tg.stop()
+    found = tg.getProfilerData()
+    steps = {each.task: len(each.ticks) for each in found.tasks}
+    methods = {(each.block, each.method): each.calls for each in blocks_of(found)}
+    assert methods["wave", "output"] == steps["fast"]  # none of the warm ticks before the start
+    assert methods["law", "output"] == steps["slow"]
+    tg.start()
+    wait_for(lambda: tg.ExecTime > 0.2)
+    found = tg.profile(0.3)  # begins anew
+    assert len(found.tasks[0].ticks) > 0
+    assert next(each.calls for each in blocks_of(found) if each.block == "wave") > 5
+    tg.stop()
     tg.start()
     wait_for(lambda: tg.ExecTime > 0.1)
     tg.stop()
-    assert tg.getProfilerData().tasks == []
-    assert tg.startProfiler() is True
+    found = tg.getProfilerData()
+    assert (found.tasks, found.profiles) == ([], {})
+
+
+def test_the_command_times_a_flying_application_for_some_seconds(
+    tg: Target, diagram: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tg.load(diagram)
+    arguments = ["profile", "--target", "lab", "--seconds"]
+    assert main([*arguments, "1"]) == 2
+    assert "nothing runs on lab, so there is nothing to time; start it first" in capsys.readouterr().err
+    tg.start()
+    wait_for(lambda: tg.ExecTime > 0.1)
+    assert main([*arguments, "-1"]) == 2
+    assert "--seconds: a time must be between 0 s" in capsys.readouterr().err
+    assert main([*arguments, "0.4", "-o", str(tmp_path / "trace.json")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "block" in next(line for line in lines if "p99" in line)
+    assert any(line.split()[:1] == ["wave"] for line in lines)
+    names = {each["name"] for each in json.loads((tmp_path / "trace.json").read_text())["traceEvents"]}
+    assert {"wave.output", "law.output"} <= names
+    assert tg.Status == "running"
+    tg.stop()
+
+
+def blocks_of(found: ProfilerData) -> Sequence[Timed]:
+    return [each for report in found.profiles.values() for each in report.methods]
 
 
 def test_a_signal_is_seen_as_the_log_has_it(tg: Target, diagram: Path) -> None:

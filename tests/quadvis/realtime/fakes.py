@@ -21,6 +21,7 @@ from quadvis.realtime.clocks import Timekeeper, machine_words
 from quadvis.realtime.control import SharedMemory
 from quadvis.realtime.crew import Crew, lead
 from quadvis.realtime.pacer import Pacer
+from quadvis.realtime.profiles import ProfileBox, ProfileRoom
 from quadvis.realtime.schedule import NANOSECONDS, Schedule
 from quadvis.realtime.streams import RowStream, room_for
 from quadvis.realtime.times import TaskTimes
@@ -155,10 +156,14 @@ class Paced:
         names = [task.name for task in graph.tasks]
         each = [limits.of(name) for name in names]
         self.pacer = Pacer(
-            self.schedule, names, each, self.shared, clock, lambda: self.engine.hold_safe(), computer
-        )
+            self.schedule, names, each, self.shared, clock, lambda: self.engine.hold_safe(), computer,
+            lambda number: self.engine.time_calls(number),
+        )  # fmt: skip
         self.engine = Engine(graph, diagram.seed, self.pacer)
         self.pacer.write_into(self.engine.memory)
+        profiles = ProfileRoom.of(graph, whole=False)
+        self.profiles = ProfileBox(np.zeros(profiles.words, np.int64), profiles)
+        self.engine.measure(self.profiles.new)
         native, choice = engine == NATIVE, choose(self.engine, 10**9, engine)
         self.crew = None
         if graph.tasking == MULTI:
