@@ -43,7 +43,10 @@ class Block:
     not_restorable: ClassVar[str] = ""  # why it cannot return to a snapshot: "the model has no way back"
     brings_code: ClassVar[str] = ""  # the parameter whose file a run executes
     harmless: ClassVar[str] = ""  # why its writes need no safe values: "a file moves nothing"
-    example: ClassVar[str] = ""  # entries under `blocks` that show its use, at the rates fast and continuous
+    example: ClassVar[str] = (
+        ""  # entries under `blocks` that show its use: rates fast, slow, inner, continuous
+    )
+    example_needs: ClassVar[str] = ""  # what its example needs that not every computer has: "an FMU"
     symbol: ClassVar[str] = ""  # by which pictures show it: one of `quadvis.block.symbol.SYMBOLS`
     free_names: ClassVar[str] = ""  # what diagrams name by themselves: "outputs, by formulas"; see `named`
     # The parameters and the numbers of inputs from which the ports were made; these numbers alone.

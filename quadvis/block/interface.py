@@ -34,8 +34,8 @@ CHECKS = ("check", "check_written", "doubts")
 FILES = ("reads", "read_file", "verify_files")
 TAGS = ("not_replayable", "not_restorable", "harmless")
 RESERVED = {
-    "self", "time", "period", "until", "interface", "numeric", "stepwise", "jumps", "functions", "example",
-    "open", "close", "write_safe", "keep", "put_back", "brings_code",
+    "self", "time", "period", "until", "interface", "numeric", "stepwise", "jumps", "functions",
+    "example", "example_needs", "open", "close", "write_safe", "keep", "put_back", "brings_code",
     PORTS, "named", "free_names", "picture_lines", "picture_formula", "picture_signs",
     "symbol", "ports_from", "with_ports", "made_for", "entry_counts", "with_entries",
     *CHECKS, *FILES, *METHODS, *EVENTS, *TAGS,

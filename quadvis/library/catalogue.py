@@ -22,13 +22,13 @@ from typing import TYPE_CHECKING
 
 from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.errors.caller import as_given
+from quadvis.library.libraries import registered_libraries
 
 if TYPE_CHECKING:
     from quadvis.block import Block
     from quadvis.library.own_package import OwnPackage
 
 STANDARD = "quadvis_blocks"
-GROUP = "quadvis.libraries"
 
 OwnBlocks = bool | Callable[[Path], None]
 """Whether the code in the folder ``blocks`` beside a diagram may be run; a function is called with that
@@ -167,9 +167,7 @@ def _own_folder(folder: Path) -> Path:
 
 def _libraries() -> dict[str, str]:
     """Return the packages of the other libraries, by the names under which they are registered."""
-    from importlib.metadata import entry_points  # this import takes longer than reading a diagram
-
-    return {entry.name: entry.value for entry in entry_points(group=GROUP) if entry.value != STANDARD}
+    return {name: value for name, value in registered_libraries().items() if value != STANDARD}
 
 
 def _exists(module: str) -> bool:

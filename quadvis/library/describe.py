@@ -126,10 +126,11 @@ def _kind(item: Declared) -> str:
     return " ".join(filter(None, (kind, unit))) or "number"
 
 
+RATES = {"fast": "100 Hz", "slow": "10 Hz", "inner": "1 kHz"}  # for the blocks of examples
 EXAMPLE = """\
 quadvis: 1
 name: {name}
-rates: {{fast: 100 Hz}}
+rates: {{{rates}}}
 solver: {{method: ode4, step: 10 ms}}
 stop_time: 1 s
 blocks:
@@ -137,17 +138,32 @@ blocks:
 
 
 def example_diagram(name: str, block: type[Block]) -> str:
-    """Return a diagram that runs the example of a block; "" if the block has none."""
+    """Return a diagram that has the example of a block; "" if the block has none."""
     entries = inspect.cleandoc(block.example)
     if not entries:
         return ""
-    return EXAMPLE.format(name=name.rpartition(".")[2], blocks=textwrap.indent(entries, "  ") + "\n")
+    used = {rate: period for rate, period in RATES.items() if f"rate: {rate}" in entries} or {
+        "fast": RATES["fast"]
+    }
+    rates = ", ".join(f"{rate}: {period}" for rate, period in used.items())
+    blocks = textwrap.indent(entries, "  ") + "\n"
+    return EXAMPLE.format(name=name.rpartition(".")[2], rates=rates, blocks=blocks)
+
+
+def only_checked(block: type[Block]) -> str:
+    """Return why the example of a block is checked and not run in a simulation; "" if it runs."""
+    if block.example_needs:
+        return f"it needs {block.example_needs}"
+    return "only a real-time run reaches a port" if issubclass(block, Device) else ""
 
 
 def example(name: str, block: type[Block]) -> list[str]:
     """Return entries of a diagram that show the use of a block: its example, or what it requires."""
-    if block.example:
-        return inspect.cleandoc(block.example).splitlines()
+    return inspect.cleandoc(block.example).splitlines() if block.example else skeleton_entry(name, block)
+
+
+def skeleton_entry(name: str, block: type[Block]) -> list[str]:
+    """Return the entry of a diagram that a block requires at least, with words to be filled in."""
     interface = block.interface
     lines = [f"{name.rpartition('.')[2].rpartition(':')[2]}:", f"  block: {name}"]
     lines += [] if interface.continuous else ["  rate: ..."]

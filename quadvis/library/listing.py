@@ -14,7 +14,7 @@ from typing import NamedTuple
 from quadvis.errors import QuadvisError, quoted, suggestion
 from quadvis.errors.synonyms import foreign_words, plain_word
 from quadvis.library.catalogue import Catalogue, CatalogueError
-from quadvis.library.shipped_files import first_sentence, shipped_names, shipped_text
+from quadvis.library.shipped_files import first_sentence, shipped_texts
 from quadvis.machine.columns import table
 
 _CLASS = re.compile(r'^class (?!_)[^\n]*(?:\n    [^\n]*\n\))?:\n    r?"""(.*?)"""', re.MULTILINE | re.DOTALL)
@@ -49,8 +49,8 @@ def _written(file: Path | None) -> str:
 
 def listed_files() -> list[Listed]:
     """Return the files that come with quadvis."""
-    texts = {name: shipped_text(name) for name in shipped_names()}
-    return [Listed(name, first_sentence(text), first_sentence(text)) for name, text in texts.items()]
+    sentences = {name: first_sentence(text) for name, text in shipped_texts().items()}
+    return [Listed(name, sentence, sentence) for name, sentence in sentences.items()]
 
 
 def matching(listed: Iterable[Listed], words: Sequence[str]) -> list[Listed]:

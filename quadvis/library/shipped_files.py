@@ -27,6 +27,11 @@ def shipped_text(name: str) -> str:
     return named_file(name).read_text(encoding="utf-8")
 
 
+def shipped_texts() -> dict[str, str]:
+    """Return the texts of all files by name."""
+    return {name: named_file(name).read_text(encoding="utf-8") for name in shipped_names()}
+
+
 def first_sentence(text: str) -> str:
     """Return the beginning of the comment at the top of a YAML or XML file."""
     if text.startswith("<!--"):

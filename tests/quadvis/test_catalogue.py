@@ -1,10 +1,12 @@
 import subprocess
 import sys
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
 
 from quadvis.library.catalogue import Catalogue, CatalogueError
+from quadvis.library.libraries import GROUP, registered_libraries
 
 FAN = '''"""A fan."""
 from quadvis.block import Block, Out
@@ -164,6 +166,26 @@ def test_an_installed_library_without_its_package_is_told(library: Path) -> None
     )
     with pytest.raises(CatalogueError, match="the library package 'acme_gone' cannot be found"):
         Catalogue().names()
+
+
+def test_libraries_are_those_that_the_standard_library_finds(
+    library: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (library / "acme-1.0.dist-info" / "entry_points.txt").write_text(
+        "[console_scripts]\nacme = acme_blocks:main\n\n"
+        "[quadvis.libraries]\n# of wind\nacme=acme_blocks [extra]\nother = other.blocks\n\n[more]\nx = y\n"
+    )
+    hidden = library / "later" / "acme-0.9.dist-info" / "entry_points.txt"
+    hidden.parent.mkdir(parents=True)
+    hidden.write_text("[quadvis.libraries]\nold = acme_old\n")
+    monkeypatch.setattr(sys, "path", [*sys.path, str(library / "later")])
+    found = registered_libraries()
+    assert {"acme": "acme_blocks", "other": "other.blocks"}.items() <= found.items()
+    assert found == {entry.name: entry.module for entry in entry_points(group=GROUP)}
+    archive = library / "modules.zip"
+    archive.write_bytes(b"")
+    monkeypatch.setattr(sys, "path", [*sys.path, str(archive)])
+    assert found == registered_libraries()
 
 
 def test_looking_at_the_library_loads_none_of_the_heavy_packages() -> None:

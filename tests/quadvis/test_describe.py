@@ -19,8 +19,8 @@ from quadvis.library.catalogue import Catalogue
 from quadvis.library.describe import (
     default_text,
     description,
-    example,
     facts,
+    skeleton_entry,
     table,
 )
 
@@ -130,10 +130,11 @@ def test_every_default_reads_back_as_it_is(name: str) -> None:
         assert value == pytest.approx(param.accept(param.default), rel=1e-5)
 
 
-@pytest.mark.parametrize("name", Catalogue().names())
-def test_every_example_of_a_diagram_is_one(name: str, tmp_path: Path) -> None:
+# The two left out require entries whose names are the diagram's own.
+@pytest.mark.parametrize("name", sorted({*Catalogue().names()} - {"logic.state_machine", "math.expression"}))
+def test_the_skeleton_of_an_entry_has_all_that_a_block_requires(name: str, tmp_path: Path) -> None:
     block = Catalogue().find(name)
-    lines = "\n".join(f"  {line}" for line in example(name, block)).replace("rate: ...", "rate: fast")
+    lines = "\n".join(f"  {line}" for line in skeleton_entry(name, block)).replace("rate: ...", "rate: fast")
     head = "quadvis: 1\nname: x\nrates: {fast: 1 Hz}\nstop_time: 1 s\nsolver: {step: 1 s}\nblocks:\n"
     problems: list[str] = []
     try:
@@ -142,7 +143,7 @@ def test_every_example_of_a_diagram_is_one(name: str, tmp_path: Path) -> None:
         problems = [fault.problem for fault in error.faults]
     # What is left to be filled in is all that may be wrong: block.port, path, and ... also for a list.
     lists = [f"'{param.name}' takes" for param in block.interface.params.values() if param.required]
-    left = ("'block'", "'block.port'", "path", "'...'", *lists)
+    left = ("'block'", "'block.port'", "path", "the arrays of a '' file", "'...'", *lists)
     assert [problem for problem in problems if not any(word in problem for word in left)] == []
 
 

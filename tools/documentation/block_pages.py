@@ -8,7 +8,14 @@ from collections.abc import Mapping, Sequence
 from documentation.markdown import code, escaped, from_docstring, table
 from quadvis.block import Block
 from quadvis.errors.synonyms import foreign_words
-from quadvis.library.describe import declarations, example, example_diagram, first_line, tags
+from quadvis.library.describe import (
+    declarations,
+    example,
+    example_diagram,
+    first_line,
+    only_checked,
+    tags,
+)
 
 COLUMNS = {
     "inputs": ("input", "type and unit", "", "what it is"),
@@ -66,11 +73,18 @@ def _shown(title: str, cell: str) -> str:
     return code(cell.removeprefix("= ")) if title in {"type and unit", "default"} else escaped(cell)
 
 
+def _words(file: str, reason: str) -> str:
+    """Return what can be done with an example."""
+    if reason:
+        return f"`quadvis check {file}.yaml` accepts this diagram; a simulation does not run it: {reason}."
+    return f"This diagram runs: `quadvis run {file}.yaml`."
+
+
 def _example(name: str, block: type[Block], pictures: Sequence[str]) -> list[str]:
     runs = example_diagram(name, block)
     text = runs or "\n".join(example(name, block)) + "\n"
     words = (
-        f"This diagram runs: `quadvis run {name.rpartition('.')[2]}.yaml`."
+        _words(name.rpartition(".")[2], only_checked(block))
         if runs
         else "What an entry in a diagram must have:"
     )

@@ -21,7 +21,7 @@ from quadvis.api import load_text
 from quadvis.block import Block
 from quadvis.graph.graph import Node, Wire
 from quadvis.graph.names import index_text, wire_text
-from quadvis.library.describe import example_diagram
+from quadvis.library.describe import example_diagram, only_checked
 from quadvis.output.figures import Figure, Panel, Trace
 from quadvis.output.plot import plot_figures
 from quadvis.units import Unit, parse_units
@@ -32,9 +32,9 @@ NAMES = ("diagram.svg", "response.svg")
 
 
 def pictures(name: str, block: type[Block], cache: Path) -> dict[str, bytes]:
-    """Return the pictures of a block by file name; none if the block has no example."""
+    """Return the pictures of a block by file name; none if its example needs what may not be here."""
     text = example_diagram(name, block)
-    if not text:
+    if not text or block.example_needs:
         return {}
     folder = cache / _key(text, block)
     if not folder.is_dir():
@@ -42,15 +42,17 @@ def pictures(name: str, block: type[Block], cache: Path) -> dict[str, bytes]:
         with tempfile.TemporaryDirectory(dir=cache) as made:
             whole = Path(made, "whole")
             whole.mkdir()
-            _draw(name, text, whole)
+            _draw(name, text, whole, runs=not only_checked(block))
             with contextlib.suppress(OSError):  # another build was sooner
                 whole.rename(folder)
     return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
 
 
-def _draw(name: str, text: str, folder: Path) -> None:
+def _draw(name: str, text: str, folder: Path, *, runs: bool) -> None:
     diagram = load_text(text, folder)
     (folder / "diagram.svg").write_text(diagram.draw(), encoding="utf-8")
+    if not runs:
+        return
     result = diagram.run()
     (node, *_) = (node for node in diagram.graph.nodes if node.kind == name)
     traces = [one for trace in _traces(node) if _is_shown(result, trace) for one in _by_unit(result, trace)]

@@ -55,6 +55,15 @@ class Altitude(Block):
     wanted = Work(unit="N")  # r1 before its limit
     thrust = Out(unit="N", doc="collective thrust u, the sum over the rotors")
 
+    example = """
+        climb: {block: sources.ramp, rate: fast, with: {slope: 0.3 m/s, initial: 1 m}}
+        altitude:
+          block: control.altitude
+          rate: fast
+          with: {bandwidth: 2 rad/s}
+          in: {height: climb.y, climb: 0.3 m/s, roll: 0 rad, pitch: 5 deg, height_reference: 1.5 m}
+    """
+
     def check(self) -> None:
         """Refuse gains of which only one is zero, and an integral that is too fast for them."""
         check_gains(self.gains)

@@ -50,6 +50,14 @@ class AngleChannels(Block):
         doc="controls that the channels give: the collective, and no torques of ours",
     )
 
+    example = """
+        tilt: {block: sources.sine, rate: fast, with: {amplitude: 20 deg, frequency: 1 Hz}}
+        channels:
+          block: control.angle_channels
+          rate: fast
+          in: {collective: 5 N, roll: tilt.y, pitch: 0 rad, yaw_rate: 0.5 rad/s}
+    """
+
     def check(self) -> None:
         """Refuse a craft that its motors cannot carry."""
         if self.mass * self.gravity >= ROTORS * self.thrust_max:

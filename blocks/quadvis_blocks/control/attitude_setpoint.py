@@ -40,6 +40,21 @@ class AttitudeSetpoint(Block):
     collective = In(unit="N", doc="collective thrust")
     command = Out("float64[4]", unit="rad rad rad 1", doc="roll, pitch, yaw, thrust")
 
+    example = """
+        ahead: {block: sources.sine, rate: fast, with: {amplitude: 1 m, frequency: 0.5 Hz}}
+        speed: {block: signal.derivative, rate: fast, in: {u: ahead.y}}
+        setpoint:
+          block: control.attitude_setpoint
+          rate: fast
+          in:
+            forward: ahead.y
+            forward_velocity: speed.rate
+            right: 0.1 m
+            right_velocity: 0 m/s
+            heading: 0 rad
+            collective: 5 N
+    """
+
     def output(
         self,
         forward: float,

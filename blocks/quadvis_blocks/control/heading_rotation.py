@@ -32,6 +32,17 @@ class HeadingRotation(Block):
     forward_velocity = Out(unit="m/s", doc="rate of change of forward at a constant heading")
     right_velocity = Out(unit="m/s", doc="rate of change of right at a constant heading")
 
+    example = """
+        turn: {block: sources.ramp, rate: fast, with: {slope: 90 deg/s}}
+        errors:
+          block: control.heading_rotation
+          rate: fast
+          in:
+            position: {value: [1, 0, 1.5], unit: m}
+            velocity: {value: [0, 0.2, 0], unit: m/s}
+            heading: turn.y
+    """
+
     def output(
         self, position: Any, velocity: Any, heading: float, position_reference: Any, velocity_reference: Any
     ) -> tuple[float, float, float, float]:

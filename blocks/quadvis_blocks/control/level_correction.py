@@ -25,6 +25,14 @@ class LevelCorrection(Block):
     correction = State(unit="rad")
     error = Work(unit="rad")
 
+    example = """
+        wanted: {block: sources.pulse, rate: fast, with: {high: 5 deg, interval: 1 s, width: 0.5 s}}
+        level:
+          block: control.level_correction
+          rate: fast
+          in: {wanted: wanted.y, measured: 1 deg}
+    """
+
     def output(self, wanted: float, measured: float) -> float:
         """Return the angle to ask for."""
         self.error = 0.0 if math.isnan(measured) else wanted - measured

@@ -50,6 +50,14 @@ class Mixer(Block):
     )
     limited = Out("bool[4]", doc="controls that gave way: collective, roll, pitch, yaw")
 
+    example = """
+        torque: {block: sources.sine, rate: fast, with: {amplitude: 8 rad/s^2, frequency: 1 Hz}}
+        mixer:
+          block: control.mixer
+          rate: fast
+          in: {collective: 5 N, roll: torque.y, pitch: 0 rad/s^2, yaw: 0.2 rad/s^2}
+    """
+
     def check(self) -> None:
         """Refuse a least thrust that is not below the greatest."""
         if self.thrust_min >= self.thrust_max:

@@ -43,6 +43,16 @@ class NestedAngle(Block):
     angle_reference = In(unit="rad", default=0.0, doc="angle that balances a known disturbance, such as wind")
     angle = Out(unit="rad", doc="the angle to take")
 
+    example = """
+        place: {block: sources.sine, rate: fast, with: {amplitude: 1 m, frequency: 0.5 Hz}}
+        speed: {block: signal.derivative, rate: fast, in: {u: place.y}}
+        law:
+          block: control.nested_angle
+          rate: fast
+          with: {axis: roll, bandwidth: 2 rad/s}
+          in: {position: place.y, velocity: speed.rate}
+    """
+
     def output(
         self,
         position: float,

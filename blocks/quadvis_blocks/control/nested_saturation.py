@@ -63,6 +63,23 @@ class NestedSaturation(Block):
     torque = Out(unit="rad/s^2", doc="torque divided by inertia: the wanted angular acceleration")
     level = Out("int64", doc="innermost saturated stage: 0 none, 1 the torque, 4 the position")
 
+    example = """
+        body:
+          block: plant.lateral
+          rate: continuous
+          with: {initial_position: 0.5 m}
+          in: {torque: {from: law.torque, across: hold}}
+        law:
+          block: control.nested_saturation
+          rate: fast
+          with: {axis: roll, bandwidth: 2 rad/s}
+          in:
+            position: {from: body.position, across: sample}
+            velocity: {from: body.velocity, across: sample}
+            angle: {from: body.angle, across: sample}
+            angular_rate: {from: body.angular_rate, across: sample}
+    """
+
     def output(
         self,
         position: float,

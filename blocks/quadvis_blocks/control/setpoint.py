@@ -21,6 +21,13 @@ class Setpoint(Block):
     position = Out("float64[3]", unit="m", doc="x, y, h to hold")
     heading = Out(unit="rad", doc="yaw angle to hold")
 
+    example = """
+        goal:
+          block: control.setpoint
+          rate: fast
+          with: {target: {value: [0.5, 0, 1.5, 0.1], unit: m m m rad}}
+    """
+
     def output(self) -> tuple[Any, float]:
         """Return the position and the heading."""
         return self.target[:3], self.target[3]

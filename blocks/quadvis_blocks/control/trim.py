@@ -31,6 +31,14 @@ class Trim(Block):
     gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
     tilt_limit = Param(0.1, unit="rad", above=0.0, tune=True, doc="greatest angle")
 
+    example = """
+        wind:
+          block: sources.table
+          rate: fast
+          with: {times: {value: [0, 1], unit: s}, values: {value: [[0, 0, 0], [0.5, 0.2, 0.1]], unit: m/s^2}}
+        trim: {block: control.trim, rate: fast, in: {acceleration: wind.y, heading: 0 rad}}
+    """
+
     def output(self, acceleration: Any, heading: float) -> tuple[float, float, float]:
         """Return the angles and the force."""
         cosine, sine = math.cos(heading), math.sin(heading)

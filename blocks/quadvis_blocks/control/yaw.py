@@ -54,6 +54,16 @@ class Yaw(Block):
     wanted = Work(unit="rad/s^2")  # the torque before its limit
     torque = Out(unit="rad/s^2", doc="torque divided by inertia: the wanted angular acceleration")
 
+    example = """
+        turn: {block: sources.sine, rate: fast, with: {amplitude: 20 deg, frequency: 1 Hz}}
+        rate: {block: signal.derivative, rate: fast, in: {u: turn.y}}
+        yaw:
+          block: control.yaw
+          rate: fast
+          with: {bandwidth: 2 rad/s}
+          in: {angle: turn.y, angular_rate: rate.rate, angle_reference: 10 deg}
+    """
+
     def check(self) -> None:
         """Refuse gains of which only one is zero, and an integral that is too fast for them."""
         check_gains(self.gains)

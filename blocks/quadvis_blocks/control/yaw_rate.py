@@ -22,6 +22,11 @@ class YawRate(Block):
     angle_reference = In(unit="rad", default=0.0, doc="heading to hold")
     rate = Out(unit="rad/s", doc="yaw rate to take")
 
+    example = """
+        turn: {block: sources.ramp, rate: fast, with: {slope: 60 deg/s}}
+        yaw_rate: {block: control.yaw_rate, rate: fast, in: {angle: turn.y, angle_reference: 30 deg}}
+    """
+
     def output(self, angle: float, angle_reference: float) -> float:
         """Return the rate."""
         wanted = -0.5 * self.bandwidth * wrapped(angle - angle_reference)

@@ -39,6 +39,14 @@ class AirAcceleration(Block):
     smooth = State("float64[3]", unit="m/s^2")
     smooth_now = Work("float64[3]", unit="m/s^2")  # with the force of this tick
 
+    example = """
+        tilt: {block: sources.sine, rate: fast, with: {amplitude: 5 deg, frequency: 1 Hz}}
+        air:
+          block: estimation.air_acceleration
+          rate: fast
+          in: {specific_force: {value: [0.1, 0, -9.81], unit: m/s^2}, roll: tilt.y, pitch: 0 rad, yaw: 0 rad}
+    """
+
     def output(self, specific_force: Any, roll: float, pitch: float, yaw: float) -> Any:
         """Return the acceleration with the force of this tick."""
         across = np.array((float(specific_force[0]), float(specific_force[1]), 0.0))

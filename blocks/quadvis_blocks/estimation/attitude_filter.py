@@ -83,6 +83,15 @@ class AttitudeFilter(Block):
     mean_now = Work("float64[4]")  # with the measurements of this tick
     spread_now = Work("float64[4,4]")
 
+    example = """
+        turn: {block: sources.sine, rate: fast, with: {amplitude: 10 deg, frequency: 1 Hz}}
+        gyro: {block: signal.derivative, rate: fast, in: {u: turn.y}}
+        filter:
+          block: estimation.attitude_filter
+          rate: fast
+          in: {angle: turn.y, gyro: gyro.rate, torque: 0 rad/s^2}
+    """
+
     def start(self) -> None:
         """Begin at zero, with the deviations ``initial_sigma``."""
         begin(self.stamps)

@@ -30,6 +30,15 @@ class CameraTilt(Block):
     camera_roll = Out(unit="rad", nan=True, doc="roll of the camera")
     camera_pitch = Out(unit="rad", nan=True, doc="pitch of the camera")
 
+    example = """
+        roll: {block: sources.sine, rate: fast, with: {amplitude: 10 deg, frequency: 1 Hz}}
+        tilt:
+          block: estimation.camera_tilt
+          rate: fast
+          with: {angles: {value: [0, 0, 90], unit: deg}}
+          in: {roll: roll.y, pitch: 2 deg}
+    """
+
     def output(self, roll: float, pitch: float) -> tuple[float, float]:
         """Return roll and pitch of the camera."""
         camera = askew(np.array((roll, pitch, 0.0)), self.angles)

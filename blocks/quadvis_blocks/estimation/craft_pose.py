@@ -49,6 +49,15 @@ class CraftPose(Block):
     pitch = Out(unit="rad", nan=True, doc="pitch of the craft")
     yaw = Out(unit="rad", nan=True, doc="heading of the craft")
 
+    example = """
+        turn: {block: sources.ramp, rate: fast, with: {slope: 90 deg/s}}
+        craft:
+          block: estimation.craft_pose
+          rate: fast
+          with: {offset: {value: [0.1, 0, 0.05], unit: m}}
+          in: {camera_position: {value: [0, 0, 3], unit: m}, camera_yaw: turn.y}
+    """
+
     def output(
         self, camera_position: Any, camera_roll: float, camera_pitch: float, camera_yaw: float
     ) -> tuple[Any, float, float, float]:

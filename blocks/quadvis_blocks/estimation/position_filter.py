@@ -173,6 +173,18 @@ class PositionFilter(Block):
     tried_now = Work("float64[3]")
     strain_now = Work()
 
+    example = """
+        place:
+          block: sources.table
+          rate: fast
+          with: {times: {value: [0, 1], unit: s}, values: {value: [[0, 0, 1.5], [0.3, 0, 1.5]], unit: m}}
+        now: {block: sources.clock, rate: fast}
+        filter:
+          block: estimation.position_filter
+          rate: fast
+          in: {acceleration: {value: [0, 0, 0], unit: m/s^2}, position: place.y, stamp: now.y}
+    """
+
     def start(self) -> None:
         """Begin at rest at the initial position."""
         begin_clock(self.stamps)

@@ -76,6 +76,24 @@ class Predictor(Block):
     count = State("int64", 1)
     now = State("float64[4]")  # the wrench of the rotors
 
+    example = """
+        turn: {block: sources.sine, rate: fast, with: {amplitude: 5 deg, frequency: 1 Hz}}
+        rate: {block: signal.derivative, rate: fast, in: {u: turn.y}}
+        later:
+          block: estimation.predictor
+          rate: fast
+          in:
+            position: {value: [0, 0, 1.5], unit: m}
+            velocity: {value: [0.2, 0, 0], unit: m/s}
+            roll: turn.y
+            pitch: 0 rad
+            yaw: 0 rad
+            roll_rate: rate.rate
+            pitch_rate: 0 rad/s
+            yaw_rate: 0 rad/s
+            thrust: {value: [1.2, 1.2, 1.2, 1.2], unit: N}
+    """
+
     def check(self) -> None:
         """Refuse a delay that holds more commands than there is room for."""
         check_delay(self.delay, CAPACITY - 1, self.period)

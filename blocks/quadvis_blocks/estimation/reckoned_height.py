@@ -61,6 +61,22 @@ class ReckonedHeight(Block):
     last = State(unit="s")
     stamps = State(f"float64[{SIZE}]")
 
+    example = """
+        now: {block: sources.clock, rate: fast}
+        blind: {block: logic.compare, rate: fast, with: {operator: ">="}, in: {a: now.y, b: 0.5 s}}
+        height:
+          block: estimation.reckoned_height
+          rate: fast
+          in:
+            position: {value: [0, 0, 1.5], unit: m}
+            velocity: {value: [0, 0, 0], unit: m/s}
+            stamp: now.y
+            blind: blind.y
+            collective: 4.8 N
+            roll: 0 rad
+            pitch: 0 rad
+    """
+
     def start(self) -> None:
         """Begin in a trimmed hover, without a frame."""
         begin(self.stamps)

@@ -47,6 +47,17 @@ class RotorState(Block):
     count = State("int64", 1)
     now = State("float64[4]")
 
+    example = """
+        command:
+          block: sources.table
+          rate: fast
+          with:
+            times: {value: [0, 0.2], unit: s}
+            values: {value: [[1.2, 1.2, 1.2, 1.2], [1.3, 1.2, 1.1, 1.2]], unit: N}
+            interpolation: hold
+        rotors: {block: estimation.rotor_state, rate: fast, in: {thrust: command.y}}
+    """
+
     def check(self) -> None:
         """Refuse a delay that holds more commands than there is room for."""
         check_delay(self.delay, CAPACITY - 1, self.period)

@@ -30,6 +30,14 @@ class ThrustAcceleration(Block):
     mass = Param(MASS, unit="kg", above=0.0, tune=True, doc="mass of the craft; default: Draganfly IV")
     gravity = Param(GRAVITY, unit="m/s^2", above=0.0, doc="g")
 
+    example = """
+        tilt: {block: sources.sine, rate: fast, with: {amplitude: 5 deg, frequency: 1 Hz}}
+        acceleration:
+          block: estimation.thrust_acceleration
+          rate: fast
+          in: {collective: 5 N, roll: tilt.y, pitch: 0 rad}
+    """
+
     def output(self, collective: float, roll: float, pitch: float, yaw: float) -> Any:
         """Return the acceleration."""
         return acceleration(collective, np.array((roll, pitch, yaw)), self.mass, self.gravity)

@@ -52,6 +52,14 @@ class TiltBias(Block):
     measured = State(unit="s")  # instant of the last frame that counted
     stamps = State(f"float64[{SIZE}]")
 
+    example = """
+        now: {block: sources.clock, rate: fast}
+        bias:
+          block: estimation.tilt_bias
+          rate: fast
+          in: {imu_roll: 1 deg, imu_pitch: 0 deg, roll: 0.2 deg, pitch: 0.1 deg, stamp: now.y}
+    """
+
     def start(self) -> None:
         """Begin without a frame."""
         begin(self.stamps)

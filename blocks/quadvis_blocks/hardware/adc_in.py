@@ -39,6 +39,13 @@ class AdcIn(CardInput):
     )
     voltage = Out("float64[n]", unit="V", nan=True, doc="the voltages; NaN before the first reading")
 
+    example = """
+        card:
+          block: hardware.adc_in
+          rate: fast
+          with: {port: comedi:/dev/comedi0, channels: [1, 2], ranges: {value: [10, -10], unit: V}}
+    """
+
     def check(self) -> None:
         """Refuse wrong channels and ranges without a width."""
         super().check()

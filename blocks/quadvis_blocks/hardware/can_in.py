@@ -25,6 +25,13 @@ class CanIn(CanFrame, Input):
 
     others = Out("int64", doc="frames with other identifiers")
 
+    example = """
+        engine:
+          block: hardware.can_in
+          rate: fast
+          with: {port: can:socketcan:can0, protocol: "quadvis:protocols/lab_can.yaml", message: engine}
+    """
+
     @classmethod
     def ports(cls, protocol: str, message: str) -> dict[str, Out]:
         """Return an output for each value of the frame."""

@@ -25,6 +25,22 @@ class CanOut(SentMessage, CanFrame, Output):
 
     spacing = Param(20e-3, unit="s", min=1e-3, max=1.0, doc="from one frame to the next")
 
+    example = """
+        angle: {block: sources.sine, rate: fast, with: {amplitude: 10 deg, frequency: 1 Hz}}
+        actuator:
+          block: hardware.can_out
+          rate: fast
+          with:
+            port: can:socketcan:can0
+            protocol: "quadvis:protocols/lab_can.yaml"
+            message: actuator
+            safe_position: 0 deg
+            safe_current: 0 A
+            initial_position: 0 deg
+            initial_current: 0 A
+          in: {position: angle.y, current: 2 A}
+    """
+
     @classmethod
     def ports(cls, protocol: str, message: str) -> dict[str, Declared]:
         """Return an input for each value of the frame, with its two values, and what is sent of it."""

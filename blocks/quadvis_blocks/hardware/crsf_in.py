@@ -37,6 +37,18 @@ class CrsfIn(ReceiverInput):
     snr = Out(nan=True, doc="signal-to-noise ratio at the receiver (dB)")
     statistics_age = Out(unit="s", nan=True, doc="time since the newest statistics came")
 
+    example = """
+        receiver:
+          block: hardware.crsf_in
+          rate: fast
+          with:
+            port: pty:rc
+            channels: [3, 1, 2, 4]
+            lowest: [-1, -1, -1, -1]
+            highest: [1, 1, 1, 1]
+            roles: throttle stick stick stick
+    """
+
     def open(self) -> None:
         """Open the port; nothing has come."""
         super().open()

@@ -36,6 +36,24 @@ class CrsfOut(CountOutput):
     safe = Safe("command", doc="command at every end of a run, for each element")
     spacing = Param(10e-3, unit="s", min=1e-3, max=0.1, doc="from one frame to the next; 2 to 20 ms")
 
+    example = """
+        sticks:
+          block: sources.table
+          rate: fast
+          with: {times: {value: [0, 1], unit: s}, values: [[-1, 0, 0, 0], [0.5, 0.2, 0, 0]]}
+        radio:
+          block: hardware.crsf_out
+          rate: fast
+          with:
+            port: pty:rc
+            channels: [3, 1, 2, 4]
+            lowest: [-1, -1, -1, -1]
+            highest: [1, 1, 1, 1]
+            initial: [-1, 0, 0, 0]
+            safe: [-1, 0, 0, 0]
+          in: {command: sticks.y}
+    """
+
     def frame(self, command: Any) -> bytes:
         """Return the frame of a command."""
         return encode(self.counts(command), SYNCS[self.to])

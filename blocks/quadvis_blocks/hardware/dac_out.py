@@ -45,6 +45,22 @@ class DacOut(CardOutput):
     sent = Out("float64[n]", unit="a", doc="the commands as they go out: limited, and in whole 1e-6 V or A")
     last = State("float64[n]", unit="a")  # the commands of the last step
 
+    example = """
+        level: {block: sources.constant, rate: fast, with: {value: {value: [2.5, -1], unit: V}}}
+        card:
+          block: hardware.dac_out
+          rate: fast
+          with:
+            port: comedi:/dev/comedi0
+            channels: [1, 2]
+            ranges: [3, 3]
+            lowest: {value: [-10, -10], unit: V}
+            highest: {value: [10, 10], unit: V}
+            initial: {value: [0, 0], unit: V}
+            safe: {value: [0, 0], unit: V}
+          in: {command: level.y}
+    """
+
     def check(self) -> None:
         """Refuse wrong channels, ends, levels beyond the ranges, and commands beyond the ends."""
         super().check()

@@ -24,6 +24,10 @@ class DigitalIn(CardInput):
     inverted = Param(False, "bool", doc="on is the low level")
     on = Out("bool[n]", doc="whether each line is on")
 
+    example = """
+        lines: {block: hardware.digital_in, rate: fast, with: {port: comedi:/dev/comedi0, channels: [1, 2]}}
+    """
+
     def message(self, values: Any) -> tuple[Any, ...] | None:
         """Return the lines; None if one is neither 0 nor 1."""
         if ((values != 0) & (values != 1)).any():

@@ -25,6 +25,17 @@ class DigitalOut(CardOutput):
     safe = Safe("command", doc="command at every end of a run, for each element")
     command = In("bool[n]", doc="whether each line is on")
 
+    example = """
+        lamp: {block: sources.pulse, rate: fast, with: {interval: 1 s, width: 0.5 s}}
+        both: {block: signal.concatenate, rate: fast, in: {u: [lamp.y, 1]}}
+        on: {block: logic.compare, rate: fast, with: {operator: ">"}, in: {a: both.y, b: [0.5, 0.5]}}
+        lines:
+          block: hardware.digital_out
+          rate: fast
+          with: {port: comedi:/dev/comedi0, channels: [1, 2], initial: [false, false], safe: [false, false]}
+          in: {command: on.y}
+    """
+
     def frame(self, command: Any) -> bytes:
         """Return the frame of the lines' levels."""
         return self.frame_of(np.asarray(command, bool) != self.inverted)

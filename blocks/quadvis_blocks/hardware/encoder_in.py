@@ -36,6 +36,13 @@ class EncoderIn(CardInput):
     position = Out("float64[n]", unit="a", nan=True, doc="the positions; NaN before the first reading")
     count = Out("int64[n]", doc="the counts, which do not wrap")
 
+    example = """
+        shaft:
+          block: hardware.encoder_in
+          rate: fast
+          with: {port: comedi:/dev/comedi0, channels: [1], scale: {value: [0.088], unit: deg}}
+    """
+
     def open(self) -> None:
         """Open the port; nothing has been read."""
         super().open()

@@ -33,6 +33,10 @@ class ImuIn(Input):
     pitch = Out(unit="rad", doc="nose up")
     rates = Out("float64[3]", unit="rad/s", doc="of the gyro, about the axes of the craft")
 
+    example = """
+        imu: {block: hardware.imu_in, rate: fast, with: {port: pty:imu, baud: 230400}}
+    """
+
     def open(self) -> None:
         """Open the port; no frame has come."""
         super().open()

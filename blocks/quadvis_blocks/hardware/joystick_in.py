@@ -68,6 +68,19 @@ class JoystickIn(CapturedInput):
     valid = Out("bool", doc="whether these are the pilot's commands")
     held = Out("bool", doc="whether the dead-man is held, by the newest report")
 
+    example = """
+        sticks:
+          block: hardware.joystick_in
+          rate: fast
+          with:
+            device: /dev/input/by-id/usb-gamepad-event-joystick
+            codes: ABS_Y ABS_X BTN_TR
+            lowest: [1, -1, 0]
+            highest: [-1, 1, 1]
+            roles: throttle stick switch
+            dead_man: BTN_TL
+    """
+
     def check(self) -> None:
         """Refuse words that are no axis and no button, and ends that are none."""
         self._codes("codes", self.codes, len(self.lowest))

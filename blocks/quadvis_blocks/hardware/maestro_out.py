@@ -77,6 +77,24 @@ class MaestroOut(PulseOutput):
         0.0, unit="us/s^2", min=0.0, max=255 * ACCELERATION_UNIT, doc="limit that the board keeps; 0: none"
     )
 
+    example = """
+        angle: {block: sources.sine, rate: fast, with: {amplitude: 30 deg, frequency: 1 Hz}}
+        both: {block: signal.concatenate, rate: fast, in: {u: [angle.y, 0 deg]}}
+        servos:
+          block: hardware.maestro_out
+          rate: fast
+          with:
+            port: pty:servos
+            channels: [1, 2]
+            lowest: {value: [-45, -45], unit: deg}
+            highest: {value: [45, 45], unit: deg}
+            shortest: {value: [1000, 1000], unit: us}
+            longest: {value: [2000, 2000], unit: us}
+            initial: {value: [0, 0], unit: deg}
+            safe: {value: [0, 0], unit: deg}
+          in: {command: both.y}
+    """
+
     def check(self) -> None:
         """Refuse what the board cannot do."""
         super().check()

@@ -36,6 +36,13 @@ class MessageIn(DescribedLine, Input):
     others = Out("int64", doc="whole messages of other kinds")
     starting = Out("bool", doc="the device has not had the time to start: what comes does not count")
 
+    example = """
+        imu:
+          block: hardware.message_in
+          rate: fast
+          with: {port: pty:imu, protocol: "quadvis:protocols/lab_imu.yaml"}
+    """
+
     @classmethod
     def ports(
         cls,

@@ -38,6 +38,25 @@ class MessageOut(SentMessage, DescribedLine, Output):
         doc="time of safe messages at the end, and nothing after it; 0: as long as anybody lives",
     )
 
+    example = r"""
+        angle: {block: sources.sine, rate: fast, with: {amplitude: 30 deg, frequency: 1 Hz}}
+        servo:
+          block: hardware.message_out
+          rate: fast
+          with:
+            port: pty:servo
+            baud: 115200
+            format: "A%.2f"
+            names: angle
+            units: deg
+            ranges: "-45..45"
+            terminator: \n
+            checksum: none
+            initial: 0 deg
+            safe: 0 deg
+          in: {angle: angle.y}
+    """
+
     @classmethod
     def ports(
         cls,

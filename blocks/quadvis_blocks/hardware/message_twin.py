@@ -23,6 +23,15 @@ class MessageTwin(DescribedMessage, Block, numeric=False):
     others = Out("int64", doc="0")
     starting = Out("bool", doc="false")
 
+    example = r"""
+        roll: {block: sources.sine, rate: fast, with: {amplitude: 10 deg, frequency: 1 Hz}}
+        imu:
+          block: hardware.message_twin
+          rate: fast
+          with: {format: "%.2f,%.2f", names: roll pitch, units: rad rad, terminator: \r\n, checksum: none}
+          in: {true_roll: roll.y, true_pitch: 0 rad}
+    """
+
     @classmethod
     def ports(
         cls,

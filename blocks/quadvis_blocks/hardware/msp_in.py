@@ -92,6 +92,10 @@ class MspIn(Input):
     pitch = Out(unit="rad", doc="nose up")
     yaw = Out(unit="rad", doc="clockwise from north, -pi to pi")
 
+    example = """
+        controller: {block: hardware.msp_in, rate: fast, with: {port: pty:controller}}
+    """
+
     def doubts(self) -> list[ParameterError]:
         """Return the warning that version 1 lets damage through."""
         if self.version != VERSIONS.index("v1"):

@@ -42,6 +42,24 @@ class MspRcOut(PulseOutput):
     safe = Safe("command", doc="command at every end of a run, for each element")
     spacing = Param(20e-3, unit="s", min=2e-3, max=0.15, doc="from one message to the next")
 
+    example = """
+        sticks:
+          block: sources.table
+          rate: fast
+          with: {times: {value: [0, 1], unit: s}, values: [[-1, 0, 0, 0], [0.5, 0.2, 0, 0]]}
+        radio:
+          block: hardware.msp_rc_out
+          rate: fast
+          with:
+            port: pty:controller
+            channels: [3, 1, 2, 4]
+            lowest: [-1, -1, -1, -1]
+            highest: [1, 1, 1, 1]
+            initial: [-1, 0, 0, 0]
+            safe: [-1, 0, 0, 0]
+          in: {command: sticks.y}
+    """
+
     def check(self) -> None:
         """Refuse channels that are not sent."""
         super().check()

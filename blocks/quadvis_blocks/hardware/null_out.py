@@ -17,6 +17,14 @@ class NullOut(Block):
     command = In("float64[n]", unit="a", doc="the commands")
     sent = Out("float64[n]", unit="a", doc="the same")
 
+    example = """
+        sticks:
+          block: sources.table
+          rate: fast
+          with: {times: {value: [0, 1], unit: s}, values: [[-1, 0, 0, 0], [0.5, 0.2, 0, 0]]}
+        radio: {block: hardware.null_out, rate: fast, in: {command: sticks.y}}
+    """
+
     def output(self, command: Any) -> Any:
         """Return the commands."""
         return copied(command)

@@ -37,6 +37,24 @@ class PpmOut(PulseOutput):
         60e-3, unit="s", min=5e-3, max=1.0, doc="from one frame to the next; 20 ms are enough at 57600 baud"
     )
 
+    example = """
+        sticks:
+          block: sources.table
+          rate: fast
+          with: {times: {value: [0, 1], unit: s}, values: [[-1, 0, 0, 0], [0.5, 0.2, 0, 0]]}
+        radio:
+          block: hardware.ppm_out
+          rate: fast
+          with:
+            port: pty:ppm
+            channels: [3, 1, 2, 4]
+            lowest: [-1, -1, -1, -1]
+            highest: [1, 1, 1, 1]
+            initial: [-1, 0, 0, 0]
+            safe: [-1, 0, 0, 0]
+          in: {command: sticks.y}
+    """
+
     def frame(self, command: Any) -> bytes:
         """Return the frame of a command."""
         pulses = zip(self.channels, self.pulses(command), strict=True)

@@ -30,6 +30,18 @@ class SbusIn(ReceiverInput):
     port = Param(type="port", doc="serial port, or a cable such as pty:rc")
     failsafe = Out("bool", doc="the newest frame has the failsafe flag: the receiver has lost the pilot")
 
+    example = """
+        receiver:
+          block: hardware.sbus_in
+          rate: fast
+          with:
+            port: pty:rc
+            channels: [3, 1, 2, 4]
+            lowest: [-1, -1, -1, -1]
+            highest: [1, 1, 1, 1]
+            roles: throttle stick stick stick
+    """
+
     def open(self) -> None:
         """Open the port; where a frame begins is not known."""
         super().open()

@@ -29,6 +29,24 @@ class SbusOut(CountOutput):
         False, "bool", doc="safe frames carry the failsafe flag, on which many receivers act by themselves"
     )
 
+    example = """
+        sticks:
+          block: sources.table
+          rate: fast
+          with: {times: {value: [0, 1], unit: s}, values: [[-1, 0, 0, 0], [0.5, 0.2, 0, 0]]}
+        radio:
+          block: hardware.sbus_out
+          rate: fast
+          with:
+            port: pty:rc
+            channels: [3, 1, 2, 4]
+            lowest: [-1, -1, -1, -1]
+            highest: [1, 1, 1, 1]
+            initial: [-1, 0, 0, 0]
+            safe: [-1, 0, 0, 0]
+          in: {command: sticks.y}
+    """
+
     def frame(self, command: Any) -> bytes:
         """Return the frame of a command."""
         return encode(self.counts(command))

@@ -29,6 +29,21 @@ class AttitudeTarget(StationCommand):
     command = In("float64[4]", unit="rad rad rad 1", doc="roll, pitch, yaw, thrust")
     sent = Out("float64[4]", unit="rad rad rad 1", doc="the command with its thrust between 0 and 1")
 
+    example = """
+        level:
+          block: sources.constant
+          rate: fast
+          with: {value: {value: [0, 0, 0, 0.6], unit: rad rad rad 1}}
+        autopilot:
+          block: mavlink.attitude_target
+          rate: fast
+          with:
+            port: udp:127.0.0.1:14550
+            initial: {value: [0, 0, 0, 0.6], unit: rad rad rad 1}
+            safe: {value: [0, 0, 0, 0.55], unit: rad rad rad 1}
+          in: {command: level.y}
+    """
+
     def check(self) -> None:
         """Refuse initial and safe thrusts that there are not."""
         super().check()

@@ -70,6 +70,10 @@ class Autopilot(Station, AutopilotPorts, NewsDevice, Input):
         NO_MODE, type="int64", min=NO_MODE, below=MODES, doc="its number of the mode to arm in; -1: as it is"
     )
 
+    example = """
+        autopilot: {block: mavlink.autopilot, rate: fast, with: {port: "udp::14540"}}
+    """
+
     def check(self) -> None:
         """Refuse a dialect without the messages of an autopilot."""
         super().check()

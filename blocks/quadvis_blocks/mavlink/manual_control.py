@@ -31,6 +31,18 @@ class ManualControl(StationCommand):
     command = In("float64[4]", doc="roll, pitch, yaw, throttle")
     sent = Out("float64[4]", doc="the command within its limits, in whole counts of 1/1000")
 
+    example = """
+        sticks:
+          block: sources.table
+          rate: fast
+          with: {times: {value: [0, 1], unit: s}, values: [[0, 0, 0, 0], [0.2, 0, 0, 0.5]]}
+        pilot:
+          block: mavlink.manual_control
+          rate: fast
+          with: {port: udp:127.0.0.1:14550, initial: [0, 0, 0, 0], safe: [0, 0, 0, 0]}
+          in: {command: sticks.y}
+    """
+
     def check(self) -> None:
         """Refuse initial and safe commands beyond the ends of the sticks."""
         super().check()

@@ -10,3 +10,14 @@ class NullVision(VisionPose):
 
     It runs everywhere, in simulations too: put it where a variant has the device.
     """
+
+    example = """
+        place:
+          block: sources.table
+          rate: slow
+          with: {times: {value: [0, 1], unit: s}, values: {value: [[0, 0, 1.5], [0.3, 0, 1.5]], unit: m}}
+        vision:
+          block: mavlink.null_vision
+          rate: slow
+          in: {position: place.y, roll: 0 rad, pitch: 0 rad, yaw: 10 deg}
+    """

@@ -35,6 +35,24 @@ class RcOverride(StationCommand):
     command = In("float64[n]", unit="a", doc="the commands")
     sent = Out("float64[n]", unit="a", doc="the commands as they are sent, limited and in whole microseconds")
 
+    example = """
+        sticks:
+          block: sources.table
+          rate: fast
+          with: {times: {value: [0, 1], unit: s}, values: [[0, 0, -1, 0], [0.2, 0, 0.5, 0]]}
+        pilot:
+          block: mavlink.rc_override
+          rate: fast
+          with:
+            port: udp:127.0.0.1:14550
+            channels: [1, 2, 3, 4]
+            lowest: [-1, -1, -1, -1]
+            highest: [1, 1, 1, 1]
+            initial: [0, 0, -1, 0]
+            safe: [0, 0, -1, 0]
+          in: {command: sticks.y}
+    """
+
     def check(self) -> None:
         """Refuse wrong channels, and initial and safe commands beyond the ends."""
         super().check()

@@ -34,6 +34,20 @@ class SimulatedAutopilot(AutopilotPorts, Block):
     asked = State(unit="s")  # when it was asked to be otherwise; below 0: it is as asked
     due = Work("bool")
 
+    example = """
+        turn:
+          block: sources.table
+          rate: fast
+          with:
+            times: {value: [0, 0.5, 1], unit: s}
+            values: {value: [[0, 0, 0], [5, 3, 0], [0, 0, 0]], unit: deg}
+        rates: {block: signal.derivative, rate: fast, in: {u: turn.y}}
+        autopilot:
+          block: mavlink.simulated_autopilot
+          rate: fast
+          in: {attitude: turn.y, body_rates: rates.rate}
+    """
+
     def start(self) -> None:
         """Begin disarmed."""
         self.asked = -1.0

@@ -29,6 +29,18 @@ class VisionPosition(Station, VisionPose, NewsOutput):
     See https://mavlink.io/en/messages/common.html#VISION_POSITION_ESTIMATE.
     """
 
+    example = """
+        place:
+          block: sources.table
+          rate: slow
+          with: {times: {value: [0, 1], unit: s}, values: {value: [[0, 0, 1.5], [0.3, 0, 1.5]], unit: m}}
+        vision:
+          block: mavlink.vision_position
+          rate: slow
+          with: {port: udp:127.0.0.1:14550}
+          in: {position: place.y, roll: 0 rad, pitch: 0 rad, yaw: 10 deg}
+    """
+
     def frame(
         self,
         position: Any,

@@ -54,6 +54,10 @@ class Dryden(Block):
     steps = State("float64[2,5]")  # coefficients of one period, horizontal and upward; see `_step`
     stream = Random()
 
+    example = """
+        wind: {block: plant.dryden, rate: fast}
+    """
+
     def start(self) -> None:
         """Compute the coefficients of the filters and draw the first wind."""
         lower, length = _low_altitude(self.altitude)

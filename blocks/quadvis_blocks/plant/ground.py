@@ -44,6 +44,17 @@ class Ground(Block):
     touching_now = Work("bool")
     hardest_now = Work(unit="m/s")
 
+    example = """
+        drop:
+          block: sources.table
+          rate: fast
+          with: {times: {value: [0, 1], unit: s}, values: {value: [[0, 0, 0.02], [0, 0, -0.03]], unit: m}}
+        ground:
+          block: plant.ground
+          rate: fast
+          in: {position: drop.y, velocity: {value: [0, 0, -0.05], unit: m/s}}
+    """
+
     def output(self, position: Any, velocity: Any, attitude: Any, rates: Any) -> tuple[Any, Any, bool, float]:
         """Return force and torque, whether a foot touches the ground, and the greatest impact so far."""
         depth, climb = self.height - float(position[2]), float(velocity[2])

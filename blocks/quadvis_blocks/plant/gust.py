@@ -38,6 +38,10 @@ class Gust(Block):
     fresh = State("float64[3]")  # the random numbers of this tick
     stream = Random()
 
+    example = """
+        wind: {block: plant.gust, rate: fast}
+    """
+
     def start(self) -> None:
         """Draw the first wind."""
         fill_normal(self.stream, self.state)

@@ -43,6 +43,11 @@ class Lateral(Block):
     spin = State(unit="rad/s", continuous=True)
     pushed = State(unit="rad/s^2", continuous=True)  # the torque behind the lag
 
+    example = """
+        torque: {block: sources.pulse, rate: fast, with: {high: 1 rad/s^2, interval: 2 s, width: 0.2 s}}
+        body: {block: plant.lateral, rate: continuous, in: {torque: {from: torque.y, across: hold}}}
+    """
+
     def start(self) -> None:
         """Begin at the initial values."""
         self.place, self.speed = self.initial_position, self.initial_velocity

@@ -32,6 +32,14 @@ class MotorThrust(Block):
     command = In("float64[4]", doc="command of each motor, 0 to 1")
     thrust = Out("float64[4]", unit="N", doc="commanded thrust of each rotor: front, right, rear, left")
 
+    example = """
+        command:
+          block: sources.table
+          rate: fast
+          with: {times: {value: [0, 1], unit: s}, values: [[0, 0, 0, 0], [1, 0.5, 1, 0.5]]}
+        rotors: {block: plant.motor_thrust, rate: fast, in: {command: command.y}}
+    """
+
     def check(self) -> None:
         """Refuse a motor that turns two rotors."""
         if len(np.unique(self.order)) < ROTORS:

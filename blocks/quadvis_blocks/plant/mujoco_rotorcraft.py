@@ -56,6 +56,14 @@ class MujocoRotorcraft(Block, numeric=False):
 
     state = State(f"float64[{CAPACITY}]", doc="MuJoCo's state: time, positions, velocities, activations ...")
 
+    example = """
+        craft:
+          block: plant.mujoco_rotorcraft
+          rate: fast
+          with: {model: "quadvis:models/rotorcraft.xml", initial_position: {value: [0, 0, 1.5], unit: m}}
+          in: {thrust: {value: [1.3, 1.2, 1.2, 1.2], unit: N}}
+    """
+
     def check(self) -> None:
         """Refuse what MuJoCo refuses, a model of no such craft, and a period that its steps do not fill."""
         simulation = self._simulation()

@@ -106,6 +106,15 @@ class Rotorcraft(Block):
     signs = State("float64[3]")  # of the torque biases
     sign_stream = Random()
 
+    example = """
+        wind: {block: plant.gust, rate: fast}
+        craft:
+          block: plant.rotorcraft
+          rate: continuous
+          with: {initial_position: {value: [0, 0, 1.5], unit: m}}
+          in: {thrust: {value: [1.23, 1.226, 1.222, 1.226], unit: N}, wind: {from: wind.wind, across: hold}}
+    """
+
     def check(self) -> None:
         """Refuse a least thrust that is not below the greatest."""
         if self.thrust_min >= self.thrust_max:

@@ -109,6 +109,17 @@ class Imu(Block):
     force_stream = Random()
     sign_stream = Random()
 
+    example = """
+        truth:
+          block: sources.table
+          rate: fast
+          with:
+            times: {value: [0, 0.5, 1], unit: s}
+            values: {value: [[0, 0, 0], [5, 3, 0], [0, 0, 0]], unit: deg}
+        rates: {block: signal.derivative, rate: fast, in: {u: truth.y}}
+        imu: {block: sensors.imu, rate: fast, in: {attitude: truth.y, rates: rates.rate}}
+    """
+
     def start(self) -> None:
         """Draw the signs of the biases and the first errors."""
         fill_normal(self.stream, self.drawn)

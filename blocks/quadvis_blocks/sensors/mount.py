@@ -33,6 +33,18 @@ class Mount(Block):
     place = Out("float64[3]", unit="m", doc="position of the device")
     turned = Out("float64[3]", unit="rad", doc="roll, pitch, yaw of the device")
 
+    example = """
+        turn:
+          block: sources.table
+          rate: fast
+          with: {times: {value: [0, 1], unit: s}, values: {value: [[0, 0, 0], [0, 0, 90]], unit: deg}}
+        camera:
+          block: sensors.mount
+          rate: fast
+          with: {offset: {value: [0.1, 0, 0.05], unit: m}}
+          in: {position: {value: [0, 0, 1.5], unit: m}, attitude: turn.y}
+    """
+
     def output(self, position: Any, attitude: Any) -> tuple[Any, Any]:
         """Return position and attitude of the device."""
         place, offset = position.copy(), self.offset

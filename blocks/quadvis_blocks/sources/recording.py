@@ -47,6 +47,13 @@ class Recording(Block, numeric=False):
         doc="the value after the last row; repeat begins again, after the time between the last two rows",
     )
 
+    example = """
+        played:
+          block: sources.recording
+          rate: fast
+          with: {file: "quadvis:recordings/motor.csv", signal: speed, between: linear}
+    """
+
     @classmethod
     def ports(cls, file: str, signal: str, before: int, after: int) -> dict[str, Out]:
         """Return the output, like the signal."""

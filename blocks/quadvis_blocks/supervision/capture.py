@@ -53,6 +53,26 @@ class Capture(Block):
     turn_now = Work()
     away = Work(unit="m")  # length of the shift
 
+    example = """
+        wish:
+          block: sources.table
+          rate: fast
+          with:
+            times: {value: [0, 0.5, 0.51], unit: s}
+            values: [[0, 0, 0, 0], [1, 1, 1, 1], [0, 0, 0, 0]]
+            interpolation: hold
+        on: {block: math.convert, rate: fast, with: {takes: float64, gives: bool}, in: {u: wish.y}}
+        capture:
+          block: supervision.capture
+          rate: fast
+          in:
+            position_reference: {value: [0, 0, 1.5], unit: m}
+            heading_reference: 0 rad
+            position: {value: [0.4, 0, 1.2], unit: m}
+            heading: 10 deg
+            engaged: on.y
+    """
+
     def output(
         self, position_reference: Any, velocity_reference: Any, heading_reference: float, position: Any,
         heading: float, engaged: Any, rearmed: bool,

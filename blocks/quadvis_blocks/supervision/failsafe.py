@@ -98,6 +98,15 @@ class Failsafe(Block):
     given_up_now = Work("bool")
     weight_now = Work()
 
+    example = """
+        wish:
+          block: sources.table
+          rate: fast
+          with: {times: {value: [0, 0.5], unit: s}, values: [[1, 1, 1, 1], [1, 0, 0, 1]], interpolation: hold}
+        on: {block: math.convert, rate: fast, with: {takes: float64, gives: bool}, in: {u: wish.y}}
+        failsafe: {block: supervision.failsafe, rate: fast, in: {automatic: on.y}}
+    """
+
     def output(
         self, automatic: Any, overridden: Any, vision: int, vision_reason: int, vision_stale: bool,
         imu_stale: bool, sticks_stale: bool, limited: Any, land: float,

@@ -58,6 +58,12 @@ class FrameNews(Block):
     known = Work("bool")  # whether that is one of the recent measurements
     cause_now = Work("int64")
 
+    example = """
+        now: {block: sources.clock, rate: slow}
+        gap: {block: signal.outage, rate: slow, with: {during: [[0.3 s, 0.6 s]]}, in: {u: now.y}}
+        news: {block: supervision.frame_news, rate: slow, in: {stamp: gap.y}}
+    """
+
     def start(self) -> None:
         """Begin without a frame."""
         begin(self.stamps)

@@ -70,6 +70,18 @@ class Landing(Block):
     slow = Work("bool")  # whether the reference is near the ground
     stands = Work("bool")  # whether the craft stands on the ground at this tick
 
+    example = """
+        now: {block: sources.clock, rate: fast}
+        end: {block: logic.compare, rate: fast, with: {operator: ">="}, in: {a: now.y, b: 0.2 s}}
+        landing:
+          block: supervision.landing
+          rate: fast
+          in:
+            position_reference: {value: [0, 0, 1.5], unit: m}
+            descend: end.y
+            current: {value: [0.1, 0, 1.45], unit: m}
+    """
+
     def output(
         self, position_reference: Any, velocity_reference: Any, descend: bool, recapture: bool, current: Any,
         current_velocity: Any, blind: bool, time: float,

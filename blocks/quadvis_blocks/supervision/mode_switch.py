@@ -68,6 +68,24 @@ class ModeSwitch(Block):
     apart = Work("float64[4]")  # output minus the value that the owner wants
     owner_now = Work("int64[4]")
 
+    example = """
+        wish:
+          block: sources.table
+          rate: fast
+          with: {times: {value: [0, 0.3], unit: s}, values: [[0, 0, 0, 0], [1, 1, 1, 1]], interpolation: hold}
+        on: {block: math.convert, rate: fast, with: {takes: float64, gives: bool}, in: {u: wish.y}}
+        controls:
+          block: supervision.mode_switch
+          rate: fast
+          in:
+            manual: {value: [5.2, 0.3, 0, 0], unit: N rad/s^2 rad/s^2 rad/s^2}
+            collective: 4.9 N
+            roll: 0 rad/s^2
+            pitch: 0 rad/s^2
+            yaw: 0 rad/s^2
+            automatic: on.y
+    """
+
     def output(
         self,
         manual: Any,

@@ -39,6 +39,16 @@ class OutputHold(Block):
     moment = Work(unit="s")  # the instant of that stamp
     good = Work("bool")  # whether the command of this tick counts
 
+    example = """
+        command: {block: sources.sine, rate: fast, with: {amplitude: 1 N, frequency: 1 Hz}}
+        gap: {block: signal.outage, rate: fast, with: {during: [[0.2 s, 0.9 s]]}, in: {u: command.y}}
+        gate:
+          block: supervision.output_hold
+          rate: fast
+          with: {max_age: 0.3 s}
+          in: {u: gap.y, valid: gap.ok}
+    """
+
     def start(self) -> None:
         """Begin without a command."""
         begin(self.stamps)

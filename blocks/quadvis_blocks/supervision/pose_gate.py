@@ -84,6 +84,21 @@ class PoseGate(Block):
     doubted_now = Work("bool")
     proving_now = Work("bool")
 
+    example = """
+        now: {block: sources.clock, rate: slow}
+        place:
+          block: sources.table
+          rate: slow
+          with:
+            times: {value: [0, 0.5, 0.7], unit: s}
+            values: {value: [[0, 0, 1.5], [0, 3, 1.5], [0, 0, 1.5]], unit: m}
+            interpolation: hold
+        gate:
+          block: supervision.pose_gate
+          rate: slow
+          in: {position: place.y, yaw: 0 rad, stamp: now.y, yaw_rate: 0 rad/s}
+    """
+
     def start(self) -> None:
         """Begin without a pose."""
         begin(self.stamps)

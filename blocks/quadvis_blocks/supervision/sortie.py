@@ -50,6 +50,14 @@ class Sortie(Block):
     height = State(unit="m")  # of the reference while it climbs
     place = Work("float64[3]", unit="m")
 
+    example = """
+        sortie:
+          block: supervision.sortie
+          rate: fast
+          with: {wait: 0.2 s, spin: 0.2 s, climb: 4 m/s, stay: 0.1 s}
+          in: {target: {value: [0, 0, 1.5], unit: m}, landed: false}
+    """
+
     def start(self) -> None:
         """Stand on the ground."""
         self.height = self.ground

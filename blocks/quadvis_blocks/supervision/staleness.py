@@ -45,6 +45,12 @@ class Staleness(Block):
     moment = Work(unit="s")  # the instant of that stamp
     newest = Work(unit="s")  # when the last news came
 
+    example = """
+        wave: {block: sources.sine, rate: fast, with: {amplitude: 2 m, frequency: 1 Hz}}
+        gap: {block: signal.outage, rate: fast, with: {during: [[0.2 s, 0.9 s]]}, in: {u: wave.y}}
+        stale: {block: supervision.staleness, rate: fast, in: {value: gap.y}}
+    """
+
     def start(self) -> None:
         """Begin without news."""
         begin(self.stamps)

@@ -47,6 +47,17 @@ class StickControl(Block):
         doc="collective; roll, pitch and yaw torque over inertia",
     )
 
+    example = """
+        sticks:
+          block: sources.table
+          rate: fast
+          with: {times: {value: [0, 1], unit: s}, values: [[0, 0, 0, 0], [0.3, 0.5, 0, 0]]}
+        manual:
+          block: supervision.stick_control
+          rate: fast
+          in: {sticks: sticks.y, roll: 2 deg, pitch: 0 rad, rates: {value: [0, 0, 0], unit: rad/s}}
+    """
+
     def output(self, sticks: Any, roll: float, pitch: float, rates: Any) -> Any:
         """Return the controls."""
         lift = self.mass * self.gravity + self.force * sticks[0]

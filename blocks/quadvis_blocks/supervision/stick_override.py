@@ -49,6 +49,20 @@ class StickOverride(Block):
     taken_now = Work("bool[4]")
     origins_now = Work("float64[4]")
 
+    example = """
+        sticks:
+          block: sources.table
+          rate: fast
+          with:
+            times: {value: [0, 0.3, 0.6], unit: s}
+            values: [[0, 0, 0, 0], [0, 0.5, 0, 0], [0, 0, 0, 0]]
+            interpolation: hold
+        override:
+          block: supervision.stick_override
+          rate: fast
+          in: {sticks: sticks.y, switches: [1, 1, 1, 1]}
+    """
+
     def check(self) -> None:
         """Refuse a release beyond the threshold."""
         if self.release > self.threshold:

@@ -31,6 +31,18 @@ class TransferJump(Block):
     counted = State("int64")
     counted_now = Work("int64")
 
+    example = """
+        owner:
+          block: sources.table
+          rate: fast
+          with: {times: {value: [0, 0.3], unit: s}, values: [[0, 0, 0, 0], [1, 1, 1, 1]], interpolation: hold}
+        source: {block: math.convert, rate: fast, with: {takes: float64, gives: int64}, in: {u: owner.y}}
+        jump:
+          block: supervision.transfer_jump
+          rate: fast
+          in: {controls: {value: [4.9, 0.1, 0, 0], unit: N rad/s^2 rad/s^2 rad/s^2}, source: source.y}
+    """
+
     def output(self, controls: Any, source: Any) -> tuple[Any, int]:
         """Return the jumps, and the number of changes of hands so far."""
         changed = (source != self.owner) & self.begun

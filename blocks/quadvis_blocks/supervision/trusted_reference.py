@@ -30,6 +30,21 @@ class TrustedReference(Block):
     trusted_velocity = Out("float64[3]", unit="m/s", doc="velocity to fly")
     trusted_heading = Out(unit="rad", doc="heading to hold, in (-pi, pi]")
 
+    example = """
+        weight: {block: sources.ramp, rate: fast, with: {initial: 1, slope: -1}}
+        reference:
+          block: supervision.trusted_reference
+          rate: fast
+          in:
+            position_reference: {value: [0, 0, 1.5], unit: m}
+            heading_reference: 0 rad
+            position: {value: [0.4, 0, 1.4], unit: m}
+            velocity: {value: [0.1, 0, 0], unit: m/s}
+            heading: 5 deg
+            position_weight: weight.y
+            velocity_weight: weight.y
+    """
+
     def output(
         self, position_reference: Any, velocity_reference: Any, heading_reference: float, position: Any,
         velocity: Any, heading: float, position_weight: float, velocity_weight: float,

@@ -104,6 +104,12 @@ class VisionWatchdog(Block):
     row_now = Work("int64")
     cause_now = Work("int64")
 
+    example = """
+        now: {block: sources.clock, rate: fast}
+        gap: {block: signal.outage, rate: fast, with: {during: [[0.2 s, 0.9 s]]}, in: {u: now.y}}
+        watchdog: {block: supervision.vision_watchdog, rate: fast, in: {stamp: gap.y, valid: gap.ok}}
+    """
+
     def check(self) -> None:
         """Refuse times that do not increase from state to state."""
         for name, after, limit in (("level", "coast", self.coast), ("land", "level", self.level)):

@@ -45,6 +45,28 @@ class Annotator(Block, numeric=False):
     radius = Param(RADIUS, unit="m", above=0.0, doc="radius of the circles")
     zoom = Param(2, type="int64", min=1, max=8, doc="size of the output relative to the picture")
 
+    example = """
+        camera:
+          block: vision.rendered_camera
+          rate: slow
+          with: {calibration: "quadvis:calib/camera.yaml"}
+          in: {position: {value: [0, 0, 1.5], unit: m}, attitude: {value: [0, 0, 0.1], unit: rad}}
+        detector:
+          block: vision.circle_detector
+          rate: slow
+          with: {colours: "quadvis:calib/colours.yaml"}
+          in: {frame: camera.frame}
+        notes:
+          block: vision.annotator
+          rate: slow
+          with: {calibration: "quadvis:calib/camera.yaml"}
+          in:
+            frame: camera.frame
+            centres: detector.centres
+            quality: detector.quality
+            status: detector.status
+    """
+
     def check(self) -> None:
         """Read the calibration."""
         self._load()

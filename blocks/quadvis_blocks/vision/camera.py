@@ -54,6 +54,16 @@ class Camera(CapturedInput):
         doc="from the end of the exposure to the read, without driver's stamps",
     )
 
+    example = """
+        camera:
+          block: vision.camera
+          rate: slow
+          with:
+            device: /dev/v4l/by-id/usb-camera-video-index0
+            calibration: "quadvis:calib/camera.yaml"
+            exposure: 8 ms
+    """
+
     def check(self) -> None:
         """Read the calibration; refuse a size that contradicts it, and an exposure that has no time."""
         calibrated, given = self._calibrated(), tuple(self.size.tolist())

@@ -108,6 +108,15 @@ class CircleDetector(Block, numeric=False):
     stuck = State("bool")
     places = State("float64[4,6]")  # places of all four circles, to follow them; see Detection
 
+    example = """
+        pictures: {block: vision.image_folder, rate: slow, with: {folder: "quadvis:recordings/hand_held"}}
+        detector:
+          block: vision.circle_detector
+          rate: slow
+          with: {colours: "quadvis:calib/colours.yaml", calibration: "quadvis:calib/camera.yaml", side: 1 m}
+          in: {frame: pictures.frame}
+    """
+
     def check(self) -> None:
         """Read the files, and compare the sizes."""
         self._load()

@@ -39,6 +39,11 @@ class FrameDelivery(Delivery, Block, numeric=False):
     new = Work("bool")  # whether a frame comes in at this tick
     _given: Frame  # by output, for update of the same tick
 
+    example = """
+        pictures: {block: vision.image_folder, rate: slow, with: {folder: "quadvis:recordings/hand_held"}}
+        delivery: {block: vision.frame_delivery, rate: slow, in: {frame: pictures.frame}}
+    """
+
     def check(self) -> None:
         """Refuse a latency that is too long for the period."""
         self.check_queue(self.period)

@@ -45,6 +45,15 @@ class FrameFault(Block, numeric=False):
     on = Work("bool")
     _given: Frame  # by output, for update of the same tick
 
+    example = """
+        pictures: {block: vision.image_folder, rate: slow, with: {folder: "quadvis:recordings/hand_held"}}
+        fault:
+          block: vision.frame_fault
+          rate: slow
+          with: {kind: freeze, begin: 0.3 s, duration: 0.4 s}
+          in: {frame: pictures.frame}
+    """
+
     def start(self) -> None:
         """Draw the random number of the first picture."""
         self.drawn = uniform(self.chance)

@@ -36,6 +36,15 @@ class FrameWriter(Block, numeric=False):
     written = State("int64", 0)  # sequence number of the last new frame
     seen = State("int64", 0)  # number of new frames so far
 
+    example = """
+        pictures: {block: vision.image_folder, rate: slow, with: {folder: "quadvis:recordings/hand_held"}}
+        writer:
+          block: vision.frame_writer
+          rate: slow
+          with: {folder: runs/seen, format: jpg}
+          in: {frame: pictures.frame}
+    """
+
     def check(self) -> None:
         """Refuse a folder that is a file."""
         if Path(self.folder).is_file():

@@ -83,6 +83,18 @@ class GeometricCamera(DeliveringCamera, Block):
     wire = Work(f"float64[{WIDTH}]")
     last_sequence = State("int64")
 
+    example = """
+        place:
+          block: sources.table
+          rate: slow
+          with: {times: {value: [0, 1], unit: s}, values: {value: [[0, 0, 1.5], [0.3, 0, 1.5]], unit: m}}
+        camera:
+          block: vision.geometric_camera
+          rate: slow
+          with: {calibration: "quadvis:calib/camera.yaml", ceiling: 4.5 m, side: 1 m, noise: 0.3 px}
+          in: {position: place.y, attitude: {value: [0, 0, 0], unit: rad}}
+    """
+
     def check(self) -> None:
         """Read the calibration, and refuse a latency that is too long for the period."""
         super().check()

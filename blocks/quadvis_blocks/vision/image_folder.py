@@ -47,6 +47,10 @@ class ImageFolder(Block, numeric=False):
     stamp = State("float64")  # of the last picture
     at_end = Work("bool")
 
+    example = """
+        pictures: {block: vision.image_folder, rate: slow, with: {folder: "quadvis:recordings/hand_held"}}
+    """
+
     def check(self) -> None:
         """Refuse a folder that is missing or has no picture."""
         if not self.read_file("folder", self._listed):

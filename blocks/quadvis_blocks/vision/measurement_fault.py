@@ -40,6 +40,23 @@ class MeasurementFault(Block, numeric=False):
     row = Work(f"float64[{WIDTH}]")  # the measurement that is shown now
     on = Work("bool")
 
+    example = """
+        place:
+          block: sources.table
+          rate: slow
+          with: {times: {value: [0, 1], unit: s}, values: {value: [[0, 0, 1.5], [0.3, 0, 1.5]], unit: m}}
+        camera:
+          block: vision.geometric_camera
+          rate: slow
+          with: {calibration: "quadvis:calib/camera.yaml", ceiling: 4.5 m, side: 1 m, noise: 0.3 px}
+          in: {position: place.y, attitude: {value: [0, 0, 0], unit: rad}}
+        fault:
+          block: vision.measurement_fault
+          rate: slow
+          with: {kind: turned, begin: 0.3 s, duration: 0.4 s}
+          in: {centres: camera.centres, instant: camera.stamp}
+    """
+
     def start(self) -> None:
         """Draw the random numbers of the first measurement."""
         fill_normal(self.chance, self.drawn)

@@ -81,6 +81,23 @@ class PoseImu(PoseFromCircles, Block):
         math.radians(0.5), unit="rad", above=0.0, tune=True, doc="standard deviation of roll and of pitch"
     )
 
+    example = """
+        place:
+          block: sources.table
+          rate: slow
+          with: {times: {value: [0, 1], unit: s}, values: {value: [[0, 0, 1.5], [0.3, 0, 1.5]], unit: m}}
+        camera:
+          block: vision.geometric_camera
+          rate: slow
+          with: {calibration: "quadvis:calib/camera.yaml", ceiling: 4.5 m, side: 1 m, noise: 0.3 px}
+          in: {position: place.y, attitude: {value: [0, 0, 0], unit: rad}}
+        pose:
+          block: vision.pose_imu
+          rate: slow
+          with: {calibration: "quadvis:calib/camera.yaml", side: 1 m}
+          in: {centres: camera.centres, imu_roll: 0 rad, imu_pitch: 0 rad}
+    """
+
     def output(self, centres: Any, imu_roll: float, imu_pitch: float, sigma: Any) -> tuple[Any, ...]:
         """Return the pose, its covariance and the status."""
         camera = pinhole(self.optics)

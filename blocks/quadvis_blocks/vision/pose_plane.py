@@ -22,6 +22,23 @@ class PosePlane(PoseFromFour, Block):
     `vision.pose_n_points`; the two poses differ only in distance.
     """
 
+    example = """
+        place:
+          block: sources.table
+          rate: slow
+          with: {times: {value: [0, 1], unit: s}, values: {value: [[0, 0, 1.5], [0.3, 0, 1.5]], unit: m}}
+        camera:
+          block: vision.geometric_camera
+          rate: slow
+          with: {calibration: "quadvis:calib/camera.yaml", ceiling: 4.5 m, side: 1 m, noise: 0.3 px}
+          in: {position: place.y, attitude: {value: [0, 0, 0], unit: rad}}
+        pose:
+          block: vision.pose_plane
+          rate: slow
+          with: {calibration: "quadvis:calib/camera.yaml", side: 1 m}
+          in: {centres: camera.centres}
+    """
+
     def output(self, centres: Any) -> tuple[Any, ...]:
         """Return the pose; NaN and false if a circle is missing or the four are no square seen from below."""
         return from_four(pose_from_plane, centres, self.optics, self.side, self.radius, self.refine)

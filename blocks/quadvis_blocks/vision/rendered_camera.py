@@ -91,6 +91,18 @@ class RenderedCamera(DeliveringCamera, Block, numeric=False):
     taken = Work(f"float64[{WIDTH}]")
     wire = Work(f"float64[{WIDTH}]")
 
+    example = """
+        place:
+          block: sources.table
+          rate: slow
+          with: {times: {value: [0, 1], unit: s}, values: {value: [[0, 0, 1.5], [0.3, 0, 1.5]], unit: m}}
+        camera:
+          block: vision.rendered_camera
+          rate: slow
+          with: {calibration: "quadvis:calib/camera.yaml", ceiling: 4.5 m, side: 1 m}
+          in: {position: place.y, attitude: {value: [0, 0, 0], unit: rad}}
+    """
+
     def check(self) -> None:
         """Read the calibration; refuse discs that overlap, and times that are too long for the period."""
         super().check()

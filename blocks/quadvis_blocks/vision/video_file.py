@@ -41,6 +41,10 @@ class VideoFile(Block, numeric=False):
     stamp = State("float64")  # of the last frame
     at_end = Work("bool")
 
+    example = """
+        video: {block: vision.video_file, rate: slow, with: {file: "quadvis:recordings/hand_held.mp4"}}
+    """
+
     def check(self) -> None:
         """Refuse a file that is missing or not a video."""
         if not Path(self.file).is_file():

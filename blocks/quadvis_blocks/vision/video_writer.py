@@ -46,6 +46,15 @@ class VideoWriter(Block, numeric=False):
     last = State("int64", 0)  # sequence number of the last frame
     due = State("int64", 0)  # pictures up to now; black pictures are due until a frame gives the size
 
+    example = """
+        pictures: {block: vision.image_folder, rate: slow, with: {folder: "quadvis:recordings/hand_held"}}
+        writer:
+          block: vision.video_writer
+          rate: slow
+          with: {file: runs/seen.avi}
+          in: {frame: pictures.frame}
+    """
+
     def check(self) -> None:
         """Refuse a folder in place of a file, and an unknown format."""
         if self._suffix not in CODECS:
