@@ -37,7 +37,8 @@ class Block:
     interface: ClassVar[Interface]
     numeric: ClassVar[bool] = True
     stepwise: bool = False  # whether outputs change at ticks only, though they use the time; or `check` says
-    jumps: ClassVar[bool] = False  # whether outputs jump between two ticks, and no ``crossing`` says where
+    # Whether outputs jump between two ticks and no ``crossing`` says where; or the block that has one.
+    jumps: ClassVar[bool | str] = False
     functions: ClassVar[tuple[Any, ...]] = ()  # plain functions with machine code that its methods call
     not_replayable: ClassVar[str] = ""  # why a second run may differ from the first: "it reads a camera"
     not_restorable: ClassVar[str] = ""  # why it cannot return to a snapshot: "the model has no way back"

@@ -74,13 +74,14 @@ def warn_jumps(drafts: Sequence[Draft], graph: Graph, faults: Faults) -> None:
     located = graph.solver not in VARIABLE
     for node in graph.nodes:
         events = bool(node.block.interface.events)
-        jumps = node.block.jumps and not events
+        jumps = "" if events else node.block.jumps
         if not node.task.continuous or not (jumps or (events and not located)) or node.path not in places:
             continue
         if not _is_integrated_loop(graph, node.path):
             continue
         problem = f"'{node.kind}' jumps on a loop that the solver integrates, and the instant is not located"
-        remedy = "take a small step, and look at 'quadvis check --accuracy'"
+        other = f"{jumps!r}, or " if isinstance(jumps, str) else ""
+        remedy = f"take {other}a small step, and look at 'quadvis check --accuracy'"
         if events:
             problem = f"{graph.solver} sees the events of '{node.kind}' at ticks only"
             remedy = "choose ode1 to ode4, which locate them"

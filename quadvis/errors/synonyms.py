@@ -83,6 +83,7 @@ _MEANT = {
     "signal.relay": "hysteresis schmitt schmitttrigger bangbang",
     "signal.quantizer": "quantize quantiser",
     "signal.friction": "coulombfriction coulombandviscousfriction",
+    "plant.sliding_mass": "stickslip stiction massonbelt masswithfriction masswithstopandfriction",
     "signal.lookup_1d": "lookup lookuptable 1dlookuptable lookuptable1d interpolate interp1",
     "signal.lookup_2d": "2dlookuptable lookuptable2d interp2",
     "signal.unit_delay": "memory onestepdelay",

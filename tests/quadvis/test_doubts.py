@@ -178,6 +178,15 @@ blocks:
     in: {u: x.y}
   x: {block: signal.integrator, in: {u: relay.y}}
 """
+SLIDE = """\
+quadvis: 1
+name: slide
+solver: {method: METHOD, step: 1 ms}
+stop_time: 1 s
+blocks:
+  mass: {block: plant.sliding_mass, with: {mass: 1 kg, coulomb: 1 N}, in: {force: spring.y}}
+  spring: {block: signal.gain, rate: continuous, with: {factor: -5 N/m}, in: {u: mass.x}}
+"""
 LOCATED = "; take a small step, and look at 'quadvis check --accuracy'"
 
 
@@ -194,14 +203,20 @@ def test_a_jump_on_a_loop_of_the_solver_is_a_warning(method: str, tmp_path: Path
         "block 'drag': 'signal.friction' jumps on a loop that the solver integrates, and the instant is not "
     )
     text = STICK.replace("METHOD", method).replace("SPEED", "speed.y")
-    assert warnings(tmp_path, text) == [f"{words}located{LOCATED}"]
+    remedy = LOCATED.replace("take", "take 'plant.sliding_mass', or")
+    assert warnings(tmp_path, text) == [f"{words}located{remedy}"]
 
 
 def test_a_jump_outside_of_loops_is_none(tmp_path: Path) -> None:
     assert not warnings(tmp_path, STICK.replace("METHOD", "ode4").replace("SPEED", "1 m/s"))
 
 
-def test_events_that_are_located_are_no_warning_and_others_are(tmp_path: Path) -> None:
-    assert not warnings(tmp_path, BANG.replace("METHOD", "ode4"))
-    words = "block 'relay': BDF sees the events of 'signal.relay' at ticks only; choose ode1 to ode4, which "
-    assert warnings(tmp_path, BANG.replace("METHOD", "BDF")) == [f"{words}locate them"]
+@pytest.mark.parametrize(
+    ("text", "block", "kind"), [(BANG, "relay", "signal.relay"), (SLIDE, "mass", "plant.sliding_mass")]
+)
+def test_events_that_are_located_are_no_warning_and_others_are(
+    text: str, block: str, kind: str, tmp_path: Path
+) -> None:
+    assert not warnings(tmp_path, text.replace("METHOD", "ode4"))
+    words = f"block '{block}': BDF sees the events of '{kind}' at ticks only; choose ode1 to ode4, which "
+    assert warnings(tmp_path, text.replace("METHOD", "BDF")) == [f"{words}locate them"]

@@ -13,10 +13,10 @@ class Friction(Block):
     """The force of Coulomb and viscous friction: ``y = sign(u) (coulomb + viscous |u|)``, 0 at rest.
 
     It follows from the speed alone, element by element. So a body under it never rests for good: it trembles
-    around speed 0, by at most one step of the solver times its acceleration.
+    around speed 0, by at most one step of the solver times its acceleration. `plant.sliding_mass` sticks.
     """
 
-    jumps = True
+    jumps = "plant.sliding_mass"
     coulomb = Param(
         1.0, type="float64[*?]", unit="b", min=0.0, tune=True, shown=True, doc="the force at any speed"
     )
