@@ -59,10 +59,10 @@ def analysis_lines(analysis: Analysis) -> Iterator[str]:
 
 
 def part_lines(parts: Mapping[str, bool]) -> Iterator[str]:
-    """Yield what is assumed of parts that do not always run."""
+    """Yield what is assumed of parts and blocks that do not always run."""
     for runs, words in ((True, "runs"), (False, "stands still, its states are frozen")):
         for name in (name for name, found in parts.items() if found == runs):
-            yield f"part '{name}' {words}, as at the operating point"
+            yield f"'{name}' {words}, as at the operating point"
 
 
 def _indented(rows: list[tuple[str, ...]]) -> Iterator[str]:
