@@ -53,9 +53,9 @@ def analysis_lines(analysis: Analysis) -> Iterator[str]:
         yield f"NOT STABLE: a disturbance grows by {worst:.3g} 1/s, in {_growing_states(analysis)}"
     count, missed = len(analysis.verdicts), sum(not verdict.met for verdict in analysis.verdicts)
     if missed:
-        yield f"FAILED: {missed} of {counted(count, 'margin')} not met"
+        yield f"FAILED: {missed} of {counted(count, 'requirement')} on loops not met"
     elif count:
-        yield f"PASSED: {count} of {counted(count, 'margin')} met"
+        yield f"PASSED: {count} of {counted(count, 'requirement')} on loops met"
 
 
 def part_lines(parts: Mapping[str, bool]) -> Iterator[str]:
