@@ -163,7 +163,11 @@ def analyse(
     stable = bool((rates(linear).real < STABLE).all())
     loops = {cut.label: _loop(linear, cut, stable) for cut in opened}
     return Analysis(
-        diagram, linear, loops, Transfers(diagram, ways, at, engine), Limits(diagram, sought, at, engine)
+        diagram,
+        linear,
+        loops,
+        Transfers(diagram.graph, ways, at, engine),
+        Limits(diagram, sought, at, engine),
     )
 
 

@@ -49,9 +49,9 @@ def silence(engine: Engine) -> None:
 
 
 def fix_conditions(engine: Engine) -> dict[str, bool]:
-    """Let each part under a condition run, or stand still, as it does now; return which of them run.
+    """Let what is under a condition run, or stand still, as it does now; return which parts and blocks run.
 
-    A part has the path of its condition without the last name.
+    They have the path of their condition without the last name.
     """
     found: dict[str, bool] = {}
     for path in engine.graph.conditions:

@@ -53,16 +53,16 @@ def analysis_lines(analysis: Analysis) -> Iterator[str]:
         yield f"NOT STABLE: a disturbance grows by {worst:.3g} 1/s, in {_growing_states(analysis)}"
     count, missed = len(analysis.verdicts), sum(not verdict.met for verdict in analysis.verdicts)
     if missed:
-        yield f"FAILED: {missed} of {counted(count, 'margin')} not met"
+        yield f"FAILED: {missed} of {counted(count, 'requirement')} on loops not met"
     elif count:
-        yield f"PASSED: {count} of {counted(count, 'margin')} met"
+        yield f"PASSED: {count} of {counted(count, 'requirement')} on loops met"
 
 
 def part_lines(parts: Mapping[str, bool]) -> Iterator[str]:
-    """Yield what is assumed of parts that do not always run."""
+    """Yield what is assumed of parts and blocks that do not always run."""
     for runs, words in ((True, "runs"), (False, "stands still, its states are frozen")):
         for name in (name for name, found in parts.items() if found == runs):
-            yield f"part '{name}' {words}, as at the operating point"
+            yield f"'{name}' {words}, as at the operating point"
 
 
 def _indented(rows: list[tuple[str, ...]]) -> Iterator[str]:

@@ -7,38 +7,34 @@ returning signal is taken out of the matrices again: its readers get what they g
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from quadvis.analysis.cut import break_path, with_breaks
-from quadvis.analysis.linearise import Linear, linearised_part
-from quadvis.analysis.loops import AnalysisError, blocks_between
+from quadvis.analysis.linearise import Linear
+from quadvis.analysis.loops import AnalysisError
 from quadvis.analysis.probe import Matrix, Positions
 from quadvis.analysis.progress import task
 from quadvis.analysis.response import Response
-from quadvis.diagram.sections.cuts import Cut, CutSignal
+from quadvis.analysis.ways import Ways, channel_label
+from quadvis.diagram.sections.cuts import CutSignal
 from quadvis.diagram.sections.transfers import Transfer
 from quadvis.errors import quoted, sentence, suggestion
 from quadvis.graph.graph import Graph
 from quadvis.native.choice import AUTO
 
-if TYPE_CHECKING:
-    from quadvis.diagram.diagram import Diagram
-
-SOURCE, TARGET, OPENED = "from", "to", "open"
 FAINT = 1e-10  # an entry of a matrix below this share of what it was made from is the noise of differences
 
 
 class Transfers(Mapping[str, Response]):
     """The responses of all transfers, by name; each is computed when it is first read.
 
-    AnalysisError if nothing gets from the one signal to the other, or as for `linearised`.
+    The first one linearises what it shares with others. AnalysisError if nothing gets from the one signal to
+    the other, or as for `linearised`.
     """
 
-    def __init__(self, diagram: Diagram, transfers: Sequence[Transfer], at: float, engine: str) -> None:
-        self._diagram, self._at, self._engine = diagram, at, engine
+    def __init__(self, graph: Graph, transfers: Sequence[Transfer], at: float, engine: str = AUTO) -> None:
         self._transfers = {transfer.label: transfer for transfer in transfers}
+        self._ways = Ways(graph, self._transfers, at, engine)
         self._found: dict[str, Response] = {}
 
     def __getitem__(self, label: str) -> Response:
@@ -47,8 +43,7 @@ class Transfers(Mapping[str, Response]):
             raise AnalysisError(sentence(f"there is no transfer {quoted(label)}", remedy))
         if label not in self._found:
             with task(f"transfer '{label}'"):
-                transfer = self._transfers[label]
-                self._found[label] = respond(self._diagram.graph, transfer, self._at, self._engine)
+                self._found[label] = _response(self._transfers[label], self._ways.linear(label))
         return self._found[label]
 
     def __iter__(self) -> Iterator[str]:
@@ -58,36 +53,12 @@ class Transfers(Mapping[str, Response]):
         return len(self._transfers)
 
 
-def respond(graph: Graph, transfer: Transfer, at: float, engine: str = AUTO) -> Response:
-    """Return the response of a transfer around the operating point that is sought at a time (s)."""
-    source, target = transfer.source, transfer.target
-    ports = {(signal.block, signal.port) for signal in (source, target, *transfer.opened)}
-    opened = with_breaks(graph, ports)
-    begin, end = break_path(source.block, source.port), _reading(graph, target)
-    if not blocks_between(opened, [begin], [end]):
-        problem = f"transfer '{transfer.label}': no way leads from '{source.text}' to '{target.text}'"
-        raise AnalysisError(f"{problem}; name a signal that depends on the first one")
-    begins = [begin, *(break_path(signal.block, signal.port) for signal in transfer.opened)]
-    blocks = blocks_between(opened, begins, [end, *(signal.block for signal in transfer.opened)])
-    cuts = [Cut(SOURCE, (source,)), Cut(TARGET, (target,), read_only=True), Cut(OPENED, transfer.opened)]
-    return _response(transfer, linearised_part(opened, blocks, cuts, at, engine))
-
-
-def _reading(graph: Graph, signal: CutSignal) -> str:
-    """Return the block that gives a signal as it is read: an input's is behind its break."""
-    is_input = signal.port in graph[signal.block].inputs
-    return break_path(signal.block, signal.port) if is_input else signal.block
-
-
 def _response(transfer: Transfer, linear: Linear) -> Response:
     """Return the matrices from the source to the target, without the states that are on no way."""
-    places = {
-        label: np.array([index for index, each in enumerate(linear.channels) if each.cut == label], np.intp)
-        for label in (SOURCE, TARGET, OPENED)
-    }
-    a, b, c, d = _without_returns(linear, *places.values())
+    source, target = (_places(linear, (end,)) for end in (transfer.source, transfer.target))
+    a, b, c, d = _without_returns(linear, source, target, _places(linear, transfer.opened))
     kept = _on_the_way(a, b, c)
-    times = [[linear.channels[index].time for index in places[end]] for end in (SOURCE, TARGET)]
+    times = [[linear.channels[index].time for index in places] for places in (source, target)]
     return Response(
         transfer,
         (a[np.ix_(kept, kept)], b[kept], c[:, kept], d),
@@ -95,6 +66,12 @@ def _response(transfer: Transfer, linear: Linear) -> Response:
         tuple(linear.states[index] for index in kept),
         (np.array(times[0]), np.array(times[1])),
     )
+
+
+def _places(linear: Linear, signals: Sequence[CutSignal]) -> Positions:
+    """Return the numbers of the channels of some signals."""
+    labels = {channel_label(signal) for signal in signals}
+    return np.array([index for index, each in enumerate(linear.channels) if each.cut in labels], np.intp)
 
 
 def _without_returns(

@@ -140,7 +140,7 @@ transfers: {name: {from, to, open, unit, hyperperiod_s, stable, dc_gain, bandwid
 resonance, rise_time, overshoot, settling_time}} in the unit, rad/s and s, null for none;
 limits: {name: {vary, unit, stable_to, reached, reason}};
 expect: [{expectation, label, kind, unit, limit, found, met, lack (why nothing is found)}].
-Exit code: 0 stable, with all margins that the diagram expects; 1 not stable, or a margin is not met;
+Exit code: 0 stable, with all requirements on loops met that the diagram has; 1 not stable, or one not met;
 2 bad input, or a loop that cannot be linearised."""
 
 IDENTIFY_HELP = """\

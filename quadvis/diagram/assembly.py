@@ -11,7 +11,7 @@ from quadvis.block import Out
 from quadvis.diagram.ages import read_routes
 from quadvis.diagram.build import Builder, Made
 from quadvis.diagram.check import WireCheck
-from quadvis.diagram.conditions import with_conditions
+from quadvis.diagram.conditions import Conditions
 from quadvis.diagram.devices import check_devices, check_losses
 from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.doubts import warn_jumps, warn_network, warn_parameters, warn_rates
@@ -95,7 +95,7 @@ class Assembly:
         spec = expansion.spec
         wiring = Wiring(expansion, faults)
         wiring.stand_ins = stand_ins(spec, self._outputs)
-        with_conditions(expansion, wiring, faults)
+        Conditions(expansion, wiring, faults).add()
         wiring.check_ports(expansion.root)
         builder = Builder(spec, expansion, wiring, self.made, faults)
         drafts = builder.drafts()

@@ -86,7 +86,7 @@ def _inputs(part: FileSpec) -> list[tuple[str, str]]:
 
 
 def _runs(block: BlockSpec) -> str:
-    """Return when a part in the part runs, if not always."""
+    """Return when a part or a block in the part runs, if not always."""
     runs = block.runs
     if runs is None or not known(runs):
         return ""

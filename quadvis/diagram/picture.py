@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 
-from quadvis.diagram.conditions import CONDITION, OUTPUT
+from quadvis.diagram.conditions import OUTPUT
 from quadvis.diagram.diagram import Diagram
+from quadvis.diagram.joined import joined
+from quadvis.diagram.named_conditions import CONDITION
 from quadvis.diagram.sections.block_text import constant_text
 from quadvis.diagram.shown import main_parameters
 from quadvis.diagram.times import rate_text
@@ -61,7 +63,7 @@ def picture_of(diagram: Diagram) -> tuple[DrawnPicture, dict[str, str]]:
     tasks = {task.name: rate_text(task) for task in diagram.graph.tasks}
     shown_by = {f"{path}.y": source for path, source in passed.items()}
     ports = {name: shown_by.get(signal, signal) for name, signal in diagram.ports.items()}
-    return DrawnPicture(blocks, wires, constants, ports), tasks
+    return joined(DrawnPicture(blocks, wires, constants, ports)), tasks
 
 
 def part_of(picture: DrawnPicture, part: str, depth: int | None) -> DrawnPicture:

@@ -12,6 +12,7 @@ from fractions import Fraction
 
 from quadvis.diagram.assembly import Assembly
 from quadvis.diagram.draft import Draft
+from quadvis.diagram.joined import joined
 from quadvis.diagram.picture import drawn_block, part_of
 from quadvis.diagram.reference import Reference
 from quadvis.diagram.scope import FlatBlock
@@ -79,7 +80,7 @@ class _Sketch:
         wires = [
             replace(wire, fault=faulty.get((wire.target_block, wire.target_port), "")) for wire in self.wires
         ]
-        return DrawnPicture(blocks, wires, self.constants, self.ports), tasks
+        return joined(DrawnPicture(blocks, wires, self.constants, self.ports)), tasks
 
     def _fill(self, path: str, box: _Box) -> None:
         """Note the ports of a block, and what leads to its inputs."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -52,7 +52,13 @@ class Wiring:
         # The ports of parts are resolved once, so that a fault in them is reported once.
         self._found: dict[tuple[str, str], Source] = {}
         self._sought: set[tuple[str, str]] = set()
-        self.shown: Mapping[tuple[str, str], Wire] = {}  # outputs of parts that have blocks of their own
+        # Outputs of parts and of blocks that have a block to show them, by prefix and port.
+        self.shown: Mapping[tuple[str, str], Wire] = {}
+
+    @property
+    def inner_blocks(self) -> Set[str]:
+        """The blocks whose outputs are shown by others, as those inside of a part are."""
+        return {prefix[:-1] for prefix, _ in self.shown} & self.expansion.blocks.keys()
 
     def check_ports(self, scope: Scope) -> None:
         """Resolve the ports of every part, used or not."""
@@ -64,7 +70,15 @@ class Wiring:
             self.check_ports(child)
 
     def ports(self, scope: Scope | None = None) -> Iterator[tuple[str, Wire]]:
-        """Yield the outputs of every part, by full names such as "control/heading.right"."""
+        """Yield the outputs of every part, by full names such as "control/heading.right".
+
+        Those of blocks that another block shows stand there, too.
+        """
+        if scope is None:
+            inner = self.inner_blocks
+            for (prefix, port), wire in self.shown.items():
+                if prefix[:-1] in inner:
+                    yield f"{prefix[:-1]}.{port}", wire
         scope = scope or self.expansion.root
         for child in scope.parts:
             for port in child.spec[PORTS].outputs:
@@ -134,7 +148,8 @@ class Wiring:
             kind = self.expansion.blocks[path].kind
             if kind is UNKNOWN or not self._offers(path, reference, kind.interface.outputs):
                 return Source(reference.place, UNKNOWN)
-            return Source(reference.place, Wire(path, reference.port, reference.index))
+            shown = self.shown.get((f"{path}/", reference.port), Wire(path, reference.port))
+            return Source(reference.place, replace(shown, index=reference.index))
         if not self._offers(path, reference, child.spec[PORTS].outputs):
             return Source(reference.place, UNKNOWN)
         return self._indexed(self._export(child, reference.port)._replace(place=reference.place), reference)

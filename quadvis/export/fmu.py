@@ -15,7 +15,7 @@ from quadvis.errors import QuadvisError
 from quadvis.export.blocks import Announce, block_code
 from quadvis.export.description_text import SOURCES, Facts, build_description, model_description
 from quadvis.export.package import FMU, compiled, fmi_headers, library_suffix, packed, platform_folder
-from quadvis.export.program_text import program_calls, program_header
+from quadvis.export.program_text import program_calls, program_header, undone_slots
 from quadvis.export.selection import WHOLE, selected_blocks
 from quadvis.export.variables import INPUT, OUTPUT, PARAMETER, ExportedVariable, variables_of
 from quadvis.machine.files import PathLike, write_output
@@ -57,15 +57,16 @@ def export_fmu(
     named = variables_of(selection, engine)
     variables = _scalars(named) if version == 2 else named
     code = block_code(engine.program, [node.block for node in selection.graph.nodes], announce)
+    undone = undone_slots(engine.program, selection.graph)
     sources = {
         "blocks.h": code.text,
-        "calls.h": program_calls(engine.program, variables, code.names),
+        "calls.h": program_calls(engine.program, variables, undone, code.names),
         "model.h": (C / "model.h").read_text(encoding="utf-8"),
         "steps.c": (C / "steps.c").read_text(encoding="utf-8"),
         f"fmi{version}.c": (C / f"fmi{version}.c").read_text(encoding="utf-8"),
     }
     facts = _facts(diagram, name, version, sources, float(engine.program.tasks[0].period))
-    sources["program.h"] = program_header(engine.program, variables, facts.token)
+    sources["program.h"] = program_header(engine.program, variables, undone, facts.token)
     library = facts.identifier + library_suffix()
     if announce:
         announce("compiling the FMU")

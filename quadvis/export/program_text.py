@@ -7,18 +7,22 @@ from itertools import groupby
 
 import numpy as np
 
-from quadvis.engine.program import COPY, Op, Program, TaskProgram
+from quadvis.engine.memory import Slot
+from quadvis.engine.program import COPY, RESET, Op, Program, TaskProgram
 from quadvis.export.c_types import real
 from quadvis.export.selection import HELD
 from quadvis.export.selection import INPUT as FROM_OUTSIDE
 from quadvis.export.variables import INPUT, KINDS, OUTPUT, ExportedVariable
+from quadvis.graph.graph import Graph
 from quadvis.native.tables import stage_numbers
 
 SLOT = 8
 _LETTERS = {INPUT: "i", OUTPUT: "o"}
 
 
-def program_header(program: Program, variables: Sequence[ExportedVariable], token: str) -> str:
+def program_header(
+    program: Program, variables: Sequence[ExportedVariable], undone: Sequence[int], token: str
+) -> str:
     """Return program.h: what the other files need to know of a program."""
     settable = sum(len(each.slots) for each in variables if each.role != OUTPUT)
     held = len(_held(program))
@@ -29,6 +33,7 @@ def program_header(program: Program, variables: Sequence[ExportedVariable], toke
         "SETTABLE": settable,
         "STATES": len(program.states),
         "HELD": held,
+        "UNDONE": len(undone),
         "STAGES": len(stage_numbers(program.solver, float(program.period))) if program.states else 0,
         "PERIOD_ABOVE": f"INT64_C({numerator})",
         "PERIOD_BELOW": f"INT64_C({denominator})",
@@ -38,10 +43,13 @@ def program_header(program: Program, variables: Sequence[ExportedVariable], toke
 
 
 def program_calls(
-    program: Program, variables: Sequence[ExportedVariable], names: Mapping[tuple[int, str], str]
+    program: Program,
+    variables: Sequence[ExportedVariable],
+    undone: Sequence[int],
+    names: Mapping[tuple[int, str], str],
 ) -> str:
     """Return calls.h. ``names`` are the C functions by the number of a block and its method."""
-    return "\n".join([*_tables(program, variables), *_Calls(program, names).lines()]) + "\n"
+    return "\n".join([*_tables(program, variables, undone), *_Calls(program, names).lines()]) + "\n"
 
 
 def _held(program: Program) -> list[int]:
@@ -51,7 +59,21 @@ def _held(program: Program) -> list[int]:
     ]
 
 
-def _tables(program: Program, variables: Sequence[ExportedVariable]) -> Iterator[str]:
+def undone_slots(program: Program, graph: Graph) -> list[int]:
+    """Return the slots that are set back before inputs are set once more at one tick.
+
+    All others are computed anew from what is set. But a block whose condition has become false leaves its
+    outputs as they are, and a reset that is none after all has set states back and drawn random numbers.
+    """
+    found: list[Slot] = []
+    for number, (block, node) in enumerate(zip(program.blocks, graph.nodes, strict=True)):
+        if program.gate(number) is not None:
+            found += [*block.outputs.values(), *map(block.field, node.block.interface.streams)]
+    found += [slot for task in program.tasks for op in task.resets for slot in op.targets]
+    return sorted({slot.position + index for slot in found for index in range(slot.size)})
+
+
+def _tables(program: Program, variables: Sequence[ExportedVariable], undone: Sequence[int]) -> Iterator[str]:
     words = np.frombuffer(program.image, np.uint64)
     cells = ", ".join(f"[{place}] = UINT64_C({value})" for place, value in enumerate(words.tolist()) if value)
     yield f"static const uint64_t image[SLOTS] = {{{cells or '0'}}};"
@@ -67,6 +89,7 @@ def _tables(program: Program, variables: Sequence[ExportedVariable]) -> Iterator
     yield f"static const int32_t state_slots[STATES + 1] = {_whole(program.states)};"
     yield f"static const int32_t slope_slots[STATES + 1] = {_whole(program.slopes)};"
     yield f"static const int32_t held_slots[HELD + 1] = {_whole(_held(program))};"
+    yield f"static const int32_t undone_slots[UNDONE + 1] = {_whole(undone)};"
     numbers = stage_numbers(program.solver, float(program.period)) if program.states else np.zeros((0, 3))
     stages = [f"{{{', '.join(map(real, row))}}}" for row in numbers.tolist()]
     yield f"static const double stages[STAGES + 1][3] = {{{', '.join(stages) or '{0.0, 0.0, 0.0}'}}};"
@@ -127,9 +150,24 @@ class _Calls:
         block = self._program.blocks[op.block]
         if block.kind == FROM_OUTSIDE:
             return self._copy(op._replace(sources=(block.field(HELD),)))
+        if op.method == RESET:
+            return self._reset(op)
         places = [block.position, *(slot.position for slot in (*op.sources, *op.targets))]
         arguments = ", ".join(f"at(m, {place})" for place in places)
-        return f'CALL({_text(block.path)}, "{op.method}", {self._names[op.block, op.method]}, {arguments});'
+        name = self._names[op.block, op.method]
+        call = f'CALL({_text(block.path)}, "{op.method}", {name}, {arguments});'
+        gate = self._program.gate(op.block)
+        if gate is None:
+            return call
+        zeros = _zeros(op.targets) if op.method == "deriv" else ""
+        return f"if (*at(m, {gate.position})) {call}" + (f" else {{ {zeros} }}" if zeros else "")
+
+    def _reset(self, op: Op) -> str:
+        """Return what sets the states under a condition back, if it says so."""
+        runs = _runs(sorted({slot.position + index for slot in op.targets for index in range(slot.size)}))
+        back = [f"memcpy(at(m, {first}), &image[{first}], {SLOT * count});" for first, count in runs]
+        starts = filter(None, map(self._start, self._program.members(op.block)))
+        return f"if (*at(m, {op.sources[0].position})) {{ {' '.join([*back, *starts])} }}"
 
     @staticmethod
     def _copy(op: Op) -> str:
@@ -144,6 +182,17 @@ class _Calls:
             for port, slot in block.outputs.items():
                 if slot.scalar == "float64" and port not in block.nan:
                     yield f"CHECK({_text(block.path)}, {_text(port)}, {slot.position}, {slot.size});"
+
+
+def _zeros(slots: Iterable[Slot]) -> str:
+    return " ".join(f"memset(at(m, {slot.position}), 0, {SLOT * slot.size});" for slot in slots)
+
+
+def _runs(places: Iterable[int]) -> Iterator[tuple[int, int]]:
+    """Yield the first and the number of each run of places that follow on each other."""
+    for _, group in groupby(enumerate(places), key=lambda pair: pair[1] - pair[0]):
+        run = [place for _, place in group]
+        yield run[0], len(run)
 
 
 def _text(name: str) -> str:

@@ -18,6 +18,7 @@ from quadvis.graph.names import read_name
 WHOLE = "."  # names the whole diagram
 INPUT = "fmu input"  # the kind of the blocks in the place of what comes from outside
 HELD = "held"  # their state: the value that was set
+CONDITIONAL = ("when", "trigger", "reset")  # the inputs of a condition that come from the diagram
 
 
 @dataclass(frozen=True)
@@ -61,9 +62,6 @@ def selected_blocks(diagram: Diagram, name: str) -> ExportSelection:
         problem = f"the solver '{graph.solver}' cannot be exported"
         raise QuadvisError(sentence(problem, "choose one of fixed step, ode1 to ode4"))
     _refuse(chosen)
-    if conditional := [node for node in chosen if node.condition]:
-        problem = f"'{conditional[0].path}' runs under the condition '{conditional[0].condition}'"
-        raise QuadvisError(sentence(f"{problem}, and cannot be exported", "export a part that always runs"))
     inputs = _Inputs(diagram, name, chosen)
     nodes = [*inputs.nodes.values(), *(replace(node, inputs=inputs.wired(node)) for node in chosen)]
     step = graph.step if any(node.task.continuous for node in nodes) else None
@@ -76,13 +74,21 @@ def _belongs(path: str, name: str) -> bool:
 
 
 def _refuse(chosen: Sequence[Node]) -> None:
-    """Refuse blocks that are no arithmetic."""
+    """Refuse blocks that are no arithmetic, and those whose condition is not chosen with them."""
     unfit = [node for node in chosen if not node.block.numeric]
     if unfit:
         named = ", ".join(f"'{node.path}' ({node.kind})" for node in unfit[:3])
         more = f" and {len(unfit) - 3} more" if len(unfit) > 3 else ""
         problem = f"only numeric blocks can be exported, and these are not: {named}{more}"
         raise QuadvisError(sentence(problem, "export a part without them"))
+    inside = {node.path for node in chosen}
+    for node in chosen:
+        if node.condition and node.condition not in inside:
+            owner = node.condition.rpartition("/")[0] or WHOLE
+            problem = (
+                f"'{node.path}' does not always run: its condition '{node.condition}' lies outside of it"
+            )
+            raise QuadvisError(sentence(problem, f"export '{owner}'"))
 
 
 def _gives(self: Any) -> Any:
@@ -95,6 +101,7 @@ class _Inputs:
     def __init__(self, diagram: Diagram, name: str, chosen: Sequence[Node]) -> None:
         self._diagram, self._chosen = diagram, chosen
         self._inside = {node.path for node in chosen}
+        self._conditions = dict.fromkeys(node.condition for node in chosen if node.condition)
         self._read: dict[tuple[str, str], list[tuple[Node, Wire]]] = {}
         for node in chosen:
             for _, wire in node.wires():
@@ -166,14 +173,22 @@ class _Inputs:
             yield self._terminal(label, pair, numbers)
 
     def _entries(self, name: str) -> Iterator[tuple[str, Wire]]:
-        """Yield the inputs of the part, or of the block, with what feeds them; ``u[0]`` is ``u_0``."""
+        """Yield the inputs of the part, or of the block, with what feeds them; ``u[0]`` is ``u_0``.
+
+        What says when it runs is an input, too: ``when``, ``trigger`` and ``reset``.
+        """
+        found: dict[str, Wire] = {}
         if name in self._inside:
-            yield from ((plain_name(port, ()), wire) for port, wire in self._diagram.graph[name].wires())
+            found |= {plain_name(port, ()): wire for port, wire in self._diagram.graph[name].wires()}
         for label, text in self._diagram.entries.items():
             part, _, port = label.rpartition(".")
             wire = read_name(text)
             if part == name and wire is not None:
-                yield port, wire
+                found[port] = wire
+        for path in self._conditions:
+            if path.rpartition("/")[0] == name:
+                found = dict(self._diagram.graph[path].wires()) | found
+        yield from sorted(found.items(), key=lambda pair: pair[0] in CONDITIONAL)
 
     def _size(self, pair: tuple[str, str]) -> int:
         return int(np.prod(self._diagram.graph[pair[0]].shape(pair[1]), dtype=int))
@@ -216,7 +231,8 @@ def _outputs(diagram: Diagram, name: str, chosen: Sequence[Node]) -> Iterator[Ex
 def _exports(diagram: Diagram, name: str, inside: Mapping[str, Node]) -> Iterator[tuple[str, Wire]]:
     """Yield the outputs by name: the ports of a part, those of a block, or of the whole what it logs."""
     if name in inside:
-        yield from ((port, Wire(name, port)) for port in inside[name].block.interface.outputs)
+        for port in inside[name].block.interface.outputs:
+            yield port, read_name(diagram.ports.get(f"{name}.{port}", "")) or Wire(name, port)
     elif name != WHOLE:
         for label, text in diagram.ports.items():
             part, _, port = label.rpartition(".")

@@ -132,4 +132,7 @@ class _Following:
                 if not wire.delayed and wire.block not in seen:
                     seen.add(wire.block)
                     waiting.append(wire.block)
+            if node.condition and node.condition not in seen:
+                seen.add(node.condition)
+                waiting.append(node.condition)
         return tuple(name for block, names in self._names.items() if block in seen for name in names)

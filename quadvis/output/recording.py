@@ -135,7 +135,7 @@ class Recording:
     """Signals in memory: `recording["plant.position"]` is an array with a leading time axis.
 
     A name may have an index, `"plant.position[0:2]"`, and may be a port of a part: `ports` names the source
-    of each.
+    of each. So may a signal of a block be what another block shows of it.
     """
 
     def __init__(
@@ -238,7 +238,7 @@ class Recording:
 
     def find(self, name: str) -> tuple[int, int, RecordedPort, Index]:
         """Return a signal's block (its number), first slot, port and index; QuadvisError if there is none."""
-        if name in self._signals:
+        if name in self._signals and name not in self.ports:
             return *self._signals[name], ()
         source, index = self._source(name)
         if source not in self._signals:

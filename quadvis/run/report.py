@@ -119,7 +119,8 @@ def accuracy_lines(found: Accuracy) -> list[str]:
 
 def not_judged(count: int) -> list[str]:
     """Return a line on the expectations that no run judges, if there are any."""
-    return [f"  not judged by a run: {counted(count, 'margin')}; 'quadvis analyse' does it"] if count else []
+    words = f"  not judged by a run: {counted(count, 'requirement')} on loops; 'quadvis analyse' does it"
+    return [words] if count else []
 
 
 def _entry_row(entry: Entry, outcome: Outcome) -> tuple[str, ...]:

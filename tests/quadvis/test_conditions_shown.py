@@ -87,11 +87,6 @@ def test_the_table_of_a_program_says_what_depends_on_what(capsys: pytest.Capture
     assert any(line.startswith("reset") and "part/inner/sum.integral" in line for line in lines)
 
 
-def test_a_part_that_pauses_is_not_exported(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["export", "test.yaml", "--fmu", "part", "-o", "part.fmu"]) == 2
-    assert "runs under the condition 'part/when', and cannot be exported" in capsys.readouterr().err
-
-
 def test_parameters_of_conditions_are_used_and_cannot_be_tuned() -> None:
     diagram = load_text(TEXT.replace("when: {from: late.y,", "when: {from: late.y, across: sample,"))
     assert not diagram.warnings

@@ -12,7 +12,7 @@ from quadvis.graph.graph import CONTINUOUS, CROSSINGS
 from quadvis.graph.names import PATTERN
 from quadvis.library.describe import default_text, first_line
 
-CONDITION_KEYS = ("when", "triggered", "reset", "initial")  # of a part
+CONDITION_KEYS = ("when", "triggered", "reset", "initial")  # when a part or a block runs
 BLOCK_KEYS = (
     "block", "part", "rate", "at", "slot", "stream", GROUP_KEY, "with", "in", *CONDITION_KEYS, "condition",
 )  # fmt: skip
@@ -78,13 +78,10 @@ def _any_block(blocks: Mapping[str, type[Block]]) -> Schema:
         },
         "with": map_of({"anyOf": [ref("value"), MAPS]}, "parameters"),
         "in": map_of(ref("input"), "inputs: block.port, a constant, or {from: block.port, across: hold}"),
-        "when": {**ref("when"), "description": "of a part: it is enabled while this signal is true"},
-        "triggered": {**ref("edge"), "description": "of a part: it runs at the edges of this signal"},
-        "reset": {
-            **ref("edge"),
-            "description": "of a part: its edges set the states back",
-        },
-        "initial": map_of(ref("value"), "outputs of a part that has not run yet"),
+        "when": {**ref("when"), "description": "it runs only while this signal is true"},
+        "triggered": {**ref("edge"), "description": "it runs only at the edges of this signal"},
+        "reset": {**ref("edge"), "description": "its edges set the states back"},
+        "initial": map_of(ref("value"), "outputs while it has not run yet"),
         "condition": {**TEXT, "description": "the block that says when this one runs, a logic.run_condition"},
     }
     cases = [

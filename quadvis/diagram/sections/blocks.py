@@ -37,7 +37,7 @@ class BlockSpec(NamedTuple):
     inputs: dict[str, InputSpec] | Unknown | None = None  # None: no 'in' was written
     stream: tuple[str, Place] | None = None  # the name of its noise, or of that of its inner blocks
     inherits: bool = False  # whether the inputs are those of the block that it replaces
-    runs: PartCondition | Unknown | None = None  # when a part runs, if not always
+    runs: PartCondition | Unknown | None = None  # when it runs, if not always
     condition: tuple[str, Place] | Unknown | None = None  # the block that says when this one runs
 
     @property
@@ -123,7 +123,7 @@ class BlocksSection(FileSection[Blocks]):
     key = "blocks"
     words = (
         "`name: {block: group.name, rate: ..., with: {parameters}, in: {inputs}}`, "
-        "or `part: file.yaml` in place of `block`; a part may have `when`, `triggered`, `reset`, `initial`, "
+        "or `part: file.yaml` in place of `block`; `when`, `triggered`, `reset`, `initial` say when it runs, "
         "see below"
     )
     required = True

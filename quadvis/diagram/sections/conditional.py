@@ -1,4 +1,4 @@
-"""When a part runs: the keys `when`, `triggered`, `reset` and `initial` of its entry under `blocks`."""
+"""When a part or a block runs: the keys `when`, `triggered`, `reset` and `initial` under `blocks`."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class EdgeSpec(NamedTuple):
 
 @dataclass(frozen=True)
 class PartCondition:
-    """When a part runs. ``place`` is that of the first of the keys, ``places`` are those of all.
+    """When a part or a block runs. ``place`` is that of the first of the keys, ``places`` are those of all.
 
-    ``initial`` are the values of outputs before the part has run, by the names of its ports.
+    ``initial`` are the values of outputs before it has run, by the names of its ports.
     """
 
     place: Place
@@ -60,7 +60,7 @@ class PartCondition:
 
 
 def read_condition(fields: YamlMap, faults: Faults) -> PartCondition | Unknown:
-    """Return what an entry says of when its part runs; `UNKNOWN` if a signal is not readable."""
+    """Return what an entry says of when it runs; `UNKNOWN` if a signal is not readable."""
     places = {key: fields[key].place for key in CONDITION_KEYS if key in fields}
     when, states, outputs = _read_when(fields["when"], faults) if "when" in fields else (None, HELD, HELD)
     triggered, reset = (_read_edge(fields.get(key), faults) for key in ("triggered", "reset"))
@@ -71,7 +71,7 @@ def read_condition(fields: YamlMap, faults: Faults) -> PartCondition | Unknown:
         next(iter(places.values())), places, when, states, outputs, triggered, reset, initial
     )
     if initial and not made.pauses:
-        problem = "'initial' is for a part that does not always run"
+        problem = "'initial' is for what does not always run"
         faults.add(places["initial"], problem, "add 'when' or 'triggered', or leave it out")
     return made
 

@@ -37,7 +37,8 @@ class LogSection(RunSection[Logged]):
 
     def read(self, node: YamlNode | None, context: Context) -> Logged:
         """Read ``{signals: [craft, "eyes/*"], every: {imu: 10}}``."""
-        faults, found = context.faults, Logged(list(context.nodes))
+        faults = context.faults
+        found = Logged([path for path in context.nodes if path not in context.wiring.inner_blocks])
         fields = faults.collect(node.fields, (), LOG_KEYS, faults) if node is not None else None
         if fields is None:
             return found
@@ -78,7 +79,13 @@ class LogSection(RunSection[Logged]):
 def _named(context: Context) -> dict[str, list[str]]:
     """Return the blocks by the names that a pattern can match: their own, those of parts, of signals."""
     found: dict[str, list[str]] = {}
+    inner = context.wiring.inner_blocks
+    for (prefix, port), wire in context.wiring.shown.items():
+        if prefix[:-1] in inner:
+            found[f"{prefix[:-1]}.{port}"] = [wire.block]
     for path, node in context.nodes.items():
+        if path in inner:
+            continue
         names = path.split("/")
         around = ["/".join(names[:count]) for count in range(1, len(names) + 1)]
         for name in (*around, *(f"{path}.{port}" for port in node.block.interface.outputs)):

@@ -9,6 +9,7 @@
 typedef struct {
     uint64_t memory[SLOTS]; /* 8 bytes each: a double, a whole number, or a truth value in the first byte */
     int64_t tick;           /* the next to run */
+    uint64_t before[UNDONE + 1]; /* what conditions have changed, as it was when the tick came */
     double begin, now;      /* s: the time of the first tick; that which has been reached */
     uint8_t started;        /* the states have their first values */
     uint8_t arrived;        /* the time of the tick has come: what is due then can be computed */

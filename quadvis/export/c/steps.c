@@ -74,16 +74,18 @@ static int integrate(Model *m) {
     return 0;
 }
 
-/* Delayed values are copied once a tick, before their producers run; all the rest may run again. */
+/* Delayed values are copied once a tick, before their producers run; all the rest may run again, from what was. */
 static void arrive(Model *m) {
     put(m, 0, time_of(m->state.tick));
     call_delays(m);
+    for (int k = 0; k < UNDONE; k++) m->state.before[k] = m->state.memory[undone_slots[k]];
     m->state.arrived = 1;
     m->state.fresh = 0;
 }
 
 static int outputs(Model *m) {
     if (m->state.fresh) return 0;
+    for (int k = 0; k < UNDONE; k++) m->state.memory[undone_slots[k]] = m->state.before[k];
     if (call_outputs(m)) return 1;
     m->state.fresh = 1;
     return 0;

@@ -37,7 +37,7 @@ def test_the_tables_have_poles_margins_and_limits(capsys) -> None:
     assert (rows["torque"][1:-2], rows["vision"][1:-2]) == (torque, vision)
     assert all(float(peak) >= 1.0 for name in ("torque", "vision") for peak in rows[name][-2:])
     assert "yaw misalignment  stable up to 43.55 deg" in out
-    assert out.splitlines()[-2:] == ["STABLE", "PASSED: 11 of 11 margins met"]
+    assert out.splitlines()[-2:] == ["STABLE", "PASSED: 11 of 11 requirements on loops met"]
 
 
 def test_a_loop_that_is_not_stable_fails_and_says_what_grows(capsys) -> None:
@@ -285,7 +285,7 @@ def test_what_takes_long_shows_which_limit_is_sought_and_how_far_it_is(monkeypat
     )
     assert "limit 'lag': at 50 ms, from 50 ms to" in shown or "limit 'lag': at 0.05" in shown
     assert shown.endswith("\r\x1b[K")
-    assert "\x1b" not in out and out.splitlines()[-1] == "PASSED: 11 of 11 margins met"
+    assert "\x1b" not in out and out.splitlines()[-1] == "PASSED: 11 of 11 requirements on loops met"
 
 
 def test_nothing_is_shown_of_what_is_quick_or_where_nobody_watches(

@@ -52,14 +52,14 @@ def test_an_enabled_part_has_the_poles_of_the_plain_one(text: str) -> None:
     found = analyse(load_text(text), engine="python")
     assert np.sort_complex(found.poles) == pytest.approx(np.sort_complex(plain.poles), rel=1e-6)
     assert len(found.poles) == 2 and found.stable
-    assert "part 'law' runs, as at the operating point" in list(analysis_lines(found))
+    assert "'law' runs, as at the operating point" in list(analysis_lines(found))
     assert found.facts()["parts"] == {"law": "runs"}
 
 
 def test_a_disabled_part_is_frozen_and_no_pole_is_its_own(text: str) -> None:
     found = analyse(load_text(text.replace("auto: true", "auto: false")), engine="python")
     assert found.poles == pytest.approx([-3.0], rel=1e-5)
-    assert "part 'law' stands still, its states are frozen, as at the operating point" in list(
+    assert "'law' stands still, its states are frozen, as at the operating point" in list(
         analysis_lines(found)
     )
 

@@ -12,9 +12,11 @@ import pytest
 from pytest import approx
 
 import quadvis
+from quadvis.analysis import ways
 from quadvis.analysis.analyse import Analysis
+from quadvis.analysis.linearise import linearised_part
 from quadvis.analysis.loops import AnalysisError
-from quadvis.analysis.transfers import respond
+from quadvis.analysis.transfers import Transfers
 from quadvis.analysis.verdict import judge_sensitivity, judge_transfer
 from quadvis.api import Diagram, load_text
 from quadvis.cli import main
@@ -358,9 +360,75 @@ def test_a_way_that_leads_nowhere_is_refused(motor: Analysis) -> None:
     diagram = motor.diagram
     found = diagram.questions.more_transfers({"back": ["motor.y", "filter.y"]})[-1]
     with pytest.raises(AnalysisError, match=r"no way leads from 'motor\.y' to 'filter\.y'"):
-        respond(diagram.graph, found, 0.1)
+        Transfers(diagram.graph, [found], 0.1)["back"]
     with pytest.raises(AnalysisError, match="there is no transfer 'referenc'; did you mean 'reference'"):
         motor.transfer("referenc")
+
+
+# A continuous plant under a sampled law, a filter at another rate, and a lag that is on no loop.
+RHYTHMS = """
+quadvis: 1
+name: rhythms
+rates: {law: 20 Hz, slow: 4 Hz}
+solver: {method: ode4, step: 10 ms}
+stop_time: 1 s
+blocks:
+  law: {block: signal.gain, rate: law, with: {factor: -2 1/s}, in: {u: {from: plant.y, across: sample}}}
+  push: {block: signal.gain, rate: law, with: {factor: 1}, in: {u: law.y}}
+  plant: {block: signal.integrator, in: {u: {from: push.y, across: hold}}}
+  slow: {block: signal.unit_delay, rate: slow, in: {u: {from: plant.y, across: sample}}}
+  wanted: {block: sources.constant, rate: continuous, with: {value: 1 m}}
+  lag: {block: systems.transfer_function, with: {numerator: [1], denominator: [0.1, 1]}, in: {u: wanted.y}}
+  edge:
+    block: signal.relay
+    rate: law
+    with: {on_at: 0 s, off_at: 0 s}
+    in: {u: {from: plant.y, across: sample}}
+  after: {block: signal.discrete_integrator, rate: law, in: {u: edge.y}}
+analyse:
+  at: 100 ms
+  transfer:
+    push: [push.y, plant.y]
+    back: [plant.y, law.y]
+    open: {from: law.y, to: plant.y, open: law.y}
+    slow: [push.y, slow.y]
+    lag: [wanted.y, lag.y]
+"""
+
+
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+    """Note of which signals the matrices are found, each time."""
+    found: list[list[str]] = []
+
+    def noted(graph, blocks, cuts, at, engine):
+        found.append([cut.label for cut in cuts])
+        return linearised_part(graph, blocks, cuts, at, engine)
+
+    monkeypatch.setattr(ways, "linearised_part", noted)
+    return found
+
+
+def test_transfers_of_one_rhythm_are_linearised_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls, analysis = asked(monkeypatch), load_text(RHYTHMS).analyse()
+    together = {name: analysis.transfers[name] for name in analysis.transfers}
+    assert [len(names) for names in calls] == [3, 2, 2]  # two signals are ends of several transfers
+    for name, found in together.items():
+        question = next(each for each in analysis.diagram.questions.transfers if each.label == name)
+        alone = Transfers(analysis.diagram.graph, [question], 0.1)[name]
+        assert found.period == alone.period == {"slow": 0.25, "lag": 0.0}.get(name, 0.05)
+        assert len(found.states) == len(alone.states)
+        for one, other in zip(found.matrices, alone.matrices, strict=True):
+            assert one == approx(other, rel=1e-9, abs=1e-9)
+
+
+def test_one_that_cannot_be_linearised_leaves_the_others_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = RHYTHMS.replace("    push:", "    edge: [push.y, after.y]\n    push:")
+    calls, analysis = asked(monkeypatch), load_text(text).analyse()
+    with pytest.raises(AnalysisError, match=r"no steady state was found|has an edge"):
+        analysis.transfers["edge"]
+    assert analysis.transfers["push"].period == 0.05
+    assert analysis.transfers["back"].period == 0.05
+    assert [len(names) for names in calls] == [4, 2, 2, 2]
 
 
 @pytest.mark.slow

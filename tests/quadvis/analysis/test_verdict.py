@@ -109,7 +109,7 @@ def test_an_unstable_loop_meets_nothing(tmp_path: Path, capsys: pytest.CaptureFi
     assert [(verdict.met, verdict.lack) for verdict in found.verdicts] == [(False, UNSTABLE)] * 3
     assert main(["analyse", str(path), "--set", "lag=0.6 s"]) == 1
     out = capsys.readouterr().out.splitlines()
-    assert out[-1] == "FAILED: 3 of 3 margins not met"
+    assert out[-1] == "FAILED: 3 of 3 requirements on loops not met"
     assert out[-2].startswith("NOT STABLE: ")
 
 
@@ -205,7 +205,7 @@ def test_the_command_ends_with_1_for_a_margin_that_is_not_met(
         "  met      feed: phase margin at least 9 deg    any",
         "  met      far: stable up to more than 0.4 1/s  0.5 1/s",
         "STABLE",
-        "FAILED: 1 of 3 margins not met",
+        "FAILED: 1 of 3 requirements on loops not met",
     ]
     assert main(["analyse", str(path), "--json"]) == 1
     facts = json.loads(capsys.readouterr().out)
@@ -216,14 +216,14 @@ def test_the_command_ends_with_1_for_a_margin_that_is_not_met(
     }  # fmt: skip
     path.write_text(f"{QUIET}expect: [{{margin: feed, phase: 9 deg}}]\n")
     assert main(["analyse", str(path)]) == 0
-    assert capsys.readouterr().out.splitlines()[-1] == "PASSED: 1 of 1 margin met"
+    assert capsys.readouterr().out.splitlines()[-1] == "PASSED: 1 of 1 requirement on loops met"
 
 
 def test_neither_a_run_nor_a_sweep_judges_margins_and_both_say_so(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "quiet.yaml"
-    said = "  not judged by a run: 2 margins; 'quadvis analyse' does it"
+    said = "  not judged by a run: 2 requirements on loops; 'quadvis analyse' does it"
     path.write_text(f"{QUIET}expect: [{{margin: feed, gain: 3, phase: 9 deg}}]\n")
     assert main(["run", str(path), "--log", ""]) == 0
     assert capsys.readouterr().out.splitlines()[-1] == said
