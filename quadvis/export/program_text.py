@@ -12,7 +12,7 @@ from quadvis.export.c_types import real
 from quadvis.export.selection import HELD
 from quadvis.export.selection import INPUT as FROM_OUTSIDE
 from quadvis.export.variables import INPUT, KINDS, OUTPUT, ExportedVariable
-from quadvis.native.tables import stage_numbers
+from quadvis.native.stages import stage_numbers
 
 SLOT = 8
 _LETTERS = {INPUT: "i", OUTPUT: "o"}

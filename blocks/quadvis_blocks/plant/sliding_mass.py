@@ -96,17 +96,7 @@ class SlidingMass(Block):
 
     def update(self, force: Any) -> None:
         """Stick, break away or turn round, if one of these is due."""
-        if isinstance(force, float):
-            self.speed, self.slips = _changed(
-                self.speed, self.slips, force, self.surface, max(self.coulomb, self.breakaway)
-            )
-            return
-        for index in range(force.size):
-            withstood = max(element(self.coulomb, index), element(self.breakaway, index))
-            self.speed.flat[index], self.slips.flat[index] = _changed(
-                self.speed.flat[index], self.slips.flat[index], force.flat[index],
-                element(self.surface, index), withstood,
-            )  # fmt: skip
+        _change(self, force)
 
     def crossing(self, force: Any) -> Any:
         """Return how far each element is from rest, or from breaking away."""
@@ -122,7 +112,22 @@ class SlidingMass(Block):
 
     def event(self, force: Any) -> None:
         """Stick, break away or turn round."""
-        self.update(force)
+        _change(self, force)
+
+
+def _change(self: Any, force: Any) -> None:
+    """Let what happens at rest on the surface happen."""
+    if isinstance(force, float):
+        self.speed, self.slips = _changed(
+            self.speed, self.slips, force, self.surface, max(self.coulomb, self.breakaway)
+        )
+        return
+    for index in range(force.size):
+        withstood = max(element(self.coulomb, index), element(self.breakaway, index))
+        self.speed.flat[index], self.slips.flat[index] = _changed(
+            self.speed.flat[index], self.slips.flat[index], force.flat[index],
+            element(self.surface, index), withstood,
+        )  # fmt: skip
 
 
 def _acceleration(slip: float, mode: int, force: float, mass: float, coulomb: float, viscous: float) -> float:
