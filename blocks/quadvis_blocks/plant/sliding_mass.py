@@ -73,7 +73,11 @@ class SlidingMass(Block):
         """Begin with the initial values."""
         self.place = self.initial
         self.speed = self.initial_speed
-        self.slips = np.sign(np.asarray(self.initial_speed) - self.surface).astype(np.int64)
+        if isinstance(self.speed, float):
+            self.slips = _direction(self.speed - self.surface)
+            return
+        for index in range(self.speed.size):
+            self.slips.flat[index] = _direction(self.speed.flat[index] - element(self.surface, index))
 
     def output(self) -> tuple[Any, Any, Any]:
         """Return position, speed and mode."""
@@ -128,6 +132,11 @@ def _change(self: Any, force: Any) -> None:
             self.speed.flat[index], self.slips.flat[index], force.flat[index],
             element(self.surface, index), withstood,
         )  # fmt: skip
+
+
+def _direction(slip: float) -> int:
+    """Return the mode at a speed on the surface."""
+    return FORWARD if slip > 0.0 else BACKWARD if slip < 0.0 else STICKS
 
 
 def _acceleration(slip: float, mode: int, force: float, mass: float, coulomb: float, viscous: float) -> float:
