@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 METHODS = ("start", "read", "output", "write", "update", "deriv")
 OUTSIDE = ("read", "write")
-EVENTS = (CROSSING, EVENT) = ("crossing", "event")  # always interpreted: a run calls them seldom
+EVENTS = (CROSSING, EVENT) = ("crossing", "event")
 PORTS = "ports"
 CHECKS = ("check", "check_written", "doubts")
 FILES = ("reads", "read_file", "verify_files")

@@ -14,7 +14,7 @@ from quadvis.export.selection import HELD
 from quadvis.export.selection import INPUT as FROM_OUTSIDE
 from quadvis.export.variables import INPUT, KINDS, OUTPUT, ExportedVariable
 from quadvis.graph.graph import Graph
-from quadvis.native.tables import stage_numbers
+from quadvis.native.stages import stage_numbers
 
 SLOT = 8
 _LETTERS = {INPUT: "i", OUTPUT: "o"}

@@ -12,16 +12,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from quadvis.block import Block, Shape
+from quadvis.block.interface import CROSSING
 from quadvis.engine.memory import Record, Slot
 from quadvis.engine.program import Op
 from quadvis.native.source import fingerprint
 
 Kind = tuple[str, Shape]  # scalar and shape
+COUNTED: tuple[Kind, ...] = (("int64", ()), ("float64", ()))  # how many values there must be; the first one
 
 
 @dataclass(frozen=True)
 class MethodType:
-    """A method by name, and the kinds of what it takes and returns."""
+    """A method by name, and the kinds of what it takes and returns.
+
+    What ``crossing`` returns goes, value by value, to neighbours outside of memory.
+    """
 
     name: str
     arguments: tuple[Kind, ...]
@@ -30,7 +35,8 @@ class MethodType:
     @staticmethod
     def of(op: Op) -> MethodType:
         """Return the type of a call."""
-        return MethodType(op.method, _kinds(op.sources), _kinds(op.targets))
+        results = COUNTED if op.method == CROSSING else _kinds(op.targets)
+        return MethodType(op.method, _kinds(op.sources), results)
 
 
 @dataclass(frozen=True)

@@ -109,8 +109,6 @@ def choose(
     names = ", ".join(f"{name} ({why})" for name, why in refused.items())
     if program.states and program.solver not in TABLEAUS:
         names = ", ".join(filter(None, (names, f"the solver {program.solver}, which is scipy's")))
-    elif program.states and program.crossings:
-        names = ", ".join(filter(None, (names, f"{program.solver}, which looks for events between ticks")))
     return Choice(NATIVE, f"but interpreted: {names}" if names else "", types)
 
 
@@ -124,7 +122,7 @@ def _saved(program: Program, blocks: Sequence[Block], ticks: int) -> float:
             for op in ops
         )
         found += CALL * calls * max(0, ticks - task.offset) / task.every
-    if program.states and program.solver in TABLEAUS and not program.crossings:
+    if program.states and program.solver in TABLEAUS:
         stages = len(TABLEAUS[program.solver].nodes)
         calls = len(program.derivatives) + len(program.minor)
         found += ticks * stages * (STAGE + CALL * calls)

@@ -7,6 +7,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
+
+from quadvis.block.interface import CROSSING
 from quadvis.engine.memory import packed
 from quadvis.machine.garbage import uncollected
 from quadvis.native.arrays import METHODS, OtherBits, methods
@@ -38,6 +41,15 @@ def compile_block(kind: BlockType, prefix: str) -> MachineCode:
     except (Unreadable, Unlinkable, NotImplementedError, numba.core.errors.NumbaError) as error:
         failed = next((method.name for method in kind.methods if method.name not in compiled), "")
         return _refused(f"method '{failed}'" if failed else "", error)
+    except KeyError as error:  # numba's, for what is no field of the record
+        failed = next((method.name for method in kind.methods if method.name not in compiled), "")
+        known = hasattr(kind.block, str(error.args[0]))
+        if not known:
+            raise
+        problem = (
+            f"it calls self.{error.args[0]}, which only Python can; call a plain function that takes self"
+        )
+        return MachineCode(refusal=f"method '{failed}': {problem}")
 
 
 def _refused(where: str, error: Exception) -> MachineCode:
@@ -229,6 +241,16 @@ def _meets_self(function: types.FunctionType, seen: set[types.FunctionType]) -> 
     )
 
 
+# What a ``crossing`` returns, value by value.
+CROSSED = """\
+    found, place = asarray({}), 0
+    if found.size != {size}[0]:
+        raise ValueError
+    for value in found.flat:
+        {values}[place] = value
+        place += 1"""
+
+
 def _pointed(kind: Kind) -> Any:
     """Return numba's type for the target of a pointer; numba cannot store through pointers to bool."""
     import numba
@@ -249,10 +271,15 @@ def _wrapper(method: MethodType, body: Any) -> Any:
         for name, (scalar, shape) in zip(names, method.arguments, strict=False)
     )
     lines = [f"def call({', '.join(['record', *names])}):", "    self = carray(record, 1)[0]"]
-    lines.append(f"    {', '.join(results)}{' = ' if results else ''}body(self, {reads})")
-    for result, name, (_, shape) in zip(results, names[count:], method.results, strict=True):
+    if method.name == CROSSING:
+        size, values = names[count:]
+        lines += CROSSED.format(f"body(self, {reads})", size=size, values=values).splitlines()
+        results = []
+    else:
+        lines.append(f"    {', '.join(results)}{' = ' if results else ''}body(self, {reads})")
+    for result, name, (_, shape) in zip(results, names[count:], method.results, strict=bool(results)):
         target = f"carray({name}, {shape})[...]" if shape else f"{name}[0]"
         lines.append(f"    {target} = {result}")
-    namespace: dict[str, Any] = {"carray": vars(numba)["carray"], "body": body}
+    namespace: dict[str, Any] = {"carray": vars(numba)["carray"], "body": body, "asarray": np.asarray}
     exec("\n".join(lines), namespace)
     return namespace["call"]

@@ -19,6 +19,7 @@ from typing import Any
 from quadvis.block import Block
 from quadvis.engine.memory import SLOT, Memory
 from quadvis.engine.program import Op, Program
+from quadvis.engine.solver import TABLEAUS
 from quadvis.native import cache
 from quadvis.native.block_type import BlockType, MethodType
 from quadvis.native.cache import MachineCode
@@ -169,7 +170,10 @@ def block_types(program: Program, blocks: Sequence[Block]) -> dict[int, BlockTyp
     """Return the types of those blocks of a program that can be compiled, by the number of the block."""
     calls: dict[int, list[Op]] = {}
     phases = [phase for task in program.tasks for phase in task.phases.values()]
-    for op in chain.from_iterable((*phases, program.derivatives)):
+    between = [program.derivatives]
+    if program.states and program.solver in TABLEAUS:
+        between += [program.crossings, program.events]
+    for op in chain.from_iterable((*phases, *between)):
         calls.setdefault(op.block, []).append(op)
     known: dict[tuple[Any, ...], BlockType] = {}
     found = {}

@@ -140,7 +140,7 @@ def _call(code: Any, place: int, end: int) -> int:
     return place
 
 
-def _called(code: Any, place: int, end: int, operands: Any, words: Any) -> bool:
+def called(code: Any, place: int, end: int, operands: Any, words: Any) -> bool:
     """Call functions one after the other, but none behind a gate that is shut; return whether none failed."""
     place = _call(code, place, end)
     while place < end and code[WIDTH * place] == GATE:
@@ -211,7 +211,7 @@ def _integrate(
         if stage > 0:
             memory[0] = time + stages[3 * stage]
             first = control[MINOR]
-        if not _called(code, first, control[CALLS], operands, words):
+        if not called(code, first, control[CALLS], operands, words):
             result = FAILED
             break
         onward, weight = stages[3 * stage + 1], stages[3 * stage + 2]

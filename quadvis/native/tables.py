@@ -8,18 +8,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.engine.interpreter import Call, Interpreter
+from quadvis.block.interface import CROSSING
+from quadvis.engine.interpreter import Call, Interpreter, MinorError
 from quadvis.engine.memory import SLOT, Slot
 from quadvis.engine.program import COPY, RESET, Op, Program
 from quadvis.engine.solver import TABLEAUS
 from quadvis.engine.taps import Observer, Tap
 from quadvis.native import loop
 from quadvis.native.clock import MachineClock
+from quadvis.native.event_tables import EventTables, Span
+from quadvis.native.stages import stage_numbers
 from quadvis.native.timing import PLACES, TimedCalls
 
 Rhythm = tuple[int, int]  # ticks from one time to the next, and the first tick
@@ -97,6 +100,16 @@ class _Gate:
         return [self.slot.position, self.count, len(zeros), *zeros]
 
 
+class _Events(NamedTuple):
+    """The step with events: what it works on, its instruction, and the instructions that it calls."""
+
+    tables: EventTables
+    step: int
+    crossings: Span
+    events: Sequence[Span]
+    renewed: Span
+
+
 def _gate(program: Program, op: Op) -> Slot | None:
     """Return what a call depends on: the condition of its block, or of a reset."""
     return op.sources[0] if op.method == RESET else program.gate(op.block)
@@ -137,7 +150,10 @@ class Tables:
         self._gate: Slot | None = None  # what the instructions that are being laid out depend on
         self._gates: dict[int, _Gate] = {}  # by the instruction
         self._open: _Gate | None = None  # the gate that the next instruction may stand behind
-        self._first_minor = self._first_derivative = 0  # instructions of the first calls between two ticks
+        # The instructions of the calls between two ticks.
+        self._minor: Span = (0, 0)
+        self._derivatives: Span = (0, 0)
+        self._events: _Events | None = None
         self._lay_out()
         self._finish()
 
@@ -262,14 +278,17 @@ class Tables:
         source, target = (field, op.targets[0]) if gives else (op.sources[0], field)
         return (source, target) if source[:2] == target[:2] else None
 
-    def _call(self, function: Function, op: Op, number: int) -> tuple[int, int]:
-        """Return the instruction of a call, for its place; `_finish` makes an address of its operand."""
+    def _call(self, function: Function, op: Op, number: int, targets: Sequence[int] = ()) -> tuple[int, int]:
+        """Return the instruction of a call, for its place; `_finish` makes an address of its operand.
+
+        ``targets`` are addresses outside of memory to which it writes.
+        """
         block = self._interpreter.program.blocks[op.block]
         first = len(self._places)
         positions = [block.position, *(slot.position for slot in (*op.sources, *op.targets))]
-        self._places += [self._base + position * SLOT for position in positions]
+        self._places += [*(self._base + position * SLOT for position in positions), *targets]
         address = function.address
-        if self._timed is not None:
+        if self._timed is not None and op.method != CROSSING:  # the interpreter does not time it, either
             call, places = self._timed.call(op.block, op.method, address)
             self._calls_timed.append((first, call))
             address, first = self._timed.address, len(self._places)
@@ -307,21 +326,46 @@ class Tables:
         """Add the solver's step: compiled, if all that it calls is."""
         program = self._interpreter.program
         python = PythonCall(None, -1)
+        located = program.solver in TABLEAUS and bool(program.crossings)
         ops = (*program.minor, *program.derivatives)
-        functions = [self._function(op) for op in ops]
-        other = program.solver not in TABLEAUS or bool(program.crossings)
-        if other or any(function is None for function in functions):
+        if located:
+            ops = (*ops, *program.crossings, *program.events, *program.renewed)
+        if program.solver not in TABLEAUS or any(self._function(op) is None for op in ops):
             self._ask(ALWAYS, python)
             return
-        self.redo[self._instruct(ALWAYS, loop.INTEGRATE, 0)] = Redo(python, None)
-        self._first_minor, self._open = len(self._code), None
-        for count, (function, op) in enumerate(zip(functions, ops, strict=True)):
+        tables = None
+        if located:
+            try:
+                tables = EventTables(self._interpreter)
+            except MinorError:  # it will be asked again at the first step
+                self._ask(ALWAYS, python)
+                return
+        step = self._instruct(ALWAYS, loop.INTEGRATE if tables is None else tables.step, 0)
+        self.redo[step] = Redo(python, None)
+        self._minor, self._derivatives = self._calls_of(program.minor), self._calls_of(program.derivatives)
+        if tables is not None:
+            targets = [tables.targets(number) for number in range(len(program.crossings))]
+            self._events = _Events(
+                tables, step, self._calls_of(program.crossings, targets),
+                [self._calls_of([op]) for op in program.events], self._calls_of(program.renewed),
+            )  # fmt: skip
+
+    def _calls_of(self, ops: Sequence[Op], targets: Sequence[Sequence[int]] = ()) -> Span:
+        """Lay out calls between two ticks, each behind its gate; return their instructions.
+
+        Those with ``targets`` are made whether their blocks run or not.
+        """
+        first, self._open = len(self._code), None
+        for count, op in enumerate(ops):
+            function = self._function(op)
             assert function is not None
-            if count == len(program.minor):
-                self._first_derivative = len(self._code)
-            self._behind(program.gate(op.block), op.targets if op.method == "deriv" else ())
-            self._code.append(self._call(function, op, len(self._code)))
+            if not targets:
+                gate = self._interpreter.program.gate(op.block)
+                self._behind(gate, op.targets if op.method == "deriv" else ())
+            number = len(self._code)
+            self._code.append(self._call(function, op, number, targets[count] if targets else ()))
         self._open = None
+        return first, len(self._code)
 
     def _finish(self) -> None:
         program, memory = self._interpreter.program, self._interpreter.memory
@@ -346,12 +390,21 @@ class Tables:
         )
         self.ring: Whole = np.zeros(sum(ring.room * (ring.size + 1) for ring in self.rings), np.int64)
         held = [
-            slot.position + index for op in program.minor for slot in op.targets for index in range(slot.size)
+            slot.position + index
+            for op in dict.fromkeys((*program.minor, *program.renewed))
+            for slot in op.targets
+            for index in range(slot.size)
         ]
         both = zip(program.states, program.slopes, strict=True)
         self.states: Whole = np.array([*chain.from_iterable(both), *held], np.int64)
         self.stages = stage_numbers(program.solver, float(program.period))
         self.scratch = np.zeros(2 * len(program.states) + len(held))
+        if self._events is not None:
+            tables, step, crossings, events, renewed = self._events
+            arrays: Sequence[NDArray[Any]] = (self.code, self.operands, self.states)
+            self.code[step, 1] = tables.finish(
+                self._minor[0], self._derivatives[0], crossings, events, renewed, arrays, len(held)
+            )
         control = self._control
         if self._clock is not None:
             self._clock_places: Whole = np.array([control.ctypes.data, *self._clock.places], np.int64)
@@ -362,16 +415,15 @@ class Tables:
         control[loop.TIME] = program.time.position
         control[loop.STATES], control[loop.HELD] = len(program.states), len(held)
         control[loop.STAGES] = len(self.stages)
-        control[loop.MINOR] = self._first_minor
-        control[loop.DERIVATIVES] = self._first_derivative
-        control[loop.CALLS] = len(self._code)
+        control[loop.MINOR], control[loop.DERIVATIVES] = self._minor[0], self._derivatives[0]
+        control[loop.CALLS] = self._derivatives[1]
         # One element of a view costs a third of an array's.
         self.control: memoryview = memoryview(cast(Any, control))
-        arrays: Sequence[NDArray[Any]] = (
+        whole: Sequence[NDArray[Any]] = (
             control, self.rhythms, self.due, self.segments, self.code, self.operands, memory.floats,
             memory.floats, self.taps, self.ring, self.states, self.stages, self.scratch,
         )  # fmt: skip
-        self._table: Whole = np.array([array.ctypes.data for array in arrays], np.int64)
+        self._table: Whole = np.array([array.ctypes.data for array in whole], np.int64)
         self.address = int(self._table.ctypes.data)  # of the table of addresses, which the loop takes
 
     def rows(self) -> Iterator[tuple[Tap, Whole, Whole]]:
@@ -392,21 +444,3 @@ def _runs(positions: Sequence[int]) -> Iterator[tuple[int, int]]:
         if index == len(positions) or positions[index] != positions[index - 1] + 1:
             yield positions[start], index - start
             start = index
-
-
-def stage_numbers(solver: str, step: float) -> NDArray[np.float64]:
-    """Return for each stage its node (s), and the weights of its slope for the next stage and the result.
-
-    In all formulas of `TABLEAUS` a stage depends on the slope of the stage before it and on no other.
-    """
-    if solver not in TABLEAUS:
-        return np.zeros((0, 3))  # the interpreter integrates
-    tableau = TABLEAUS[solver]
-    found = np.zeros((len(tableau.nodes), 3))
-    for stage, (node, weights) in enumerate(zip(tableau.nodes, tableau.stages, strict=True)):
-        assert not any(weights[:-1]), solver
-        found[stage, 0] = node * step
-        if stage:
-            found[stage - 1, 1] = step * weights[-1]
-    found[:, 2] = [step * weight for weight in tableau.weights]
-    return found

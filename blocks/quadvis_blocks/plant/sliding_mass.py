@@ -73,7 +73,11 @@ class SlidingMass(Block):
         """Begin with the initial values."""
         self.place = self.initial
         self.speed = self.initial_speed
-        self.slips = np.sign(np.asarray(self.initial_speed) - self.surface).astype(np.int64)
+        if isinstance(self.speed, float):
+            self.slips = _direction(self.speed - self.surface)
+            return
+        for index in range(self.speed.size):
+            self.slips.flat[index] = _direction(self.speed.flat[index] - element(self.surface, index))
 
     def output(self) -> tuple[Any, Any, Any]:
         """Return position, speed and mode."""
@@ -96,17 +100,7 @@ class SlidingMass(Block):
 
     def update(self, force: Any) -> None:
         """Stick, break away or turn round, if one of these is due."""
-        if isinstance(force, float):
-            self.speed, self.slips = _changed(
-                self.speed, self.slips, force, self.surface, max(self.coulomb, self.breakaway)
-            )
-            return
-        for index in range(force.size):
-            withstood = max(element(self.coulomb, index), element(self.breakaway, index))
-            self.speed.flat[index], self.slips.flat[index] = _changed(
-                self.speed.flat[index], self.slips.flat[index], force.flat[index],
-                element(self.surface, index), withstood,
-            )  # fmt: skip
+        _change(self, force)
 
     def crossing(self, force: Any) -> Any:
         """Return how far each element is from rest, or from breaking away."""
@@ -122,7 +116,27 @@ class SlidingMass(Block):
 
     def event(self, force: Any) -> None:
         """Stick, break away or turn round."""
-        self.update(force)
+        _change(self, force)
+
+
+def _change(self: Any, force: Any) -> None:
+    """Let what happens at rest on the surface happen."""
+    if isinstance(force, float):
+        self.speed, self.slips = _changed(
+            self.speed, self.slips, force, self.surface, max(self.coulomb, self.breakaway)
+        )
+        return
+    for index in range(force.size):
+        withstood = max(element(self.coulomb, index), element(self.breakaway, index))
+        self.speed.flat[index], self.slips.flat[index] = _changed(
+            self.speed.flat[index], self.slips.flat[index], force.flat[index],
+            element(self.surface, index), withstood,
+        )  # fmt: skip
+
+
+def _direction(slip: float) -> int:
+    """Return the mode at a speed on the surface."""
+    return FORWARD if slip > 0.0 else BACKWARD if slip < 0.0 else STICKS
 
 
 def _acceleration(slip: float, mode: int, force: float, mass: float, coulomb: float, viscous: float) -> float:

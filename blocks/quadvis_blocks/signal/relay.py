@@ -62,20 +62,34 @@ class Relay(Block):
 
     def update(self, u: Any) -> None:
         """Keep its state."""
-        if isinstance(u, float):
-            self.is_on = _switched(u, self.is_on, self.on_at, self.off_at)
-        else:
-            for index in range(u.size):
-                on_at, off_at = element(self.on_at, index), element(self.off_at, index)
-                self.is_on.flat[index] = _switched(u.flat[index], self.is_on.flat[index], on_at, off_at)
+        _switch(self, u)
 
     def crossing(self, u: Any) -> Any:
         """Return how far each element is from the threshold at which it switches next."""
-        return np.where(self.is_on, u - self.off_at, self.on_at - u)
+        if isinstance(u, float):
+            return u - self.off_at if self.is_on else self.on_at - u
+        found = np.empty_like(u)
+        for index in range(u.size):
+            value = u.flat[index]
+            if self.is_on.flat[index]:
+                found.flat[index] = value - element(self.off_at, index)
+            else:
+                found.flat[index] = element(self.on_at, index) - value
+        return found
 
     def event(self, u: Any) -> None:
         """Switch."""
-        self.update(u)
+        _switch(self, u)
+
+
+def _switch(self: Any, u: Any) -> None:
+    """Let a relay be on or off, as its input says."""
+    if isinstance(u, float):
+        self.is_on = _switched(u, self.is_on, self.on_at, self.off_at)
+    else:
+        for index in range(u.size):
+            on_at, off_at = element(self.on_at, index), element(self.off_at, index)
+            self.is_on.flat[index] = _switched(u.flat[index], self.is_on.flat[index], on_at, off_at)
 
 
 def _switched(u: float, is_on: Any, on_at: float, off_at: float) -> bool:

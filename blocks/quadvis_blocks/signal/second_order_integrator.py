@@ -84,25 +84,39 @@ class SecondOrderIntegrator(Block):
 
     def update(self, u: Any) -> None:
         """Leave a stop from which u points, and rebound from one that the step before has missed."""
-        if isinstance(u, float):
-            self.place, self.speed, self.rests = _rebound(
-                self.place, self.speed, self.rests, u, self.lower, self.upper, self.restitution, self.period
-            )
-            return
-        for index in range(u.size):
-            self.place.flat[index], self.speed.flat[index], self.rests.flat[index] = _rebound(
-                self.place.flat[index], self.speed.flat[index], self.rests.flat[index], u.flat[index],
-                element(self.lower, index), element(self.upper, index), self.restitution, self.period,
-            )  # fmt: skip
+        _meet_stops(self, u)
 
     def crossing(self) -> Any:
         """Return how far each element is from its stops: from all lower ones, then from all upper ones."""
-        gaps = np.array([self.place - self.lower, self.upper - self.place])
-        return np.where(np.array([self.rests, self.rests]), 1.0, gaps)
+        if isinstance(self.place, float):
+            if self.rests:
+                return np.ones(2)
+            return np.array((self.place - self.lower, self.upper - self.place))
+        size = self.place.size
+        found = np.ones(2 * size)
+        for index in range(size):
+            if not self.rests.flat[index]:
+                found[index] = self.place.flat[index] - element(self.lower, index)
+                found[size + index] = element(self.upper, index) - self.place.flat[index]
+        return found
 
     def event(self, u: Any) -> None:
         """Rebound."""
-        self.update(u)
+        _meet_stops(self, u)
+
+
+def _meet_stops(self: Any, u: Any) -> None:
+    """Let what happens at the stops happen."""
+    if isinstance(u, float):
+        self.place, self.speed, self.rests = _rebound(
+            self.place, self.speed, self.rests, u, self.lower, self.upper, self.restitution, self.period
+        )
+        return
+    for index in range(u.size):
+        self.place.flat[index], self.speed.flat[index], self.rests.flat[index] = _rebound(
+            self.place.flat[index], self.speed.flat[index], self.rests.flat[index], u.flat[index],
+            element(self.lower, index), element(self.upper, index), self.restitution, self.period,
+        )  # fmt: skip
 
 
 def _slopes(x: float, v: float, rests: bool, u: float, lower: float) -> tuple[float, float]:
