@@ -83,20 +83,31 @@ def test_words_that_nothing_has_get_a_sentence(words: list[str], sentence: str) 
 
 COUNT = """
 import cProfile, pstats, sys
-profile = cProfile.Profile()
-profile.enable()
-from quadvis.cli import main
-code = main(["list"])
-profile.disable()
-others = [name for name in sys.modules if not name.startswith("quadvis")]
-heavy = {"numpy", "yaml", "importlib.metadata"} & {*sys.modules}
-print(code, len(others), pstats.Stats(profile).total_calls, *heavy)
+
+def counted(*words):
+    profile = cProfile.Profile()
+    profile.enable()
+    from quadvis.cli import main
+    code = main(words)
+    profile.disable()
+    others = [name for name in sys.modules if not name.startswith("quadvis")]
+    heavy = {"numpy", "yaml", "numba", "scipy", "cv2", "importlib.metadata"} & {*sys.modules}
+    print(code, len(others), pstats.Stats(profile).total_calls, *sorted(heavy))
+
+counted("list")
+counted("describe", "signal.derivative")
 """
 
 
-def test_a_list_starts_quickly_without_numpy() -> None:
+def test_a_list_starts_quickly_without_numpy_and_a_description_with_little_more() -> None:
     found = subprocess.run([sys.executable, "-c", COUNT], capture_output=True, text=True, check=True)
-    code, modules, calls, *heavy = found.stdout.splitlines()[-1].split()
+    lines = found.stdout.splitlines()
+    listed = next(line for line in lines if line.startswith("0 "))
+    code, modules, calls, *heavy = listed.split()
     assert (code, heavy) == ("0", [])
     assert int(modules) < 130  # beside our own
     assert int(calls) < 150_000  # a tenth of a second of CPU; each block and each shipped file adds some
+    code, modules, calls, *heavy = lines[-1].split()
+    assert (code, heavy) == ("0", ["numpy"])  # which a class of a block needs
+    assert int(modules) < 260
+    assert int(calls) < 250_000

@@ -82,6 +82,9 @@ def test_docstrings_become_markdown() -> None:
         "Rate: ``x_t``, \\|u\\| \\<= M \\* T.\n\n"
         "The law is:\n\n```text\na = b_1 * c\n```\n\nUp to \\[0, 1\\]."
     )
+    assert from_docstring("A:\n\n=== =====\na   b\n=== =====\n1   x\n    and y\n2   z\n=== =====\n\nB.") == (
+        "A:\n\n| a | b |\n| --- | --- |\n| 1 | x and y |\n| 2 | z |\n\nB."
+    )
     assert escaped("`a_b` a_b") == "`a_b` a\\_b"
     assert table(("a", "b", "c"), [("x", "", "1 | 2")]) == "| a | c |\n| --- | --- |\n| x | 1 \\| 2 |"
 
