@@ -50,6 +50,7 @@ class Porter:
     ) -> None:
         self.listeners = listeners
         self.pid = 0  # while there is one
+        self.serves = False  # whether it takes connections
         self.connected: list[int] = []  # at each of the listeners
         self._pair, self._on_lost, self._memory, self._clock = pair, on_lost, memory, clock
         self._pipe: Pipe | None = None
@@ -126,7 +127,7 @@ class Porter:
                 return None
             if message is None:
                 return None
-            self._silent, self._patience = 0.0, PORTER_SILENT
+            self._silent, self._patience, self.serves = 0.0, PORTER_SILENT, True
             if message[0] != "facts":
                 return message
             self._note(*message[1:])
@@ -195,7 +196,7 @@ class Porter:
         now = self._clock()
         assert self._pipe is not None
         self._pipe.close()
-        self._pipe, self.pid = None, 0
+        self._pipe, self.pid, self.serves = None, 0, False
         self.connected = [0] * len(self.listeners)
         self._sums = self.shut, self.dropped()
         self._present, self._dropped = (0, 0), {}

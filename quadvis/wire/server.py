@@ -146,6 +146,11 @@ class Server:
         """Return whether anybody has subscribed to a topic, so that its data is worth being made."""
         return self._feed.wants(topic)
 
+    @property
+    def serves(self) -> bool:
+        """Whether hosts are served now: a porter that starts takes a moment."""
+        return self.porter.serves
+
     def close(self) -> None:
         """Answer what is under way, close all sockets and wait for the end of the thread."""
         self._closing.set()
