@@ -12,13 +12,13 @@ from typing import Any
 import pytest
 
 
-def children(process: subprocess.Popen[Any]) -> list[int]:
-    """Return the processes of its own that a command has begun."""
+def children(process: subprocess.Popen[Any], program: bytes = b"spawn_main") -> list[int]:
+    """Return the processes that a command has begun to run a program, by default those of a run."""
     found = []
     for entry in Path("/proc").glob("[0-9]*"):
         try:
             parent = (entry / "stat").read_text().rpartition(")")[2].split()[1]
-            if int(parent) == process.pid and b"spawn_main" in (entry / "cmdline").read_bytes():
+            if int(parent) == process.pid and program in (entry / "cmdline").read_bytes():
                 found.append(int(entry.name))
         except OSError:
             continue

@@ -22,8 +22,15 @@ def started_here() -> None:
     from quadvis.wire.address import local_path
 
     path = local_path(LOCAL)
-    if _answers(path):
-        return
+    until = time.monotonic() + START
+    if not _listens(path):
+        _start(path, until)
+    while not _answers(path):
+        _check(until)
+
+
+def _start(path: Path, until: float) -> None:
+    """Start the target, and return when there is one, be it another one that was quicker."""
     words = ["-m", "quadvis", "target", "--name", LOCAL, "--until-idle", str(UNUSED)]
     with tempfile.TemporaryFile() as output, open(os.devnull, "rb") as nothing:
         files = [
@@ -34,24 +41,38 @@ def started_here() -> None:
         process = os.posix_spawn(
             sys.executable, [sys.executable, *words], os.environ, file_actions=files, setsid=True
         )
-        until = time.monotonic() + START
-        while not _answers(path):
-            if os.waitpid(process, os.WNOHANG)[0] and not _answers(path):  # another one may have been quicker
+        while not _listens(path):
+            if os.waitpid(process, os.WNOHANG)[0] and not _listens(path):
                 output.seek(0)
                 said = output.read().decode(errors="replace").strip().splitlines()
                 raise QuadvisError(
                     f"the target of this machine cannot start{f': {said[-1]}' if said else ''}"
                 )
-            if time.monotonic() > until:
-                raise QuadvisError(f"the target of this machine does not answer after {START:g} s")
-            time.sleep(LOOK)
+            _check(until)
 
 
-def _answers(path: Path) -> bool:
-    """Return whether something listens at the path of a socket."""
+def _check(until: float) -> None:
+    if time.monotonic() > until:
+        raise QuadvisError(f"the target of this machine does not answer after {START:g} s")
+    time.sleep(LOOK)
+
+
+def _listens(path: Path) -> bool:
+    """Return whether there is a target at the path of a socket."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as found:
         try:
             found.connect(os.fspath(path))
         except OSError:
             return False
     return True
+
+
+def _answers(path: Path) -> bool:
+    """Return whether a target takes connections at the path of a socket: ZeroMQ speaks first."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as found:
+        try:
+            found.settimeout(LOOK)
+            found.connect(os.fspath(path))
+            return bool(found.recv(1))
+        except OSError:
+            return False

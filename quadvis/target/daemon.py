@@ -144,6 +144,8 @@ class Daemon:
                 shown = now + SHOWN
                 self._display.show(self._head(), self.kernel.shown(), self.kernel.view)
             self._live()
+            if not self._server.serves:
+                self._asked = now  # nobody could ask
             if idle is not None and self.kernel.is_idle and now - self._asked > idle:
                 return
 

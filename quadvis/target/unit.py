@@ -42,6 +42,7 @@ def unit_text(
         "KillMode=control-group",  # "mixed" kills the guardian at once when the target has died
         "SuccessExitStatus=143",  # what `quadvis target` ends with when it is stopped
         "TimeoutStopSec=10",
+        "OOMPolicy=continue",  # it may have been the porter, which the target starts again
         "LimitRTPRIO=99",
         "LimitMEMLOCK=infinity",
         f"CPUAffinity={_processors(cpu)}" if cpu else "",

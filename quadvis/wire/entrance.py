@@ -1,4 +1,4 @@
-"""One ROUTER socket of a target: it opens, bounds who is connected, and gives each message with its sender.
+"""One ROUTER socket in the porter: it bounds who is connected, and gives each message with its sender.
 
 ZeroMQ itself accepts any number of TCP connections that never show a key, each of which is a descriptor of
 this process. Its monitor tells of each; beyond a number we shut the oldest of those that are too young to
@@ -7,7 +7,6 @@ be cut off by ZeroMQ. The address from which a key was let in of late is spared 
 
 from __future__ import annotations
 
-import math
 import os
 import socket
 import time
@@ -19,7 +18,6 @@ from typing import Any, NamedTuple
 import zmq
 from zmq.utils.monitor import recv_monitor_message
 
-from quadvis.wire.keys import KeyPair
 from quadvis.wire.limits import (
     CONNECTIONS,
     DEAD_AFTER,
@@ -54,12 +52,15 @@ class _Connection:
 
 
 class Entrance:
-    """A ROUTER socket; ``pair`` is the target's key, or None for CURVE's absence on this computer."""
+    """A ROUTER socket at a port (a number) or a path.
 
-    def __init__(self, context: zmq.Context[Any], number: int, verbs: str, pair: KeyPair | None) -> None:
-        self.number, self.verbs = number, verbs
-        self.domain = f"quadvis-{number}"
-        self.pair = pair
+    ``keys`` are the target's, public and private, for CURVE; None for its absence on this computer.
+    """
+
+    def __init__(
+        self, context: zmq.Context[Any], domain: str, place: int | str, keys: tuple[bytes, bytes] | None
+    ) -> None:
+        self.place = place
         self.socket = made = context.socket(zmq.ROUTER)
         made.linger = 0
         made.router_mandatory = True
@@ -67,35 +68,28 @@ class Entrance:
         made.maxmsgsize = REQUEST  # whoever announces more is cut off before it takes memory
         made.handshake_ivl = int(HANDSHAKE * 1000)
         made.heartbeat_ivl, made.heartbeat_timeout = int(HEARTBEAT * 1000), int(DEAD_AFTER * 1000)
-        made.zap_domain = self.domain.encode()
-        if pair is not None:
+        made.zap_domain = domain.encode()
+        if keys is not None:
             made.curve_server = True
-            made.curve_secretkey, made.curve_publickey = pair.private, pair.public
+            made.curve_publickey, made.curve_secretkey = keys
         self.monitor = made.get_monitor_socket(_EVENTS)
         self.outbox = Outbox(made)
-        self.place: int | str = 0
+        self.connected = 0
         self.shut = 0  # connections that were too many
         self._open: dict[int, _Connection] = {}  # by descriptor, as the monitor tells
         self._let_in: deque[tuple[float, str, str]] = deque()  # when which key, from where, of late
 
-    def open_path(self, path: str) -> None:
-        """Listen at a path of this computer."""
-        self.socket.bind(f"ipc://{path}")
-        self.place = path
+    def open(self, descriptor: int, ipv6: bool) -> None:
+        """Accept connections at a socket that listens already."""
+        self.socket.ipv6 = ipv6
+        self.socket.setsockopt(zmq.USE_FD, descriptor)
+        # The address is not used; its kind is.
+        self.socket.bind(
+            f"ipc://{self.place}" if isinstance(self.place, str) else f"tcp://127.0.0.1:{self.place}"
+        )
 
-    def open_port(self, listener: socket.socket) -> None:
-        """Listen at a TCP socket that is bound."""
-        self.place = listener.getsockname()[1]
-        if listener.family == socket.AF_INET6:
-            self.socket.ipv6 = True
-        with suppress(OSError, AttributeError):  # Linux: who is silent is not even accepted
-            listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_DEFER_ACCEPT, math.ceil(HANDSHAKE))
-        listener.listen(2 * HALF_OPEN)  # a short queue would keep good hosts waiting in an attack
-        self.socket.setsockopt(zmq.USE_FD, listener.detach())  # the address below is not used
-        self.socket.bind(f"tcp://127.0.0.1:{self.place}")
-
-    def count(self) -> int:
-        """Note who came and went, and shut who is too many; return how many are connected."""
+    def count(self) -> None:
+        """Note who came and went, and shut who is too many."""
         while self.monitor.poll(0):
             event = recv_monitor_message(self.monitor)
             descriptor = int(event["value"])
@@ -105,7 +99,7 @@ class Entrance:
                 self._open.pop(descriptor, None)
         if isinstance(self.place, int):
             self._bound()
-        return len(self._open)
+        self.connected = len(self._open)
 
     def _bound(self) -> None:
         """Shut the connections that are too many."""

@@ -9,19 +9,16 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from quadvis.wire.budget import Tally
-from quadvis.wire.entrance import Entrance
 from quadvis.wire.limits import OUTGOING, SUBSCRIPTIONS
 from quadvis.wire.messages import pack_stream
+from quadvis.wire.porter import Key, Porter
 from quadvis.wire.refusals import BadError, WireError
 from quadvis.wire.verbs import check_topic
 from quadvis.wire.who import Who
 
-Key = tuple[int, bytes]  # the number of an entrance, and an identity there
-
 
 @dataclass
 class _Subscriber:
-    entrance: Entrance
     who: Who
     user: str
     address: str
@@ -67,13 +64,11 @@ class Feed:
             self._size += size
         self._wake()
 
-    def subscribe(
-        self, entrance: Entrance, who: Who, user: str, address: str, topics: list[str]
-    ) -> list[str]:
+    def subscribe(self, who: Who, user: str, address: str, topics: list[str]) -> list[str]:
         """Add topics of a connection; refuse them all if one may not be seen."""
         for topic in topics:
             check_topic(topic, who.level)
-        one = self._subscribers.get(who.connection) or _Subscriber(entrance, who, user, address)
+        one = self._subscribers.get(who.connection) or _Subscriber(who, user, address)
         if len(one.topics.union(topics)) > SUBSCRIPTIONS:
             raise BadError(f"a connection can subscribe to {SUBSCRIPTIONS} topics")
         one.topics.update(topics)
@@ -92,21 +87,29 @@ class Feed:
         self._update()
         return sorted(one.topics)
 
-    def deliver(self, present: Callable[[str, str, Key], Who | None]) -> None:
+    def deliver(self, porter: Porter, present: Callable[[str, str, Key], Who | None]) -> None:
         """Send what waits to all who have subscribed; ``present`` says who a sender is now."""
-        while True:
+        while porter.has_room:
             with self._lock:
                 if not self._outgoing:
                     return
                 topic, frames, size = self._outgoing.popleft()
                 self._size -= size
-            for key, one in list(self._subscribers.items()):
-                if topic in one.topics and self._may_see(topic, present(one.user, one.address, key)):
-                    if not one.entrance.outbox.send(key[1], frames):
-                        self.forget(key)
-                elif topic in one.topics:
-                    self._counts.add("refused")
-                    self.forget(key)
+            porter.send(list(self._allowed(topic, porter, present)), frames)
+
+    def _allowed(
+        self, topic: str, porter: Porter, present: Callable[[str, str, Key], Who | None]
+    ) -> Iterator[Key]:
+        """Yield who has subscribed to a topic and may see it; the others are forgotten."""
+        for key, one in list(self._subscribers.items()):
+            if topic not in one.topics:
+                continue
+            if self._may_see(topic, present(one.user, one.address, key)):
+                yield key
+            else:
+                self._counts.add("refused")
+                self.forget(key)
+                porter.forget(key)
 
     def _may_see(self, topic: str, who: Who | None) -> bool:
         if who is None:
@@ -119,16 +122,18 @@ class Feed:
 
     def forget(self, key: Key) -> None:
         """Send nothing more to a connection."""
-        one = self._subscribers.pop(key, None)
-        if one is not None:
-            one.entrance.outbox.forget(key[1])
+        if self._subscribers.pop(key, None) is not None:
             self._update()
 
-    def subscribers(self) -> Iterator[dict[str, Any]]:
-        """Yield the name, the topics and the dropped messages of each subscriber."""
-        for (_, identity), one in self._subscribers.items():
-            dropped = one.entrance.outbox.dropped[identity]
-            yield {"host": one.who.name, "topics": sorted(one.topics), "dropped": dropped}
+    def forget_all(self) -> None:
+        """Send nothing more to anybody who is there now."""
+        self._subscribers.clear()
+        self._update()
+
+    def subscribers(self, dropped: Callable[[Key], int]) -> Iterator[dict[str, Any]]:
+        """Yield the name, the topics and the number of dropped messages of each subscriber."""
+        for key, one in self._subscribers.items():
+            yield {"host": one.who.name, "topics": sorted(one.topics), "dropped": dropped(key)}
 
     def _update(self) -> None:
         wanted = frozenset(topic for one in self._subscribers.values() for topic in one.topics)

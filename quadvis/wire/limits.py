@@ -30,4 +30,9 @@ DEAD_AFTER = 5.0  # s without one
 RENEWAL = 0.2  # s between renewals of the lease
 LEASE = 1.0  # s without one: the lease is lost
 
+PORTER_MEMORY = 256 << 20  # bytes that the porter may take for all its peers
+PORTER_LIFE = 0.25  # s between its signs of life
+PORTER_SILENT = 5.0  # s without one: it hangs, and is ended
+PORTER_START = 30.0  # s that it has for the first one
+
 PORT = 22222  # control; the next port introduces the target, the one after it has the streams

@@ -1,17 +1,56 @@
-"""The ports and paths at which a target listens, bound before ZeroMQ has them."""
+"""The ports and paths at which a target listens, itself: they outlive the porter, which accepts there."""
 
 from __future__ import annotations
 
+import math
 import os
 import socket
 from contextlib import ExitStack, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from quadvis.errors import QuadvisError
 from quadvis.machine.files import reason
 from quadvis.wire.home import private_folder
+from quadvis.wire.limits import HALF_OPEN, HANDSHAKE
 
 _TRIES = 50
+
+
+@dataclass(frozen=True)
+class ListeningSocket:
+    """A socket that listens for ``verbs`` (of control, or of the stream), and its port or path as ``place``.
+
+    Whoever comes to one that is ``keyed`` has to show a key.
+    """
+
+    bound: socket.socket
+    place: int | str
+    verbs: str
+    keyed: bool
+
+    @classmethod
+    def at_port(cls, bound: socket.socket, verbs: str, *, keyed: bool) -> ListeningSocket:
+        """Listen at a TCP socket that is bound."""
+        with suppress(OSError, AttributeError):  # Linux: who is silent is not even accepted
+            bound.setsockopt(socket.IPPROTO_TCP, socket.TCP_DEFER_ACCEPT, math.ceil(HANDSHAKE))
+        bound.listen(2 * HALF_OPEN)  # a short queue would keep good hosts waiting in an attack
+        return cls(bound, int(bound.getsockname()[1]), verbs, keyed)
+
+    @classmethod
+    def at_path(cls, path: str, verbs: str) -> ListeningSocket:
+        """Listen at a path that this process holds: what is there was left behind. OSError if it cannot."""
+        with suppress(FileNotFoundError):
+            os.unlink(path)
+        made = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            made.setblocking(False)
+            made.bind(path)
+            made.listen(2 * HALF_OPEN)
+        except BaseException:
+            made.close()
+            raise
+        return cls(made, path, verbs, False)
 
 
 def listeners(host: str, port: int) -> list[socket.socket]:
@@ -54,8 +93,8 @@ def local_folder(path: str) -> Path:
 class HeldPath:
     """A path at which this process alone may listen, with its two sockets, until `release`.
 
-    ZeroMQ would take the path away from whoever listens there, and leaves its files behind. QuadvisError if
-    another process has it.
+    Whoever listens at a path takes it away from whoever listened there. QuadvisError if another process has
+    it.
     """
 
     def __init__(self, path: str, target: str) -> None:

@@ -1,8 +1,9 @@
-"""The target's end of the wire: two sockets for each way to reach it, and one thread that serves them all."""
+"""The target's end of the wire: one thread that answers what comes through the porter."""
 
 from __future__ import annotations
 
 import math
+import select
 import socket
 import threading
 import time
@@ -11,28 +12,27 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any
 
-import zmq
-
 from quadvis.errors import QuadvisError
+from quadvis.machine.files import reason
 from quadvis.wire import limits
 from quadvis.wire.address import LOOPBACK, checked_path, local_path
 from quadvis.wire.audit import Audit
 from quadvis.wire.budget import Tally, sparing
 from quadvis.wire.desk import Desk, Handle
 from quadvis.wire.doorkeeper import LOCAL, Doorkeeper
-from quadvis.wire.entrance import Entrance, Letter
-from quadvis.wire.feed import Feed, Key
+from quadvis.wire.feed import Feed
 from quadvis.wire.hosts import AuthorizedHosts
 from quadvis.wire.introduction import introduce
 from quadvis.wire.keys import KeyPair, checked_name
 from quadvis.wire.lease import Lease
-from quadvis.wire.ports import HeldPath, listeners, local_folder
+from quadvis.wire.porter import Key, Porter
+from quadvis.wire.ports import HeldPath, ListeningSocket, listeners, local_folder
 from quadvis.wire.verbs import CONTROL, STREAM
 from quadvis.wire.waker import Waker
 from quadvis.wire.who import Who
 
-_AT_ONCE = 32  # messages of one socket before the others have their turn
-_REST, _SOON = 0.2, 0.005  # s between two looks at the clock; the same while something waits to be sent
+_AT_ONCE = 64  # messages of the porter before the rest has its turn
+_REST = 0.2  # s between two looks at the clock
 _REREAD = 0.25  # s between two looks at the list of hosts
 
 
@@ -42,7 +42,7 @@ class Server:
     ``handle(verb, arguments, who)`` is the target, see `desk.Desk`; the thread of the server calls it, and so
     `handle` must return soon, if need be a Future. `publish` and `close` may be called from any thread.
     ``on_lost(who)`` is called when the operator's lease is lost, ``say`` with sentences for the target's own
-    output, few a second.
+    output, few a second. ``memory`` is what the porter may take for its peers (bytes).
     """
 
     def __init__(
@@ -55,6 +55,7 @@ class Server:
         audit: Audit | None = None,
         on_lost: Callable[[Who], object] = lambda who: None,
         say: Callable[[str], object] = lambda words: None,
+        memory: int = limits.PORTER_MEMORY,
     ) -> None:
         self.name = checked_name(name)
         self.counts = Tally()
@@ -70,17 +71,25 @@ class Server:
         self._desk.own |= {
             "hello": self._hello,
             "subscribe": self._subscribe,
-            "unsubscribe": lambda args, who: self._feed.unsubscribe(who, args["topics"]),
+            "unsubscribe": self._unsubscribe,
         }
-        self._context = zmq.Context()
-        self._doorkeeper = Doorkeeper(self._context, hosts, self.counts, self._say)
-        self._entrances: list[Entrance] = []
+        self._doorkeeper = Doorkeeper(hosts, self.counts, self._say)
+        self._listeners: list[ListeningSocket] = []
+        self.porter = Porter(self._listeners, pair, self._porter_lost, memory)
+        self._heard: dict[str, Callable[..., None]] = {
+            "knock": self._knocked,
+            "handshake": self._doorkeeper.note,
+            "letter": self._open,
+            "gone": self._gone,
+        }
         self._introductions: list[socket.socket] = []
         self._held: list[HeldPath] = []
         self._calls: deque[Callable[[], object]] = deque()
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
-        self._letter = Letter(b"", "", "", None)  # the one that is being answered
+        self._sender = ("", "")  # user and address of the message that is being answered
+        self._closed = False
+        self._more = False  # whether the porter has said more than was heard yet
         self._next_reading = 0.0
 
     def listen_here(self, path: str | None = None) -> str:
@@ -88,11 +97,11 @@ class Server:
         path = checked_path(path or str(local_path(self.name)))
         local_folder(path)
         self._held.append(HeldPath(path, self.name))
-        for entrance, place in zip(self._two_entrances(None), self._held[-1].sockets, strict=True):
-            try:
-                entrance.open_path(place)
-            except zmq.ZMQError as error:
-                raise QuadvisError(f"cannot listen at '{path}': {error.strerror.lower()}") from None
+        try:
+            for verbs, place in zip((CONTROL, STREAM), self._held[-1].sockets, strict=True):
+                self._listeners.append(ListeningSocket.at_path(place, verbs))
+        except OSError as error:
+            raise QuadvisError(f"cannot listen at '{path}': {reason(error)}") from None
         return path
 
     def listen(self, host: str = "0.0.0.0", port: int = limits.PORT, *, insecure: bool = False) -> int:
@@ -108,21 +117,14 @@ class Server:
             )
         control, introductions, stream = listeners(host, port)
         first = int(control.getsockname()[1])
-        pair = None if insecure else self._pair
-        for entrance, listener in zip(self._two_entrances(pair), (control, stream), strict=True):
-            entrance.open_port(listener)
-        if pair is None:
+        for verbs, bound in zip((CONTROL, STREAM), (control, stream), strict=True):
+            self._listeners.append(ListeningSocket.at_port(bound, verbs, keyed=not insecure))
+        if insecure:
             introductions.close()
         else:
             introductions.listen(limits.CONNECTIONS)
             self._introductions.append(introductions)
         return first
-
-    def _two_entrances(self, pair: KeyPair | None) -> list[Entrance]:
-        number = len(self._entrances)
-        made = [Entrance(self._context, number + n, verbs, pair) for n, verbs in enumerate((CONTROL, STREAM))]
-        self._entrances += made
-        return made
 
     def start(self) -> Server:
         """Serve in a thread of its own."""
@@ -144,6 +146,11 @@ class Server:
         """Return whether anybody has subscribed to a topic, so that its data is worth being made."""
         return self._feed.wants(topic)
 
+    @property
+    def serves(self) -> bool:
+        """Whether hosts are served now: a porter that starts takes a moment."""
+        return self.porter.serves
+
     def close(self) -> None:
         """Answer what is under way, close all sockets and wait for the end of the thread."""
         self._closing.set()
@@ -157,54 +164,60 @@ class Server:
         """Return the counts, the connections and the subscribers; for the thread of the server."""
         return {
             "counts": self.counts.all(),
-            "connections": [entrance.count() for entrance in self._entrances],
-            "shut": sum(entrance.shut for entrance in self._entrances),
-            "dropped": sum(entrance.outbox.all_dropped for entrance in self._entrances),
-            "subscribers": list(self._feed.subscribers()),
+            "connections": list(self.porter.connected),
+            "shut": self.porter.shut,
+            "dropped": self.porter.dropped(),
+            "subscribers": list(self._feed.subscribers(self.porter.dropped)),
             "audit_lost": 0 if self._audit is None else self._audit.lost,
         }
 
     def run(self) -> None:
         """Serve until `close` is called."""
         self._thread = threading.current_thread()
-        poller = zmq.Poller()
-        places: list[Any] = [self._waker, self._doorkeeper.socket, *self._introductions]
-        places += [each.socket for each in self._entrances] + [each.monitor for each in self._entrances]
-        for place in places:
-            poller.register(place, zmq.POLLIN)
         try:
             while not self._closing.is_set():
-                self._turn(poller)
+                self._turn()
         finally:
             self._end()
 
-    def _turn(self, poller: zmq.Poller) -> None:
-        ready = dict(poller.poll(math.ceil(self._pause() * 1000)))
+    def _turn(self) -> None:
+        pause = min(self.porter.watch(), self._pause())
+        ready = self._ready(pause)
         self._waker.drain()
         self._look_after()
-        if self._doorkeeper.socket in ready:
-            self._doorkeeper.answer({each.domain: each for each in self._entrances})
         for listener in self._introductions:
             if listener.fileno() in ready:
                 self.counts.add("introduced", introduce(listener, self.name, self._public()))
-        for entrance in self._entrances:
-            if entrance.monitor in ready:
-                entrance.count()
-            for _ in range(_AT_ONCE if entrance.socket in ready else 0):
-                letter = entrance.receive()
-                if letter is None:
-                    break
-                self._open(entrance, letter)
+        self._listen_to_porter()
         for _ in range(len(self._calls)):
             self._calls.popleft()()
-        self._feed.deliver(self._present)
-        for entrance in self._entrances:
-            for identity in entrance.outbox.flush() if entrance.outbox.waits else ():
-                self._feed.forget((entrance.number, identity))
+        self._feed.deliver(self.porter, self._present)
+        self.porter.flush()
+
+    def _ready(self, pause: float) -> set[int]:
+        """Wait until there is something to do, or for a time (s); return the descriptors to be read."""
+        poller = select.poll()
+        poller.register(self._waker, select.POLLIN)
+        for listener in self._introductions:
+            poller.register(listener, select.POLLIN)
+        self.porter.register(poller)
+        return {descriptor for descriptor, _ in poller.poll(0 if self._more else math.ceil(pause * 1000))}
+
+    def _listen_to_porter(self) -> None:
+        """Do what the porter says; whatever is wrong with a message, the server goes on."""
+        self._more = True
+        for _ in range(_AT_ONCE):
+            message = self.porter.take()
+            if message is None:
+                self._more = False
+                return
+            try:
+                self._heard[message[0]](*message[1:])
+            except Exception as error:
+                self.counts.add("failed")
+                self._say(f"a message could not be answered: {type(error).__name__}: {error}")
 
     def _pause(self) -> float:
-        if any(each.outbox.waits for each in self._entrances):
-            return _SOON
         times = (_REST, self.lease.watch(), self._desk.watch())
         return max(0.0, min(each for each in times if each is not None))
 
@@ -223,28 +236,43 @@ class Server:
             if holder is not None and holder.public and holder.public not in {h.public for h in self._hosts}:
                 self.lease.withdraw()
 
-    def _open(self, entrance: Entrance, letter: Letter) -> None:
-        """Answer a message; whatever is wrong with it, the server goes on."""
-        if letter.data is None:
+    def _knocked(self, number: int, address: str, mechanism: str, key: bytes) -> None:
+        user = ""
+        try:
+            user = self._doorkeeper.user(self._listeners[number], address, mechanism, key)
+        finally:
+            self.porter.admit(user)  # in any case: the next ones wait for this answer
+
+    def _gone(self, number: int, identity: bytes) -> None:
+        self.counts.add("unread")
+        self._feed.forget(self.porter.key(number, identity))
+
+    def _porter_lost(self, words: str) -> None:
+        self.counts.add("porters lost")
+        self._feed.forget_all()
+        if self._audit is not None:
+            self._audit.note(words)
+        self._say(words)
+
+    def _open(self, number: int, identity: bytes, user: str, address: str, data: bytes | None) -> None:
+        """Answer a message."""
+        if data is None:
             self.counts.add("malformed")
-            self._say(f"a message of a wrong form came from {letter.address or 'this computer'}")
+            self._say(f"a message of a wrong form came from {address or 'this computer'}")
             return
-        who = self._present(letter.user, letter.address, (entrance.number, letter.identity))
-        head = [b""] if entrance.verbs == STREAM else []
+        key, verbs = self.porter.key(number, identity), self._listeners[number].verbs
+        who = self._present(user, address, key)
+        head = [b""] if verbs == STREAM else []
 
         def send(data: bytes) -> None:
-            if not entrance.outbox.send(letter.identity, [*head, data, *head]):
+            if not self.porter.send([key], [*head, data, *head]):
                 self.counts.add("unread")
 
-        self._letter = letter
-        try:
-            if who is None:
-                self._desk.turn_away(letter.user.encode(), letter.data, send)
-            else:
-                self._desk.answer(who, letter.data, send, entrance.verbs)
-        except Exception as error:
-            self.counts.add("failed")
-            self._say(f"a message could not be answered: {type(error).__name__}: {error}")
+        self._sender = user, address
+        if who is None:
+            self._desk.turn_away(user.encode(), data, send)
+        else:
+            self._desk.answer(who, data, send, verbs)
 
     def _present(self, user: str, address: str, key: Key) -> Who | None:
         """Return who a sender is by the present list, None if the key is let in no more."""
@@ -257,15 +285,20 @@ class Server:
         return None if host is None else Who(host.name, host.level, host.public, key)
 
     def _hello(self, args: Mapping[str, Any], who: Who) -> dict[str, Any]:
-        number = who.connection[0]
+        stream = self._listeners[who.connection[0] + 1]
         return {
             "target": self.name, "version": limits.VERSION, "key": who.name, "level": who.level,
-            "stream": self._entrances[number + 1].place,
+            "stream": stream.place,
         }  # fmt: skip
 
     def _subscribe(self, args: Mapping[str, Any], who: Who) -> list[str]:
-        entrance = self._entrances[who.connection[0]]
-        return self._feed.subscribe(entrance, who, self._letter.user, self._letter.address, args["topics"])
+        return self._feed.subscribe(who, *self._sender, args["topics"])
+
+    def _unsubscribe(self, args: Mapping[str, Any], who: Who) -> list[str]:
+        left = self._feed.unsubscribe(who, args["topics"])
+        if not left:
+            self.porter.forget(who.connection)
+        return left
 
     def _lost(self, who: Who) -> None:
         if self._audit is not None:
@@ -284,16 +317,13 @@ class Server:
         self._waker.wake()
 
     def _end(self) -> None:
-        if self._context.closed:
+        if self._closed:
             return
+        self._closed = True
         self._desk.close()
-        for entrance in self._entrances:
-            entrance.outbox.flush()
-            entrance.close()
-        for listener in self._introductions:
+        self.porter.close()
+        for listener in (*self._introductions, *(each.bound for each in self._listeners)):
             listener.close()
-        self._doorkeeper.close()
-        self._context.term()
         for path in self._held:
             path.release()
         self._waker.close()

@@ -13,7 +13,7 @@ import quadvis
 from quadvis.cli import main
 from quadvis.engine.profile import Timed
 from quadvis.errors import QuadvisError
-from quadvis.host.local import _answers
+from quadvis.host.local import _listens
 from quadvis.host.profiler import ProfilerData
 from quadvis.host.properties import PROPERTIES
 from quadvis.host.target import Target
@@ -618,7 +618,7 @@ def test_a_local_target_starts_and_ends_by_itself(
         assert tg.level == 0
     socket = Path(folder) / "_DIR" / "quadvis" / "local"
     assert socket.exists()
-    wait_for(lambda: not _answers(socket))
+    wait_for(lambda: not _listens(socket))
 
 
 @pytest.mark.slow

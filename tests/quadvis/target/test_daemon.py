@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import socket
 import tempfile
 import threading
@@ -17,7 +19,8 @@ from quadvis.host.target import Target
 from quadvis.target.daemon import Daemon
 from quadvis.target.notify import Notifier
 from quadvis.wire import address
-from tests.processes import linux, wait_for
+from quadvis.wire.refusals import NoAnswerError
+from tests.processes import children, gone, linux, wait_for
 from tests.quadvis.host.targets import LOOP, running_target
 
 pytestmark = linux
@@ -130,6 +133,43 @@ def test_a_target_starts_its_application_at_boot_and_leaves_no_socket(
         lab.process.terminate()
         lab.process.wait(20)
         assert heard()[-1] == "STOPPING=1"
+
+
+@pytest.mark.faults
+@pytest.mark.slow
+def test_an_application_flies_on_when_the_porter_is_killed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    diagram = tmp_path / "loop.yaml"
+    diagram.write_text(LOOP)
+    with running_target("--folder", str(tmp_path / "kept")) as lab:
+        for name in ("QUADVIS_HOME", "XDG_RUNTIME_DIR"):
+            monkeypatch.setenv(name, lab.environment[name])
+        with Target("lab") as tg:
+            tg.load(diagram)
+            tg.start()
+            wait_for(lambda: tg.ExecTime > 0.2)
+            for how in (signal.SIGKILL, signal.SIGABRT):
+                (porter,) = children(lab.process, b"porter_process")
+                flown = tg.ExecTime
+                os.kill(porter, how)
+                wait_for(lambda porter=porter: gone(porter) and answers(tg))
+                assert tg.Status == "running" and tg.ExecTime > flown
+                words = f"has ended by {how.name}"
+                assert words in lab.output
+                assert words in (tmp_path / "kept" / "audit.jsonl").read_text()
+            tg.stop()
+            times = tg.getlog("TimeLog")  # of one run
+            assert times[0] == 0 and times[-1] > flown
+        (porter,) = children(lab.process, b"porter_process")
+        lab.process.kill()
+        wait_for(lambda: gone(porter))
+
+
+def answers(tg: Target) -> bool:
+    with suppress(NoAnswerError):
+        return bool(tg.Status)
+    return False
 
 
 @pytest.mark.slow

@@ -35,6 +35,7 @@ def test_a_unit_starts_at_boot_is_watched_and_may_use_real_time() -> None:
         "LimitRTPRIO": "99", "LimitMEMLOCK": "infinity", "CPUAffinity": "1 2",
         "Restart": "on-failure", "StateDirectory": "quadvis/lab1",
         "RuntimeDirectory": "quadvis/lab1", "Type": "notify", "KillMode": "control-group",
+        "OOMPolicy": "continue",
         "SuccessExitStatus": "143",
     }  # fmt: skip
     assert expected.items() <= service.items()

@@ -24,6 +24,7 @@ from quadvis.wire.limits import CONNECTIONS, HALF_OPEN, HANDSHAKE, REQUEST
 from quadvis.wire.meeting import meet
 from quadvis.wire.messages import read_reply
 from quadvis.wire.refusals import WireError
+from tests.processes import children
 from tests.quadvis.wire.rig import Rig, proxied, request, until
 from tests.quadvis.wire.target_process import PACKAGES
 from tests.stages import mostly_slow
@@ -207,9 +208,12 @@ class TargetProcess:
         return made
 
     def memory(self) -> float:
-        """Return the target's resident memory (MB)."""
-        text = Path(f"/proc/{self.process.pid}/statm").read_text(encoding="ascii")
-        return int(text.split()[1]) * os.sysconf("SC_PAGESIZE") / 1e6
+        """Return the resident memory of the target and its porter (MB)."""
+        (porter,) = children(self.process, b"porter_process")
+        texts = [
+            Path(f"/proc/{each}/statm").read_text(encoding="ascii") for each in (self.process.pid, porter)
+        ]
+        return sum(int(text.split()[1]) for text in texts) * os.sysconf("SC_PAGESIZE") / 1e6
 
     def close(self) -> None:
         assert self.process.stdin is not None and self.process.stdout is not None
@@ -291,6 +295,7 @@ def test_floods_of_all_kinds_are_bounded_in_memory_and_a_good_host_is_served(tar
     for attack in (requests, long_messages, too_long, connections, strangers):
         assert grown(target, good, attack) < ENOUGH, attack.__name__
     counts = good.request("status", 20)["wire"]["counts"]
+    assert "porters lost" not in counts
     assert counts["dropped"] > 100 and counts["turned away"] > 5 and counts["malformed"] > 0
     good.close()
 
