@@ -9,6 +9,16 @@ import { View } from "./view.js";
 
 const FAR = 0.45; // pixels of the screen for one unit, below which names are all that can be read
 
+/** Say how far below its place the name of a block is in its middle, if nothing but text is there. */
+function centre(block) {
+  const [outline, name] = [".outline", ".name"].map((each) => block.querySelector(`:scope > ${each}`));
+  const bare = [...block.children].every((each) => each.matches("title, .outline, .name, .kind, .port, .mark"));
+  if (!outline || !name || !bare) return;
+  const { y, height } = outline.getBBox();
+  const at = Number(name.getAttribute("y"));
+  if (at > y && at < y + height) name.style.setProperty("--down", `${y + height / 2 - at}px`);
+}
+
 export class Drawing {
   #blocks = new Map();
   #wires = [];
@@ -41,10 +51,12 @@ export class Drawing {
     }
     const layer = makeSvg("g", { class: "values" });
     content.append(layer);
-    this.labels = new Labels(layer, this.#wires, this.model);
+    const solid = svg.querySelectorAll(".block > .outline, .part > text");
+    this.labels = new Labels(layer, this.#wires, [...solid], this.model);
     this.frame.replaceChildren(svg);
     content.removeAttribute("transform");
     this.svg = svg;
+    blocks.forEach(centre);
     this.view.take(svg, content.getBBox());
     this.#scaled();
   }

@@ -8,6 +8,7 @@ const LARGEST = 27; // where the drawing is small on the screen
 const LEGIBLE = 9.5; // px of the screen
 const SCALAR = 10, VECTOR = 22; // characters for which a label keeps its place free
 const WIDTH = 0.56; // of a character, in sizes of the type
+const CELL = 120; // of the grid in which places are looked up
 
 /** Return the horizontal stretches of a line as [left, right, y], from its beginning. */
 function stretches(points) {
@@ -28,6 +29,18 @@ class Label {
     this.element = makeSvg("text", { class: "value", x: this.left + 4, y: this.y - 2.5 });
   }
 
+  /** Stand above the wire, or below it, wherever the place is free for type of a size; return the box, or null. */
+  settle(size, taken) {
+    const width = Math.min(this.right - this.left, (this.signal.shape.length ? VECTOR : SCALAR) * WIDTH * size);
+    const above = [this.left, this.y - size, this.left + width, this.y - 1];
+    const below = [this.left, this.y + 1, this.left + width, this.y + size];
+    const box = width > 3 * size ? [above, below].find((each) => taken.free(each)) : null;
+    this.element.setAttribute("y", box === below ? this.y + 0.9 * size : this.y - 2.5);
+    this.element.style.display = box ? "" : "none";
+    this.element.style.fontSize = `${size}px`;
+    return box ?? null;
+  }
+
   show(found, size) {
     const index = [...this.source.matchAll(/\[(\d+)\]/g)].map((match) => Number(match[1]));
     const chosen = index.reduce((inner, at) => inner?.[at], found);
@@ -41,13 +54,34 @@ class Label {
 
 const overlap = (one, other) => one[0] < other[2] && other[0] < one[2] && one[1] < other[3] && other[1] < one[3];
 
+/** Boxes, as [left, top, right, bottom], by the cells of a grid. */
+class Boxes {
+  #cells = new Map();
+
+  add(box) {
+    for (const key of this.#keys(box)) this.#cells.set(key, [...(this.#cells.get(key) ?? []), box]);
+  }
+
+  free(box) {
+    return this.#keys(box).every((key) => !this.#cells.get(key)?.some((other) => overlap(box, other)));
+  }
+
+  #keys([left, top, right, bottom]) {
+    const found = [];
+    for (let x = Math.floor(left / CELL); x <= right / CELL; x++) {
+      for (let y = Math.floor(top / CELL); y <= bottom / CELL; y++) found.push(`${x} ${y}`);
+    }
+    return found;
+  }
+}
+
 export class Labels {
   #labels = [];
   #size = 0;
 
-  /** Put a label beside the wires of each source; `wires` are their elements. */
-  constructor(layer, wires, model) {
-    this.model = model;
+  /** Put a label beside the wires of each source; `wires` are their elements, no label hides `solid` ones. */
+  constructor(layer, wires, solid, model) {
+    Object.assign(this, { solid, model });
     const places = new Map();
     for (const wire of wires) {
       const source = wire.dataset.source;
@@ -78,14 +112,11 @@ export class Labels {
     const size = Math.min(LARGEST, Math.max(SIZE, LEGIBLE / scale));
     if (Math.abs(size - this.#size) < 0.2) return;
     this.#size = size;
-    const taken = [];
+    const taken = new Boxes();
+    for (const { x, y, width, height } of this.solid.map((each) => each.getBBox())) taken.add([x, y, x + width, y + height]);
     for (const label of this.#labels) {
-      const width = Math.min(label.right - label.left, (label.signal.shape.length ? VECTOR : SCALAR) * WIDTH * size);
-      const box = [label.left, label.y - size, label.left + width, label.y];
-      const free = width > 3 * size && !taken.some((other) => overlap(box, other));
-      if (free) taken.push(box);
-      label.element.style.display = free ? "" : "none";
-      label.element.style.fontSize = `${size}px`;
+      const box = label.settle(size, taken);
+      if (box) taken.add(box);
     }
     this.update();
   }

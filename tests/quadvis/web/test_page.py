@@ -232,6 +232,32 @@ def test_a_phone_shows_state_and_stop_first_and_pans(
     assert browser.complaints == []
 
 
+def test_from_afar_names_stand_in_the_middle_and_no_value_hides_them(
+    browser: Browser, running: Running
+) -> None:
+    opened(browser, running)
+    browser.click_on("#start")
+    browser.until("[...document.querySelectorAll('.value')].filter((each) => each.textContent).length > 5")
+    assert browser.run("document.querySelector('#drawing svg').classList.contains('far')")
+    boxes = """(selector) => [...document.querySelectorAll(selector)].map((each) => {
+      const { left, right, top, bottom } = each.getBoundingClientRect();
+      return [left, right, top, bottom];
+    })"""
+    name, outline = (
+        browser.run(f"({boxes})('.block[data-path=\"control/roll\"] > .{each}')")[0]
+        for each in ("name", "outline")
+    )
+    middle, height = (outline[2] + outline[3]) / 2, outline[3] - outline[2]
+    assert abs((name[2] + name[3]) / 2 - middle) < 0.15 * height
+    solid = browser.run(f"({boxes})('.block > .outline, .part > text')")
+    values = [box for box in browser.run(f"({boxes})('.value')") if box[1] > box[0]]
+    assert len(values) > 5
+    for left, right, top, bottom in values:
+        most = top + 0.3 * (bottom - top), bottom - 0.3 * (bottom - top)  # type is less high than its box
+        for begin, end, upper, lower in solid:
+            assert right <= begin or left >= end or most[1] <= upper or most[0] >= lower
+
+
 def test_a_drawing_brings_no_script_into_the_page(
     browser: Browser, running: Running, target: StandIn
 ) -> None:
