@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import functools
 from typing import Any
 
 from quadvis.cli import commands, wire
@@ -176,8 +177,9 @@ a target. All is kept in $QUADVIS_HOME, else in $XDG_CONFIG_HOME/quadvis or ~/.c
 never leaves it."""
 
 
+@functools.cache
 def parser() -> Parser:
-    """Return the parser of all commands and their options."""
+    """Return the parser of all commands and their options, which a console asks for at every line."""
     made = Parser(prog="quadvis", description="Block diagrams in YAML that fly a four-rotor craft.")
     made.add_argument("--version", action="version", version=f"quadvis {__version__}")
     subparsers = made.add_subparsers(required=True, metavar="COMMAND")

@@ -35,10 +35,22 @@ MISSING = 0.123  # stands for NaN
 DEVICES, PROGRAM = "devices", "program"
 
 
-def every_case() -> Iterator[tuple[str, str | None, str]]:
-    """Yield every diagram by itself and with each of its variants, and what it needs that tests may lack."""
+@cache
+def parsed(path: Path) -> dict[str, Any]:
+    """Return what a YAML file says, which nobody changes."""
+    data: dict[str, Any] = yaml.load(path.read_text(), yaml.CSafeLoader)
+    return data
+
+
+@cache
+def every_case() -> tuple[tuple[str, str | None, str], ...]:
+    """Return every diagram by itself and with each of its variants, and what it needs that tests may lack."""
+    return tuple(_every_case())
+
+
+def _every_case() -> Iterator[tuple[str, str | None, str]]:
     for path in sorted(DIAGRAMS.glob("*.yaml")):
-        data = yaml.load(path.read_text(), yaml.CSafeLoader)
+        data = parsed(path)
         variants, blocks = data.get("variants", {}), data.get("blocks", {})
         yield path.name, None, need(blocks.values())
         for name, variant in variants.items():
@@ -62,25 +74,21 @@ def kinds(blocks: Iterable[dict[str, Any]], folder: Path = DIAGRAMS) -> Iterator
     for block in blocks:
         if "part" in block:
             part = folder / block["part"]
-            inside = yaml.load(part.read_text(), yaml.CSafeLoader)["blocks"]
-            yield from kinds(inside.values(), part.parent)
+            yield from kinds(parsed(part)["blocks"].values(), part.parent)
         else:
             yield block["block"]
 
 
-@cache
 def cases() -> tuple[tuple[str, str | None], ...]:
     """Return every diagram that can be simulated anywhere, by itself and with each of its variants."""
     return needing("")
 
 
-@cache
 def with_programs() -> tuple[tuple[str, str | None], ...]:
     """Return those that fly with a program of somebody else; the golden file has their hashes alone."""
     return needing(PROGRAM)
 
 
-@cache
 def on_devices() -> tuple[tuple[str, str | None], ...]:
     """Return the variants with devices, which run in real time alone."""
     return needing(DEVICES)
