@@ -61,8 +61,8 @@ def send_to_plotjuggler(
         follower = Follower(target, names, sender, say)
         sender.want = follower.want
         try:
-            say(f"{target.name} goes to {address}: start 'UDP Server' there, {encoding} with its timestamp")
             follower.open()
+            say(f"{target.name} goes to {address}: start 'UDP Server' there, {encoding} with its timestamp")
             follower.run()
         finally:
             follower.close()

@@ -18,7 +18,7 @@ TUNE = "write 'quadvis tune FILE --minimise NUMBER --over NAME=FROM..TO'"
 COMMANDS = (
     "run, replay, sweep, tune, check, list, describe, analyse, identify, draw, export, program, diff, merge, "
     "fmt, plot, schema, completion, camera, cache, target, load, start, stop, unload, status, get, set, "
-    "scope, log, sets, profile, web, console, new, keys, wire"
+    "scope, log, sets, profile, web, bridge, console, new, keys, wire"
 )
 
 
