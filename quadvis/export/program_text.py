@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import groupby
+from itertools import accumulate, groupby
 
 import numpy as np
+from numpy.typing import NDArray
 
+from quadvis.engine.events import LOCATED, MOST, PARTS, TRIES
 from quadvis.engine.program import COPY, Op, Program, TaskProgram
 from quadvis.export.c_types import real
 from quadvis.export.selection import HELD
@@ -18,8 +20,13 @@ SLOT = 8
 _LETTERS = {INPUT: "i", OUTPUT: "o"}
 
 
-def program_header(program: Program, variables: Sequence[ExportedVariable], token: str) -> str:
-    """Return program.h: what the other files need to know of a program."""
+def program_header(
+    program: Program, variables: Sequence[ExportedVariable], sizes: Sequence[int], token: str
+) -> str:
+    """Return program.h: what the other files need to know of a program.
+
+    ``sizes`` are the numbers of values by which the blocks with events say where these are.
+    """
     settable = sum(len(each.slots) for each in variables if each.role != OUTPUT)
     held = len(_held(program))
     numerator, denominator = program.period.as_integer_ratio()
@@ -30,6 +37,8 @@ def program_header(program: Program, variables: Sequence[ExportedVariable], toke
         "STATES": len(program.states),
         "HELD": held,
         "STAGES": len(stage_numbers(program.solver, float(program.period))) if program.states else 0,
+        "EVENTS": len(sizes),
+        "VALUES": sum(sizes),
         "PERIOD_ABOVE": f"INT64_C({numerator})",
         "PERIOD_BELOW": f"INT64_C({denominator})",
     }
@@ -38,17 +47,29 @@ def program_header(program: Program, variables: Sequence[ExportedVariable], toke
 
 
 def program_calls(
-    program: Program, variables: Sequence[ExportedVariable], names: Mapping[tuple[int, str], str]
-) -> str:
+    program: Program, variables: Sequence[ExportedVariable], names: Mapping[tuple[int, str], str],
+    sizes: Sequence[int],
+) -> str:  # fmt: skip
     """Return calls.h. ``names`` are the C functions by the number of a block and its method."""
-    return "\n".join([*_tables(program, variables), *_Calls(program, names).lines()]) + "\n"
+    lines = [*_tables(program, variables), *_Calls(program, names).lines()]
+    if sizes:
+        lines += [*_event_tables(program, sizes), *_Calls(program, names).events(sizes)]
+    return "\n".join(lines) + "\n"
+
+
+def _event_tables(program: Program, sizes: Sequence[int]) -> Iterator[str]:
+    limits = {"LOCATED": real(LOCATED), "MOST": MOST, "PARTS": PARTS, "TRIES": TRIES}
+    yield from (f"#define {name} {value}" for name, value in limits.items())
+    yield f"static const int64_t event_sizes[EVENTS] = {_whole(sizes)};"
+    yield f"static const int32_t first_value[EVENTS + 1] = {_whole([0, *accumulate(sizes)])};"
+    yield f"static const double formula_step = {real(float(program.period))};"
+    yield f"static const double formula[STAGES][3] = {_rows(stage_numbers(program.solver, 1.0))};"
 
 
 def _held(program: Program) -> list[int]:
     """Return the slots over which minor steps write."""
-    return [
-        slot.position + index for op in program.minor for slot in op.targets for index in range(slot.size)
-    ]
+    ops = dict.fromkeys((*program.minor, *(program.renewed if program.states else ())))
+    return [slot.position + index for op in ops for slot in op.targets for index in range(slot.size)]
 
 
 def _tables(program: Program, variables: Sequence[ExportedVariable]) -> Iterator[str]:
@@ -68,8 +89,12 @@ def _tables(program: Program, variables: Sequence[ExportedVariable]) -> Iterator
     yield f"static const int32_t slope_slots[STATES + 1] = {_whole(program.slopes)};"
     yield f"static const int32_t held_slots[HELD + 1] = {_whole(_held(program))};"
     numbers = stage_numbers(program.solver, float(program.period)) if program.states else np.zeros((0, 3))
-    stages = [f"{{{', '.join(map(real, row))}}}" for row in numbers.tolist()]
-    yield f"static const double stages[STAGES + 1][3] = {{{', '.join(stages) or '{0.0, 0.0, 0.0}'}}};"
+    yield f"static const double stages[STAGES + 1][3] = {_rows(numbers)};"
+
+
+def _rows(numbers: NDArray[np.float64]) -> str:
+    rows = [f"{{{', '.join(map(real, row))}}}" for row in numbers.tolist()]
+    return f"{{{', '.join(rows) or '{0.0, 0.0, 0.0}'}}}"
 
 
 def _whole(numbers: Iterable[int]) -> str:
@@ -101,6 +126,22 @@ class _Calls:
         yield from self._function("minor", [(None, self._op(op)) for op in program.minor])
         yield from self._function("derivatives", [(None, self._op(op)) for op in program.derivatives])
 
+    def events(self, sizes: Sequence[int]) -> Iterator[str]:
+        """Yield the functions that steps with events call; ``sizes`` as in `program_header`."""
+        program = self._program
+        yield "static int call_crossings(Model *m, double *found) {"
+        for number, op in enumerate(program.crossings):
+            first = sum(sizes[:number])
+            yield f"    {self._op(op, f'(char *)&event_sizes[{number}]', f'(char *)&found[{first}]')}"
+        yield "    return 0;"
+        yield "}"
+        yield "static int call_event(Model *m, int number) {"
+        for number, op in enumerate(program.events):
+            yield f"    if (number == {number}) {self._op(op)}"
+        yield "    return 0;"
+        yield "}"
+        yield from self._function("renewed", [(None, self._op(op)) for op in program.renewed])
+
     def _function(self, name: str, calls: Sequence[tuple[TaskProgram | None, str]]) -> Iterator[str]:
         """Yield a function that makes calls, each when its task is due."""
         yield f"static int call_{name}(Model *m) {{"
@@ -123,12 +164,13 @@ class _Calls:
         block = self._program.blocks[number]
         return f'CALL({_text(block.path)}, "start", {name}, at(m, {block.position}));' if name else ""
 
-    def _op(self, op: Op) -> str:
+    def _op(self, op: Op, *targets: str) -> str:
+        """Return a call; ``targets`` are addresses outside of memory to which it writes."""
         block = self._program.blocks[op.block]
         if block.kind == FROM_OUTSIDE:
             return self._copy(op._replace(sources=(block.field(HELD),)))
         places = [block.position, *(slot.position for slot in (*op.sources, *op.targets))]
-        arguments = ", ".join(f"at(m, {place})" for place in places)
+        arguments = ", ".join([*(f"at(m, {place})" for place in places), *targets])
         return f'CALL({_text(block.path)}, "{op.method}", {self._names[op.block, op.method]}, {arguments});'
 
     @staticmethod
