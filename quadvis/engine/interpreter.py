@@ -386,6 +386,11 @@ class Interpreter:
         except Exception as error:
             raise MinorError(self.call(op), error) from error
 
+    @np.errstate(all="ignore")  # as in a run
+    def crossing_size(self, op: Op) -> int:
+        """Return how many values a ``crossing`` gives; MinorError if it fails now."""
+        return int(np.size(self.asked(op)))
+
 
 class MinorError(Exception):
     """A block failed at a minor step."""

@@ -80,7 +80,8 @@ def _kinds(program: Program, blocks: Sequence[Block]) -> Iterator[tuple[int, lis
     """Yield the types of each block: that of its calls, and one of its ``start``. Inputs are only copied."""
     calls: dict[int, list[Op]] = {number: [] for number in range(len(blocks))}
     phases = [phase for task in program.tasks for phase in task.phases.values()]
-    for op in chain.from_iterable((*phases, program.derivatives)):
+    between = (program.derivatives, program.crossings, program.events) if program.states else ()
+    for op in chain.from_iterable((*phases, *between)):
         if op.method != COPY and program.blocks[op.block].kind != INPUT:
             calls[op.block].append(op)
     for number, ops in calls.items():

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from quadvis.diagram.diagram import Diagram
 from quadvis.engine.engine import Engine
+from quadvis.engine.interpreter import MinorError
 from quadvis.errors import QuadvisError
 from quadvis.export.blocks import Announce, block_code
 from quadvis.export.description_text import SOURCES, Facts, build_description, model_description
@@ -57,16 +58,17 @@ def export_fmu(
     named = variables_of(selection, engine)
     variables = _scalars(named) if version == 2 else named
     code = block_code(engine.program, [node.block for node in selection.graph.nodes], announce)
-    undone = undone_slots(engine.program, selection.graph)
+    undone, sizes = undone_slots(engine.program, selection.graph), _crossing_sizes(engine)
     sources = {
         "blocks.h": code.text,
-        "calls.h": program_calls(engine.program, variables, undone, code.names),
+        "calls.h": program_calls(engine.program, variables, undone, code.names, sizes),
         "model.h": (C / "model.h").read_text(encoding="utf-8"),
+        **({"events.h": (C / "events.h").read_text(encoding="utf-8")} if sizes else {}),
         "steps.c": (C / "steps.c").read_text(encoding="utf-8"),
         f"fmi{version}.c": (C / f"fmi{version}.c").read_text(encoding="utf-8"),
     }
     facts = _facts(diagram, name, version, sources, float(engine.program.tasks[0].period))
-    sources["program.h"] = program_header(engine.program, variables, undone, facts.token)
+    sources["program.h"] = program_header(engine.program, variables, undone, sizes, facts.token)
     library = facts.identifier + library_suffix()
     if announce:
         announce("compiling the FMU")
@@ -85,6 +87,20 @@ def export_fmu(
         role: tuple(each.name for each in named if each.role == role) for role in (INPUT, OUTPUT, PARAMETER)
     }
     return ExportedFmu(Path(path), version, roles[INPUT], roles[OUTPUT], roles[PARAMETER], facts.step)
+
+
+def _crossing_sizes(engine: Engine) -> list[int]:
+    """Return how many values the ``crossing`` of each block gives; none without a solver's step."""
+    program, found = engine.program, list[int]()
+    interpreter = engine.apart(program)
+    for op in program.crossings if program.states else ():
+        try:
+            found.append(interpreter.crossing_size(op))
+        except MinorError as failure:
+            path = program.blocks[op.block].path
+            problem = f"block '{path}' cannot be exported: its crossing fails at the start: {failure.error}"
+            raise QuadvisError(problem) from failure
+    return found
 
 
 def _scalars(variables: Sequence[ExportedVariable]) -> list[ExportedVariable]:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import groupby
+from itertools import accumulate, groupby
 
 import numpy as np
+from numpy.typing import NDArray
 
+from quadvis.engine.events import LOCATED, MOST, NEVER, PARTS, TRIES
 from quadvis.engine.memory import Slot
 from quadvis.engine.program import COPY, RESET, Op, Program, TaskProgram
 from quadvis.export.c_types import real
@@ -21,9 +23,16 @@ _LETTERS = {INPUT: "i", OUTPUT: "o"}
 
 
 def program_header(
-    program: Program, variables: Sequence[ExportedVariable], undone: Sequence[int], token: str
+    program: Program,
+    variables: Sequence[ExportedVariable],
+    undone: Sequence[int],
+    sizes: Sequence[int],
+    token: str,
 ) -> str:
-    """Return program.h: what the other files need to know of a program."""
+    """Return program.h: what the other files need to know of a program.
+
+    ``sizes`` are the numbers of values by which the blocks with events say where these are.
+    """
     settable = sum(len(each.slots) for each in variables if each.role != OUTPUT)
     held = len(_held(program))
     numerator, denominator = program.period.as_integer_ratio()
@@ -35,6 +44,8 @@ def program_header(
         "HELD": held,
         "UNDONE": len(undone),
         "STAGES": len(stage_numbers(program.solver, float(program.period))) if program.states else 0,
+        "EVENTS": len(sizes),
+        "VALUES": sum(sizes),
         "PERIOD_ABOVE": f"INT64_C({numerator})",
         "PERIOD_BELOW": f"INT64_C({denominator})",
     }
@@ -47,16 +58,28 @@ def program_calls(
     variables: Sequence[ExportedVariable],
     undone: Sequence[int],
     names: Mapping[tuple[int, str], str],
+    sizes: Sequence[int],
 ) -> str:
     """Return calls.h. ``names`` are the C functions by the number of a block and its method."""
-    return "\n".join([*_tables(program, variables, undone), *_Calls(program, names).lines()]) + "\n"
+    lines = [*_tables(program, variables, undone), *_Calls(program, names).lines()]
+    if sizes:
+        lines += [*_event_tables(program, sizes), *_Calls(program, names).events(sizes)]
+    return "\n".join(lines) + "\n"
+
+
+def _event_tables(program: Program, sizes: Sequence[int]) -> Iterator[str]:
+    limits = {"LOCATED": real(LOCATED), "MOST": MOST, "PARTS": PARTS, "TRIES": TRIES, "NEVER": real(NEVER)}
+    yield from (f"#define {name} {value}" for name, value in limits.items())
+    yield f"static const int64_t event_sizes[EVENTS] = {_whole(sizes)};"
+    yield f"static const int32_t first_value[EVENTS + 1] = {_whole([0, *accumulate(sizes)])};"
+    yield f"static const double formula_step = {real(float(program.period))};"
+    yield f"static const double formula[STAGES][3] = {_rows(stage_numbers(program.solver, 1.0))};"
 
 
 def _held(program: Program) -> list[int]:
     """Return the slots over which minor steps write."""
-    return [
-        slot.position + index for op in program.minor for slot in op.targets for index in range(slot.size)
-    ]
+    ops = dict.fromkeys((*program.minor, *(program.renewed if program.states else ())))
+    return [slot.position + index for op in ops for slot in op.targets for index in range(slot.size)]
 
 
 def undone_slots(program: Program, graph: Graph) -> list[int]:
@@ -91,8 +114,12 @@ def _tables(program: Program, variables: Sequence[ExportedVariable], undone: Seq
     yield f"static const int32_t held_slots[HELD + 1] = {_whole(_held(program))};"
     yield f"static const int32_t undone_slots[UNDONE + 1] = {_whole(undone)};"
     numbers = stage_numbers(program.solver, float(program.period)) if program.states else np.zeros((0, 3))
-    stages = [f"{{{', '.join(map(real, row))}}}" for row in numbers.tolist()]
-    yield f"static const double stages[STAGES + 1][3] = {{{', '.join(stages) or '{0.0, 0.0, 0.0}'}}};"
+    yield f"static const double stages[STAGES + 1][3] = {_rows(numbers)};"
+
+
+def _rows(numbers: NDArray[np.float64]) -> str:
+    rows = [f"{{{', '.join(map(real, row))}}}" for row in numbers.tolist()]
+    return f"{{{', '.join(rows) or '{0.0, 0.0, 0.0}'}}}"
 
 
 def _whole(numbers: Iterable[int]) -> str:
@@ -124,6 +151,24 @@ class _Calls:
         yield from self._function("minor", [(None, self._op(op)) for op in program.minor])
         yield from self._function("derivatives", [(None, self._op(op)) for op in program.derivatives])
 
+    def events(self, sizes: Sequence[int]) -> Iterator[str]:
+        """Yield the functions that steps with events call; ``sizes`` as in `program_header`."""
+        program = self._program
+        yield "static int call_crossings(Model *m, double *found) {"
+        for number, op in enumerate(program.crossings):
+            size, first = sizes[number], sum(sizes[:number])
+            never = f"for (int k = 0; k < {size}; k++) found[{first} + k] = NEVER;"
+            call = self._op(op, f"(char *)&event_sizes[{number}]", f"(char *)&found[{first}]", rests=never)
+            yield f"    {call}"
+        yield "    return 0;"
+        yield "}"
+        yield "static int call_event(Model *m, int number) {"
+        for number, op in enumerate(program.events):
+            yield f"    if (number == {number}) {self._op(op)}"
+        yield "    return 0;"
+        yield "}"
+        yield from self._function("renewed", [(None, self._op(op)) for op in program.renewed])
+
     def _function(self, name: str, calls: Sequence[tuple[TaskProgram | None, str]]) -> Iterator[str]:
         """Yield a function that makes calls, each when its task is due."""
         yield f"static int call_{name}(Model *m) {{"
@@ -146,21 +191,25 @@ class _Calls:
         block = self._program.blocks[number]
         return f'CALL({_text(block.path)}, "start", {name}, at(m, {block.position}));' if name else ""
 
-    def _op(self, op: Op) -> str:
+    def _op(self, op: Op, *targets: str, rests: str = "") -> str:
+        """Return a call; ``targets`` are addresses outside of memory to which it writes.
+
+        ``rests`` is what happens in its place while the block does not run.
+        """
         block = self._program.blocks[op.block]
         if block.kind == FROM_OUTSIDE:
             return self._copy(op._replace(sources=(block.field(HELD),)))
         if op.method == RESET:
             return self._reset(op)
         places = [block.position, *(slot.position for slot in (*op.sources, *op.targets))]
-        arguments = ", ".join(f"at(m, {place})" for place in places)
+        arguments = ", ".join([*(f"at(m, {place})" for place in places), *targets])
         name = self._names[op.block, op.method]
         call = f'CALL({_text(block.path)}, "{op.method}", {name}, {arguments});'
         gate = self._program.gate(op.block)
         if gate is None:
             return call
-        zeros = _zeros(op.targets) if op.method == "deriv" else ""
-        return f"if (*at(m, {gate.position})) {call}" + (f" else {{ {zeros} }}" if zeros else "")
+        rests = _zeros(op.targets) if op.method == "deriv" else rests
+        return f"if (*at(m, {gate.position})) {call}" + (f" else {{ {rests} }}" if rests else "")
 
     def _reset(self, op: Op) -> str:
         """Return what sets the states under a condition back, if it says so."""

@@ -41,15 +41,6 @@ def compile_block(kind: BlockType, prefix: str) -> MachineCode:
     except (Unreadable, Unlinkable, NotImplementedError, numba.core.errors.NumbaError) as error:
         failed = next((method.name for method in kind.methods if method.name not in compiled), "")
         return _refused(f"method '{failed}'" if failed else "", error)
-    except KeyError as error:  # numba's, for what is no field of the record
-        failed = next((method.name for method in kind.methods if method.name not in compiled), "")
-        known = hasattr(kind.block, str(error.args[0]))
-        if not known:
-            raise
-        problem = (
-            f"it calls self.{error.args[0]}, which only Python can; call a plain function that takes self"
-        )
-        return MachineCode(refusal=f"method '{failed}': {problem}")
 
 
 def _refused(where: str, error: Exception) -> MachineCode:
@@ -70,7 +61,14 @@ def compiled_methods(kind: BlockType) -> Iterator[tuple[str, Compiled]]:
             pointer(numba.from_dtype(kind.record.dtype)),
             *(pointer(_pointed(each)) for each in (*method.arguments, *method.results)),
         ]
-        yield method.name, compile_function(_wrapper(method, body), pointers)
+        try:
+            compiled = compile_function(_wrapper(method, body), pointers)
+        except KeyError as error:  # numba's, for what is no field of the record
+            if not hasattr(kind.block, str(error.args[0])):
+                raise
+            remedy = "which only Python can; call a plain function that takes self"
+            raise NotImplementedError(f"it calls self.{error.args[0]}, {remedy}") from error
+        yield method.name, compiled
 
 
 def compile_functions(functions: Sequence[NativeFunction], prefix: str) -> MachineCode:

@@ -26,9 +26,7 @@ class EventTables:
         from quadvis.native.library import library
 
         self._interpreter, self._program = interpreter, interpreter.program
-        with np.errstate(all="ignore"):
-            values = [np.asarray(interpreter.asked(op)) for op in self._program.crossings]
-        self._sizes = np.array([each.size for each in values], np.int64)
+        self._sizes = np.array([interpreter.crossing_size(op) for op in self._program.crossings], np.int64)
         self._begins = np.cumsum(self._sizes) - self._sizes
         self._room = np.zeros((3, int(self._sizes.sum())))  # present, found, above
         self.step = library().routine(event_step.EVENT_STEP)  # its address

@@ -46,13 +46,20 @@ static int fell(Model *m, const char *block, const char *fallback, const char *e
     if (!finite_at(m, first, count)) return failed(m, block, "port '" port "': the output is not finite")
 #include "calls.h"
 
-/* One step of the solver, with its operations in the order in which quadvis does them. */
-static int integrate(Model *m) {
-    double begin[STATES + 1], sum[STATES + 1];
-    uint64_t kept[HELD + 1];
-    const double time = real_at(m, 0);
-    if (STATES == 0) return 0;
-    for (int k = 0; k < HELD; k++) kept[k] = m->state.memory[held_slots[k]];
+#if EVENTS
+#include "events.h"
+
+/* Let `sum` be the states one step later. */
+static int stepped(Model *m, double time, double *sum) {
+    Events events;
+    if (advance(m, &events, time)) return 1;
+    memcpy(sum, events.state, sizeof events.state);
+    return 0;
+}
+#else
+/* Let `sum` be the states one step later, with the operations in the order in which quadvis does them. */
+static int stepped(Model *m, double time, double *sum) {
+    double begin[STATES + 1];
     for (int k = 0; k < STATES; k++) begin[k] = sum[k] = real_at(m, state_slots[k]);
     for (int stage = 0; stage < STAGES; stage++) {
         if (stage > 0) {
@@ -66,6 +73,18 @@ static int integrate(Model *m) {
             sum[k] += stages[stage][2] * slope;
         }
     }
+    return 0;
+}
+#endif
+
+/* One step of the solver. */
+static int integrate(Model *m) {
+    double sum[STATES + 1];
+    uint64_t kept[HELD + 1];
+    const double time = real_at(m, 0);
+    if (STATES == 0) return 0;
+    for (int k = 0; k < HELD; k++) kept[k] = m->state.memory[held_slots[k]];
+    if (stepped(m, time, sum)) return 1;
     put(m, 0, time);
     for (int k = 0; k < HELD; k++) m->state.memory[held_slots[k]] = kept[k];
     for (int k = 0; k < STATES; k++) put(m, state_slots[k], sum[k]);

@@ -92,6 +92,48 @@ def test_fmpy_finds_no_problem_and_simulates_it_to_our_bits(
         assert np.array_equal(found[name][::every], ours[name]), name
 
 
+SLIDING = """\
+quadvis: 1
+name: sliding
+solver: {method: ode4, step: 20 ms}
+stop_time: 2 s
+blocks:
+  mass:
+    block: plant.sliding_mass
+    with: {mass: 2 kg, coulomb: 3 N, breakaway: 5 N, surface: 0.2 m/s}
+    in: {force: spring.y}
+  spring: {block: signal.gain, rate: continuous, with: {factor: -50 N/m}, in: {u: mass.x}}
+  ball:
+    block: signal.second_order_integrator
+    with: {initial: 1 m, lower: 0 m, restitution: 0.7}
+    in: {u: -9.81 m/s^2}
+  relay:
+    block: signal.relay
+    rate: continuous
+    with: {on_at: 0.11 m, off_at: -0.11 m, on_value: -1 m/s, off_value: 1 m/s}
+    in: {u: place.y}
+  place: {block: signal.integrator, in: {u: relay.y}}
+"""
+
+
+@BOTH
+def test_events_between_ticks_have_our_bits(version: int, tmp_path: Path) -> None:
+    diagram = load_text(SLIDING)
+    diagram.export_fmu(".", tmp_path / "sliding.fmu", version=version)
+    found, ours = by_fmpy(tmp_path / "sliding.fmu", 2.0, 0.02), diagram.run(keep=("*",))
+    for name in ("mass.x", "mass.v", "mass.mode", "ball.x", "ball.v", "relay.y", "place.y"):
+        assert np.array_equal(found[name], ours[name]), name
+    assert set(ours["mass.mode"].tolist()) == {-1, 0}
+
+
+@pytest.mark.slow
+def test_chatter_ends_the_simulation_of_an_fmu(tmp_path: Path) -> None:
+    text = SLIDING.replace("on_at: 0.11 m, off_at: -0.11 m", "on_at: 1e-5 m, off_at: -1e-5 m")
+    load_text(text).export_fmu(".", tmp_path / "chatter.fmu")
+    with pytest.raises(RunError, match="more events within one step than can be meant"):
+        drive(Fmu(file=str(tmp_path / "chatter.fmu"), isolation="none"), rate="20 ms", steps=5)
+
+
 @BOTH
 def test_our_own_block_gives_the_same_bits(version: int, whole: dict[int, Path], loop: Diagram) -> None:
     block = Fmu(file=str(whole[version]), isolation="none")
