@@ -115,6 +115,19 @@ blocks:
   place: {block: signal.integrator, in: {u: relay.y}}
 """
 
+AT_TIMES = """\
+rates: {slow: 5 Hz}
+"""
+UNDER_A_CONDITION = """\
+  on: {block: sources.clock, rate: slow}
+  runs: {block: logic.compare, rate: slow, with: {operator: "<"}, in: {a: on.y, b: 1.3 s}}
+  caught:
+    block: signal.second_order_integrator
+    when: {from: runs.y, across: hold}
+    with: {initial: 1 m, lower: 0 m, restitution: 0.7}
+    in: {u: -9.81 m/s^2}
+"""
+
 
 @BOTH
 def test_events_between_ticks_have_our_bits(version: int, tmp_path: Path) -> None:
@@ -124,6 +137,16 @@ def test_events_between_ticks_have_our_bits(version: int, tmp_path: Path) -> Non
     for name in ("mass.x", "mass.v", "mass.mode", "ball.x", "ball.v", "relay.y", "place.y"):
         assert np.array_equal(found[name], ours[name]), name
     assert set(ours["mass.mode"].tolist()) == {-1, 0}
+
+
+def test_no_event_comes_while_a_block_does_not_run(tmp_path: Path) -> None:
+    head, blocks = SLIDING.split("blocks:\n")
+    diagram = load_text(f"{head}{AT_TIMES}blocks:\n{blocks}{UNDER_A_CONDITION}")
+    diagram.export_fmu(".", tmp_path / "caught.fmu")
+    found, ours = by_fmpy(tmp_path / "caught.fmu", 2.0, 0.02), diagram.run(keep=("*",))
+    for name in ("caught.x", "caught.v", "ball.x"):
+        assert np.array_equal(found[name], ours[name]), name
+    assert len(set(ours["caught.x"][70:].tolist())) == 1 < len(set(ours["caught.x"][:60].tolist()))
 
 
 @pytest.mark.slow
