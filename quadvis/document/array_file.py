@@ -113,13 +113,9 @@ def _npz(data: bytes) -> Mapping[str, Any]:
 
 
 def _mat(data: bytes) -> Mapping[str, Any]:
-    if data[:10] == b"MATLAB 7.3":
-        raise QuadvisError(sentence("it is of version 7.3", "save it with '-v7'"))
-    from scipy.io import loadmat
+    from quadvis.document.mat_files import read_mat_arrays  # numpy is not needed to read a diagram
 
-    found: dict[str, Any] = loadmat(io.BytesIO(data))
-    arrays = {name: array for name, array in found.items() if hasattr(array, "dtype")}
-    return {name: array for name, array in arrays.items() if array.dtype.kind in "biufc"}
+    return read_mat_arrays(data)
 
 
 def _yaml(data: bytes) -> Mapping[str, Any]:

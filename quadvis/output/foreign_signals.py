@@ -22,11 +22,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quadvis.document.mat_files import read_mat
 from quadvis.errors import QuadvisError, quoted
 from quadvis.machine.inputs import read_input
 from quadvis.output.foreign_recording import KINDS, ForeignSignals
 from quadvis.output.log_reader import Log, is_foreign, read_log
-from quadvis.output.mat_files import read_mat
 from quadvis.output.ros_signals import read_messages
 from quadvis.output.stretch import NANOSECONDS
 from quadvis.units import Unit, UnitError

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import contextlib
 import re
+import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
+import hdf5storage
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.io import savemat
 
+from quadvis.api import load_text
 from quadvis.document.array_file import chosen, read_arrays
 from quadvis.errors import QuadvisError
 
@@ -46,6 +49,55 @@ def test_arrays_have_names(name: str, tmp_path: Path) -> None:
         chosen(found, None)
 
 
+def _both(folder: Path, arrays: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return what is read of arrays as scipy writes them in version 5, and hdf5storage in 7.3."""
+    savemat(folder / "5.mat", arrays)
+    path = str(folder / "7.mat")
+    hdf5storage.savemat(path, arrays, format="7.3", oned_as="row", store_python_metadata=False)
+    return [dict(read_arrays(str(folder / name))) for name in ("5.mat", "7.mat")]
+
+
+def test_matlab_7_3_gives_what_earlier_versions_give(tmp_path: Path) -> None:
+    arrays = {
+        "K": K, "row": K[:1], "column": K[:, :1], "one": np.array([[3.5]]), "v": K[0],
+        "poles": np.array([[-1 + 2j, -1 - 2j]]), "cube": np.arange(24.0).reshape(2, 3, 4),
+        "whole": np.array([[1, 2]], np.int16), "on": np.array([[True, False]]),
+        "title": "gains", "inner": {"x": 1.0},
+    }  # fmt: skip
+    early, late = _both(tmp_path, arrays)
+    assert set(early) == set(late) == set(arrays) - {"title", "inner"}
+    for name in late:
+        assert early[name].dtype == late[name].dtype, name
+        assert np.array_equal(early[name], late[name]), name
+    assert np.array_equal(late["K"], K) and late["one"].shape == (1, 1)
+
+
+def test_a_diagram_takes_a_matrix_from_a_file_of_matlab_7_3(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    _both(tmp_path, {"K": K, "other": K[0]})
+    text = """
+quadvis: 1
+name: gains
+rates: {fast: 10 Hz}
+stop_time: 1 s
+blocks:
+  u: {block: sources.constant, rate: fast, with: {value: {value: [1, 2, 3], unit: m}}}
+  y: {block: math.matrix_gain, rate: fast, with: {gain: {file: 7.mat, name: K, unit: N/m}}, in: {u: u.y}}
+"""
+    result = load_text(text).run(engine="python")
+    assert result["y.y"][-1] == pytest.approx(K @ [1, 2, 3])
+
+
+def test_version_7_3_needs_h5py(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _both(tmp_path, {"K": K})
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(QuadvisError, match=r"needs the package h5py; install 'quadvis\[hdf5\]', or save"):
+        read_arrays(str(tmp_path / "7.mat"))
+    assert np.array_equal(read_arrays(str(tmp_path / "5.mat"))["K"], K)
+
+
 @pytest.mark.parametrize("name", ["k.npy", "k.csv"])
 def test_a_single_array_needs_no_name(name: str, tmp_path: Path) -> None:
     assert np.array_equal(chosen(read_arrays(_write(tmp_path, name)), None), K)
@@ -71,7 +123,8 @@ def test_tables_have_columns_by_name(separator: str, tmp_path: Path) -> None:
         ("k.csv", b"", "its lines are not equally long rows of numbers"),
         ("k.npy", b"\x93NUMPY", "it is no .npy file that can be read: ValueError"),
         ("k.npz", b"PK", "it is no .npz file that can be read: BadZipFile"),
-        ("k.mat", b"MATLAB 7.3 MAT-file, ", "it is of version 7.3; save it with '-v7'"),
+        ("k.mat", b"secret", "it is no .mat file that can be read: "),
+        ("k.mat", b"\x89HDF\r\n\x1a\n secret", "it is no .mat file that can be read: "),
         ("k.yaml", b"a: [1, secret]\n", "it has no lists of numbers under names"),
         ("k.yaml", b"a: [[1, 2], [3]]\n", "it has no lists of numbers under names"),
     ],

@@ -236,7 +236,7 @@ def test_any_bytes_are_read_or_refused_in_a_sentence(data: bytes, suffix: str, t
         ("x.csv", "t,a\nnan,1\n", "'t' has times that are no numbers"),
         ("x.parquet", "t,a\n", "this is no Parquet file that can be read"),
         ("x.npz", "t,a\n", "this is no file of numpy.savez that can be read"),
-        ("x.mat", "t,a\n", "this is no file of MATLAB that can be read"),
+        ("x.mat", "t,a\n", "it is no .mat file that can be read"),
     ],
 )
 def test_what_is_wrong_in_a_file_gets_a_sentence(name: str, text: str, sentence: str, tmp_path: Path) -> None:

@@ -1,8 +1,11 @@
-"""MATLAB's files as arrays and dicts by name: versions 5 to 7 by scipy, 7.3 (HDF5) by h5py."""
+"""MATLAB's files as arrays and dicts by name: versions 5 to 7 by scipy, 7.3 (HDF5) by h5py.
+
+All that quadvis reads of such a file, recordings and matrices, it reads here.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from io import BytesIO
 from typing import Any
 
@@ -15,23 +18,40 @@ PLACES = (0, 512)  # of its signature: MATLAB writes a head of its own before it
 MOST_SIZE = 1 << 31  # bytes of all arrays
 LEAST = 1024  # bytes that each counts for: references can lead to one array again and again
 DEEPEST = 16  # structures inside of structures
-CLASS = "MATLAB_class"
+CLASS, EMPTY = "MATLAB_class", "MATLAB_empty"
+COMPLEX = ("real", "imag")  # the members of a number in a file of version 7.3
+NUMBERS = "biufc"  # kinds of numpy's types
 
 
 def read_mat(data: bytes) -> dict[str, Any]:
     """Return the variables: arrays squeezed, texts, dicts, lists. QuadvisError if damaged."""
-    if any(data[place : place + len(HDF5)] == HDF5 for place in PLACES):
-        return _read_hdf5(data)
+    if _is_hdf5(data):
+        return _read_hdf5(data, _Reader.value)
+    return _read_early(data, simplify_cells=True)
+
+
+def read_mat_arrays(data: bytes) -> dict[str, Any]:
+    """Return the arrays of numbers, with the axes that MATLAB gives them. QuadvisError if damaged."""
+    found = _read_hdf5(data, _Reader.array) if _is_hdf5(data) else _read_early(data)
+    arrays = {name: value for name, value in found.items() if hasattr(value, "dtype")}
+    return {name: array for name, array in arrays.items() if array.dtype.kind in NUMBERS}
+
+
+def _is_hdf5(data: bytes) -> bool:
+    return any(data[place : place + len(HDF5)] == HDF5 for place in PLACES)
+
+
+def _read_early(data: bytes, **options: bool) -> dict[str, Any]:
     from scipy.io import loadmat  # python-control brings it
 
     try:
-        arrays = loadmat(BytesIO(data), simplify_cells=True)
+        arrays = loadmat(BytesIO(data), **options)
     except Exception as error:  # scipy raises many kinds for damaged files
-        raise QuadvisError(f"this is no file of MATLAB that can be read: {error}") from error
+        raise _damaged(error) from error
     return {name: value for name, value in arrays.items() if not name.startswith("__")}
 
 
-def _read_hdf5(data: bytes) -> dict[str, Any]:
+def _read_hdf5(data: bytes, read: Callable[[_Reader, Any], Any]) -> dict[str, Any]:
     try:
         import h5py
     except ImportError as error:
@@ -40,11 +60,16 @@ def _read_hdf5(data: bytes) -> dict[str, Any]:
     try:
         with h5py.File(BytesIO(data), "r") as file:
             reader = _Reader(h5py, file)
-            return {name: reader.value(member, 0) for name, member in reader.members(file)}
+            return {name: read(reader, member) for name, member in reader.members(file)}
     except QuadvisError:
         raise
     except Exception as error:  # h5py raises many kinds for damaged files
-        raise QuadvisError(f"this is no file of MATLAB that can be read: {error}") from error
+        raise _damaged(error) from error
+
+
+def _damaged(error: Exception) -> QuadvisError:
+    """Return what is said of a damaged file, of which nothing is quoted."""
+    return QuadvisError(f"it is no .mat file that can be read: {type(error).__name__}")
 
 
 class _Reader:
@@ -59,7 +84,17 @@ class _Reader:
             if not name.startswith("#") and isinstance(group.get(name, getlink=True), self._h5py.HardLink):
                 yield name, group[name]
 
-    def value(self, member: Any, depth: int) -> Any:
+    def array(self, member: Any) -> Any:
+        """Return a variable that is an array of numbers with its axes; None if it is none."""
+        if isinstance(member, self._h5py.Group) or self._h5py.check_ref_dtype(member.dtype) is not None:
+            return None
+        self._check(member)
+        name = self._class(member)
+        if name == "char":
+            return None
+        return np.zeros((0, 0)) if EMPTY in member.attrs else self._numbers(member[()], name)
+
+    def value(self, member: Any, depth: int = 0) -> Any:
         """Return a variable as `scipy.io.loadmat` simplifies it."""
         if depth > DEEPEST:
             raise QuadvisError(f"its structures are nested deeper than {DEEPEST}")
@@ -69,16 +104,27 @@ class _Reader:
         array = member[()]
         if self._h5py.check_ref_dtype(member.dtype) is not None:
             return [self.value(self._file[each], depth + 1) for each in np.ravel(array) if each]
-        kind = member.attrs.get(CLASS, b"")
-        name = kind.decode() if isinstance(kind, bytes) else str(kind)
-        if "MATLAB_empty" in member.attrs:
+        name = self._class(member)
+        if EMPTY in member.attrs:
             return "" if name == "char" else np.zeros(0)
         if name == "char":
             return "".join(map(chr, np.ravel(array)))
         if isinstance(array, bytes):
             return array.decode(errors="replace")
-        squeezed = np.squeeze(np.asarray(array).T)
-        return squeezed.astype(bool) if name == "logical" else squeezed
+        return np.squeeze(self._numbers(array, name))
+
+    @staticmethod
+    def _class(member: Any) -> str:
+        kind = member.attrs.get(CLASS, b"")
+        return kind.decode() if isinstance(kind, bytes) else str(kind)
+
+    @staticmethod
+    def _numbers(array: Any, name: str) -> Any:
+        """Return an array of a class of MATLAB's in the order of its axes there."""
+        found = np.asarray(array).T
+        if found.dtype.names == COMPLEX:
+            found = found[COMPLEX[0]] + 1j * found[COMPLEX[1]]
+        return found.astype(bool) if name == "logical" else found
 
     def _structure(self, fields: dict[str, Any]) -> Any:
         """Return a structure; several of them have a list in each field, of equal lengths."""
