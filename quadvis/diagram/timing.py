@@ -1,7 +1,7 @@
 """Rates, the solver's step and the stop time that are parameters, or that settings replace.
 
 ``rates: {control: $fs}``, ``solver: {step: 1 / (10 * $fs)}``, ``stop_time: $T``; as settings they are
-``rates.control``, ``solver.step`` and ``stop_time``.
+``rates.control``, ``solver.step`` and ``stop_time``. The solver's method and tolerances are settings, too.
 """
 
 from __future__ import annotations
@@ -16,14 +16,15 @@ from quadvis.diagram.parameters import Params, named_parameters, substitute
 from quadvis.diagram.sections.blocks import BLOCKS
 from quadvis.diagram.sections.params import PARAMS
 from quadvis.diagram.sections.rates import RATES, Rate, read_rate
-from quadvis.diagram.sections.solver import SOLVER, SolverSpec
+from quadvis.diagram.sections.solver import SOLVER, SOLVER_KEYS, SolverSpec, read_method, read_tolerances
 from quadvis.diagram.sections.stop_time import STOP_TIME, OpenTime
 from quadvis.diagram.spec import FileSpec
 from quadvis.diagram.times import read_duration, read_step
 from quadvis.document import YamlMap, YamlNode
 from quadvis.errors import UNKNOWN, Faults, Unknown, known, suggestion
+from quadvis.graph.graph import USUAL
 
-_STEP = "step"
+METHOD, STEP = SOLVER_KEYS[:2]
 _Read = TypeVar("_Read")
 
 
@@ -100,17 +101,29 @@ class _Timing:
 
     def solver(self) -> SolverSpec:
         """Return the solver."""
-        own = self.spec[SOLVER]
-        node = self._node(SOLVER.key, _STEP, own.node)
-        for name, setting in self.overrides.of(SOLVER.key).items() if self._is_free(SOLVER.key) else ():
-            if name != _STEP:
-                self.overrides.chosen(SOLVER.key, name, UNKNOWN)
-                problem = f"'{SOLVER.key}.{name}' cannot be set"
-                self.faults.add(setting.place, problem, f"set '{SOLVER.key}.{_STEP}'", subject="")
+        own = self._solver_method(self.spec[SOLVER])
+        node = self._node(SOLVER.key, STEP, own.node)
         if node is None:
             return own
         place = node.place if known(node) else own.place
         return own._replace(step=self._read(read_step, node, ""), place=place)
+
+    def _solver_method(self, own: SolverSpec) -> SolverSpec:
+        """Return the solver with the method and the tolerances of settings."""
+        given: dict[str, YamlNode] = {}
+        for name, setting in self.overrides.of(SOLVER.key).items() if self._is_free(SOLVER.key) else ():
+            value = self.overrides.chosen(SOLVER.key, name, UNKNOWN)
+            if name not in SOLVER_KEYS:
+                problem = f"the solver has no '{name}'"
+                self.faults.add(setting.place, problem, suggestion(name, SOLVER_KEYS), subject="")
+            elif name != STEP and known(value):
+                found = self._substituted(value)
+                given |= {name: found} if known(found) else {}
+        with self.faults.about(""):
+            read = self.faults.read(read_method, given[METHOD]) if METHOD in given else own.method
+            method = read if known(read) else own.method
+            tolerances = read_tolerances(given, method, self.faults, own.tolerances) if known(read) else USUAL
+        return own._replace(method=method, tolerances=tolerances)
 
     def stop_time(self) -> Fraction | Unknown | None:
         """Return the stop time."""

@@ -14,6 +14,7 @@ from quadvis.diagram.computed import is_computed
 from quadvis.diagram.schema import diagram_schema
 from quadvis.document import parse_yaml
 from quadvis.errors import DiagramError, QuadvisError
+from quadvis.graph.graph import Tolerances
 from quadvis.library.catalogue import Catalogue
 
 DIAGRAM = """\
@@ -98,6 +99,36 @@ def test_times_are_settings(path: Path) -> None:
     assert diagram.graph.step == Fraction(1, 1000)
     assert diagram.stop_time == 3
     assert quadvis.load(path, settings=settings, stop_time="4 s").stop_time == 4
+
+
+@pytest.mark.parametrize("method", ["Radau", "radau", "RADAU"])
+def test_the_method_of_the_solver_and_its_tolerances_are_settings(path: Path, method: str) -> None:
+    diagram = quadvis.load(path, settings={"solver.method": method, "solver.rtol": 1e-9})
+    assert diagram.graph.solver == "Radau"
+    assert diagram.graph.tolerances == Tolerances(1e-9, 1e-9)
+    again = quadvis.load(path, settings={"solver.method": "ode3"})
+    assert (again.graph.solver, again.graph.step) == ("ode3", diagram.graph.step)
+
+
+def test_a_method_of_fixed_step_leaves_tolerances_of_the_file_alone(path: Path) -> None:
+    path.write_text(DIAGRAM.replace("method: ode4", "method: BDF, rtol: 1e-8"))
+    assert quadvis.load(path).graph.tolerances.rtol == 1e-8
+    fixed = quadvis.load(path, settings={"solver.method": "ode2"})
+    assert fixed.graph.solver == "ode2" and not fixed.warnings
+    assert quadvis.load(path, settings={"solver.atol": "1e-4"}).graph.tolerances == Tolerances(1e-8, 1e-4)
+
+
+def test_a_sweep_goes_over_methods_and_steps(path: Path) -> None:
+    over = {"solver.method": ["ode1", "ode4", "RK45"], "solver.step": ["5 ms", "10 ms"]}
+    lag = "block: systems.transfer_function, with: {numerator: [1], denominator: [0.1, 1]}"
+    text = f"  lag: {{{lag}, in: {{u: {{from: wave.y, across: hold}}}}}}\n"
+    path.write_text(f"{DIAGRAM}{text}summary: {{lag: {{signal: lag.y, show: [final]}}}}\n")
+    table = quadvis.sweep(path, over=over, workers=1)
+    found = [float(value) for value in next(each for name, each in table.items() if name.startswith("lag"))]
+    assert len(found) == 6
+    exact = found[-1]
+    assert found[2:] == pytest.approx([exact] * 4, rel=1e-4)
+    assert all(abs(value / exact - 1) > 1e-3 for value in found[:2])
 
 
 def test_a_block_with_the_name_of_times_keeps_its_settings(path: Path) -> None:

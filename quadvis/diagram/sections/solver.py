@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -9,9 +10,9 @@ from quadvis.diagram.parameters import named_parameters
 from quadvis.diagram.sections.forms import QUANTITY, Schema, closed
 from quadvis.diagram.sections.section import Checked, FileSection
 from quadvis.diagram.times import read_step
-from quadvis.document import YamlMap, YamlNode, YamlScalar
+from quadvis.document import YamlNode, YamlScalar
 from quadvis.errors import UNKNOWN, Faults, Place, Unknown, known, quoted
-from quadvis.graph.graph import SOLVERS, VARIABLE, Tolerances
+from quadvis.graph.graph import SOLVERS, USUAL, VARIABLE, Tolerances
 
 SOLVER_KEYS = ("method", "step", "rtol", "atol")
 METHODS = (*SOLVERS, *VARIABLE)
@@ -34,7 +35,7 @@ class SolverSpec(NamedTuple):
     step: Fraction | Unknown | None = None
     place: Place | None = None
     node: YamlNode | None = None
-    tolerances: Tolerances = Tolerances()
+    tolerances: Tolerances = USUAL
 
 
 class SolverSection(FileSection[SolverSpec]):
@@ -43,8 +44,8 @@ class SolverSection(FileSection[SolverSpec]):
     key = "solver"
     words = (
         "`{method: ode1 to ode4, step: 5 ms}` for continuous blocks; the step divides every period, "
-        "and may be a parameter, `$name`; `--set solver.step=...` replaces it; or a `method` of variable "
-        "step, RK45, Radau, BDF or LSODA, with `rtol` and `atol`"
+        "and may be a parameter, `$name`; or a `method` of variable step, RK45, Radau, BDF or LSODA, with "
+        "`rtol` and `atol`; `--set solver.step=...` and the like replace each of them"
     )
 
     def read(self, node: YamlNode | None, faults: Faults) -> SolverSpec:
@@ -52,8 +53,9 @@ class SolverSection(FileSection[SolverSpec]):
         fields = faults.collect(node.fields, (), SOLVER_KEYS, faults) if node is not None else None
         if fields is None:
             return SolverSpec(step=UNKNOWN if node is not None else None)
-        method = faults.collect(_method, fields["method"]) if "method" in fields else None
-        found = SolverSpec(method or METHOD, tolerances=_tolerances(fields, method or METHOD, faults))
+        method = faults.collect(read_method, fields["method"]) if "method" in fields else None
+        tolerances = read_tolerances(fields.values, method or METHOD, faults)
+        found = SolverSpec(method or METHOD, tolerances=tolerances)
         if "step" not in fields:
             return found
         written = fields["step"]
@@ -82,16 +84,18 @@ class SolverSection(FileSection[SolverSpec]):
         return {"method": graph.solver, "step": f"{graph.step} s", **tolerances}
 
 
-def _method(node: YamlNode) -> str:
-    """Read a method; one that another program calls otherwise is suggested."""
-    meant = MEANT.get(node.value.lower()) if isinstance(node, YamlScalar) else None
-    if meant is not None:
+def read_method(node: YamlNode) -> str:
+    """Read a method, in small or capital letters; one that another program calls otherwise is suggested."""
+    text = node.value.lower() if isinstance(node, YamlScalar) else ""
+    if (meant := MEANT.get(text)) is not None:
         raise node.fault(f"there is no method {quoted(node.text())}", f"did you mean '{meant}'?")
-    return node.choice(METHODS)
+    return next((each for each in METHODS if each.lower() == text), "") or node.choice(METHODS)
 
 
-def _tolerances(fields: YamlMap, method: str, faults: Faults) -> Tolerances:
-    """Read the tolerances, which a method of fixed step does not have."""
+def read_tolerances(
+    fields: Mapping[str, YamlNode], method: str, faults: Faults, before: Tolerances = USUAL
+) -> Tolerances:
+    """Read the tolerances, which a method of fixed step does not have; ``before`` are those not written."""
     read: dict[str, float] = {}
     for name in Tolerances._fields:
         if name not in fields:
@@ -106,7 +110,7 @@ def _tolerances(fields: YamlMap, method: str, faults: Faults) -> Tolerances:
         value = faults.read(_tolerance, node)
         if known(value):
             read[name] = value
-    return Tolerances(**read)
+    return before._replace(**read)
 
 
 def _tolerance(node: YamlNode) -> float:
