@@ -1,17 +1,19 @@
 """The signals at which an analysis opens a graph: each passes a block that adds a disturbance.
 
-The signal of an output passes it on the way to all readers, that of an input on the way to its block alone.
+The signal of an output passes it on the way to all readers, that of an input on the way to its block alone,
+or to the blocks of its part that read it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from quadvis.block import Block, In, Out
+from quadvis.block import Block, In, Out, Shape
+from quadvis.diagram.sections.cuts import CutSignal
 from quadvis.graph.graph import Constant, Graph, Node, Wire
 from quadvis.graph.order import execution_order
 
@@ -33,12 +35,17 @@ def break_path(block: str, port: str) -> str:
     return f"{block}.{port}"
 
 
-def with_breaks(graph: Graph, signals: Iterable[tuple[str, str]]) -> Graph:
-    """Return the graph with a break at each of the ports (block, port), otherwise unchanged."""
-    opened = set(signals)
-    nodes = []
+def with_breaks(graph: Graph, signals: Iterable[CutSignal]) -> Graph:
+    """Return the graph with a break at the port of each of the signals, otherwise unchanged."""
+    ends = {(signal.block, signal.port): signal for signal in signals}
+    entries = _Entries([signal for signal in ends.values() if signal.feed is not None])
+    opened = {port for port, signal in ends.items() if signal.feed is None}
+    nodes = entries.nodes(graph, opened)
     for node in graph.nodes:
-        inputs = {name: _rerouted(source, opened) for name, source in node.inputs.items()}
+        inputs = {
+            name: entries.rerouted(node.path, name, _rerouted(source, opened))
+            for name, source in node.inputs.items()
+        }
         mine = sorted(port for block, port in opened if block == node.path)
         for port in mine:
             if port in inputs:
@@ -56,10 +63,48 @@ def _rerouted(source: Wire | Constant, opened: set[tuple[str, str]]) -> Wire | C
     return source
 
 
+class _Entries:
+    """Breaks at inputs of parts. What leads through several of them, inner ones last, passes each."""
+
+    def __init__(self, signals: Iterable[CutSignal]) -> None:
+        self._signals = sorted(signals, key=lambda signal: signal.block.count("/"))
+
+    def nodes(self, graph: Graph, opened: set[tuple[str, str]]) -> list[Node]:
+        """Return the blocks that break; each runs with the block that gives its signal."""
+        found = []
+        for number, signal in enumerate(self._signals):
+            assert signal.feed is not None
+            producer = graph[signal.feed.block]
+            whole = producer.shape(signal.feed.port)
+            shape = np.empty(whole)[signal.feed.index].shape
+            plain = Wire(signal.feed.block, signal.feed.port, signal.feed.index)
+            around = [outer for outer in self._signals[:number] if {*signal.readers} <= {*outer.readers}]
+            source = self._through(around, _rerouted(plain, opened))
+            found.append(_made(break_path(signal.block, signal.port), producer, source, shape))
+        return found
+
+    def rerouted(self, path: str, port: str, source: Wire | Constant) -> Wire | Constant:
+        """Return what an input of a block reads."""
+        return self._through([signal for signal in self._signals if (path, port) in signal.readers], source)
+
+    @staticmethod
+    def _through(signals: Sequence[CutSignal], source: Wire | Constant) -> Wire | Constant:
+        """Return a wire from the last break; an index that a part's input has taken is taken no more."""
+        if not signals or not isinstance(source, Wire):
+            return source
+        taken = any(signal.feed is not None and signal.feed.index for signal in signals)
+        last = break_path(signals[-1].block, signals[-1].port)
+        return replace(source, block=last, port="y", index=() if taken else source.index)
+
+
 def _break(node: Node, port: str, source: Wire | Constant) -> Node:
-    shape = node.shape(port)
+    return _made(break_path(node.path, port), node, source, node.shape(port))
+
+
+def _made(path: str, node: Node, source: Wire | Constant, shape: Shape) -> Node:
+    """Return a break that runs with a block."""
     inputs: dict[str, Wire | Constant] = {
         "u": source,
         "added": Constant(np.zeros(shape) if shape else 0.0),
     }
-    return Node(break_path(node.path, port), "break", Break(), node.task, inputs, {"*": shape})
+    return Node(path, "break", Break(), node.task, inputs, {"*": shape})

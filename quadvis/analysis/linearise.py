@@ -65,8 +65,7 @@ def linearised(graph: Graph, cuts: Sequence[Cut], at: float, engine: str = AUTO)
     """
     looped = blocks_on_loops(graph)
     _check_cuts(graph, looped, cuts)
-    signals = {(signal.block, signal.port) for cut in cuts for signal in cut.signals}
-    opened = with_breaks(graph, signals)
+    opened = with_breaks(graph, (signal for cut in cuts for signal in cut.signals))
     linear = linearised_part(opened, blocks_on_loops(opened), cuts, at, engine)
     if not looped and not linear.states:
         raise AnalysisError("there is nothing to analyse: the diagram has no loop and no state")

@@ -183,11 +183,11 @@ class Probe:
 
     def _channels(self, cut: Cut) -> Iterator[Channel]:
         for signal in cut.signals:
-            task = self.graph[signal.block].task
+            task = self.graph[break_path(signal.block, signal.port)].task
             every, offset = self.graph.ticks(task.period), self.graph.ticks(task.offset)
             opened = self.program[break_path(signal.block, signal.port)]
             added = opened.inputs["added"].position
-            outputs = self.program[signal.block].outputs
+            outputs = self.program[signal.block].outputs if signal.block in self.graph else {}
             read = (outputs[signal.port] if signal.port in outputs else opened.outputs["y"]).position
             for element in signal.elements:
                 for tick in range(offset % every, self.span, every):

@@ -53,9 +53,7 @@ class Ways:
 
     @cached_property
     def _opened(self) -> Graph:
-        signals = {
-            (signal.block, signal.port) for each in self._transfers.values() for signal in _signals(each)
-        }
+        signals = (signal for each in self._transfers.values() for signal in _signals(each))
         return with_breaks(self._graph, signals)
 
     def _mates(self, way: Way) -> list[Way]:
@@ -112,5 +110,5 @@ def _cuts(transfers: Iterable[Transfer]) -> list[Cut]:
 
 def _reading(graph: Graph, signal: CutSignal) -> str:
     """Return the block that gives a signal as it is read: an input's is behind its break."""
-    is_input = signal.port in graph[signal.block].inputs
+    is_input = signal.feed is not None or signal.port in graph[signal.block].inputs
     return break_path(signal.block, signal.port) if is_input else signal.block

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from quadvis.block import SignalType
+from quadvis.block import Shape, SignalType
 from quadvis.diagram.draft import misfit
 from quadvis.diagram.sections.context import Context
 from quadvis.document import YamlList, YamlNode
@@ -19,13 +19,17 @@ from quadvis.graph.names import wire_text
 class CutSignal(NamedTuple):
     """A signal, or some elements of it, counted as if it lay flat.
 
-    ``port`` is an output of the block, or an input: the signal as this block alone reads it.
+    ``port`` is an output of the block, or an input: the signal as this block alone reads it. Of an input of a
+    part, ``block`` is the part, ``feed`` the wire that feeds it, and ``readers`` are the inputs of blocks in
+    the part, (block, port), that read it.
     """
 
     text: str
     block: str
     port: str
     elements: tuple[int, ...]
+    feed: Wire | None = None
+    readers: tuple[tuple[str, str], ...] = ()
 
 
 class Cut(NamedTuple):
@@ -65,12 +69,18 @@ def cut_signal(
     node: YamlNode, named: Wire, signal: SignalType, found: Node, context: Context
 ) -> CutSignal | Unknown:
     """Return the elements of a port of a block that a text names; a fault if they are no real numbers."""
+    return signal_of(node, named, signal.scalar, found.shape(named.port), context)
+
+
+def signal_of(
+    node: YamlNode, named: Wire, scalar: str, shape: Shape, context: Context
+) -> CutSignal | Unknown:
+    """Return the elements of a signal of this shape that a text names; a fault as above."""
     faults = context.faults
-    if signal.scalar != "float64":
-        problem = f"'{named.source}' holds {signal.scalar} values, which vary in no small steps"
+    if scalar != "float64":
+        problem = f"'{named.source}' holds {scalar} values, which vary in no small steps"
         faults.add(node.place, problem, "open the loop at a signal of real numbers")
         return UNKNOWN
-    shape = found.shape(named.port)
     try:
         flat = np.arange(math.prod(shape)).reshape(shape)[named.index]
     except IndexError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from quadvis.block import entry_name
@@ -9,6 +10,7 @@ from quadvis.diagram.reference import Reference, read_reference
 from quadvis.diagram.sections.context import Context
 from quadvis.diagram.sections.cuts import Cut, CutSignal, cut_signal, read_cut
 from quadvis.diagram.sections.forms import Schema, closed, list_of, ref
+from quadvis.diagram.sections.part_inputs import part_input
 from quadvis.document import YamlList, YamlMap, YamlNode
 from quadvis.errors import UNKNOWN, Unknown, known
 from quadvis.graph.graph import Node, Wire, selected
@@ -22,9 +24,9 @@ class Transfer(NamedTuple):
     """A question: how the signal ``target`` answers a disturbance that is added to the signal ``source``.
 
     Each is one number. An output is disturbed for all its readers, and read as its block gives it, without
-    the disturbance; an input is disturbed for its block alone, and read with it. ``opened`` are signals
-    whose readers get what they get at the operating point: there the loop is open. ``unit`` is that of the
-    answer over the disturbance.
+    the disturbance; an input is disturbed for its block or part alone, and read with it. ``opened`` are
+    signals whose readers get what they get at the operating point: there the loop is open. ``unit`` is that
+    of the answer over the disturbance.
     """
 
     label: str
@@ -76,8 +78,10 @@ def _end(node: YamlNode, context: Context) -> CutSignal | Unknown:
     reference = read_reference(node, context.faults)
     if reference is UNKNOWN:
         return UNKNOWN
-    reader = _input(reference, context)
-    if reader is None:
+    reader, entry = _input(reference, context), part_input(node, reference, context)
+    if entry is not None:
+        found = entry
+    elif reader is None:
         cut = read_cut("", node, context)
         found = cut.signals[0] if known(cut) else UNKNOWN
     else:
@@ -103,16 +107,25 @@ def _input(reference: Reference, context: Context) -> tuple[Wire, Node] | None:
 
 def _unit(signal: CutSignal, context: Context) -> Unit:
     """Return the unit of a number; that of an input is the unit of what comes in, if it is known."""
+    if signal.feed is not None:
+        return _of_feed(signal.feed, signal.elements[0], context)
     block = context.nodes[signal.block]
     units, place = block.units.get(signal.port, ()), signal.elements[0]
     if signal.port in block.inputs:
         wire = block.inputs[signal.port]
         if isinstance(wire, Wire):
-            producer = context.nodes[wire.block]
-            units = producer.units.get(wire.port, ())
-            part = selected(producer.shape(wire.port), wire.index)
-            place += part[0] if part else 0
-        else:
-            units = block.block.interface.inputs[signal.port].units
+            return _of_feed(wire, place, context)
+        units = block.block.interface.inputs[signal.port].units
+    return _at(units, place)
+
+
+def _of_feed(wire: Wire, place: int, context: Context) -> Unit:
+    """Return the unit of a number of what a wire carries."""
+    producer = context.nodes[wire.block]
+    part = selected(producer.shape(wire.port), wire.index)
+    return _at(producer.units.get(wire.port, ()), place + (part[0] if part else 0))
+
+
+def _at(units: Sequence[Unit], place: int) -> Unit:
     unit = units[place if len(units) > 1 else 0] if units else Unit()
     return Unit() if unit.variables else unit
