@@ -16,6 +16,7 @@ from .script import run_script
 ROOT = Path(__file__).parents[2]
 sys.path.append(str(ROOT / "tools"))
 
+from documentation.block_pictures import pictures  # noqa: E402
 from documentation.build import build_site  # noqa: E402
 from documentation.diagram_pages import diagram_files  # noqa: E402
 from documentation.generator import render  # noqa: E402
@@ -36,6 +37,11 @@ def test_two_blocks_have_their_pages_and_no_link_is_broken(tmp_path: Path) -> No
         assert [each for each in declared if f">{each}<" not in page] == []
         assert ("-response.svg" in page) == (only_checked(block) == "")
         assert ("-diagram.svg" in page) == (block.example_needs == "")
+
+
+def test_what_an_example_writes_is_no_picture(tmp_path: Path) -> None:
+    found = pictures("vision.frame_writer", Catalogue().find("vision.frame_writer"), tmp_path)
+    assert [*found] == ["diagram.svg"]  # a frame is not drawn over time
 
 
 def test_what_did_not_change_is_not_made_again(tmp_path: Path) -> None:

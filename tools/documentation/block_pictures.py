@@ -49,7 +49,7 @@ def pictures(name: str, block: type[Block], cache: Path) -> dict[str, bytes]:
 
 
 def _draw(name: str, text: str, folder: Path, *, runs: bool) -> None:
-    diagram = load_text(text, folder)
+    diagram = load_text(text, folder.parent)  # what it writes is no picture
     (folder / "diagram.svg").write_text(diagram.draw(), encoding="utf-8")
     if not runs:
         return

@@ -27,6 +27,7 @@ SETTINGS = {
     "html_copy_source": False,
     "html_show_sourcelink": False,
     "html_show_copyright": False,
+    "smartquotes": False,  # "--vary" stays what one types and searches for
     "highlight_language": "text",
     "pygments_style": "friendly",
 }
