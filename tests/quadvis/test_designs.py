@@ -17,7 +17,7 @@ from scipy.stats import qmc
 import quadvis
 from quadvis.cli import main
 from quadvis.errors import QuadvisError
-from quadvis.sweeps import parts
+from quadvis.sweeps import parts, saving
 from quadvis.sweeps import sweep as sweeping
 from quadvis.sweeps.axes import read_axes
 from quadvis.sweeps.designs import make_design
@@ -302,14 +302,14 @@ def test_the_indices_of_sobol_are_those_of_ishigamis_closed_form(monkeypatch: py
 
 @pytest.mark.slow
 def test_the_indices_of_sobol_are_found_through_a_diagram(here: list[int]) -> None:
-    table = quadvis.sweep("ishigami.yaml", ANGLES, design="saltelli", runs=2560)
+    table = quadvis.sweep("ishigami.yaml", ANGLES, design="saltelli", runs=1280)
     values = [ishigami(*places) for places in table.design.places(range(table.runs))]
     np.testing.assert_allclose(table["f.final"], values, rtol=1e-12)
     (found,) = sensitivities(table)
     first, total = indices()
-    np.testing.assert_allclose(found.first, first, atol=0.06)
+    np.testing.assert_allclose(found.first, first, atol=0.13)  # so few runs know no more
     assert found.total is not None
-    np.testing.assert_allclose(found.total, total, atol=0.06)
+    np.testing.assert_allclose(found.total, total, atol=0.02)
 
 
 @pytest.mark.slow
@@ -502,7 +502,8 @@ def test_parts_are_resumed_where_they_ended_with_the_same_bytes(quick: list[int]
 def test_rows_before_their_part_is_complete_are_written_now_and_then(
     quick: list[int], small_parts: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(parts, "SAVE", 0.0)
+    monkeypatch.setattr(saving, "SAVE", 0.0)
+    monkeypatch.setattr(saving, "SHARE", 0)
     kept: list[int] = []
 
     def look(finished: int, count: int, failed: int) -> None:
