@@ -141,8 +141,8 @@ def replay(options: argparse.Namespace) -> int:
 
 
 def sweep(options: argparse.Namespace) -> int:
-    """Run a diagram at every point of a grid; 1 if a run fails."""
-    from quadvis.sweeps.summary import SweepLine, sweep_lines
+    """Run a diagram many times, with the values of a design; 1 if a run fails."""
+    from quadvis.sweeps.summary import SweepLine, read_quantiles, sweep_lines
     from quadvis.sweeps.sweep import sweep as run_sweep
 
     several = len(options.variant) > 1
@@ -150,42 +150,47 @@ def sweep(options: argparse.Namespace) -> int:
     one = None if several else next(iter(options.variant), None)
     name = f"{default_name(options, one)}-sweep.csv"
     table_path = Path(options.output or runs_folder("table", "-o") / name)
+    quantiles = read_quantiles(options.quantiles) if options.quantiles is not None else None
     plot = table_path.parent / f"{table_path.stem}.png" if options.plot is None else Path(options.plot)
     if options.plot and plot.suffix != ".png":
         raise QuadvisError(f"cannot write the plot '{plot}': give a name that ends in .png")
+    if options.sensitivity is not None and Path(options.sensitivity).suffix != ".png":
+        raise QuadvisError(f"cannot write the plot '{options.sensitivity}': give a name that ends in .png")
     collected_from_now_on()
     with SweepLine() as progress:
         table = run_sweep(
-            options.file, over, variant=one,
+            options.file, over, design=options.design, runs=options.runs, until=options.until, variant=one,
             settings=options.set, params=options.params, stop_time=options.stop_time, seed=options.seed,
-            workers=options.workers, cluster=options.cluster, output=table_path,
+            workers=options.workers, cluster=options.cluster, output=options.output or table_path,
             timings=options.timings, resume=options.resume,
             engine=options.engine, announce=progress.say,
-            plot=None if options.plot == "" else plot, logs=options.logs, own_blocks=_own_blocks(options),
-            progress=progress,
+            plot=None if options.plot == "" else plot, sensitivity=options.sensitivity, logs=options.logs,
+            own_blocks=_own_blocks(options), progress=progress,
         )  # fmt: skip
-    print("\n".join(sweep_lines(table, _width())))
+    print("\n".join(sweep_lines(table, _width(), quantiles)))
     print(f"table: {table_path}")
     if options.plot != "":
         print(f"plot: {plot}")
+    if options.sensitivity is not None:
+        print(f"sensitivity: {options.sensitivity}")
     return 0 if table.passed else FAILED
 
 
 def tune(options: argparse.Namespace) -> int:
     """Look for the best values of parameters; 1 if the best trial fails."""
-    from quadvis.sweeps.axes import SEED, read_axes
+    from quadvis.sweeps.axes import read_seeds
     from quadvis.sweeps.tune import tune as search
     from quadvis.sweeps.tune_lines import TuneLine, parameter_file, tune_lines
 
     if options.output:
         check_output(options.output, PARAMETERS)
-    seeds = read_axes([f"{SEED}={options.seeds}"])[0].values if options.seeds else ()
+    seeds = read_seeds(options.seeds) if options.seeds else ()
     collected_from_now_on()
     with TuneLine() as progress:
         result = search(
             options.file, options.minimise, _ranges(options.over),
             variant=options.variant, settings=options.set, params=options.params,
-            stop_time=options.stop_time, seeds=tuple(map(int, seeds)), method=options.method,
+            stop_time=options.stop_time, seeds=seeds, method=options.method,
             most=options.trials, passing=options.passing, own_blocks=_own_blocks(options),
             engine=options.engine, announce=progress.say, progress=progress,
         )  # fmt: skip

@@ -60,6 +60,16 @@ for --set, or seed, variant, params (files); 'none' means no variant or no file.
 with a step 1..3 step 0.5 rad/s. The table has the axes, the numbers of summary and expectations with their
 units, passed, failure (why a run stopped) and the hash of the diagram; it does not depend on the number of
 processes. Wall times do, so it has them only with --timings.
+
+A --design is another choice of runs than all combinations: --runs of a latin_hypercube, a sobol sequence,
+at random, or by saltelli's scheme (for --sensitivity); or one_at_a_time, others as in the diagram. An axis is
+then also a range of any value, '1..4 rad/s', or a distribution, 'normal(0.5 kg, 20 g)': uniform(LOW, HIGH),
+loguniform(LOW, HIGH), normal(MEAN, DEVIATION), truncated_normal(MEAN, DEVIATION, LOW, HIGH),
+lognormal(MEDIAN, FACTOR), triangular(LOW, MODE, HIGH). Listed values are drawn alike often. The summary has
+means with their 95 % interval (bootstrap), quantiles, and the probability to fail with Wilson's interval:
+  quadvis sweep diagrams/motor.yaml --over kp='0.2..0.8 V*s/rad' --over J='normal(0.01, 0.002)' \\
+    --design latin_hypercube --runs 200 --until 'failing within 5 %'
+
 Exit code: 0 all runs passed, 1 a run did not, 2 bad input; 130, 129 or 143 interrupted, hung up or ended
 (finished runs are in the table)."""
 
@@ -461,16 +471,27 @@ def _sweep_options(parser: Parser) -> None:
         "seed=0..29, craft.lag='20 ms,50 ms', bandwidth='1..3 step 0.5 rad/s', variant=A,B; may be repeated"
     )
     parser.add_argument("--over", action="append", default=[], metavar="NAME=VALUES", help=words)
+    words = "grid (default), latin_hypercube, sobol, random, saltelli or one_at_a_time: which runs, see below"
+    parser.add_argument("--design", default="grid", metavar="NAME", help=words)
+    parser.add_argument(
+        "--runs", type=int, metavar="N", help="how many runs the design has; a grid says so itself"
+    )
+    words = "stop when half of a 95 %% interval is so small: 'failing within 2 %%', 'xy.rms within 0.1 cm'"
+    parser.add_argument("--until", metavar="'WHAT within SIZE'", help=words)
+    words = "quantiles of the summary, in %%; default 5,50,95 for a design, none for a grid"
+    parser.add_argument("--quantiles", metavar="P,Q", help=words)
+    words = "draw how much of the spread is due to each axis (Sobol's indices, by SALib)"
+    parser.add_argument("--sensitivity", metavar="PNG", help=words)
     words = "one of the diagram's variants; several are swept over"
     parser.add_argument("--variant", action="append", default=[], metavar="V", help=words)
     _setting_options(parser)
     parser.add_argument("--stop-time", metavar="T", help="such as '20 s'; replaces the diagram's")
-    parser.add_argument("--seed", type=int, metavar="N", help="seed of every run; replaces the diagram's")
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of every run, and of the design's draw")
     _engine_option(parser)
     parser.add_argument("--workers", type=int, metavar="N", help="processes; default: one per processor")
     words = "let the workers of a Dask cluster do the runs: the address of its scheduler, tcp://host:8786"
     parser.add_argument("--cluster", metavar="ADDRESS", help=words)
-    words = "the table, .csv or .parquet; default runs/NAME-sweep.csv, with variant and sets in its name"
+    words = "the table, .csv or .parquet, 'x.parquet/' for a folder of parts; default runs/NAME-sweep.csv"
     parser.add_argument("--output", "-o", metavar="TABLE", help=words)
     words = "picture of the summary; default: beside the table, '' for none"
     parser.add_argument("--plot", metavar="PNG", help=words)

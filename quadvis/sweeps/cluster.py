@@ -6,8 +6,9 @@ user's own blocks among them, travel as they are.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator
 from importlib import import_module
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -18,17 +19,21 @@ from quadvis.sweeps.worker import Job, Row
 
 PATIENCE = 10.0  # s in which the scheduler must answer and have a worker
 MOST_JOBS = 16  # of one task: what a lost worker repeats
+AHEAD = 8  # tasks that wait for each thread
 SHARES = 8  # tasks for each thread of the cluster, at least, if there are so many jobs
 
 
-def perform_on(address: str, jobs: Sequence[Job], paths: Iterable[Path]) -> Generator[Row | None, None, None]:
+def perform_on(
+    address: str, jobs: Iterable[Job], count: int, paths: Iterable[Path]
+) -> Generator[Row | None, None, None]:
     """Yield the rows as they come, and None after a second without one; closing it gives the jobs up.
 
-    ``paths`` are the files that the jobs need. What a worker that is lost has not done goes to another one.
-    QuadvisError if no cluster is at the address, or if a worker has other software; RunError if one job
-    after the other has lost its worker.
+    There are ``count`` jobs, which are taken from ``jobs`` as they are needed; ``paths`` are the files that
+    they need. What a worker that is lost has not done goes to another one. QuadvisError if no cluster is at
+    the address, or if a worker has other software; RunError if one job after the other has lost its worker.
     """
-    if not jobs:
+    first = list(islice(jobs := iter(jobs), 1))
+    if not first:
         return
     with _client(address) as client:
         _check_workers(client, address)
@@ -37,14 +42,24 @@ def perform_on(address: str, jobs: Sequence[Job], paths: Iterable[Path]) -> Gene
         parcel = Parcel.of(paths)
         store = ParcelStore(parcel)
         client.register_plugin(store)
-        count = max(1, min(MOST_JOBS, len(jobs) // (SHARES * sum(client.nthreads().values()) or 1)))
-        tasks = [tuple(jobs[first : first + count]) for first in range(0, len(jobs), count)]
-        futures = client.map(perform_there, tasks, parcel=parcel.key, pure=False)
+        threads = sum(client.nthreads().values()) or 1
+        size = max(1, min(MOST_JOBS, count // (SHARES * threads)))
+        pending: set[Any] = set()
+
+        def submit(task: tuple[Job, ...]) -> Any:
+            return client.submit(perform_there, task, parcel=parcel.key, pure=False)
+
         try:
-            yield from _rows(futures)
+            tasks = _tasks(chain(first, jobs), size)
+            yield from _rows(results_of(submit, tasks, AHEAD * threads, pending))
         finally:
-            client.cancel(futures)
+            client.cancel(list(pending))
             client.unregister_worker_plugin(store.name)
+
+
+def _tasks(jobs: Iterator[Job], size: int) -> Iterator[tuple[Job, ...]]:
+    while task := tuple(islice(jobs, size)):
+        yield task
 
 
 def _client(address: str) -> Any:
@@ -74,11 +89,11 @@ def _check_workers(client: Any, address: str) -> None:
             raise QuadvisError(f"the worker {worker} {problem}")
 
 
-def _rows(futures: Sequence[Any]) -> Iterator[Row | None]:
+def _rows(results: Iterator[list[Row] | None]) -> Iterator[Row | None]:
     from distributed import KilledWorker
 
     try:
-        for found in results_of(futures):
+        for found in results:
             yield from (None,) if found is None else found
     except KilledWorker:
         problem = "some jobs have lost one worker after the other, perhaps for lack of memory"

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from itertools import chain, islice
 from multiprocessing.process import BaseProcess
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -22,6 +23,9 @@ from quadvis.machine.processes import launching
 from quadvis.sweeps.worker import Job, Row, begin, perform
 
 IDLE = 1.0  # s without a row after which the caller gets None
+AHEAD = (
+    64  # tasks that wait for each worker: no worker waits while rows are written, and few tasks are in memory
+)
 
 
 def processors() -> int:
@@ -31,26 +35,30 @@ def processors() -> int:
     return os.cpu_count() or 1
 
 
-def perform_all(jobs: Sequence[Job], workers: int) -> Generator[Row | None, None, None]:
+def perform_all(jobs: Iterable[Job], workers: int) -> Generator[Row | None, None, None]:
     """Yield the rows as they come, and None after a second without one; closing it ends the workers.
 
-    RunError if a worker is killed.
+    Jobs are taken from ``jobs`` as they are needed. RunError if a worker is killed.
     """
-    if not jobs:
+    first = list(islice(jobs := iter(jobs), workers))
+    if not first:
         return
     before = set(multiprocessing.active_children())
     with launching():
         executor = ProcessPoolExecutor(
-            min(workers, len(jobs)),
+            len(first),
             multiprocessing.get_context("spawn"),
             initializer=begin,
             initargs=(IS_COMMAND.get(),),
         )
     finished = False
+
+    def submit(job: Job) -> Any:
+        with launching():  # the first ones start the processes
+            return executor.submit(perform, job)
+
     try:
-        with launching():
-            futures = [executor.submit(perform, job) for job in jobs]  # this starts the processes
-        yield from results_of(futures)
+        yield from results_of(submit, chain(first, jobs), AHEAD * len(first), set())
         finished = True
     except BrokenProcessPool:
         problem = "a worker process was killed, perhaps by the system for lack of memory"
@@ -67,19 +75,29 @@ def perform_all(jobs: Sequence[Job], workers: int) -> Generator[Row | None, None
             child.join()
 
 
-def results_of(futures: Sequence[Any]) -> Generator[Any, None, None]:
-    """Yield the results of futures as they come, and None after a second without one.
+def results_of(
+    submit: Callable[[Any], Any], tasks: Iterator[Any], most: int, pending: set[Any]
+) -> Generator[Any, None, None]:
+    """Yield the results of tasks as they come, and None after a second without one.
 
-    They are those of ``concurrent.futures``, or what has the same methods.
+    ``submit`` gives a task to the workers, and returns its future, one of ``concurrent.futures`` or what has
+    the same methods. At most ``most`` of them are ``pending``, however many tasks there are.
     """
     done: SimpleQueue[Any] = SimpleQueue()
-    for future in futures:
-        future.add_done_callback(done.put)
-    left = len(futures)
-    while left:
+
+    def more() -> None:
+        for task in islice(tasks, most - len(pending)):
+            future = submit(task)
+            pending.add(future)
+            future.add_done_callback(done.put)
+
+    more()
+    while pending:
         try:
-            found = done.get(timeout=IDLE).result()
-            left -= 1
+            future = done.get(timeout=IDLE)
         except Empty:
-            found = None
-        yield found
+            yield None
+            continue
+        pending.remove(future)
+        more()
+        yield future.result()

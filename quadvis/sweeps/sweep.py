@@ -2,33 +2,31 @@
 
 from __future__ import annotations
 
-import math
 import os
-import time
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
-
-import numpy as np
 
 from quadvis.diagram.settings import Files, Given, value_text
 from quadvis.engine.engine import Engine
-from quadvis.errors import QuadvisError, quoted
+from quadvis.errors import QuadvisError
 from quadvis.errors.caller import as_given
 from quadvis.graph.devices import refuse_devices
 from quadvis.library.catalogue import OwnBlocks
-from quadvis.machine.files import PLOT, Claim, check_output
+from quadvis.machine.files import PLOT, check_output
 from quadvis.native.choice import AUTO, Announce, choose
-from quadvis.sweeps.axes import PARAMS, SEED, VARIANT, Axis, Over, points, read_axes
-from quadvis.sweeps.grid import Grid
+from quadvis.sweeps.axes import GRID, PARAMS, SEED, VARIANT, AnyAxis, Over, read_axes
+from quadvis.sweeps.collection import TableMaker
+from quadvis.sweeps.designs import make_design
+from quadvis.sweeps.jobs import Jobs
+from quadvis.sweeps.parts import PartedSaving, sweep_key
 from quadvis.sweeps.pool import perform_all, processors
-from quadvis.sweeps.table import FAILURE, HASH, PASSED, WALL, Table, read_rows, table_kind
-from quadvis.sweeps.worker import Configuration, Job, Quantity, Row, diagram_of, quantities
+from quadvis.sweeps.saving import Saving
+from quadvis.sweeps.stop_rule import StopRule
+from quadvis.sweeps.table import Table
+from quadvis.sweeps.worker import Configuration, Job, Row, quantities
 
-SAVE = 1.0  # s between two writings of finished runs
+MOST_IN_FILE = 100_000  # runs of a table that is one file; a larger one is a folder
 
 Progress = Callable[[int, int, int], None]  # takes the numbers of runs: finished, all, not passed
 
@@ -37,6 +35,9 @@ def sweep(
     path: str | Path,
     over: Over,
     *,
+    design: str = GRID,
+    runs: int | None = None,
+    until: str | None = None,
     variant: str | None = None,
     settings: Given = (),
     params: Files = (),
@@ -48,113 +49,116 @@ def sweep(
     timings: bool = False,
     resume: bool = False,
     plot: str | Path | None = None,
+    sensitivity: str | Path | None = None,
     logs: str | Path | None = None,
     own_blocks: OwnBlocks = True,
     engine: str = AUTO,
     announce: Announce | None = None,
     progress: Progress | None = None,
 ) -> Table:
-    """Run a diagram at every point of a grid, and return a table of the results.
+    """Run a diagram many times, and return a table of the results.
 
     ``over`` maps each axis to its values: ``{"seed": range(30), "craft.lag": ["20 ms", "50 ms"], "bandwidth":
     "1..3 step 0.5 rad/s"}``, or is a list of texts such as ``seed=0..29``. An axis is a parameter, named as
-    in ``settings``, or ``seed``, ``variant`` or ``params``. With several axes all combinations are run; the
-    last axis changes fastest. The other arguments are those of `quadvis.load`, for every run.
+    in ``settings``, or ``seed``, ``variant`` or ``params``. All combinations are run, as a grid; the last
+    axis changes fastest. Another ``design`` of `designs.DESIGNS` has ``runs`` of its own, and axes of any
+    value, too: ranges such as "1..4 rad/s", and distributions of `continuous.KINDS`, such as "normal(0.5 kg,
+    20 g)". It is drawn with ``seed``, 0 if there is none. ``until`` ends the sweep early, see `StopRule`:
+    "failing within 2 %". The other arguments are those of `quadvis.load`, for every run.
 
     ``workers`` processes share the runs (by default one for each processor); the table is the same to the bit
     for any number of workers. It is written to ``output`` (.csv or .parquet). If the sweep is interrupted, or
     a worker (RunError) or this process is killed, the file keeps all finished runs but those of the last two
-    seconds. ``cluster`` is the address of a scheduler of Dask, such as ``tcp://host:8786``: its workers do
-    the runs, have the same quadvis, and get the files. ``resume`` takes over the runs of ``output`` with the
-    same hash, and does the others. ``plot`` is the file for a picture of the summary (PNG), ``logs`` a folder
+    seconds. A .parquet of more than 100,000 runs, or whose name ends in "/", is a folder of parts; its table
+    reads a column when it is asked for. ``cluster`` is the address of a scheduler of Dask, such as
+    ``tcp://host:8786``: its workers do the runs, have the same quadvis, and get the files. ``resume`` takes
+    over the runs of ``output`` with the same hash, and does the others. ``plot`` is the file for a picture of
+    the summary (PNG), ``sensitivity`` one for how much of the spread is due to each axis, ``logs`` a folder
     for a log of every run. ``engine`` and ``announce`` are as in `Diagram.run`; what has to be compiled is
     compiled before the workers begin.
 
     A run that stops with an error is a row that says so. QuadvisError if a value does not fit the diagram, or
     if a file cannot be written because it is an input, another kind of file, or the output of another sweep.
     """
-    axes, processes = read_axes(over), _workers(workers, cluster)
+    axes, processes = read_axes(over, design), _workers(workers, cluster)
     if cluster and logs:
         taken = as_given("--logs", "logs")
         raise QuadvisError(f"the workers of a cluster write no logs here; leave {taken} out, or the cluster")
-    _refuse_conflicts(axes, variant, settings, seed)
+    _refuse_conflicts(axes, variant, settings, seed if design == GRID else None)
+    drawn = make_design(axes, design, runs, seed or 0)
+    if sensitivity is not None:
+        from quadvis.sweeps.sensitivity import refuse_unfit
+
+        refuse_unfit(drawn)
+    large = _refuse_large(output, drawn.runs)
     given = (str(path), variant, setting_texts(settings), setting_paths(params), stop_time, bool(own_blocks))
-    places = points(axes)
-    grid = Grid(axes, places, Configuration(*given), seed, own_blocks)
-    diagram = grid.check()
-    target = Path(output) if output else None
-    if plot is not None:
-        check_output(plot, PLOT, grid.inputs)
+    made = Jobs(drawn, Configuration(*given), seed, own_blocks)
+    diagram = made.check()
+    for picture in (plot, sensitivity):
+        if picture is not None:
+            check_output(picture, PLOT, made.inputs)
     refuse_devices(diagram.graph)
     found = quantities(diagram)
-    chosen = choose(Engine(diagram.graph), diagram.ticks * len(places), engine, announce).engine
+    rule = StopRule(until, found, drawn) if until is not None else None
+    make = TableMaker(diagram.name, drawn, found, len(diagram.loop_requirements))
+    chosen = choose(Engine(diagram.graph), diagram.ticks * drawn.runs, engine, announce).engine
     several = any(axis.name in (VARIANT, PARAMS) for axis in axes)  # block types may differ from run to run
-    jobs = list(grid.jobs(_folder(logs), engine if several else chosen))
-    collection = _Collection(diagram.name, axes, places, found, len(diagram.loop_requirements))
-    with _Saving(collection, target, timings, grid.inputs) as save:
-        if resume and target is not None and target.stat().st_size:
-            jobs = _not_known(jobs, _earlier(target, found), collection)
+    with _saving(make, rule, output, large, timings, made, diagram.hash) as saving:
+        jobs = saving.jobs(made, _folder(logs), engine if several else chosen, resume)
+        collection = saving.collection
         try:
-            with closing(_performed(jobs, processes, cluster, grid)) as rows:
+            with closing(_performed(jobs, processes, cluster, made)) as rows:
                 for row in rows:
                     if row is not None:
                         collection.add(row)
                         if progress:
-                            progress(len(collection.rows), len(places), collection.failed)
-                    save.now_and_then()
+                            progress(collection.finished, drawn.runs, collection.failed)
+                    saving.now_and_then()
+                    if collection.enough:
+                        break
+            collection.drop_surplus()
         except BaseException as error:
-            error.add_note(f"{len(collection.rows)} of {len(places)} runs are finished{save.words}")
+            kept = output is not None and collection.finished
+            words = f" and in {output}; {as_given('--resume', 'resume=True')} does the rest" if kept else ""
+            error.add_note(f"{collection.finished} of {drawn.runs} runs are finished{words}")
             raise
-    table = collection.table()
+    table = saving.table()
+    table.note = rule.words if rule is not None else ""
     if plot is not None:
         from quadvis.sweeps.picture import draw  # a sweep without a plot does not wait for this import
 
-        draw(table, Path(plot), grid.inputs)
+        draw(table, Path(plot), made.inputs)
+    if sensitivity is not None:
+        from quadvis.sweeps.sensitivity_plot import draw_sensitivity
+
+        draw_sensitivity(table, Path(sensitivity), made.inputs)
     return table
 
 
-class _Saving:
-    """Writes finished rows to a file, if one is given: as they come, at the end in the grid's order."""
+def _refuse_large(output: str | Path | None, runs: int) -> bool:
+    """Return whether the table is a folder; QuadvisError if it has to be one, and cannot."""
+    is_parquet = Path(output or "").suffix == ".parquet"
+    if runs > MOST_IN_FILE and not is_parquet:
+        problem = f"the table of {runs} runs is too large for memory and for one file"
+        raise QuadvisError(f"{problem}; give {as_given('-o', 'output')} a name that ends in .parquet")
+    return runs > MOST_IN_FILE or (is_parquet and (str(output).endswith("/") or Path(str(output)).is_dir()))
 
-    def __init__(
-        self, collection: _Collection, path: Path | None, timings: bool, inputs: Iterable[Path]
-    ) -> None:
-        self.collection, self.path, self.timings = collection, path, timings
-        self.claim = None if path is None else Claim(path, table_kind(path), inputs)
-        self.saved = 0  # rows
-        self.last = time.monotonic()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self.claim is not None:
-            with closing(self.claim):
-                if self.collection.rows:
-                    self.claim.write(self._content(self.collection.table()))
-
-    @property
-    def words(self) -> str:
-        """The advice on how to continue a stopped sweep."""
-        kept = self.path is not None and self.collection.rows
-        return f" and in {self.path}; {as_given('--resume', 'resume=True')} does the rest" if kept else ""
-
-    def now_and_then(self) -> None:
-        """Append new rows if the last time is long enough ago; after `kill -9` these rows are left."""
-        count = len(self.collection.rows)
-        if self.claim is None or count == self.saved or time.monotonic() - self.last < SAVE:
-            return
-        if self.saved and self.claim.path.suffix == ".csv":
-            self.claim.append(self._content(self.collection.table(self.saved), head=False))
-        else:
-            self.claim.write(self._content(self.collection.table()))
-        self.saved, self.last = count, time.monotonic()
-
-    def _content(self, table: Table, head: bool = True) -> bytes:
-        assert self.path is not None
-        return table.content(self.path.suffix, timings=self.timings, head=head)
+def _saving(
+    make: TableMaker,
+    rule: StopRule | None,
+    output: str | Path | None,
+    large: bool,
+    timings: bool,
+    made: Jobs,
+    diagram_hash: str,
+) -> Saving | PartedSaving:
+    """Take the file, or the folder, of the table; QuadvisError if it cannot be written."""
+    path = Path(output) if output else None
+    if path is None or not large:
+        return Saving(make, rule, path, timings, made.inputs)
+    key = sweep_key(made, diagram_hash, [quantity.column for quantity in make.quantities])
+    return PartedSaving(make, rule, path, timings, made.inputs, key)
 
 
 def setting_texts(settings: Given) -> tuple[str, ...]:
@@ -170,14 +174,14 @@ def setting_paths(params: Files) -> tuple[str, ...]:
 
 
 def _performed(
-    jobs: Sequence[Job], processes: int, cluster: str | None, grid: Grid
+    jobs: Iterator[Job], processes: int, cluster: str | None, made: Jobs
 ) -> Generator[Row | None, None, None]:
     """Do the jobs, here or on a cluster."""
     if cluster is None:
-        return perform_all(jobs, processes)
+        return perform_all(jobs, min(processes, made.design.runs))
     from quadvis.sweeps.cluster import perform_on  # what it needs takes a while
 
-    return perform_on(cluster, jobs, [*grid.inputs, *grid.named])
+    return perform_on(cluster, jobs, made.design.runs, [*made.inputs, *made.named])
 
 
 def _workers(given: int | None, cluster: str | None) -> int:
@@ -199,7 +203,9 @@ def _folder(logs: str | Path | None) -> Path | None:
     return Path(logs)
 
 
-def _refuse_conflicts(axes: Sequence[Axis], variant: str | None, settings: Given, seed: int | None) -> None:
+def _refuse_conflicts(
+    axes: Sequence[AnyAxis], variant: str | None, settings: Given, seed: int | None
+) -> None:
     """Refuse an axis that also has a fixed value; an axis of parameter files is added to the given files."""
     names = {text.partition("=")[0].strip() for text in setting_texts(settings)}
     names |= {SEED} if seed is not None else set()
@@ -207,83 +213,3 @@ def _refuse_conflicts(axes: Sequence[Axis], variant: str | None, settings: Given
     for axis in axes:
         if axis.name in names:
             raise QuadvisError(f"'{axis.name}' is swept over and given a value as well; keep one of them")
-
-
-def _not_known(jobs: Sequence[Job], earlier: Mapping[str, Row], collection: _Collection) -> list[Job]:
-    """Take over the rows of an earlier table with the hash of a job's diagram; return the other jobs."""
-    rest = []
-    for job in jobs:
-        try:
-            row = earlier.get(diagram_of(job).hash)
-        except QuadvisError:
-            row = None  # the run will report the error
-        if row is None:
-            rest.append(job)
-        else:
-            collection.add(replace(row, index=job.index))
-    return rest
-
-
-def _earlier(path: Path, quantities: Sequence[Quantity]) -> dict[str, Row]:
-    """Return the rows of an earlier table by hash, without runs that stopped with an error."""
-    found = {}
-    for cells in read_rows(path):
-        names = (HASH, FAILURE, PASSED, *(quantity.column for quantity in quantities))
-        if any(name not in cells for name in names):
-            problem = f"cannot go on with '{path}': it is not a table of this sweep"
-            raise QuadvisError(f"{problem}; leave {as_given('--resume', 'resume')} out to begin anew")
-        if not cells[FAILURE]:
-            numbers = tuple(_number(cells[quantity.column]) for quantity in quantities)
-            units = tuple(quantity.unit for quantity in quantities)
-            passed = cells[PASSED] in (True, "true")
-            wall = _number(cells.get(WALL))
-            found[cells[HASH]] = Row(0, cells[HASH], units, numbers, passed, wall=wall)
-    return found
-
-
-def _number(cell: Any) -> float:
-    try:
-        return float(cell) if cell not in (None, "") else math.nan
-    except ValueError:
-        raise QuadvisError(f"the table holds {quoted(cell)} in place of a number") from None
-
-
-class _Collection:
-    """The rows so far, and their table in the order of the grid."""
-
-    def __init__(
-        self,
-        name: str,
-        axes: Sequence[Axis],
-        grid: Sequence[tuple[int, ...]],
-        quantities: Sequence[Quantity],
-        margins: int,
-    ) -> None:
-        self.name, self.axes, self.grid, self.quantities = name, axes, grid, quantities
-        self.margins = margins
-        self.units = tuple(quantity.unit for quantity in quantities)
-        self.rows: dict[int, Row] = {}
-        self.failed = 0
-
-    def add(self, row: Row) -> None:
-        """Add the row of one run."""
-        if not row.failure and row.units != self.units:
-            row = Row(row.index, row.hash, failure="its numbers have other units than those of the first run")
-        self.rows[row.index] = row
-        self.failed += not row.passed
-
-    def table(self, after: int = 0) -> Table:
-        """Return the table of the rows so far, without the first ``after`` rows that came."""
-        rows = [self.rows[index] for index in sorted(list(self.rows)[after:])]
-        indices = np.array([self.grid[row.index] for row in rows], np.int64).reshape(-1, len(self.axes))
-        columns = {
-            axis.column: axis.cells(indices[:, number].tolist()) for number, axis in enumerate(self.axes)
-        }
-        missing = (math.nan,) * len(self.quantities)
-        numbers = np.array([row.numbers or missing for row in rows]).reshape(len(rows), -1)
-        columns |= {quantity.column: numbers[:, number] for number, quantity in enumerate(self.quantities)}
-        columns[PASSED] = np.array([row.passed for row in rows], np.bool_)
-        columns[FAILURE] = np.array([row.failure for row in rows], np.str_)
-        columns[HASH] = np.array([row.hash for row in rows], np.str_)
-        wall = np.array([row.wall for row in rows], np.float64)
-        return Table(self.name, self.axes, self.quantities, indices, columns, wall, self.margins)

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from quadvis.errors import QuadvisError
 from quadvis.machine.files import Kind, write_output
-from quadvis.sweeps.axes import SEED, Axis
+from quadvis.sweeps.axes import GRID, SEED
+from quadvis.sweeps.designs import Design
 from quadvis.sweeps.worker import Quantity
 
 PASSED, FAILURE, HASH, WALL = "passed", "failure", "hash", "wall [s]"
@@ -30,22 +31,24 @@ class Table(Mapping[str, NDArray[Any]]):
     The columns are the axes, the quantities (NaN for a run without results), ``passed``, ``failure`` (why a
     run stopped, or "") and ``hash`` (of the resolved diagram, seed included). ``wall`` (s) is the wall time
     of each run. It is not a column, because it alone differs between two sweeps of the same runs. ``margins``
-    is the number of the diagram's expectations on its loop, which no run judges.
+    is the number of the diagram's expectations on its loop, which no run judges. ``note`` is a sentence about
+    a sweep that was to end early.
     """
 
     def __init__(
         self,
         name: str,
-        axes: Sequence[Axis],
+        design: Design,
         quantities: Sequence[Quantity],
-        indices: NDArray[np.int64],
+        rows: NDArray[np.int64],
         columns: Mapping[str, NDArray[Any]],
         wall: NDArray[np.float64],
         margins: int = 0,
     ) -> None:
-        """Keep the columns; ``indices`` (N, axes) are each run's indices of values on the axes."""
-        self.name, self.axes, self.quantities = name, tuple(axes), tuple(quantities)
-        self.indices, self.columns, self.wall, self.margins = indices, dict(columns), wall, margins
+        """Keep the columns; ``rows`` (N,) are the runs' numbers in the design."""
+        self.name, self.design, self.quantities = name, design, tuple(quantities)
+        self.rows, self.columns, self.wall, self.margins = rows, columns, wall, margins
+        self.note = ""
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.columns[name]
@@ -59,7 +62,7 @@ class Table(Mapping[str, NDArray[Any]]):
     @property
     def runs(self) -> int:
         """The number of rows."""
-        return len(self.indices)
+        return len(self.rows)
 
     @property
     def passed(self) -> bool:
@@ -67,12 +70,33 @@ class Table(Mapping[str, NDArray[Any]]):
         return bool(self.columns[PASSED].all())
 
     def groups(self) -> list[tuple[tuple[int, ...], NDArray[np.intp]]]:
-        """Return the points of the grid without the seed, as indices of values, each with its rows."""
-        others = [number for number, axis in enumerate(self.axes) if axis.name != SEED]
-        found: dict[tuple[int, ...], list[int]] = {}
-        for row, point in enumerate(self.indices[:, others].tolist()):
-            found.setdefault(tuple(point), []).append(row)
-        return [(point, np.array(found[point])) for point in sorted(found)]
+        """Return the points of a grid without the seed, as indices of values, each with its rows.
+
+        Another design is one group.
+        """
+        others = [number for number, axis in enumerate(self.design.axes) if axis.name != SEED]
+        if self.design.name != GRID or not others:
+            return [((), np.arange(self.runs))] if self.runs else []
+        points, inverse = np.unique(self.design.places(self.rows)[:, others], axis=0, return_inverse=True)
+        order = np.argsort(inverse.reshape(-1), kind="stable")
+        ends = np.cumsum(np.bincount(inverse.reshape(-1), minlength=len(points)))[:-1]
+        groups = np.split(order, ends) if len(points) else []
+        return [(tuple(map(int, point)), rows) for point, rows in zip(points, groups, strict=True)]
+
+    def reasons(self) -> dict[str, tuple[int, int]]:
+        """Return why runs stopped: for each reason the first such row here, and how many there are."""
+        found: dict[str, tuple[int, int]] = {}
+        row = 0
+        for piece in self.pieces(FAILURE):
+            for here in np.flatnonzero(piece != "").tolist():
+                first, count = found.get(str(piece[here]), (row + here, 0))
+                found[str(piece[here])] = first, count + 1
+            row += len(piece)
+        return found
+
+    def pieces(self, name: str) -> Iterator[NDArray[Any]]:
+        """Yield a column piece by piece."""
+        yield self[name]
 
     def save(self, path: str | Path, *, timings: bool = False, inputs: Iterable[Path] = ()) -> None:
         """Write a CSV or Parquet file, by the name's ending; ``timings`` adds the column ``wall [s]``.
@@ -85,8 +109,8 @@ class Table(Mapping[str, NDArray[Any]]):
 
     def content(self, suffix: str, *, timings: bool = False, head: bool = True) -> bytes:
         """Return the contents of a file with this suffix; CSV without its first line if ``head`` is false."""
-        columns = self.columns | ({WALL: self.wall} if timings else {})
-        return _csv(columns, head) if suffix == ".csv" else _parquet(columns)
+        columns = {**self.columns, **({WALL: self.wall} if timings else {})}
+        return _csv(columns, head) if suffix == ".csv" else parquet(columns)
 
 
 def table_kind(path: Path) -> Kind:
@@ -94,11 +118,12 @@ def table_kind(path: Path) -> Kind:
     if path.suffix not in KINDS:
         raise QuadvisError(f"cannot write the table '{path}': its name must end in .csv or .parquet")
     if path.suffix == ".parquet":
-        _pyarrow()
+        pyarrow_library()
     return KINDS[path.suffix]
 
 
-def _pyarrow() -> Any:
+def pyarrow_library() -> Any:
+    """Return the package pyarrow; QuadvisError if it is not installed."""
     try:
         import pyarrow.parquet
     except ImportError:
@@ -126,15 +151,17 @@ def _cell(value: Any) -> str:
     return str(value)
 
 
-def _parquet(columns: Mapping[str, NDArray[Any]]) -> bytes:
-    pyarrow, file = _pyarrow(), BytesIO()
+def parquet(columns: Mapping[str, NDArray[Any]], facts: Mapping[str, str] | None = None) -> bytes:
+    """Return the columns as a Parquet file, with facts in its metadata."""
+    pyarrow, file = pyarrow_library(), BytesIO()
     arrays = {name: pyarrow.array(column.tolist(), _arrow_type(column)) for name, column in columns.items()}
-    pyarrow.parquet.write_table(pyarrow.table(arrays), file)
+    table = pyarrow.table(arrays)
+    pyarrow.parquet.write_table(table.replace_schema_metadata(facts) if facts else table, file)
     return file.getvalue()
 
 
 def _arrow_type(column: NDArray[Any]) -> Any:
-    pyarrow = _pyarrow()
+    pyarrow = pyarrow_library()
     kinds = {"f": pyarrow.float64, "i": pyarrow.int64, "b": pyarrow.bool_}
     return kinds.get(column.dtype.kind, pyarrow.string)()
 
@@ -146,7 +173,7 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
     """
     try:
         if path.suffix == ".parquet":
-            rows: list[dict[str, Any]] = _pyarrow().parquet.read_table(path).to_pylist()
+            rows: list[dict[str, Any]] = pyarrow_library().parquet.read_table(path).to_pylist()
             return rows
         with path.open(encoding="utf-8", newline="") as file:
             return list(csv.DictReader(file, strict=True))

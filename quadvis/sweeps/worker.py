@@ -66,13 +66,21 @@ class Job:
 class Quantity:
     """A number that every run gives: a statistic of the summary, or the value found for an expectation.
 
-    ``limit`` is the limit of an expectation of this very number, in the same unit.
+    ``limit`` is the limit of an expectation of this very number, in the same unit; ``kind`` is the
+    expectation's, for a number that is its own.
     """
 
     label: str
     unit: str = ""
     limit: float | None = None
     summary: bool = True
+    kind: str = ""
+
+    def holds(self, value: float) -> bool:
+        """Return whether the expectation is met by its number; a run without one does not meet it."""
+        from quadvis.diagram.requirements import EXPECTATIONS
+
+        return self.limit is not None and EXPECTATIONS[self.kind].holds(value, self.limit)
 
     @property
     def column(self) -> str:
@@ -111,7 +119,8 @@ def quantities(diagram: Diagram) -> list[Quantity]:
     for expectation in diagram.expectations:
         selection, name = expectation.selection, expectation.statistic
         limit = expectation.limit * _scale(selection, name)
-        found.append(Quantity(str(expectation), _unit(selection, name), limit, summary=False))
+        unit = _unit(selection, name)
+        found.append(Quantity(str(expectation), unit, limit, summary=False, kind=expectation.kind))
     return found
 
 

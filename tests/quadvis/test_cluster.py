@@ -115,6 +115,18 @@ def test_the_table_is_the_same_as_on_one_machine_byte_for_byte(
     quadvis.sweep("loop.yaml", OVER, workers=2, output="here.csv")
     quadvis.sweep("loop.yaml", OVER, cluster=address, output="there.csv")
     assert Path("there.csv").read_bytes() == Path("here.csv").read_bytes()
+    pytest.importorskip("pyarrow")
+    drawn = {"size": "normal(1.6 m, 20 cm)", "seed": "0..99"}
+    for place, where in (("here", {"workers": 2}), ("there", {"cluster": address})):
+        for name in (f"{place}-drawn.csv", f"{place}.parquet/"):
+            quadvis.sweep(
+                "loop.yaml", drawn, design="latin_hypercube", runs=100, until="failing within 14 %",
+                output=name, **where,
+            )  # fmt: skip
+    assert Path("there-drawn.csv").read_bytes() == Path("here-drawn.csv").read_bytes()
+    assert 40 < len(Path("here-drawn.csv").read_text().splitlines()) < 100
+    part = "part-00000.parquet"
+    assert Path("there.parquet", part).read_bytes() == Path("here.parquet", part).read_bytes()
     Path("blocks/own/_factor.py").write_text("FACTOR = 0.8\n")  # another parcel of the same names
     table = quadvis.sweep("loop.yaml", OVER, cluster=address)
     expected = pytest.approx(0.8 / 0.9 * _first("here.csv"), rel=1e-9)

@@ -3,7 +3,7 @@
 import os
 import shutil
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -316,7 +316,7 @@ def edited_after_planning(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Call
     """Do the runs in this process as fresh workers would, after an edit that a test puts into the list."""
     edits: list[Callable[[], Any]] = []
 
-    def in_turn(jobs: Sequence[Job], workers: int) -> Iterator[Row]:
+    def in_turn(jobs: Iterator[Job], workers: int) -> Iterator[Row]:
         for edit in edits:
             edit()
         for job in jobs:

@@ -25,8 +25,10 @@ from quadvis.cli import main
 from quadvis.errors import QuadvisError, RunError
 from quadvis.machine.files import Claim, Kind
 from quadvis.machine.interrupts import ENDS
+from quadvis.sweeps import saving
 from quadvis.sweeps import sweep as sweeping
-from quadvis.sweeps.axes import points, read_axes
+from quadvis.sweeps.axes import read_axes
+from quadvis.sweeps.designs import make_design
 from quadvis.sweeps.picture import draw
 from quadvis.sweeps.summary import SweepLine, duration_text, sweep_lines
 from quadvis.sweeps.table import read_rows
@@ -73,8 +75,9 @@ def here(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Do the runs in this process, in an order of their own; return which were done."""
     done: list[int] = []
 
-    def in_turn(jobs: Sequence[Job], workers: int) -> Iterator[Row]:
-        for job in random.Random(len(jobs)).sample(list(jobs), len(jobs)):
+    def in_turn(jobs: Iterator[Job], workers: int) -> Iterator[Row]:
+        taken = list(jobs)
+        for job in random.Random(len(taken)).sample(taken, len(taken)):
             done.append(job.index)
             yield perform(job)
 
@@ -152,7 +155,8 @@ def test_an_axis_of_quantities_is_a_column_of_numbers_with_the_unit_in_its_name(
 
 
 def test_all_combinations_are_run_with_the_last_axis_fastest() -> None:
-    assert points(read_axes(["a=1,2", "b=5..7"])) == [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)]
+    grid = make_design(read_axes(["a=1,2", "b=5..7"]), "grid", None, 0)
+    assert grid.places(range(grid.runs)).tolist() == [[0, 0], [0, 1], [0, 2], [1, 0], [1, 1], [1, 2]]
 
 
 BAD = [
@@ -184,7 +188,8 @@ def test_what_cannot_be_swept_over_is_told_in_one_sentence(
         ("--over", "seed=1", "--over", "seed=2"),
         ("--over", "seed=1", "--variant", "half", "--variant", "half"),
         ("--over", "variant=none,half", "--variant", "half"),
-        ("--over", "seed=1..400", "--over", "size=1..400 step 1 m"),
+        ("--over", "seed=1..4000", "--over", "size=1..400 step 1 m"),
+        ("--over", "seed=1..400", "--over", "size=1..400 step 1 m", "-o", "x.csv"),
         ("--over", "seed=1", "--workers", "0"),
         ("--over", "seed=1", "-o", "x.txt"),
         ("--over", "seed=1", "-o", "none/x.csv"),
@@ -592,7 +597,7 @@ def test_workers_end_with_the_first_process_however_it_ends() -> None:
 
 
 def test_what_is_finished_is_written_now_and_then(here: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sweeping, "SAVE", 0.0)
+    monkeypatch.setattr(saving, "SAVE", 0.0)
     seen: list[int] = []
     quadvis.sweep(
         "loop.yaml", ["seed=0..3"], output="x.csv", progress=lambda *_: seen.append(len(rows_of("x.csv")))
