@@ -8,7 +8,6 @@ over.
 from __future__ import annotations
 
 import hashlib
-import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -23,7 +22,7 @@ from quadvis.errors.caller import as_given
 from quadvis.machine.files import Claim, reason, write_output
 from quadvis.sweeps.collection import Collection, TableMaker
 from quadvis.sweeps.jobs import Jobs
-from quadvis.sweeps.saving import SAVE, row_of
+from quadvis.sweeps.saving import WritingPause, row_of
 from quadvis.sweeps.stop_rule import StopRule
 from quadvis.sweeps.table import KINDS, WALL, Table, parquet, pyarrow_library, read_rows
 from quadvis.sweeps.worker import Job, Row
@@ -57,7 +56,7 @@ class PartedSaving:
         self.old = sorted(folder.glob("part-*.parquet"))
         self.claim = Claim(folder / UNFINISHED, KIND, self.inputs)
         self.written = 0  # parts
-        self.changed, self.last = 0, time.monotonic()
+        self.changed, self.pause = 0, WritingPause()
 
     def __enter__(self) -> Self:
         return self
@@ -129,7 +128,7 @@ class PartedSaving:
     def now_and_then(self) -> None:
         """Write complete parts, and now and then the rows of others; after `kill -9` these rows are left."""
         self.write_parts()
-        if self.collection.finished != self.changed and time.monotonic() - self.last >= SAVE:
+        if self.collection.finished != self.changed and not self.pause.is_early:
             self._keep()
 
     def write_parts(self) -> None:
@@ -147,9 +146,11 @@ class PartedSaving:
         self.written += 1
 
     def _keep(self) -> None:
+        self.pause.begin()
         rows = sorted(self.collection.rows.values(), key=lambda row: row.index)
         self.claim.write(self._content(rows, with_numbers=True))
-        self.changed, self.last = self.collection.finished, time.monotonic()
+        self.changed = self.collection.finished
+        self.pause.finish()
 
     def _content(self, rows: list[Row], *, with_numbers: bool = False) -> bytes:
         table = self.collection.make.table(rows)

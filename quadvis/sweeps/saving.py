@@ -21,6 +21,7 @@ from quadvis.sweeps.table import FAILURE, HASH, PASSED, WALL, Table, read_rows, 
 from quadvis.sweeps.worker import Job, Quantity, Row, diagram_of
 
 SAVE = 1.0  # s between two writings of finished runs
+SHARE = 10  # times what the last one took: so long is the pause after it, at least
 
 
 class Saving:
@@ -38,7 +39,7 @@ class Saving:
         self.path, self.timings = path, timings
         self.claim = None if path is None else Claim(path, table_kind(path), inputs)
         self.saved = 0  # rows
-        self.last = time.monotonic()
+        self.pause = WritingPause()
 
     def __enter__(self) -> Self:
         return self
@@ -80,17 +81,40 @@ class Saving:
     def now_and_then(self) -> None:
         """Append new rows if the last time is long enough ago; after `kill -9` these rows are left."""
         count = len(self.collection.rows)
-        if self.claim is None or count == self.saved or time.monotonic() - self.last < SAVE:
+        if self.claim is None or count == self.saved or self.pause.is_early:
             return
+        self.pause.begin()
         if self.saved and self.claim.path.suffix == ".csv":
             self.claim.append(self._content(self.collection.table(self.saved), head=False))
         else:
             self.claim.write(self._content(self.collection.table()))
-        self.saved, self.last = count, time.monotonic()
+        self.saved = count
+        self.pause.finish()
 
     def _content(self, table: Table, head: bool = True) -> bytes:
         assert self.path is not None
         return table.content(self.path.suffix, timings=self.timings, head=head)
+
+
+class WritingPause:
+    """When it is time to write again."""
+
+    def __init__(self) -> None:
+        self._began = self._finished = time.monotonic()
+
+    @property
+    def is_early(self) -> bool:
+        """True until `SAVE` has passed, or longer after a write that took long."""
+        pause = max(SAVE, SHARE * (self._finished - self._began))
+        return time.monotonic() - self._finished < pause
+
+    def begin(self) -> None:
+        """Note that a write begins."""
+        self._began = time.monotonic()
+
+    def finish(self) -> None:
+        """Note that it is done."""
+        self._finished = time.monotonic()
 
 
 def earlier_rows(path: Path, quantities: Sequence[Quantity]) -> dict[str, Row]:

@@ -69,13 +69,13 @@ def sweep(
     ``workers`` processes share the runs (by default one for each processor); the table is the same to the bit
     for any number of workers. It is written to ``output`` (.csv or .parquet). If the sweep is interrupted, or
     a worker (RunError) or this process is killed, the file keeps all finished runs but those of the last two
-    seconds. A .parquet of more than 100,000 runs, or whose name ends in "/", is a folder of parts; its table
-    reads a column when it is asked for. ``cluster`` is the address of a scheduler of Dask, such as
-    ``tcp://host:8786``: its workers do the runs, have the same quadvis, and get the files. ``resume`` takes
-    over the runs of ``output`` with the same hash, and does the others. ``plot`` is the file for a picture of
-    the summary (PNG), ``sensitivity`` one for how much of the spread is due to each axis, ``logs`` a folder
-    for a log of every run. ``engine`` and ``announce`` are as in `Diagram.run`; what has to be compiled is
-    compiled before the workers begin.
+    seconds (of a large .parquet, which takes long to write, some more). A .parquet of more than 100,000 runs,
+    or whose name ends in "/", is a folder of parts; its table reads a column when it is asked for.
+    ``cluster`` is the address of a scheduler of Dask, such as ``tcp://host:8786``: its workers do the runs,
+    have the same quadvis, and get the files. ``resume`` takes over the runs of ``output`` with the same hash,
+    and does the others. ``plot`` is the file for a picture of the summary (PNG), ``sensitivity`` one for how
+    much of the spread is due to each axis, ``logs`` a folder for a log of every run. ``engine`` and
+    ``announce`` are as in `Diagram.run`; what has to be compiled is compiled before the workers begin.
 
     A run that stops with an error is a row that says so. QuadvisError if a value does not fit the diagram, or
     if a file cannot be written because it is an input, another kind of file, or the output of another sweep.

@@ -17,7 +17,7 @@ from scipy.stats import qmc
 import quadvis
 from quadvis.cli import main
 from quadvis.errors import QuadvisError
-from quadvis.sweeps import parts
+from quadvis.sweeps import parts, saving
 from quadvis.sweeps import sweep as sweeping
 from quadvis.sweeps.axes import read_axes
 from quadvis.sweeps.designs import make_design
@@ -502,7 +502,8 @@ def test_parts_are_resumed_where_they_ended_with_the_same_bytes(quick: list[int]
 def test_rows_before_their_part_is_complete_are_written_now_and_then(
     quick: list[int], small_parts: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(parts, "SAVE", 0.0)
+    monkeypatch.setattr(saving, "SAVE", 0.0)
+    monkeypatch.setattr(saving, "SHARE", 0)
     kept: list[int] = []
 
     def look(finished: int, count: int, failed: int) -> None:

@@ -598,6 +598,7 @@ def test_workers_end_with_the_first_process_however_it_ends() -> None:
 
 def test_what_is_finished_is_written_now_and_then(here: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(saving, "SAVE", 0.0)
+    monkeypatch.setattr(saving, "SHARE", 0)
     seen: list[int] = []
     quadvis.sweep(
         "loop.yaml", ["seed=0..3"], output="x.csv", progress=lambda *_: seen.append(len(rows_of("x.csv")))
