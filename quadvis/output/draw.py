@@ -47,24 +47,26 @@ def draw(
     notes: Sequence[str] = (),
     *,
     row: float | None = None,
+    aspect: float | None = None,
 ) -> str:
     """Return the diagram as the text of an SVG file; equal arguments give equal text.
 
     The blocks come in reading order: a loop without a source outside starts at its first block. `constants`
     are the values set at inputs, by (block, port). `tasks` are the words of the legend by task name,
     `CONTINUOUS` among them. `notes` are the sentences of faults, which stand below the diagram. With
-    ``row`` the picture is laid out in rows of about this width (pixels), like the lines of a text. Raises
-    `QuadvisError` if the arguments contradict each other or the layout engine is missing; a diagram that the
-    engine cannot place gets a simpler layout.
+    ``row`` the picture is laid out in rows of about this width (pixels), like the lines of a text; with
+    ``aspect`` the engine does so, for about this width divided by height. Raises `QuadvisError` if the
+    arguments contradict each other or the layout engine is missing; a diagram that the engine cannot place
+    gets a simpler layout.
     """
     drawing = Drawing(blocks, wires, constants, tasks)
-    placed = {shape["id"]: shape for shape in _shapes(_laid_out(drawing, row))}
+    placed = {shape["id"]: shape for shape in _shapes(_laid_out(drawing, row, aspect))}
     return _page(title, drawing, placed, notes)
 
 
-def _laid_out(drawing: Drawing, row: float | None) -> dict[str, Any]:
+def _laid_out(drawing: Drawing, row: float | None, aspect: float | None) -> dict[str, Any]:
     """Return the graph with positions: the layout engine's, or those of a simpler layout if it is large."""
-    graph = drawing.graph()
+    graph = drawing.graph(aspect)
     if row is None and len(drawing.blocks) <= MOST_BLOCKS and len(drawing.wires) <= MOST_WIRES:
         with suppress(LayoutError):
             return engine.layout(graph)

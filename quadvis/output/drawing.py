@@ -45,6 +45,19 @@ _OPTIONS = {
     "elk.layered.spacing.edgeNodeBetweenLayers": 14,
     "elk.layered.spacing.edgeEdgeBetweenLayers": 9,
 }
+# For a sheet of paper: the columns go on below one another, like lines of a text, and stand closer. This
+# strategy cuts loops at as few wires as it can; each would go around all lines.
+_WRAPPED = {
+    "elk.layered.cycleBreaking.strategy": "GREEDY",
+    "elk.layered.wrapping.strategy": "MULTI_EDGE",
+    "elk.layered.wrapping.additionalEdgeSpacing": 0,
+    "elk.spacing.nodeNode": 16,
+    "elk.spacing.edgeNode": 9,
+    "elk.spacing.edgeEdge": 7,
+    "elk.layered.spacing.nodeNodeBetweenLayers": 16,
+    "elk.layered.spacing.edgeNodeBetweenLayers": 9,
+    "elk.layered.spacing.edgeEdgeBetweenLayers": 7,
+}
 
 
 class Drawing:
@@ -110,9 +123,13 @@ class Drawing:
         mark = self.marks.get(port)
         return ARROW + (mark.width + INDENT if mark else 0.0)
 
-    def graph(self) -> dict[str, Any]:
-        """Return the graph in the engine's format, parts as nodes around the nodes of their blocks."""
-        root: dict[str, Any] = {"id": "root", "layoutOptions": _OPTIONS, "children": []}
+    def graph(self, aspect: float | None = None) -> dict[str, Any]:
+        """Return the graph in the engine's format, parts as nodes around the nodes of their blocks.
+
+        With ``aspect``, about the width divided by the height, its columns are wrapped.
+        """
+        options = _OPTIONS if aspect is None else {**_OPTIONS, **_WRAPPED, "elk.aspectRatio": aspect}
+        root: dict[str, Any] = {"id": "root", "layoutOptions": options, "children": []}
         parts = {"": root}
         for number, block in enumerate(self.blocks):
             _part_node(block.path.rpartition("/")[0], parts)["children"].append(self._node(number, block))

@@ -124,6 +124,20 @@ def folded(picture: DrawnPicture, depth: int) -> DrawnPicture:
     return DrawnPicture(blocks, list(wires), constants, picture.ports)
 
 
+def shortened(picture: DrawnPicture) -> DrawnPicture:
+    """Return a picture whose boxes have no outputs that lead nowhere; each says how many it leaves out."""
+    used = {_split(wire.source)[0] for wire in picture.wires} | {*picture.ports.values()}
+    blocks = []
+    for block in picture.blocks:
+        wired = tuple(port for port in block.outputs if f"{block.path}.{port}" in used)
+        count = len(block.outputs) - len(wired)
+        if count > 1 and not block.symbol:
+            lines = (*block.lines, f"and {counted(count, 'more output')}")
+            block = replace(block, outputs=wired, lines=lines)
+        blocks.append(block)
+    return replace(picture, blocks=blocks)
+
+
 def _fold(
     path: str, inside: Sequence[DrawnBlock], inputs: tuple[str, ...], outputs: tuple[str, ...]
 ) -> DrawnBlock:

@@ -15,7 +15,7 @@ from quadvis.wire.verbs import VERBS, check_level
 FORWARDED = (
     "load", "setparam", "start", "stop", "logs", "getlog", "parameters", "getparam", "addscope", "remscope",
     "applications", "signals", "getsignal", "drawing", "picture", "scopes", "setscope", "startscope",
-    "stopscope", "trigger", "status",
+    "stopscope", "trigger", "status", "startprofiler", "stopprofiler", "getprofilerdata",
 )  # fmt: skip
 OWN: Mapping[str, str] = {"describe": "signals", "watch": "watch", "listen": "scopes"}
 """The gateway's own verbs, each with the verb of the target whose level it has."""

@@ -136,5 +136,6 @@ def test_the_largest_diagrams_are_legible_on_a3(name: str, variant: str | None) 
     read = Read(draw_book(diagram))
     parts = parts_of(picture_of(diagram)[0].blocks)
     assert len(read.pages) >= 1 + len(parts) and read.links(0)
+    assert not any(" sheet 1 of " in text for text in read.texts(0))  # the whole is on one
     for page in range(len(read.pages)):
         assert min(read.sizes(page)) >= LEAST - 0.01

@@ -477,9 +477,28 @@ def test_many_more_diagrams_are_well_drawn(diagram: Drawn) -> None:
     assert_drawn_well(diagram)
 
 
-def assert_drawn_well(diagram: Drawn) -> None:
+@pytest.mark.slow
+@settings(max_examples=5, suppress_health_check=list(HealthCheck))
+@given(diagrams(), st.sampled_from([0.5, 1.0, 2.0]))
+def test_any_diagram_is_well_drawn_with_wrapped_columns(diagram: Drawn, aspect: float) -> None:
+    assert_drawn_well(diagram, aspect)
+
+
+def test_wrapped_columns_stand_below_one_another() -> None:
+    blocks = [DrawnBlock(f"b{n}", "signal.gain", ("u",) if n else (), ("y",), "imu") for n in range(24)]
+    wires = [DrawnWire(f"b{n}.y", f"b{n + 1}", "u") for n in range(23)]
+    sizes = []
+    for aspect in (None, 1.4):
+        picture = ElementTree.fromstring(draw("chain", blocks, wires, {}, TASKS, aspect=aspect))
+        sizes.append((float(picture.get("width", "0")), float(picture.get("height", "0"))))
+    (long, flat), (width, height) = sizes
+    assert long > 10 * flat
+    assert 0.7 < width / height < 2.8
+
+
+def assert_drawn_well(diagram: Drawn, aspect: float | None = None) -> None:
     blocks, wires = diagram
-    picture = read(draw("any", blocks, wires, {}, TASKS))
+    picture = read(draw("any", blocks, wires, {}, TASKS, aspect=aspect))
     assert_well_drawn(picture, blocks, wires)
     assert_texts_apart(picture)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ import quadvis
 from quadvis.cli import main
 from quadvis.errors import QuadvisError
 from quadvis.output.drawn import DrawnBlock, DrawnWire
-from quadvis.output.folding import DrawnPicture, folded, part_alone
+from quadvis.output.folding import DrawnPicture, folded, part_alone, shortened
 
 ROOT = Path(__file__).parents[2]
 A = DrawnBlock("a", "sources.step", (), ("y", "z"), "fast")
@@ -45,6 +46,18 @@ def test_at_depth_one_each_part_of_the_diagram_is_a_box() -> None:
         DrawnWire("a.z", "b", "w"),
     ]
     assert made.constants == {("b", "x"): "4"}
+
+
+def test_a_shortened_picture_counts_the_outputs_that_lead_nowhere() -> None:
+    many = DrawnBlock("c", "vision.any", ("u",), ("y", "age", "lost", "shown"), "fast", ("as it is",))
+    symbol = DrawnBlock("d", "signal.any", (), ("y", "z", "w"), "fast", symbol="sum")
+    wires = [DrawnWire("c.y[2]", "b", "u"), DrawnWire("a.y", "c", "u")]
+    made = shortened(DrawnPicture([A, many, symbol, B], wires, {}, {"shown": "c.shown"}))
+    one, short, *rest = made.blocks
+    assert one == A  # a line would take as much room as the only output that leads nowhere
+    assert short == replace(many, outputs=("y", "shown"), lines=("as it is", "and 2 more outputs"))
+    assert rest == [symbol, B]
+    assert made.wires == wires
 
 
 def test_at_depth_two_the_parts_of_parts_are_boxes() -> None:

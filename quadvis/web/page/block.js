@@ -1,5 +1,6 @@
 // One block: what it is, the values of its outputs, its parameters, which can be changed.
 
+import { calls } from "./calls.js";
 import { find, make, say, show } from "./dom.js";
 import { number, unit, value } from "./format.js";
 
@@ -48,6 +49,7 @@ export class Block {
         make("dt", {}, make("button", { type: "button", className: "plain", textContent: signal.port, title: `${signal.doc}\nclick: show it in the scope`, disabled: signal.type === "frame", onclick: () => this.onsignal(signal.name) })),
         make("dd", { title: signal.doc }),
       ])),
+      ...(this.connection.may("startprofiler") ? calls(this.connection, path) : []),
     );
     show(this.box, true);
     this.update();

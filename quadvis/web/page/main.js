@@ -165,7 +165,7 @@ setInterval(() => {
   const old = !connection.hello || silent > OLD;
   const text = !old ? "" : Number.isFinite(silent) ? `no news for ${since(silent / 1000)}` : "waiting for the target";
   document.body.dataset.connection = old ? "old" : "live";
-  say(find("#connection"), text || (connection.dropped ? `${connection.dropped} messages dropped` : ""));
+  say(find("#connection"), text || (connection.dropped ? `${connection.dropped} message${connection.dropped === 1 ? "" : "s"} dropped` : ""));
   if (greyed !== null && old !== greyed) events.add({ event: old ? "the connection is lost" : "the connection is back" }, true);
   if (greyed !== null || !old) greyed = old;
 }, 100);

@@ -107,6 +107,14 @@ def test_a_flight_from_start_to_stop(browser: Browser, running: Running, target:
         browser.key("Enter", "Enter", 13, "\r")
         browser.until(lambda note=note: note in browser.text("form.held .note, form.refused .note"))
     assert [change.value for change in target._flight.run.changes] == [2.5]  # type: ignore[union-attr]
+    # how long its calls take, of all blocks as much
+    browser.click_on("#block > button")
+    browser.until("document.querySelectorAll('#block .calls td').length === 4")
+    count = len(target.profiled or ())
+    assert browser.text("#block .calls").split("\n")[-1].split("\t") == [
+        "output", "20.0 µs", "30.0 µs", f"{100 / count:.1f} %",
+    ]  # fmt: skip
+    assert target.asked[-1] == "getprofilerdata"
     # Esc closes the block, then the scope
     browser.run("document.activeElement.blur()")
     browser.key("Escape", "Escape", 27)

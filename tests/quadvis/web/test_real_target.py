@@ -52,6 +52,11 @@ def test_a_page_has_all_that_it_asks_for(tmp_path: Path, monkeypatch: pytest.Mon
                     found = page.request("setparam", values={"law.factor": "3"})
                     assert found["changes"] == [{"name": "law.factor", "old": 2.0, "new": 3.0}]
                     assert "lab refuses" in page.refused("setparam", values={"wave.frequency": "3 m"})
+                    page.request("startprofiler")
+                    wait_for(lambda: tg.getProfilerData().profiles)
+                    page.request("stopprofiler")
+                    (timed,) = page.request("getprofilerdata")["blocks"]
+                    assert {"wave", "law"} <= {each[0] for each in timed["methods"]}
                     state = page.topic("state")["data"]
                     (execution,) = {
                         tuple(each["execution"]) for each in state["Tasks"] if each["execution"] is not None
