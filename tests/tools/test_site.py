@@ -17,6 +17,7 @@ ROOT = Path(__file__).parents[2]
 sys.path.append(str(ROOT / "tools"))
 
 from documentation.build import build_site  # noqa: E402
+from documentation.diagram_pages import diagram_files  # noqa: E402
 from documentation.generator import render  # noqa: E402
 from documentation.link_check import broken_links  # noqa: E402
 from documentation.markdown import escaped, from_docstring, table  # noqa: E402
@@ -109,7 +110,24 @@ def test_links_of_a_readme_are_led_to_pages_and_code_stays() -> None:
     assert files == {"diagrams/motor.yaml", "blocks/README.md"}
 
 
+# Two thirds of the time go into the pictures: here a few are made, beside every page and every link.
+DRAWN = ("signal.derivative", "logic.edge", "diagrams/step.yaml")
+
+
 @pytest.mark.slow
+def test_all_pages_with_a_few_of_their_pictures_have_no_broken_link(tmp_path: Path) -> None:
+    assert build_site(tmp_path / "site", tmp_path / "cache", drawn=DRAWN) == []
+    pages = {
+        path.relative_to(tmp_path / "site").as_posix(): path for path in tmp_path.rglob("site/**/*.html")
+    }
+    blocks = {f"blocks/{name.replace('.', '/')}.html": name for name in Catalogue().names()}
+    diagrams = {page_of(file).replace(".md", ".html"): file for file in diagram_files()}
+    assert pages.keys() >= blocks.keys() | diagrams.keys()
+    for page, name in (blocks | diagrams).items():
+        assert ('.svg"' in pages[page].read_text("utf-8")) == (name in DRAWN), page
+
+
+@pytest.mark.long
 def test_the_whole_site_has_no_broken_link() -> None:
     found = run_script(ROOT / "tools" / "site", "--check")
     assert (found.returncode, found.stdout, found.stderr) == (0, "no broken link\n", "")

@@ -46,19 +46,21 @@ def build_site(
     cache: Path,
     *,
     names: Collection[str] | None = None,
+    drawn: Collection[str] | None = None,
     say: Callable[[str], object] = lambda line: None,
 ) -> list[str]:
     """Build the site, with the blocks of these names or all; return what is wrong with its links.
 
+    ``drawn`` are the blocks and the diagrams (by their paths from the root) that get pictures; all if None.
     ``cache`` keeps pages, pictures and what Sphinx has read, for the next build. QuadvisError if a page is
     wrong.
     """
     staging = Staging(cache / "pages")
     blocks = _blocks(names)
     files = diagram_files() if names is None else []
-    for name in _write_blocks(staging, blocks, files, cache / "pictures"):
+    for name in _write_blocks(staging, blocks, files, cache / "pictures", drawn):
         say(f"page of {name}")
-    _write_diagrams(staging, files, set(blocks), cache / "pictures")
+    _write_diagrams(staging, files, set(blocks), cache / "pictures", drawn)
     if names is None:
         staging.write("errors.md", error_page())
         _write_documents(staging, set(blocks))
@@ -76,14 +78,18 @@ def _blocks(names: Collection[str] | None) -> dict[str, type[Block]]:
 
 
 def _write_blocks(
-    staging: Staging, blocks: dict[str, type[Block]], files: Collection[str], cache: Path
+    staging: Staging,
+    blocks: dict[str, type[Block]],
+    files: Collection[str],
+    cache: Path,
+    drawn: Collection[str] | None,
 ) -> Iterator[str]:
     """Write the pages of blocks and of their groups; yield each name when its page is written."""
     groups: dict[str, dict[str, type[Block]]] = {}
     for name, block in blocks.items():
         group, _, short = name.partition(".")
         groups.setdefault(group, {})[name] = block
-        made = pictures(name, block, cache)
+        made = pictures(name, block, cache) if drawn is None or name in drawn else {}
         for file, content in made.items():
             staging.write(f"blocks/{group}/{short}-{file}", content)
         used = {file: os.path.relpath(page_of(file), f"blocks/{group}") for file in users_of(name, files)}
@@ -94,14 +100,18 @@ def _write_blocks(
         staging.write(f"blocks/{group}/index.md", group_page(group, from_docstring(text), members))
 
 
-def _write_diagrams(staging: Staging, files: Iterable[str], blocks: set[str], cache: Path) -> None:
+def _write_diagrams(
+    staging: Staging, files: Iterable[str], blocks: set[str], cache: Path, drawn: Collection[str] | None
+) -> None:
     for file in files:
         page = page_of(file)
-        picture = diagram_picture(file, cache) if file.count("/") == 1 else ""  # a part alone is no diagram
+        # A part alone is no diagram.
+        is_drawn = file.count("/") == 1 and (drawn is None or file in drawn)
+        picture = diagram_picture(file, cache) if is_drawn else ""
         if picture:
             staging.write(page.replace(".md", ".svg"), picture)
-        drawn = Path(page).with_suffix(".svg").name if picture else ""
-        staging.write(page, diagram_page(file, drawn, blocks))
+        shown = Path(page).with_suffix(".svg").name if picture else ""
+        staging.write(page, diagram_page(file, shown, blocks))
 
 
 def _write_documents(staging: Staging, blocks: set[str]) -> None:
