@@ -46,6 +46,7 @@ def test_a_loop_that_is_not_stable_fails_and_says_what_grows(capsys) -> None:
     assert out.splitlines()[-2].startswith("NOT STABLE: a disturbance grows by 0.0395 1/s, in ")
 
 
+@pytest.mark.slow
 def test_the_json_has_all_of_it(capsys) -> None:
     facts = json.loads(told(capsys, MARGINS, "--json")[1])
     assert facts["stable"] is True and facts["hyperperiod_s"] == 0.0
@@ -271,6 +272,7 @@ class Terminal(StringIO):
         return True
 
 
+@pytest.mark.slow
 def test_what_takes_long_shows_which_limit_is_sought_and_how_far_it_is(monkeypatch, capsys) -> None:
     terminal = Terminal()
     monkeypatch.setattr("quadvis.machine.status_line.PATIENCE", 0.0)
