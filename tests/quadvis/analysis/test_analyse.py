@@ -79,6 +79,7 @@ def without_limits(tmp_path) -> str:
     return str(path)
 
 
+@pytest.mark.slow
 def test_bode_and_nyquist_plots_are_written(capsys, tmp_path, without_limits) -> None:
     _, out, _ = told(capsys, without_limits, "-o", str(tmp_path / "new"))
     kinds, cuts = ("bode", "nyquist"), ("imu", "torque", "vision")
@@ -314,6 +315,7 @@ def test_an_interrupted_analysis_ends_with_a_word(step, monkeypatch, capsys) -> 
     assert (code, error) == (130, "interrupted\n")
 
 
+@pytest.mark.slow
 def test_a_remark_does_not_look_like_a_row_of_a_table(tmp_path, capsys) -> None:
     path = sampled(tmp_path).path
     path.write_text(path.read_text().partition("analyse:")[0])

@@ -44,6 +44,7 @@ def test_a_gain_can_go_to_where_a_pole_comes_to_minus_1(tmp_path) -> None:
     assert found.reached and found.text == "stable up to 40 1/s"
 
 
+@pytest.mark.slow
 def test_a_range_may_go_down(tmp_path) -> None:
     """At z on the unit circle c = k T / 2."""
     found = limit(sampled(tmp_path), "damper.factor", "1.5 1/s", "0.01 1/s")
@@ -113,7 +114,9 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("latency", "variant", "bandwidth"), mostly_slow(CASES[7:] + CASES[:7], slow=5))
+@pytest.mark.parametrize(
+    ("latency", "variant", "bandwidth"), mostly_slow(CASES[7:] + CASES[:7], quick=0, slow=6)
+)
 def test_the_sampled_loop_is_stable_up_to_the_known_bandwidth(latency, variant, bandwidth) -> None:
     for factor, stable in ((0.98, True), (1.02, False)):
         settings = {"latency": f"{latency} s", "bandwidth": f"{factor * bandwidth} rad/s"}
@@ -136,7 +139,7 @@ def test_the_largest_stable_bandwidth_falls_with_the_motor_lag(lag: int, bandwid
 
 @pytest.mark.parametrize(
     ("bandwidth", "unstable"),
-    mostly_slow([(3.0, 0.25), (1.0, 1.05), (1.5, 0.70), (2.0, 0.50), (2.5, 0.40)], slow=1),
+    mostly_slow([(3.0, 0.25), (1.0, 1.05), (1.5, 0.70), (2.0, 0.50), (2.5, 0.40)], quick=0, slow=2),
 )
 def test_the_first_unstable_vision_latency_on_a_grid_of_50_ms(bandwidth: float, unstable: float) -> None:
     for latency, stable in ((unstable - 0.05, True), (unstable, False)):
