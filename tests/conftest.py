@@ -10,6 +10,7 @@ import pytest
 from hypothesis import settings
 
 from quadvis.machine.processes import ONE_THREAD
+from tests.stages import longest_first
 
 # As in the workers of a sweep: before numpy is imported, and for the commands under test.
 os.environ.update(ONE_THREAD)
@@ -34,12 +35,14 @@ settings.load_profile("quick")
 OPTIONAL = [name for name in ("mujoco",) if find_spec(name) is None]
 
 
+@pytest.hookimpl(trylast=True)  # after pytest has brought together what shares a fixture
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Skip what needs a package that is not installed."""
+    """Skip what needs a package that is not installed, and begin with what takes longest."""
     for item in items:
         for name in OPTIONAL:
             if name in item.nodeid:
                 item.add_marker(pytest.mark.skip(reason=f"the package {name} is not installed"))
+    longest_first(items)
 
 
 def pytest_collection_finish() -> None:

@@ -5,6 +5,23 @@ from typing import Any
 
 import pytest
 
+# What takes half a minute or more of the second stage. It comes first: none of it is left alone at the end.
+LONGEST = (
+    "tests/tools/test_site.py::test_all_pages",
+    "tests/blocks/test_every_block.py::test_every_block_conforms[estimation.",
+    "tests/blocks/vision/test_rays.py::test_machine_code",
+    "tests/blocks/plant/test_mujoco_rotorcraft.py::test_the_hover_flies",
+    "tests/diagrams/test_guides.py::test_a_guide_can_be_followed",
+    "tests/quadvis/test_shipped.py::test_a_wheel",
+    "tests/tools/test_bench.py::test_machine_code",
+    "tests/tools/test_bench_realtime.py::test_the_table",
+)
+
+
+def longest_first(items: list[pytest.Item]) -> None:
+    """Move what takes longest to the front; all else keeps its order."""
+    items.sort(key=lambda item: not item.nodeid.startswith(LONGEST))
+
 
 def mostly_slow(cases: Iterable[Any], quick: int = 1, slow: int | None = None) -> list[Any]:
     """Have the first cases tried in the first stage, all others in the second.

@@ -249,6 +249,26 @@ def _vectorized(function: Any) -> Any:
     return made(function)
 
 
+@functools.cache
+def other_shape() -> Any:
+    """Return what compiled code calls where a slice is given an array of another shape.
+
+    numba's own puts both shapes into a sentence; what makes texts of numbers takes it seconds to compile.
+    """
+
+    def refuse(given: Any, taken: Any) -> None:
+        raise ValueError
+
+    @_overload(refuse)
+    def _(given: Any, taken: Any) -> Any:
+        def refused(given: Any, taken: Any) -> None:
+            raise ValueError("an array of another shape is assigned to a slice")
+
+        return refused
+
+    return refuse
+
+
 def _arange() -> Any:
     """Return numpy's range, of whole numbers only: others are rounded in two ways."""
 

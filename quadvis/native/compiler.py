@@ -12,7 +12,7 @@ import numpy as np
 from quadvis.block.interface import CROSSING
 from quadvis.engine.memory import packed
 from quadvis.machine.garbage import uncollected
-from quadvis.native.arrays import METHODS, OtherBits, methods
+from quadvis.native.arrays import METHODS, OtherBits, methods, other_shape
 from quadvis.native.block_type import BlockType, Kind, MethodType
 from quadvis.native.cache import MachineCode
 from quadvis.native.checked import instead, power, replacements
@@ -22,6 +22,7 @@ from quadvis.native.machine_code import Compiled, Unlinkable, emit
 from quadvis.native.routine import ROUTINE, Routine, plain
 from quadvis.native.source import METHOD, POWER, Unreadable, fingerprint, names_in, prepared
 
+REFUSE = "raise_with_shape_context"  # of numba's arrayobj
 # A division by zero and a wrong index are noticed. Nobody calls the functions from Python.
 OPTIONS = {"error_model": "python", "boundscheck": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
@@ -171,18 +172,26 @@ def compile_function(
 
 @contextmanager
 def _quickly() -> Iterator[None]:
-    """Have numba optimise at its second level, a quarter sooner than at its third; `emit` comes after it."""
+    """Have numba optimise at its second level, a quarter sooner than at its third; `emit` comes after it.
+
+    And have it compile no texts for a slice that is given an array of another shape.
+    """
     from numba.core import config as settings
     from numba.core import registry
+    from numba.np import arrayobj
 
     config: Any = settings
     _ = registry.cpu_target.target_context  # what numba makes for the whole process stays as it was
-    level = config.OPT
+    level, refuse = config.OPT, getattr(arrayobj, REFUSE, None)
     config.OPT = type(level)(2)
+    if refuse:  # older releases have no such sentence
+        setattr(arrayobj, REFUSE, other_shape())
     try:
         yield
     finally:
         config.OPT = level
+        if refuse:
+            setattr(arrayobj, REFUSE, refuse)
 
 
 Known = dict[tuple[types.FunctionType, str], Any]  # numba's dispatchers, by function and fingerprint

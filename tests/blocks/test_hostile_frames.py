@@ -129,7 +129,7 @@ def test_a_frame_of_any_kind_does_not_end_a_run(name: str, kind: str, tmp_path: 
     feed(make(name, tmp_path), between((NOT_PICTURES | PICTURES)[kind]))
 
 
-@pytest.mark.parametrize("suffix", mostly_slow(["avi", "mp4", "mkv"]))
+@pytest.mark.parametrize("suffix", mostly_slow(["avi", "mp4", "mkv"], slow=1))
 @pytest.mark.parametrize("kind", NOT_PICTURES | PICTURES)
 def test_a_frame_of_any_kind_does_not_end_any_video(kind: str, suffix: str, tmp_path: Path) -> None:
     file = tmp_path / f"video.{suffix}"

@@ -58,11 +58,14 @@ def test_the_papers_craft_is_the_default_of_the_blocks() -> None:
 
 
 # First, and as machine code, so that the hovers below find nearly all of it compiled and take it.
-@pytest.mark.slow
-@pytest.mark.parametrize("craft", NAMES)
 @pytest.mark.parametrize(
-    ("name", "variant"),
-    [("landing.yaml", "robust"), ("blackout.yaml", "robust"), ("takeover.yaml", "robust")],
+    ("craft", "name", "variant"),
+    mostly_slow(
+        [(craft, "landing.yaml", "robust") for craft in NAMES]
+        + [(craft, name, "robust") for name in ("blackout.yaml", "takeover.yaml") for craft in NAMES],
+        quick=0,
+        slow=len(NAMES),
+    ),
 )
 def test_every_craft_flies_under_the_failsafe(craft: str, name: str, variant: str) -> None:
     result = loaded(name, variant, CRAFTS / f"{craft}.yaml").run(engine="native")
@@ -74,9 +77,11 @@ def test_every_craft_flies_under_the_failsafe(craft: str, name: str, variant: st
     mostly_slow(
         [
             (craft, variant)
+            for variant in ("geometric", "fused_geometric", "robust_geometric")
             for craft in NAMES
-            for variant in ("geometric", "robust_geometric", "fused_geometric")
-        ]
+        ],
+        quick=0,
+        slow=len(NAMES) + 1,
     ),
 )
 def test_every_craft_hovers(craft: str, variant: str) -> None:

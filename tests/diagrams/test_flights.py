@@ -39,7 +39,7 @@ def jumps(result: Any) -> np.ndarray:
     return np.abs(np.diff(controls, axis=0)) * changed
 
 
-@pytest.mark.parametrize("variant", mostly_slow([None, "robust"]))
+@pytest.mark.parametrize("variant", mostly_slow([None, "robust"], quick=0))
 def test_a_take_over_meets_what_its_diagram_expects(variant: str | None) -> None:
     assert fly("takeover", variant).passed  # tests/test_readmes.py flies all the others in the second stage
 
@@ -60,6 +60,7 @@ def test_without_noise_and_wind_the_steps_are_those_of_the_paper_s_poles() -> No
     assert yaw == pytest.approx(30.0 * (1 - np.exp(-s) * (1 + s)), abs=2.0)
 
 
+@pytest.mark.slow
 def test_a_blackout_of_eight_seconds_ends_softly_on_the_ground() -> None:
     result = fly("landing", "blackout")
     assert result.passed
@@ -81,6 +82,7 @@ def test_the_pilots_stick_counts_within_one_tick_of_the_control() -> None:
     assert times[np.argmax(taken)] == times[np.argmax(np.abs(stick) > 0.3)]
 
 
+@pytest.mark.slow
 def test_lost_vision_reaches_the_control_within_three_tenths_of_a_second() -> None:
     result = fly("blackout", stop_time=21)
     known = result["supervision/failsafe.velocity_weight"] == 0.0
@@ -89,6 +91,7 @@ def test_lost_vision_reaches_the_control_within_three_tenths_of_a_second() -> No
     assert 20.0 < times[(times > 5.0) & known][0] <= 20.3
 
 
+@pytest.mark.slow
 def test_a_hanging_imu_hands_roll_and_pitch_to_nobody_and_back_without_a_jump(tmp_path: Path) -> None:
     text = re.sub("(parts|crafts)/", rf"{DIAGRAMS}/\1/", (DIAGRAMS / "takeover.yaml").read_text())
     gyro = "\n      rates: {from: craft.rates, across: sample}\n"
@@ -137,8 +140,7 @@ def test_commands_that_nobody_renews_are_not_sent_for_long(tmp_path: Path) -> No
     assert idle == pytest.approx([6.25, 6.3, 6.35, 6.4, 6.45])  # the last command was made at 5.95 s
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(1, 4))
+@pytest.mark.parametrize("seed", mostly_slow(range(1, 4), quick=0, slow=1))
 def test_the_craft_outlasts_a_blackout_of_three_seconds_in_any_wind(seed: int) -> None:
     result = fly("blackout", seed=seed)
     times, position = result.times("craft/body.position"), result["craft/body.position"]
@@ -148,24 +150,21 @@ def test_the_craft_outlasts_a_blackout_of_three_seconds_in_any_wind(seed: int) -
     assert result["supervision/failsafe.mode"][-1] == 2
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(2, 4))
+@pytest.mark.parametrize("seed", mostly_slow(range(2, 4), quick=0, slow=1))
 def test_the_better_design_outlasts_it_within_six_decimetres_of_its_target(seed: int) -> None:
     result = fly("blackout", "robust", seed=seed)
     assert result.passed
     assert result["excursion.y"].max() <= 0.6
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(1, 3))
+@pytest.mark.parametrize("seed", mostly_slow(range(1, 3), quick=0, slow=1))
 def test_half_the_frames_keep_the_better_design_in_the_air(seed: int) -> None:
     result = fly("blackout", "robust", seed=seed, settings={"eyes/camera.drop_rate": "0.5"})
     assert result["excursion.y"].max() <= 0.6
     assert result["supervision/failsafe.mode"].max() <= 3  # AUTOMATIC and COAST
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, 7, 9])
+@pytest.mark.parametrize("seed", mostly_slow([2, 7, 9], quick=0, slow=1))
 def test_the_better_design_lands_after_eight_seconds_of_blackout_near_its_target(seed: int) -> None:
     result = fly("landing", "robust_blackout", seed=seed)
     assert result["craft/ground.impact"][-1] <= 0.35
@@ -173,15 +172,13 @@ def test_the_better_design_lands_after_eight_seconds_of_blackout_near_its_target
     assert result["excursion.y"].max() <= 2.5  # seed 7 drifts 2.2 m
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(2, 4))
+@pytest.mark.parametrize("seed", mostly_slow(range(2, 4), quick=0, slow=1))
 @pytest.mark.parametrize("variant", [None, "blackout", "robust"])
 def test_no_touch_down_is_harder_than_it_may_be(variant: str | None, seed: int) -> None:
     assert fly("landing", variant, seed)["craft/ground.impact"][-1] <= 0.35
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(2, 4))
+@pytest.mark.parametrize("seed", mostly_slow(range(2, 4), quick=0, slow=1))
 def test_a_take_over_jumps_in_no_wind(seed: int) -> None:
     result = fly("takeover", seed=seed)
     assert result.passed
@@ -203,7 +200,7 @@ def test_a_camera_that_delivers_nothing_does_not_pass_the_hover_where_nothing_mo
     assert missed == ["eyes/camera.fresh"]
 
 
-@pytest.mark.parametrize("name", mostly_slow(["step", "trajectory", "takeover"]))
+@pytest.mark.parametrize("name", mostly_slow(["step", "takeover", "trajectory"], quick=0, slow=2))
 def test_a_camera_that_loses_a_third_of_its_frames_passes_no_flight(name: str) -> None:
     result = fly(name, settings={"eyes/camera.drop_rate": "0.33"})
     missed = [verdict.expectation.selection.text for verdict in result.outcome.verdicts if not verdict.met]

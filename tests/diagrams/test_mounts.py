@@ -34,7 +34,7 @@ def errors(result: Any) -> Any:
     return np.mean(poses[late] - at_stamps, axis=0)
 
 
-@pytest.mark.parametrize("variant", ["geometric", "fused_geometric"])
+@pytest.mark.parametrize("variant", mostly_slow(["geometric", "fused_geometric"]))
 def test_an_estimate_that_knows_the_mount_finds_the_craft(tmp_path: Path, variant: str) -> None:
     result = flight(tmp_path, variant, known=True)
     assert errors(result) == pytest.approx((0.0, 0.0, 0.0, 0.0), abs=0.02)

@@ -40,6 +40,7 @@ def test_s0_is_what_the_hover_has_by_itself() -> None:
     assert np.array_equal(plain["craft.position"], with_set["craft.position"])
 
 
+@pytest.mark.slow
 def test_on_the_same_seed_s1_adds_constant_errors_to_the_noise_of_s0() -> None:
     added = np.array([errors("s1", seed) - errors("s0", seed) for seed in range(1, 9)])
     assert np.degrees(np.abs(added)) == pytest.approx(np.full((8, 2), 0.5))

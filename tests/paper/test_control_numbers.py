@@ -17,6 +17,7 @@ from quadvis_blocks.control.nested_saturation import NestedSaturation
 from quadvis_blocks.control.yaw import Yaw
 from quadvis_blocks.plant.lateral import Lateral
 from quadvis_blocks.plant.rotorcraft import Rotorcraft
+from tests.stages import mostly_slow
 
 GRAVITY = 9.81
 LINEAR = (1e9, 1e9, 1e9, 1e9)  # amplitudes that never saturate
@@ -155,7 +156,7 @@ def test_far_away_it_cruises_at_the_speed_of_the_last_amplitude_and_leans_no_fur
     assert abs(result["position"][-1]) < 1e-3
 
 
-@pytest.mark.parametrize("bandwidth", [1.0, 2.0])
+@pytest.mark.parametrize("bandwidth", mostly_slow([1.0, 2.0]))
 @pytest.mark.parametrize(
     ("name", "value", "share"),
     [

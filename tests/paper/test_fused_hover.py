@@ -27,7 +27,7 @@ def fly(seed, variant="fused_geometric", noise=NOMINAL, stop_time=None, **settin
     diagram = quadvis.load(
         HOVER, variant=variant, settings=settings, params=params, stop_time=stop_time, seed=seed
     )
-    return diagram.run()
+    return diagram.run(engine="native")
 
 
 @cache

@@ -26,7 +26,9 @@ def flights(name, seeds, variant="geometric", **settings):
     params = DIAGRAMS / "sets" / f"{name}.yaml"
     found = []
     for seed in seeds:
-        result = quadvis.load(HOVER, variant=variant, settings=settings, params=[params], seed=seed).run()
+        result = quadvis.load(HOVER, variant=variant, settings=settings, params=[params], seed=seed).run(
+            engine="native"
+        )
         late = result.times("craft.position") >= 40
         position, yaw = result["craft.position"][late, :2], result["craft.attitude"][late, 2]
         found.append([np.sqrt(np.mean(position**2)), np.sqrt(np.mean(yaw**2))])

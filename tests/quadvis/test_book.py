@@ -90,6 +90,7 @@ class Read:
         ]
 
 
+@pytest.mark.slow
 def test_the_whole_comes_first_then_each_part_with_links_both_ways(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

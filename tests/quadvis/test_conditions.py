@@ -289,6 +289,7 @@ EVERYTHING = (
 SIGNALS = ["a.y", "a.square", "b.y", "c.y", "d.y", "d.own", "e.y", "f.y", "d/inner/when.restart"]
 
 
+@pytest.mark.slow
 def test_machine_code_gives_the_same_bits() -> None:
     one, other = run(EVERYTHING), run(EVERYTHING, engine="native")
     for name in SIGNALS:

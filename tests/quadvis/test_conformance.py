@@ -88,6 +88,7 @@ WORKING = (
 )
 
 
+@pytest.mark.slow
 def test_a_block_whose_update_uses_what_output_has_computed_passes(tmp_path: Path) -> None:
     check_block(block(tmp_path, WORKING), test=tmp_path / "blocks" / "wind" / "fan.py")
 

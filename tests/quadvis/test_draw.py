@@ -334,6 +334,7 @@ def test_blocks_of_one_task_share_a_colour_that_the_legend_names(hover_svg: str)
     assert {TASKS[task]: colours.pop() for task, colours in fills.items()}.items() <= named.items()
 
 
+@pytest.mark.slow
 def test_equal_diagrams_give_equal_bytes_in_every_process(hover_svg: str) -> None:
     blocks, wires, constants = hover()
     assert draw("hover", blocks, wires, constants, TASKS) == hover_svg

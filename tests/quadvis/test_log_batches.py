@@ -295,6 +295,7 @@ def test_every_truncation_holds_all_messages_up_to_a_time(
     assert max(counts) == len(messages)
 
 
+@pytest.mark.slow
 def test_a_disk_that_hangs_for_a_while_costs_batches_that_are_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -370,6 +371,7 @@ def logged(diagram: Diagram, path: Path, engine: str) -> list[list[Message]]:
     return [read(path) for read in (by_mcap, by_rosbags, in_sequence)]
 
 
+@pytest.mark.slow
 @needs_numba
 def test_machine_code_logs_the_messages_of_the_interpreter(tmp_path: Path) -> None:
     diagram = load_text(RUN)
@@ -392,7 +394,9 @@ load_text(text.replace("fast: 3", "fast: " + sys.argv[3])).run(
 """
 
 
-@pytest.mark.parametrize(("engine", "every"), [("python", 1), pytest.param("native", 200, marks=needs_numba)])
+@pytest.mark.parametrize(
+    ("engine", "every"), [("python", 1), pytest.param("native", 200, marks=[needs_numba, pytest.mark.slow])]
+)
 def test_a_killed_run_keeps_all_but_its_last_moments(engine: str, every: int, tmp_path: Path) -> None:
     path = tmp_path / "killed.mcap"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}

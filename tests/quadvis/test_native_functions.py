@@ -62,6 +62,7 @@ def test_machine_code_gives_the_same_is_kept_and_is_loaded_again(fresh):
         assert load(TOGETHER)
 
 
+@pytest.mark.slow
 def test_what_machine_code_refuses_is_pythons_to_say(fresh):
     prepare(TOGETHER)
     assert inverse(np.array([4.0])) == 0.25
@@ -89,6 +90,7 @@ class Looking(Block, numeric=False):
         return inverse(np.array([u]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("steps", "engine", "compiled"), [(9, "native", True), (9, "auto", False)])
 def test_a_run_by_machine_code_compiles_what_blocks_call_where_that_pays(fresh, steps, engine, compiled):
     assert drive(Looking(), u=np.full(steps, 4.0), engine=engine, rate="10 Hz").y == pytest.approx(0.25)
@@ -112,3 +114,20 @@ def test_a_source_that_was_edited_is_refused_until_it_is_back(fresh, tmp_path):
     library().compile_functions([function])
     assert library().load_functions([function])
     assert function(2.0) == 8.0
+
+
+@pytest.mark.slow
+def test_a_slice_that_another_shape_is_given_needs_no_functions_of_texts():
+    numba = pytest.importorskip("numba")
+    from numba.np import arrayobj
+
+    from quadvis.native.compiler import compile_function
+
+    def moved(place):
+        values = numba.carray(place, 3)
+        values[: int(values[0])] = values[1:]
+
+    refuse = arrayobj.raise_with_shape_context
+    compiled = compile_function(moved, [numba.types.CPointer(numba.float64)])
+    assert "moved" in compiled.text and "unicode" not in compiled.text
+    assert arrayobj.raise_with_shape_context is refuse

@@ -131,6 +131,7 @@ def test_a_file_of_another_kind_stays(command: str, content: bytes, project: Pat
     assert contents(project) == before
 
 
+@pytest.mark.slow
 def test_every_command_writes_again_what_it_wrote(project: Path) -> None:
     for _ in range(2):
         assert main(["run", "loop.yaml", "--log", "x.mcap"]) == 0
@@ -324,6 +325,7 @@ def test_parameter_sets_and_variants_of_one_name_have_logs_of_their_own(project:
     assert len(list(Path("runs").iterdir())) == 2
 
 
+@pytest.mark.slow
 def test_drawings_and_tables_of_variants_have_names_of_their_own(project: Path, capsys: Captured) -> None:
     outputs = set()
     for options in ([], ["--variant", "c"], ["--variant", "b"], ["--params", "set.yaml"]):
@@ -398,7 +400,7 @@ def wait_for(path: str) -> None:
         time.sleep(0.02)
 
 
-@pytest.mark.parametrize("log", [(), ("--log", "x.mcap")])
+@pytest.mark.parametrize("log", mostly_slow([((),), (("--log", "x.mcap"),)]))
 def test_two_runs_at_a_time_end_with_one_whole_log_and_one_refusal(
     log: tuple[str, ...], capsys: Captured
 ) -> None:
@@ -415,6 +417,7 @@ def test_two_runs_at_a_time_end_with_one_whole_log_and_one_refusal(
     assert len(whole["law.y"]) == 101
 
 
+@pytest.mark.slow
 def test_runs_of_variants_side_by_side_end_with_a_whole_log_each(project: Path) -> None:
     for number, name in enumerate(("a-b", "a")):
         Path(f"{number}.yaml").write_text(LOOP.format(name=name))
@@ -465,7 +468,7 @@ def whole_log_and_video() -> bool:
     return read_log("x.mcap").complete and bool(video.read()[0])
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGHUP, 129), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(("number", "code"), mostly_slow([(signal.SIGHUP, 129), (signal.SIGTERM, 143)]))
 def test_a_run_that_is_ended_closes_its_log_and_its_video(number: signal.Signals, code: int) -> None:
     process = started("run", recording(), "--log", "x.mcap")
     wait_for("x.mcap")

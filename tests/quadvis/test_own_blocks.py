@@ -11,6 +11,7 @@ import quadvis
 from quadvis.api import check, load_text
 from quadvis.cli import main
 from quadvis.errors import DiagramError
+from tests.stages import mostly_slow
 
 MARK = "import pathlib\npathlib.Path('ran').touch()\n"
 FAN = '''"""A fan."""
@@ -233,7 +234,7 @@ def sharing(folder: Path, lift: float = 2.0) -> Path:
     return folder / "one.yaml"
 
 
-@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("engine", mostly_slow(["python", "native"]))
 def test_own_blocks_share_modules_of_their_folder_and_of_packages_there(project: Path, engine: str) -> None:
     result = quadvis.load(sharing(project)).run(engine=engine)
     assert result["fan.y"].tolist() == result["big.y"].tolist() == [20.0, 20.0]

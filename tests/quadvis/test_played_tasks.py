@@ -17,9 +17,10 @@ from quadvis.run.played_tasks import PlayedTasks, begins
 from tests.quadvis.realtime.fakes import CrewClock, Paced
 from tests.quadvis.realtime.test_crew import BLOCKS, TASKS, busy, diagram
 from tests.quadvis.realtime.test_streams import Kept
+from tests.stages import mostly_slow
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="real time is Linux's")
-engines = pytest.mark.parametrize("engine", ["python", "native"])
+engines = pytest.mark.parametrize("engine", mostly_slow(["python", "native"]))
 COUNT = 80
 Takes = dict[str, dict[int, float]]
 

@@ -502,7 +502,7 @@ CROWDED = {
 }
 
 
-@pytest.mark.parametrize("panels", mostly_slow([(panels,) for panels in CROWDED.values()], 4), ids=CROWDED)
+@pytest.mark.parametrize("panels", mostly_slow([(panels,) for panels in CROWDED.values()], 2), ids=CROWDED)
 def test_legends_fit_and_no_two_curves_look_alike(
     panels: tuple[Panel, ...], sheets: Sheets, tmp_path: Path
 ) -> None:

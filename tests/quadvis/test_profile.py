@@ -15,6 +15,7 @@ from quadvis.engine.profile import Profile, ProfileReport, Timed, TimedMethod, r
 from quadvis.errors import RunError
 from quadvis.native.choice import choose, use
 from quadvis.run.report import profile_lines
+from tests.stages import mostly_slow
 
 TEXT = """\
 quadvis: 1
@@ -31,7 +32,7 @@ blocks:
 """
 
 
-@pytest.mark.parametrize("kind", ["python", "native"])
+@pytest.mark.parametrize("kind", mostly_slow(["python", "native"]))
 def test_every_call_of_a_block_is_counted_and_the_signals_stay(kind: str) -> None:
     diagram = load_text(TEXT)
     plain = diagram.run(engine=kind)
@@ -55,7 +56,7 @@ def test_every_call_of_a_block_is_counted_and_the_signals_stay(kind: str) -> Non
     assert report.cost > 0
 
 
-@pytest.mark.parametrize("kind", ["python", "native"])
+@pytest.mark.parametrize("kind", mostly_slow(["python", "native"]))
 def test_a_call_that_fails_fails_as_without_a_profile(kind: str) -> None:
     engine = Engine(load_text(TEXT).graph)
     engine.measure()

@@ -13,6 +13,7 @@ from quadvis.diagram.sections.figures import read_figures
 from quadvis.document import parse_yaml
 from quadvis.errors import DiagramError
 from quadvis.output.log_reader import read_log
+from tests.stages import mostly_slow
 
 DIAGRAMS = Path(__file__).parents[2] / "diagrams"
 
@@ -29,7 +30,7 @@ def same(diagram: Diagram, again: Diagram) -> None:
     assert again.hash == diagram.hash
 
 
-@pytest.mark.parametrize("variant", [None, "plane", "geometric"])
+@pytest.mark.parametrize("variant", mostly_slow(["geometric", "plane", None]))
 def test_the_hover_written_out_gives_the_same_run_to_the_bit(variant: str | None) -> None:
     diagram = load(
         DIAGRAMS / "hover.yaml", variant=variant, settings=["bandwidth=1 rad/s"], stop_time="1 s", seed=3

@@ -190,7 +190,7 @@ def test_a_run_without_its_streams_leaves_a_whole_log(closed: str, code: int) ->
     assert Path("step.mcap").read_bytes()[:5] == b"\x89MCAP"
 
 
-@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("unbuffered", mostly_slow(["", "1"]))
 @pytest.mark.parametrize(
     "words", mostly_slow(["check step.yaml --json", "list", "schema", "--help", "draw step.yaml -o -"])
 )
@@ -200,7 +200,7 @@ def test_a_full_standard_output_is_one_sentence(words: str, unbuffered: str) -> 
     assert done.stderr == "cannot write to standard output: no space left on device\n"
 
 
-@pytest.mark.parametrize("closed", ["2>&-", "2>/dev/full"])
+@pytest.mark.parametrize("closed", mostly_slow(["2>&-", "2>/dev/full"]))
 def test_a_fault_that_cannot_be_told_keeps_its_exit_code(closed: str) -> None:
     assert command(f"quadvis run none.yaml {closed}").returncode == 2
 
@@ -316,6 +316,7 @@ def test_an_interruption_that_an_import_turned_into_another_error_is_still_one(c
     assert capsys.readouterr().err == "interrupted\n"
 
 
+@pytest.mark.slow
 def test_an_interruption_that_python_had_to_drop_comes_again(capsys: Captured) -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     shell.listen()

@@ -117,6 +117,7 @@ def test_in_a_checkout_the_shipped_diagrams_write_beside_their_folder() -> None:
     assert Path(diagram.graph["eyes/video"].block.file).resolve() == ROOT / "runs" / "hover.mp4"
 
 
+@pytest.mark.slow
 def test_commands_and_parameter_files_take_them_by_name(installed: Path, capsys: Captured) -> None:
     Path("set.yaml").write_text(
         "{quadvis: 1, name: set, base: quadvis:sets/s1.yaml, set: {bandwidth: 1 rad/s}}"

@@ -75,6 +75,7 @@ def test_what_is_written_is_as_mypy_wants_it(kind: str) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_the_test_of_a_new_block_finds_a_breach_of_the_contract(
     project: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

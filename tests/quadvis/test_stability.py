@@ -13,6 +13,7 @@ from quadvis.api import load_text
 from quadvis.engine.engine import Engine
 from quadvis.engine.stability import Marks, StatePole, poles, stable_to, too_large
 from quadvis.errors import RunError
+from tests.stages import mostly_slow
 
 FALL = """\
 quadvis: 1
@@ -98,7 +99,7 @@ def test_complex_poles_are_shown_with_both_parts() -> None:
     assert StatePole(complex(-3, 0), "x").shown == "-3 1/s"
 
 
-@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("engine", mostly_slow(["python", "native"]))
 def test_a_run_that_diverges_names_the_pole(engine: str) -> None:
     words = (
         "block 'fast', t = 1.34 s: state 'integral' left the finite numbers, as the solver's step of 5 ms is "

@@ -505,6 +505,7 @@ def test_the_table_is_the_same_to_the_bit_for_any_number_of_workers(
     assert Path(f"here.{kind}").read_bytes() == Path(f"there.{kind}").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_script_needs_no_guard_and_its_environment_is_left_alone() -> None:
     Path("script.py").write_text(
         "import os, quadvis\n"
@@ -567,6 +568,7 @@ def test_what_is_finished_when_a_sweep_is_ended_stays_and_resuming_gives_the_byt
     assert Path("x.csv").read_bytes() == Path("y.csv").read_bytes()
 
 
+@pytest.mark.slow
 @linux
 def test_a_worker_that_is_killed_is_told_in_one_sentence() -> None:
     long_runs(100_000)
@@ -584,6 +586,7 @@ def test_a_worker_that_is_killed_is_told_in_one_sentence() -> None:
     assert all(wait_for(lambda pid=pid: gone(pid)) for pid in workers)
 
 
+@pytest.mark.slow
 @linux
 def test_workers_end_with_the_first_process_however_it_ends() -> None:
     long_runs(100_000)
@@ -636,7 +639,7 @@ def hanging_runs() -> tuple[str, ...]:
 
 
 @linux
-@pytest.mark.parametrize("kind", ["csv", "parquet"])
+@pytest.mark.parametrize("kind", mostly_slow(["csv", "parquet"]))
 def test_rows_are_in_the_table_also_if_no_other_run_ends_and_the_sweep_is_killed(
     kind: str, here: list[int]
 ) -> None:
@@ -690,6 +693,7 @@ def test_a_sweep_writes_over_nothing_that_it_reads_and_no_file_of_another_kind(
     assert here == []
 
 
+@pytest.mark.slow
 def test_the_final_value_of_a_vector_has_a_column_for_each_element(here: list[int]) -> None:
     text = LOOP.replace("summary:\n", (
         "summary:\n  all: {signal: both.y, show: [rms, final], unit: cm}\n"

@@ -171,7 +171,7 @@ def random_blocks(rng: random.Random) -> list[str]:
     return lines
 
 
-@pytest.mark.parametrize("seed", mostly_slow(range(150), 30))
+@pytest.mark.parametrize("seed", mostly_slow(range(150), 15, slow=30))
 def test_the_order_of_the_blocks_does_not_matter(seed: int) -> None:
     rng = random.Random(seed)
     lines = random_blocks(rng)

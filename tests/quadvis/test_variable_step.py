@@ -159,6 +159,7 @@ def test_it_begins_anew_only_where_something_has_changed(monkeypatch: pytest.Mon
     assert len(begun) <= 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", VARIABLE)
 def test_both_engines_and_a_restored_run_give_the_same_bits(method: str) -> None:
     diagram = made(SAMPLED, method)

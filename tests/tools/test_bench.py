@@ -80,6 +80,7 @@ def test_interpreted_blocks_do_the_tasks_right_and_are_timed() -> None:
         assert row["block"] == (pytest.approx(row["step"] / blocks) if blocks else None)
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_ratios_are_those_to_c_by_hand() -> None:
     found = measured("python_by_hand,c")

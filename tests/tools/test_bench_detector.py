@@ -51,6 +51,7 @@ def everything():
     return done.stdout
 
 
+@pytest.mark.slow
 def test_every_condition_has_a_row_with_what_was_right_and_where_the_circles_were(everything):
     found = cells(everything)
     for name, condition in CONDITIONS.items():
@@ -59,6 +60,7 @@ def test_every_condition_has_a_row_with_what_was_right_and_where_the_circles_wer
         assert rms == "-" if condition.missing == 4 else float(rms) < 0.15
 
 
+@pytest.mark.slow
 def test_markers_are_found_in_a_clean_scene_and_not_in_an_empty_one(everything):
     found = cells(everything)
     assert found["clean"][3] == "100.0%" and float(found["clean"][4]) < 0.5
@@ -66,6 +68,7 @@ def test_markers_are_found_in_a_clean_scene_and_not_in_an_empty_one(everything):
     assert found["1 missing"][3] == "-"
 
 
+@pytest.mark.slow
 def test_all_peers_are_timed_on_pictures_in_which_they_see_what_they_look_for(everything):
     found = cells(everything)
     for name in (
@@ -77,6 +80,7 @@ def test_all_peers_are_timed_on_pictures_in_which_they_see_what_they_look_for(ev
         assert found[name][0] == "100%" and float(found[name][1]) > 0
 
 
+@pytest.mark.slow
 def test_every_figure_that_was_asked_for_is_judged(everything):
     judged = [line.strip() for line in everything.splitlines() if re.match(r"\s+(reached|missed) ", line)]
     with_april = "not installed" not in everything
@@ -85,6 +89,7 @@ def test_every_figure_that_was_asked_for_is_judged(everything):
     assert everything.endswith(f"{reached} of {len(judged)} figures reach what is asked\n")
 
 
+@pytest.mark.slow
 def test_without_apriltag_its_row_says_how_to_install_it(tmp_path):
     (tmp_path / "pupil_apriltags.py").write_text("raise ModuleNotFoundError\n")
     done = run("speed", *SMALL, PYTHONPATH=str(tmp_path))

@@ -70,6 +70,11 @@ def test_the_table_has_all_cases(cyclictest: Path) -> None:
     for (case,) in found["50"].values():
         assert case["p99"] > 0
     assert all(found["50"][name][0]["periods"] == 51 for name in cases)
-    lines = run_script(TOOL, *arguments).stdout.splitlines()
-    assert len(lines) == 6
-    assert lines[1].split() == ["50", "Hz", "cyclictest", "20", "us", "1.00", "0", "of", "50"]
+
+
+def test_a_row_of_the_table_is_the_median_of_its_rounds() -> None:
+    limit, ours = bench.Measured(20e-6, 0, 50), bench.Measured(30e-6, 1, 51, 5e-6, 9e-6)
+    cases = {"cyclictest": [limit, limit], "native": [ours, ours._replace(p99=50e-6)]}
+    first, second = bench.rows(50, cases)
+    assert first == ("50 Hz", "cyclictest", "20 us", "1.00", "0 of 100", "", "")
+    assert second == ("50 Hz", "native", "40 us", "2.00", "2 of 102", "5 us", "9 us")

@@ -79,6 +79,7 @@ def test_without_arguments_it_plays_the_recording_prints_the_table_and_draws_the
     assert cv2.imread(str(tmp_path / "runs" / "comparison.png")) is not None
 
 
+@pytest.mark.slow
 def test_rendered_pictures_are_compared_with_the_true_poses(tmp_path):
     said, methods = found("--rendered", folder=tmp_path)
     assert next(iter(methods)) == "truth" and len(methods) >= 3
@@ -100,6 +101,7 @@ def test_both_methods_of_the_paper_find_the_same_attitude(recording):
     assert np.array(pair["z_ratios"]) == pytest.approx(1, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_the_radius_of_the_circles_reaches_the_detector(tmp_path):
     sizes = ("--rendered", "--side", "50 cm", "--radius", "6 cm", "--pictures", "1")
     _, methods = found(*sizes, folder=tmp_path)
@@ -140,6 +142,7 @@ def test_a_video_is_played_to_its_end(tmp_path, recording):
     assert methods["plane"] == pytest.approx(pictures["plane"], abs=0.04)  # the video is compressed
 
 
+@pytest.mark.slow
 def test_a_camera_with_twice_the_focal_length_sees_everything_twice_as_far(tmp_path, recording):
     text = (ROOT / "diagrams" / "calib" / "camera.yaml").read_text()
     (tmp_path / "tele.yaml").write_text(text.replace("430, 2", "860, 4").replace("438", "876"))
@@ -226,6 +229,7 @@ def test_the_calibration_of_the_pictures_is_the_detectors_too(tmp_path):
     assert all(np.isfinite(values).all() for values in methods.values())
 
 
+@pytest.mark.slow
 def test_orientation_tags_are_ignored_and_what_cannot_be_read_is_told(tmp_path, recording):
     shutil.copytree(PICTURES, tmp_path / "pictures")
     first, second = (tmp_path / "pictures" / f"{number:06d}.jpg" for number in (1, 2))

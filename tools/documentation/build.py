@@ -110,8 +110,8 @@ def _write_diagrams(
         picture = diagram_picture(file, cache) if is_drawn else ""
         if picture:
             staging.write(page.replace(".md", ".svg"), picture)
-        drawn = Path(page).with_suffix(".svg").name if picture else ""
-        staging.write(page, diagram_page(file, drawn, blocks))
+        shown = Path(page).with_suffix(".svg").name if picture else ""
+        staging.write(page, diagram_page(file, shown, blocks))
 
 
 def _write_documents(staging: Staging, blocks: set[str]) -> None:

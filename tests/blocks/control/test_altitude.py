@@ -96,6 +96,7 @@ def held(mass: float, integral: float) -> float:
     return float(load_text(text).run()["craft.position"][-1, 2])
 
 
+@pytest.mark.slow
 def test_with_an_integral_a_craft_of_another_mass_comes_to_its_height() -> None:
     assert held(0.6, 0.0) == pytest.approx(-0.1 * 9.81 / 0.5, rel=1e-3)  # d / a2
     assert held(0.6, 0.2) == pytest.approx(0.0, abs=5e-3)

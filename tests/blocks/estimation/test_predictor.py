@@ -10,6 +10,7 @@ from quadvis_blocks.control.mixer import Mixer
 from quadvis_blocks.estimation.predictor import Predictor
 from quadvis_blocks.plant.rotorcraft import Rotorcraft
 from quadvis_blocks.signal.transport_delay import TransportDelay
+from tests.stages import mostly_slow
 
 PARTS = Path(__file__).parents[3] / "diagrams" / "parts"
 DELAY, LAG = 0.022, 0.08
@@ -117,13 +118,14 @@ def greatest_at_the_end(folder: Path, part: str, bandwidth: float, lag: str = "8
     return float(np.abs(result["craft.position"][late, :2]).max())
 
 
-@pytest.mark.parametrize("lag", ["40 ms", "80 ms", "160 ms"])
+@pytest.mark.parametrize("lag", mostly_slow(["80 ms", "40 ms", "160 ms"]))
 def test_with_it_the_laws_of_the_paper_are_stable_at_bandwidths_that_they_cannot_have_without(
     tmp_path: Path, lag: str
 ) -> None:
     assert greatest_at_the_end(tmp_path, "fused", 7.0, lag) < 1e-3
 
 
+@pytest.mark.slow
 def test_without_it_they_are_not(tmp_path: Path) -> None:
     assert greatest_at_the_end(tmp_path, "paper", 3.0) < 1e-2
     assert greatest_at_the_end(tmp_path, "paper", 4.5) > 1e-2

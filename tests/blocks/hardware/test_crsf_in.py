@@ -80,6 +80,7 @@ def test_a_range_of_pulses_can_be_another_one() -> None:
         assert made.step(frame(1793 + 90, 192))["refused"] == 1
 
 
+@pytest.mark.slow
 def test_of_10000_frames_each_tenth_without_a_byte_all_others_come_and_none_is_wrong() -> None:
     random = np.random.default_rng(7)
     sent, wanted = bytearray(), []

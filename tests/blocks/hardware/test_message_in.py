@@ -86,6 +86,7 @@ def test_the_newest_message_counts_and_ages() -> None:
         assert (found["age"], found["refused"], found["roll"]) == (pytest.approx(0.02), 1, 0.4)
 
 
+@pytest.mark.slow
 def test_however_long_a_run_the_age_stays_and_what_is_skipped_is_counted() -> None:
     """D2: a sensor at 200 Hz, a task at 50 Hz, 60 s."""
     with reading(protocol=LAB, rate="50 Hz") as reader:

@@ -91,6 +91,7 @@ def test_a_byte_too_few_too_many_or_wrong_costs_one_frame(spoil: str) -> None:
         assert found[-6:] == shown[-6:]
 
 
+@pytest.mark.slow
 def test_of_10000_frames_each_tenth_without_a_byte_all_others_come_and_none_is_wrong() -> None:
     random = np.random.default_rng(4)
     every = list(range(1, 17))

@@ -53,6 +53,7 @@ def test_what_an_autopilot_says_in_our_units_and_axes() -> None:
         assert not run["valid"] and run["age"] == pytest.approx(1.0, abs=0.03)
 
 
+@pytest.mark.slow
 def test_of_three_who_speak_one_is_the_autopilot_and_the_others_touch_no_signal() -> None:
     """D7: 6000 heartbeats in random order; mode and armed follow 1/1 alone."""
     random = np.random.default_rng(6)

@@ -189,7 +189,7 @@ blocks:
 def test_the_hover_flies_in_it_as_closely_as_in_the_equations() -> None:
     """The same noise, the same laws, another simulator: the errors of 140 s are the same within 3 %."""
     ours, theirs = (
-        quadvis.load(MODEL.parents[1] / name, variant=variant).run()
+        quadvis.load(MODEL.parents[1] / name, variant=variant).run(engine="native")
         for name, variant in (("hover.yaml", "fused_geometric"), ("mujoco.yaml", None))
     )
     assert ours.passed and theirs.passed

@@ -92,6 +92,7 @@ def signed_biases(seed: int, **parameters: Any) -> list[float]:
     return errors[0].tolist()
 
 
+@pytest.mark.slow
 def test_biases_of_random_sign_have_their_size_and_every_pattern_of_signs_comes() -> None:
     found = np.array([signed_biases(seed) for seed in range(300)])
     assert np.abs(found) == pytest.approx(np.tile([0.01, 0.02, 0.1, 0.2, 0.3], (300, 1)))
@@ -188,6 +189,7 @@ def test_a_craft_begins_at_rest_and_without_its_velocity_no_force_is_known() -> 
     assert np.isnan(measure(**QUIET).specific_force).all()
 
 
+@pytest.mark.slow
 def test_scale_delay_and_errors_reach_the_force_too() -> None:
     plain, bias = forces(**QUIET), np.array([0.1, -0.2, 0.3])
     assert forces(**QUIET, scale=1.3) == pytest.approx(1.3 * plain)

@@ -64,6 +64,7 @@ def test_the_heights_of_the_rebounds_fall_by_the_square_of_the_restitution() -> 
     assert peaks[:5] == pytest.approx(0.49 ** np.arange(1, 6), abs=5e-6)  # G (0.5 ms)^2 / 2 beside a row
 
 
+@pytest.mark.slow
 def test_both_engines_give_the_same_bits() -> None:
     diagram = load_text(BALL.replace("METHOD", "ode4").replace("STOP", "3 s"))
     native = diagram.run(engine="native")

@@ -11,6 +11,7 @@ from quadvis.api import load_text
 from quadvis.block import ParameterError
 from quadvis.testing import drive
 from quadvis_blocks.systems.kalman import Kalman
+from tests.stages import mostly_slow
 
 A, C = np.array([[1.0, 0.1], [0.0, 1.0]]), np.array([[1.0, 0.0]])
 Q, R = np.array([[1.25e-05, 0.00025], [0.00025, 0.005]]), np.array([[0.04]])
@@ -80,8 +81,8 @@ def test_precise_measurements_leave_the_covariance_whole() -> None:
     assert (found.variances >= 0.0).all()
 
 
-@pytest.mark.slow
-def test_a_million_precise_measurements_leave_no_negative_variance(tmp_path: Path) -> None:
+@pytest.mark.parametrize("seconds", mostly_slow([100, 1000], quick=0, slow=1))
+def test_ever_so_many_precise_measurements_leave_no_negative_variance(seconds: int, tmp_path: Path) -> None:
     text = """quadvis: 1
 name: precise
 rates: {fast: 1 kHz}
@@ -95,9 +96,11 @@ blocks:
       {A: [[1, 0.1], [0, 1]], C: [[1, 0]], Q: [[1.0e-9, 0], [0, 1.0e-9]], R: [[1.0e-12]], spread: [1.0e6]}
     in: {y: wave.y}
 """
-    result = load_text(text, tmp_path).run(engine="native", keep=["filter.*"])
+    result = load_text(text.replace("1000 s", f"{seconds} s"), tmp_path).run(
+        engine="native", keep=["filter.*"]
+    )
     variances = result["filter.variances"]
-    assert len(variances) == 1_000_001
+    assert len(variances) == 1000 * seconds + 1
     assert (variances > 0.0).all()
     assert np.isfinite(result["filter.x"][-1]).all()
 

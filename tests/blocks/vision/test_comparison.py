@@ -95,6 +95,7 @@ def test_the_figure_shows_every_method(tmp_path, count):
         assert (np.abs(picture - blue_green_red).max(axis=2) < 10).sum() > 30
 
 
+@pytest.mark.slow
 def test_a_figure_without_any_pose_is_drawn_too(tmp_path):
     methods = [poses(np.full((3, 6), math.nan), name) for name in "ab"]
     comparison.draw(methods, [], tmp_path / "figure.png")

@@ -127,13 +127,13 @@ def test_points_in_space_have_deviations_that_repetitions_scatter_by():
     assert np.isnan(homogeneous_deviations(camera, points, noisy).camera[5:]).all()
 
 
-@pytest.mark.parametrize("noise", mostly_slow([0.1, 0.02, 0.2]))
+@pytest.mark.parametrize("noise", mostly_slow([0.1, 0.02, 0.2], slow=0))
 @pytest.mark.parametrize("case", range(len(GOOD)))
 def test_views_from_all_sides_need_no_warning(case, noise):
     assert weighed(views(GOOD[case], noise))[1].warning("these views", "tilt") == ""
 
 
-@pytest.mark.parametrize("noise", mostly_slow([0.1, 0.02, 0.3]))
+@pytest.mark.parametrize("noise", mostly_slow([0.1, 0.02, 0.3], slow=0))
 @pytest.mark.parametrize("case", range(len(POOR)))
 def test_views_that_leave_the_camera_undetermined_are_told_whatever_their_residuals(case, noise):
     try:

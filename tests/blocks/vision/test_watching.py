@@ -8,6 +8,7 @@ import pytest
 import yaml
 
 import quadvis
+from tests.stages import mostly_slow
 
 DIAGRAMS = Path(__file__).parents[3] / "diagrams"
 FLIGHT = """\
@@ -44,7 +45,7 @@ def read(path):
     return pictures
 
 
-@pytest.mark.parametrize("variant", [None, "video"])
+@pytest.mark.parametrize("variant", mostly_slow(["video", None]))
 def test_a_recording_is_written_with_what_was_found_in_it(tmp_path, variant):
     file = tmp_path / "watch.mkv"
     result = quadvis.load(DIAGRAMS / "watch.yaml", variant=variant, settings={"writer.file": str(file)}).run()
@@ -58,6 +59,7 @@ def test_a_recording_is_written_with_what_was_found_in_it(tmp_path, variant):
             assert np.ptp(picture[v - 8 : v + 9, u - 8 : u + 9].sum(axis=2).astype(int)) > 250
 
 
+@pytest.mark.slow
 def test_a_recording_is_written_as_pictures(tmp_path):
     quadvis.load(DIAGRAMS / "watch.yaml", variant="pictures", settings={"writer.folder": str(tmp_path)}).run()
     paths = sorted(tmp_path.iterdir())

@@ -46,6 +46,7 @@ def test_a_loop_that_is_not_stable_fails_and_says_what_grows(capsys) -> None:
     assert out.splitlines()[-2].startswith("NOT STABLE: a disturbance grows by 0.0395 1/s, in ")
 
 
+@pytest.mark.slow
 def test_the_json_has_all_of_it(capsys) -> None:
     facts = json.loads(told(capsys, MARGINS, "--json")[1])
     assert facts["stable"] is True and facts["hyperperiod_s"] == 0.0
@@ -78,6 +79,7 @@ def without_limits(tmp_path) -> str:
     return str(path)
 
 
+@pytest.mark.slow
 def test_bode_and_nyquist_plots_are_written(capsys, tmp_path, without_limits) -> None:
     _, out, _ = told(capsys, without_limits, "-o", str(tmp_path / "new"))
     kinds, cuts = ("bode", "nyquist"), ("imu", "torque", "vision")
@@ -271,6 +273,7 @@ class Terminal(StringIO):
         return True
 
 
+@pytest.mark.slow
 def test_what_takes_long_shows_which_limit_is_sought_and_how_far_it_is(monkeypatch, capsys) -> None:
     terminal = Terminal()
     monkeypatch.setattr("quadvis.machine.status_line.PATIENCE", 0.0)
@@ -312,6 +315,7 @@ def test_an_interrupted_analysis_ends_with_a_word(step, monkeypatch, capsys) -> 
     assert (code, error) == (130, "interrupted\n")
 
 
+@pytest.mark.slow
 def test_a_remark_does_not_look_like_a_row_of_a_table(tmp_path, capsys) -> None:
     path = sampled(tmp_path).path
     path.write_text(path.read_text().partition("analyse:")[0])

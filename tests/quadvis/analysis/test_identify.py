@@ -18,6 +18,7 @@ from quadvis.api import load_text
 from quadvis.cli import main
 from quadvis.errors import QuadvisError
 from quadvis.output.foreign_signals import ForeignSignals
+from tests.stages import mostly_slow
 
 PERIOD = 0.01
 MOTOR = ([0.1], [5e-5, 0.0051, 0.02])  # volt to rad/s
@@ -105,7 +106,7 @@ def test_the_pulse_response_is_that_of_python_control() -> None:
     assert pulses[:60] == approx(wanted, abs=1e-3 * float(wanted.max()))
 
 
-@pytest.mark.parametrize("delay", [0, 7])
+@pytest.mark.parametrize("delay", mostly_slow([7, 0]))
 def test_a_delay_is_found_to_the_sample(delay: int) -> None:
     found = identify(
         experiment(2, delay=delay, count=900), input="u", output="y", order=2, zeros=0, delay=True
@@ -183,7 +184,7 @@ def test_the_command_prints_a_block_that_runs(bench: Path, capsys, tmp_path: Pat
     assert len(facts["numerator_deviation"]) == 1 and facts["period_s"] == 0.0
 
 
-@pytest.mark.parametrize("more", [{"discrete": True}, {"delay": True, "zeros": 0}])
+@pytest.mark.parametrize("more", mostly_slow([{"delay": True, "zeros": 0}, {"discrete": True}]))
 def test_the_blocks_of_other_forms_run_as_well(more) -> None:
     found = identify(experiment(2, delay=5, count=800), input="u", output="y", order=2, **more)
     rates = f"rates: {{model_rate: {PERIOD} s}}\nsolver: {{method: ode4, step: 10 ms}}\n"

@@ -126,7 +126,7 @@ def chain(bandwidth: float, delay: float) -> np.ndarray:
     return np.linalg.eigvals(lifted)
 
 
-@pytest.mark.parametrize("delay", [0.05, 0.1, 0.25])
+@pytest.mark.parametrize("delay", mostly_slow([0.05, 0.1, 0.25]))
 def test_vision_and_control_at_their_rates_give_the_lifted_matrix_made_by_hand(delay: float) -> None:
     settings = {"latency": f"{delay} s", "bandwidth": "2 rad/s"}
     diagram = quadvis.load(DIAGRAMS / "sampled_margins.yaml", variant="ideal", settings=settings)
@@ -136,6 +136,7 @@ def test_vision_and_control_at_their_rates_give_the_lifted_matrix_made_by_hand(d
         assert np.abs(found - value).min() < 1e-6
 
 
+@pytest.mark.slow
 def test_noise_is_taken_away_and_the_seed_does_not_matter() -> None:
     quiet, noisy = (
         quadvis.load(

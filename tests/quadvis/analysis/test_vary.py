@@ -20,13 +20,14 @@ def bare(name: str, variant: str | None = None, **settings: str) -> Diagram:
     return quadvis.load(DIAGRAMS / name, variant=variant, settings=settings)
 
 
-@pytest.mark.parametrize("bandwidth", [1.0, 2.0])
+@pytest.mark.parametrize("bandwidth", mostly_slow([2.0, 1.0]))
 def test_the_motor_lag_that_the_law_tolerates_goes_as_1_over_its_bandwidth(bandwidth: float) -> None:
     """s^5 lag + s^4 + 4 s^3 + 6 s^2 + 4 s + 1: Routh's array changes sign at lag = 0.5685 / bandwidth."""
     analysis = bare("margins.yaml", bandwidth=f"{bandwidth} rad/s").analyse()
     assert analysis.limits["motor lag"].value == approx(0.5685 / bandwidth, rel=2e-4)
 
 
+@pytest.mark.slow
 def test_the_yaw_misalignment_that_it_tolerates_is_the_phase_margin_of_vision() -> None:
     analysis = bare("margins.yaml").analyse()
     assert analysis.limits["yaw misalignment"].value == approx(math.radians(43.55), abs=2e-4)
@@ -43,6 +44,7 @@ def test_a_gain_can_go_to_where_a_pole_comes_to_minus_1(tmp_path) -> None:
     assert found.reached and found.text == "stable up to 40 1/s"
 
 
+@pytest.mark.slow
 def test_a_range_may_go_down(tmp_path) -> None:
     """At z on the unit circle c = k T / 2."""
     found = limit(sampled(tmp_path), "damper.factor", "1.5 1/s", "0.01 1/s")
@@ -58,6 +60,7 @@ def test_a_range_may_hold_no_limit_or_begin_beyond_it(tmp_path) -> None:
     assert math.isnan(beyond.value) and beyond.text == "unstable from 50 1/s on"
 
 
+@pytest.mark.slow
 def test_an_element_of_a_vector_can_be_varied_and_what_ends_the_loop_is_told(tmp_path) -> None:
     """A lean of 0.05 rad against the wind takes an amplitude of three times that, or there is no rest."""
     diagram = quadvis.load(write(tmp_path, """
@@ -111,7 +114,9 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("latency", "variant", "bandwidth"), mostly_slow(CASES[7:] + CASES[:7]))
+@pytest.mark.parametrize(
+    ("latency", "variant", "bandwidth"), mostly_slow(CASES[7:] + CASES[:7], quick=0, slow=6)
+)
 def test_the_sampled_loop_is_stable_up_to_the_known_bandwidth(latency, variant, bandwidth) -> None:
     for factor, stable in ((0.98, True), (1.02, False)):
         settings = {"latency": f"{latency} s", "bandwidth": f"{factor * bandwidth} rad/s"}
@@ -133,7 +138,8 @@ def test_the_largest_stable_bandwidth_falls_with_the_motor_lag(lag: int, bandwid
 
 
 @pytest.mark.parametrize(
-    ("bandwidth", "unstable"), mostly_slow([(3.0, 0.25), (1.0, 1.05), (1.5, 0.70), (2.0, 0.50), (2.5, 0.40)])
+    ("bandwidth", "unstable"),
+    mostly_slow([(3.0, 0.25), (1.0, 1.05), (1.5, 0.70), (2.0, 0.50), (2.5, 0.40)], quick=0, slow=2),
 )
 def test_the_first_unstable_vision_latency_on_a_grid_of_50_ms(bandwidth: float, unstable: float) -> None:
     for latency, stable in ((unstable - 0.05, True), (unstable, False)):
@@ -169,7 +175,7 @@ QUIET = {
 }  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.long  # half a minute each; the margins of this hover are judged in the second stage
 @pytest.mark.parametrize(("delay", "stable"), [("60 ms", True), ("70 ms", False)])
 def test_the_fused_hover_tolerates_as_late_a_radio_as_it_does_in_flight(delay: str, stable: bool) -> None:
     """Its filters and its predictor go on reckoning with 22 ms; by 15 s the gains are steady."""

@@ -193,6 +193,7 @@ def test_questions_of_the_command_line_do_not_change_what_is_judged(tmp_path: Pa
         diagram.analyse(cuts={"feed": "decay.y"})
 
 
+@pytest.mark.slow
 def test_the_command_ends_with_1_for_a_margin_that_is_not_met(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -21,6 +21,7 @@ from quadvis.testing.checks.compiled import _same
 from quadvis.testing.rig import PERIOD, STEPS, Rig, Subject, rigs, sources, targets
 from tests.blocks.test_every_block import CAMERA, INPUTS, PARAMETERS
 from tests.fmus.builder import needs_gcc
+from tests.stages import mostly_slow
 
 pytestmark = needs_gcc
 GIVEN: dict[str, Any] = {
@@ -31,9 +32,10 @@ GIVEN: dict[str, Any] = {
 FIRST = ("control.trim",)
 SOME = (
     "plant.rotorcraft", "sources.noise", "sources.table", "signal.transport_delay",
-    "estimation.position_filter", "control.nested_saturation", "supervision.failsafe", "sensors.imu",
+    "control.nested_saturation", "supervision.failsafe", "sensors.imu",
     "signal.gain", "signal.lookup_2d", "logic.multiport_switch", "math.function",
 )  # fmt: skip
+LARGE = ("estimation.position_filter",)  # numba works at it for 40 s
 
 
 def library(rig: Rig, folder: Path) -> tuple[dict[str, Any], dict[str, Op]]:
@@ -103,9 +105,7 @@ def agree(rig: Rig, functions: dict[str, Any], ops: dict[str, Op], step: int) ->
 NAMES = [name for name in Catalogue().names() if Catalogue().find(name).numeric]
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[] if name in FIRST else pytest.mark.slow) for name in (*FIRST, *SOME)]
-)
+@pytest.mark.parametrize("name", mostly_slow((*FIRST, *SOME, *LARGE), quick=len(FIRST), slow=len(SOME)))
 def test_a_block_does_the_same_in_c(name: str, tmp_path: Path) -> None:
     check(name, tmp_path)
 

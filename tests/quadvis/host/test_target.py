@@ -490,6 +490,7 @@ def test_two_scopes_that_trigger_each_other_lose_nothing(tg: Target, diagram: Pa
     assert tg.Scopes == []
 
 
+@pytest.mark.slow
 def test_packages_of_a_scope_follow_one_another(tg: Target, diagram: Path) -> None:
     tg.load(diagram)
     scope = tg.addscope(signals=["wave.y"], NumSamples=10).start()

@@ -99,6 +99,7 @@ blocks:
 """
 
 
+@pytest.mark.slow
 def test_machine_code_gives_the_same_bits() -> None:
     diagram = load_text(ONE_LINK)
     one, other = diagram.run(engine="python"), diagram.run(engine="native")

@@ -22,8 +22,9 @@ from tests.quadvis.realtime.test_crew import MS, busy
 from tests.quadvis.realtime.test_crew import diagram as crew_diagram
 from tests.quadvis.realtime.test_pacer import TWO
 from tests.quadvis.realtime.test_pacer import diagram as paced_diagram
+from tests.stages import mostly_slow
 
-engines = pytest.mark.parametrize("engine", ["python", "native"])
+engines = pytest.mark.parametrize("engine", mostly_slow(["python", "native"]))
 
 
 def word(value: float) -> int:

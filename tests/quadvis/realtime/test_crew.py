@@ -15,6 +15,7 @@ from quadvis.realtime import control, dispatch
 from quadvis.realtime.streams import streams_of
 from tests.quadvis.realtime.fakes import CrewClock, Paced
 from tests.quadvis.realtime.test_streams import Kept
+from tests.stages import mostly_slow
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="real time is Linux's")
 
@@ -51,7 +52,7 @@ blocks:
 """
 BLOCKS = ("wave", "lag", "ramp", "mid", "back", "time", "deep", "straight")
 TASKS = {"fast": 0, "mid": 1, "slow": 2}
-engines = pytest.mark.parametrize("engine", ["python", "native"])
+engines = pytest.mark.parametrize("engine", mostly_slow(["python", "native"]))
 
 
 def diagram(**replaced: str) -> Diagram:

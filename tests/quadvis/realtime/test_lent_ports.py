@@ -78,6 +78,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
+@pytest.mark.slow
 def test_what_comes_back_over_a_serial_line_is_read(tmp_path: Path) -> None:
     with ptys(1) as (pty,):
         write(pty.path)

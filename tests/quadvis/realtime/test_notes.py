@@ -17,9 +17,10 @@ from tests.quadvis.realtime.test_crew import TASKS, busy, diagram
 from tests.quadvis.realtime.test_pacer import TWO
 from tests.quadvis.realtime.test_pacer import busy as busy_alone
 from tests.quadvis.realtime.test_pacer import diagram as diagram_alone
+from tests.stages import mostly_slow
 
 MS = 1_000_000
-engines = pytest.mark.parametrize("engine", ["python", "native"])
+engines = pytest.mark.parametrize("engine", mostly_slow(["python", "native"]))
 
 
 @given(

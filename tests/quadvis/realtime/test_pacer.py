@@ -21,6 +21,7 @@ from quadvis.realtime.clocks import MonotonicClock
 from quadvis.realtime.overload import SIGNAL
 from quadvis.realtime.pacer import Ended
 from tests.quadvis.realtime.fakes import WARN, FakeClock, Paced
+from tests.stages import mostly_slow
 
 MS = 1_000_000
 FAST = """\
@@ -54,7 +55,7 @@ def busy(paced: Paced, clock: FakeClock, takes: dict[int, float], task: str = "f
     return ticks
 
 
-@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("engine", mostly_slow(["python", "native"]))
 @pytest.mark.parametrize(("periods", "missed"), [(0.5, 0), (1.0, 0), (1.5, 1), (3.1, 3), (250.5, 250)])
 def test_a_step_of_so_many_periods_misses_so_many_ticks_and_the_grid_stays(
     periods: float, missed: int, engine: str
@@ -104,7 +105,7 @@ def test_a_tick_runs_late_until_the_next_one_is_due() -> None:
     assert times.lateness.most == (MS - 1) / 1e9
 
 
-@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("engine", mostly_slow(["python", "native"]))
 def test_ticks_are_due_later_or_earlier_as_the_supervisor_shifts_them(engine: str) -> None:
     clock = FakeClock()
     paced = Paced(diagram(), clock, engine=engine)
@@ -124,7 +125,7 @@ def test_ticks_are_due_later_or_earlier_as_the_supervisor_shifts_them(engine: st
     assert times.lateness.most == 0.0
 
 
-@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("engine", mostly_slow(["python", "native"]))
 def test_how_long_a_step_takes_does_not_depend_on_a_shift_in_the_meantime(engine: str) -> None:
     clock = FakeClock()
     paced = Paced(diagram(), clock, engine=engine)
@@ -177,7 +178,7 @@ def test_ticks_without_a_due_task_are_passed_over() -> None:
     assert (times["fast"].overruns, times["odd"].overruns) == (0, 0)
 
 
-@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("engine", mostly_slow(["python", "native"]))
 def test_a_run_that_is_to_end_does_so_between_two_steps(engine: str) -> None:
     clock = FakeClock()
     paced = Paced(diagram(), clock, engine=engine)
@@ -222,6 +223,7 @@ def told(engine: str, takes: dict[int, float], late: dict[int, float], limits: O
     )
 
 
+@pytest.mark.slow
 @given(
     st.dictionaries(st.integers(0, 119), st.floats(0, 12), max_size=6),
     st.dictionaries(st.integers(0, 99), st.floats(0, 6), max_size=4),
@@ -240,6 +242,7 @@ def test_the_compiled_pacer_does_what_the_interpreted_one_does(
     assert told("native", takes, late, limits) == told("python", takes, late, limits)
 
 
+@pytest.mark.slow
 def test_a_compiled_loop_returns_to_python_after_a_signal_and_at_no_other_time(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -346,7 +349,7 @@ def test_a_task_has_limits_of_its_own_and_takes_the_others_from_the_diagram() ->
     assert "task 'slow': overload limit (0) exceeded with 1 overrun" in overloaded({16: 1.5}, limits, TWO)
 
 
-@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("engine", mostly_slow(["python", "native"]))
 def test_an_overrun_too_many_can_make_the_outputs_safe_and_the_run_goes_on(engine: str) -> None:
     clock = FakeClock()
     limits = OverloadLimits(action="safe", tasks=(TaskLimits("slow", OverloadLimits(max=9), Place("")),))

@@ -336,7 +336,7 @@ def test_options_that_are_refused(
     assert Path("run.mcap").read_text() == "the log of an earlier run"
 
 
-@pytest.mark.parametrize("engine", mostly_slow(["native", "python"]))
+@pytest.mark.parametrize("engine", mostly_slow(["python", "native"]))
 def test_tasks_that_run_by_themselves_give_the_signals_of_a_simulation(engine: str) -> None:
     write(seed="7\ntasking: multi")
     diagram = quadvis.load("flight.yaml")
@@ -360,7 +360,7 @@ def test_tasks_that_run_by_themselves_give_the_signals_of_a_simulation(engine: s
     assert any("task 'fast' runs Python" in words for words in said)
 
 
-@pytest.mark.parametrize("engine", mostly_slow(["native", "python"]))
+@pytest.mark.parametrize("engine", mostly_slow(["python", "native"]))
 def test_a_block_that_fails_in_a_thread_of_its_own_ends_the_run(engine: str) -> None:
     write("raise OSError('no such device')", seed="7\ntasking: multi")
     text = (
@@ -375,6 +375,7 @@ def test_a_block_that_fails_in_a_thread_of_its_own_ends_the_run(engine: str) -> 
     assert life() == ["open", "safe", "close"]
 
 
+@pytest.mark.slow
 def test_outputs_that_overruns_made_safe_fail_the_run_and_let_it_go_on(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

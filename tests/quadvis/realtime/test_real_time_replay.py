@@ -86,6 +86,7 @@ def left_out(log: Log) -> list[int]:
     return [tick for first, count in ticks for tick in range(first, first + count)]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="real time is Linux's")
 def test_a_run_with_overruns_is_the_same_to_the_bit() -> None:
     result = quadvis.load("flight.yaml").run(log="run.mcap", real_time=CALM)

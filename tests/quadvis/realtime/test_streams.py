@@ -9,6 +9,7 @@ from quadvis.api import load_text
 from quadvis.engine.taps import Tap
 from quadvis.realtime.streams import streams_of
 from tests.quadvis.realtime.fakes import FakeClock, Paced
+from tests.stages import mostly_slow
 
 TEXT = """\
 quadvis: 1
@@ -46,7 +47,7 @@ def taps() -> list[Kept]:
     return [*found, Kept("wave")]
 
 
-@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("engine", mostly_slow(["python", "native"]))
 def test_rows_through_rings_are_those_of_taps_to_the_bit(engine: str) -> None:
     diagram = load_text(TEXT)
     simulated, received = taps(), taps()

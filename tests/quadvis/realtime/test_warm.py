@@ -16,9 +16,10 @@ from quadvis.realtime.warm import TIMES, warm
 from tests.quadvis.realtime.test_crew import TEXT as CREW
 from tests.quadvis.realtime.test_real_time_replay import TEXT as FLIGHT
 from tests.quadvis.realtime.test_streams import Kept
+from tests.stages import mostly_slow
 
 FAST, SLOW = Task("fast", Fraction(1, 10)), Task("slow", Fraction(1, 2), Fraction(1, 5))
-engines = pytest.mark.parametrize("engine", ["python", "native"])
+engines = pytest.mark.parametrize("engine", mostly_slow(["python", "native"]))
 
 
 class Noted(Block, numeric=False):

@@ -68,7 +68,7 @@ def counted(kind: ProtocolMessage, count: int) -> float:
         ("none", 10_000, 1.3),
         ("xor", 20_000, 2.5),
         pytest.param("sum8", 200_000, 2.0, marks=pytest.mark.slow),
-        pytest.param("crc8", 300_000, 3.0, marks=pytest.mark.slow),
+        pytest.param("crc8", 300_000, 3.0, marks=pytest.mark.long),
     ],
 )
 def test_the_estimate_is_about_what_happens(
