@@ -119,7 +119,8 @@ class PorterProcess:
         ready = dict(poller.poll(_SOON if waits else int(PORTER_LIFE * 1000)))
         while (message := self._pipe.take()) is not None:
             self._obeyed[message[0]](*message[1:])
-        self._ask()
+        if self._questions in ready and not self._question:
+            self._ask()
         for entrance in self._entrances:
             if entrance.monitor in ready:
                 entrance.count()
@@ -142,8 +143,6 @@ class PorterProcess:
 
     def _ask(self) -> None:
         """Ask the target about one handshake; the next ones wait."""
-        if self._question or not self._questions.poll(0):
-            return
         self._question = self._questions.recv_multipart()
         _, _, domain, address, _, mechanism, *shown = self._question
         place = address.decode("ascii", "replace")
