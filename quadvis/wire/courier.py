@@ -8,11 +8,11 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import zmq
-from zmq.utils.monitor import recv_monitor_message
 
 from quadvis.wire.address import WireAddress
 from quadvis.wire.keys import KeyPair
 from quadvis.wire.limits import DEAD_AFTER, HANDSHAKE, HEARTBEAT, MESSAGE
+from quadvis.wire.monitor import next_event
 from quadvis.wire.verbs import CONTROL, STREAM
 from quadvis.wire.waker import Waker
 
@@ -56,8 +56,7 @@ class _End:
         """Note what happened to the connection; return its new states, in their order."""
         states = []
         while self.monitor.poll(0):
-            event = recv_monitor_message(self.monitor)
-            kind, value = event["event"], int(event["value"])
+            kind, value = next_event(self.monitor)
             before = self.state
             if kind == zmq.Event.CONNECTED:
                 self.reached = True

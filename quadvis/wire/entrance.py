@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import zmq
-from zmq.utils.monitor import recv_monitor_message
 
 from quadvis.wire.limits import (
     CONNECTIONS,
@@ -28,6 +27,7 @@ from quadvis.wire.limits import (
     QUEUED,
     REQUEST,
 )  # fmt: skip
+from quadvis.wire.monitor import next_event
 from quadvis.wire.outbox import Outbox
 
 _EVENTS = zmq.Event.ACCEPTED | zmq.Event.DISCONNECTED
@@ -91,9 +91,8 @@ class Entrance:
     def count(self) -> None:
         """Note who came and went, and shut who is too many."""
         while self.monitor.poll(0):
-            event = recv_monitor_message(self.monitor)
-            descriptor = int(event["value"])
-            if event["event"] == zmq.Event.ACCEPTED:
+            event, descriptor = next_event(self.monitor)
+            if event == zmq.Event.ACCEPTED:
                 self._open[descriptor] = _Connection(time.monotonic(), self._peer(descriptor))
             else:
                 self._open.pop(descriptor, None)

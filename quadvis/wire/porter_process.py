@@ -24,10 +24,8 @@ import resource
 import signal
 import socket
 import time
-import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 import zmq
@@ -49,13 +47,13 @@ def main(descriptor: int) -> None:
     """Be the porter of the target at the other end of a socket, until that closes, then end the process."""
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # systemd sends it to all; our end follows the target's
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # the private key is in our memory
-    with suppress(OSError):
-        Path("/proc/self/oom_score_adj").write_text(_FIRST_TO_GO, encoding="ascii")
+    with suppress(OSError), open("/proc/self/oom_score_adj", "w", encoding="ascii") as file:
+        file.write(_FIRST_TO_GO)
     pipe = Pipe(socket.socket(fileno=descriptor), MESSAGE + _SPARE)
     try:
         PorterProcess(pipe).run()
-    except BaseException:  # such as a lack of memory: to close the sockets might take for ever
-        traceback.print_exc()
+    except BaseException as error:  # such as a lack of memory: to close the sockets might take for ever
+        os.write(2, f"{type(error).__name__}: {error}\n".encode())
         os._exit(1)
     os._exit(0)
 
@@ -121,7 +119,8 @@ class PorterProcess:
         ready = dict(poller.poll(_SOON if waits else int(PORTER_LIFE * 1000)))
         while (message := self._pipe.take()) is not None:
             self._obeyed[message[0]](*message[1:])
-        self._ask()
+        if self._questions in ready and not self._question:
+            self._ask()
         for entrance in self._entrances:
             if entrance.monitor in ready:
                 entrance.count()
@@ -144,8 +143,6 @@ class PorterProcess:
 
     def _ask(self) -> None:
         """Ask the target about one handshake; the next ones wait."""
-        if self._question or not self._questions.poll(0):
-            return
         self._question = self._questions.recv_multipart()
         _, _, domain, address, _, mechanism, *shown = self._question
         place = address.decode("ascii", "replace")
@@ -194,6 +191,7 @@ class PorterProcess:
 
 def _bound_memory(more: int) -> None:
     """Let this process take some bytes more than it has; libzmq ends it when it gets none."""
-    status = Path("/proc/self/status").read_text(encoding="ascii")
+    with open("/proc/self/status", encoding="ascii") as file:
+        status = file.read()
     used = 1024 * int(status.partition("VmData:")[2].split()[0])
     resource.setrlimit(resource.RLIMIT_DATA, (used + more, used + more))

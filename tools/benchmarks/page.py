@@ -161,11 +161,31 @@ class PageClient:
 
 
 def processor_time(process: int) -> float:
-    """Return the processor time of a process, without its children (s)."""
-    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    """Return the processor time of a process, without its children but a target's porter (s)."""
+    return sum((int(each[11]) + int(each[12])) / os.sysconf("SC_CLK_TCK") for each in _states(process))
+
+
+def _states(process: int) -> list[list[str]]:
+    """Return what the system says of a process, and of its porter if it is a target (proc(5), stat)."""
+    return [
+        Path(f"/proc/{each}/stat").read_text().rpartition(")")[2].split()
+        for each in (process, *porters(process))
+    ]
+
+
+def porters(process: int) -> list[int]:
+    """Return the process that has the sockets of a target, if it is one."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+            if parent == process and b"porter_process" in (entry / "cmdline").read_bytes():
+                found.append(int(entry.name))
+        except OSError:  # it has ended
+            continue
+    return found
 
 
 def memory(process: int) -> float:
-    """Return the resident memory of a process (MB)."""
-    return int(Path(f"/proc/{process}/statm").read_text().split()[1]) * os.sysconf("SC_PAGESIZE") / 1e6
+    """Return the resident memory of a process, and of a target's porter (MB)."""
+    return sum(int(each[21]) for each in _states(process)) * os.sysconf("SC_PAGESIZE") / 1e6

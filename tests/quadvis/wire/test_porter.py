@@ -185,7 +185,7 @@ def test_the_porter_imports_little() -> None:
     """It must be there soon, also when it is started again."""
     script = (
         "import sys, quadvis.wire.porter_process\n"
-        "print(sorted({'numpy', 'yaml', 'multiprocessing', 'quadvis.errors'} & sys.modules.keys()))"
+        "print(sorted({'numpy', 'yaml', 'asyncio', 'subprocess', 'quadvis.errors'} & sys.modules.keys()))"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
