@@ -6,7 +6,7 @@ import argparse
 import functools
 from typing import Any
 
-from quadvis.cli import commands, wire
+from quadvis.cli import diagram_commands, library_commands, run_commands, wire
 from quadvis.cli.arguments import Parser
 from quadvis.cli.target_options import add_target_commands
 from quadvis.cli.tool import dimensions, positive
@@ -193,7 +193,7 @@ def parser() -> Parser:
         added.set_defaults(command=command)
         return added
 
-    run = add("run", commands.run, "run a diagram and judge it by what it expects", JSON_HELP)
+    run = add("run", run_commands.run, "run a diagram and judge it by what it expects", JSON_HELP)
     _diagram_options(run)
     run.add_argument("--stop-time", metavar="T", help="such as '20 s'; replaces the diagram's")
     run.add_argument("--seed", type=int, metavar="N", help="seed of all noise; replaces the diagram's")
@@ -211,22 +211,24 @@ def parser() -> Parser:
     words = "time every call of a block; write a trace for Perfetto or chrome://tracing there, '' for none"
     run.add_argument("--profile", metavar="PATH.json", help=words)
     run.add_argument("--json", action="store_true", help="print one JSON object instead of the summary")
-    _replay_options(add("replay", commands.replay, "repeat a run from its log, to the bit", REPLAY_HELP))
-    _sweep_options(add("sweep", commands.sweep, "run a diagram at every point of a grid", SWEEP_HELP))
-    _tune_options(add("tune", commands.tune, "look for the best values of parameters", TUNE_HELP))
-    check = add("check", commands.check, "check a diagram and report all its faults", CHECK_HELP)
+    _replay_options(add("replay", run_commands.replay, "repeat a run from its log, to the bit", REPLAY_HELP))
+    _sweep_options(add("sweep", run_commands.sweep, "run a diagram at every point of a grid", SWEEP_HELP))
+    _tune_options(add("tune", run_commands.tune, "look for the best values of parameters", TUNE_HELP))
+    check = add("check", diagram_commands.check, "check a diagram and report all its faults", CHECK_HELP)
     _diagram_options(check)
     words = "run it also with a half and a quarter of the solver's step, and say what this changes"
     check.add_argument("--accuracy", action="store_true", help=words)
     check.add_argument("--json", action="store_true", help="print the faults and warnings as JSON")
-    blocks = add("list", commands.list_blocks, "list all blocks, and the files that come with quadvis")
+    blocks = add(
+        "list", library_commands.list_blocks, "list all blocks, and the files that come with quadvis"
+    )
     words = "show what has these words in its name or its text; the words of other programs count, too"
     blocks.add_argument("words", nargs="*", metavar="WORD", help=words)
     blocks.add_argument("--json", action="store_true", help="print the declarations of blocks as JSON")
     _own_block_option(blocks)
     describe = add(
         "describe",
-        commands.describe,
+        library_commands.describe,
         "describe a block or a part: ports, parameters; or show a file that comes with quadvis",
     )
     describe.add_argument(
@@ -235,7 +237,10 @@ def parser() -> Parser:
     describe.add_argument("--json", action="store_true", help="print its declarations as JSON")
     _own_block_option(describe)
     analyse = add(
-        "analyse", commands.analyse, "linearise the loop: poles, margins, transfers, limits", ANALYSE_HELP
+        "analyse",
+        diagram_commands.analyse,
+        "linearise the loop: poles, margins, transfers, limits",
+        ANALYSE_HELP,
     )
     _diagram_options(analyse)
     words = "another cut point: one signal or several, such as torque=control/roll.torque; may be repeated"
@@ -249,9 +254,9 @@ def parser() -> Parser:
     analyse.add_argument("--json", action="store_true", help="print one JSON object instead of the tables")
     analyse.add_argument("--output", "-o", metavar="FOLDER", help="write plots there, as PNG")
     _identify_options(
-        add("identify", commands.identify, "find a transfer function from a recording", IDENTIFY_HELP)
+        add("identify", diagram_commands.identify, "find a transfer function from a recording", IDENTIFY_HELP)
     )
-    draw = add("draw", commands.draw, "draw a diagram as SVG")
+    draw = add("draw", diagram_commands.draw, "draw a diagram as SVG")
     _diagram_options(draw)
     draw.add_argument("--part", metavar="PART", help="draw the inside of this part, such as control")
     words = "draw what lies deeper as one box each: with 1 the parts of the diagram itself"
@@ -263,7 +268,7 @@ def parser() -> Parser:
     words = "paper of the book; the smaller one on which all is legible, if left out"
     draw.add_argument("--paper", choices=("a4", "a3"), help=words)
     export = add(
-        "export", commands.export, "write a log's signals, or a part, for other programs", EXPORT_HELP
+        "export", run_commands.export, "write a log's signals, or a part, for other programs", EXPORT_HELP
     )
     _diagram_options(export)
     words = "as an FMU: a part or a block of the diagram, or '.' for all of it"
@@ -279,40 +284,56 @@ def parser() -> Parser:
         "of a log: .csv, .parquet, .mat, .npz or .ulg; of a part: default PART.fmu, or NAME.fmu for all of it"
     )
     export.add_argument("--output", "-o", metavar="PATH", help=words)
-    program = add("program", commands.program, "print what is called at which ticks, and in which order")
+    program = add(
+        "program", diagram_commands.program, "print what is called at which ticks, and in which order"
+    )
     _diagram_options(program)
     _diff_options(
-        add("diff", commands.diff, "print what differs between two diagrams, variants or logs", DIFF_HELP)
+        add(
+            "diff",
+            diagram_commands.diff,
+            "print what differs between two diagrams, variants or logs",
+            DIFF_HELP,
+        )
     )
     words = "merge two versions of a file that come from a third one, by block and key; for git"
-    merge = add("merge", commands.merge, words, MERGE_HELP)
+    merge = add("merge", diagram_commands.merge, words, MERGE_HELP)
     merge.add_argument("base", metavar="BASE", help="what both come from")
     merge.add_argument("ours", metavar="OURS", help="one of them, which becomes the result")
     merge.add_argument("theirs", metavar="THEIRS", help="the other one")
     words = "write YAML files in the house style, with their comments and their meaning"
-    style = add("fmt", commands.fmt, words, FMT_HELP)
+    style = add("fmt", diagram_commands.fmt, words, FMT_HELP)
     style.add_argument("files", metavar="FILE", nargs="+", help="diagrams, parts, or other YAML files")
     style.add_argument(
         "--check", action="store_true", help="write nothing; exit code 1 if a file would change"
     )
     style.add_argument("--diff", action="store_true", help="write nothing; print what would change")
-    _plot_options(add("plot", commands.plot, "draw the figures of a log, or of several in one", PLOT_HELP))
-    schema = add("schema", commands.schema, "print the JSON schema of diagrams, for editors")
+    _plot_options(
+        add("plot", run_commands.plot, "draw the figures of a log, or of several in one", PLOT_HELP)
+    )
+    schema = add("schema", library_commands.schema, "print the JSON schema of diagrams, for editors")
     schema.add_argument("--output", "-o", metavar="PATH", help="default: standard output")
     _own_block_option(schema)
     completion = add(
-        "completion", commands.completion, "print what a shell needs to complete words", SHELL_HELP
+        "completion", library_commands.completion, "print what a shell needs to complete words", SHELL_HELP
     )
     completion.add_argument(
         "shell", choices=("bash", "zsh", "tcsh", "fish"), metavar="SHELL", help="bash, zsh, tcsh, fish"
     )
     _camera_options(
-        add("camera", commands.camera, "list cameras, show what one sees, or calibrate it", CAMERA_HELP)
+        add(
+            "camera",
+            library_commands.camera,
+            "list cameras, show what one sees, or calibrate it",
+            CAMERA_HELP,
+        )
     )
-    cache = add("cache", commands.cache, "say where compiled blocks are kept, and how large they are")
+    cache = add("cache", library_commands.cache, "say where compiled blocks are kept, and how large they are")
     cache.add_argument("--clear", action="store_true", help="remove them all")
     add_target_commands(add, _setting_options, _engine_option)
-    new = add("new", commands.new, "write the skeleton of a block, an output device, a diagram or a project")
+    new = add(
+        "new", library_commands.new, "write the skeleton of a block, an output device, a diagram or a project"
+    )
     new.add_argument("kind", choices=("block", "device", "diagram", "project"))
     new.add_argument(
         "name",

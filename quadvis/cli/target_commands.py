@@ -9,7 +9,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from quadvis.cli.commands import FAILED, _print_json
+from quadvis.cli.given import FAILED
+from quadvis.cli.shown import print_json
 from quadvis.errors import QuadvisError, quoted
 
 if TYPE_CHECKING:
@@ -45,12 +46,12 @@ def load(options: argparse.Namespace) -> int:
     with _target(options) as tg:
         what = options.what
         if what.endswith((".yaml", ".yml")):
-            from quadvis.cli.commands import _own_blocks
+            from quadvis.cli.given import own_blocks
             from quadvis.diagram.load import load as load_diagram
 
             diagram = load_diagram(
                 what, variant=options.variant, settings=options.set, params=options.params,
-                stop_time=options.stop_time, own_blocks=_own_blocks(options),
+                stop_time=options.stop_time, own_blocks=own_blocks(options),
             )  # fmt: skip
             tg.load(diagram, engine=options.engine, name=options.name, computers=options.computer)
         else:
@@ -87,7 +88,7 @@ def status(options: argparse.Namespace) -> int:
     """Print the properties of a target."""
     with _target(options) as tg:
         if options.json:
-            _print_json(_finite(tg.status()))
+            print_json(_finite(tg.status()))
         else:
             print(tg)
     return 0
@@ -102,7 +103,7 @@ def get(options: argparse.Namespace) -> int:
             parameters = {each["name"] for each in tg.parameters()}
             found = {name: _value(tg, name, parameters) for name in options.names}
         if options.json:
-            _print_json(found)
+            print_json(found)
         else:
             for name, value in found.items():
                 print(f"{name}: {_text(value)}")
