@@ -27,7 +27,7 @@ from quadvis.output.drawn import (
 )
 
 TOP = 23.0  # of a box with a symbol: the height of its name
-FORMULA = 14.0  # size of the type of a formula
+FORMULA, FORMULA_LINE = 14.0, 17.0  # size of the type of a formula, and the height of a line of it
 GAP = 6.0  # around a symbol
 
 Point = tuple[float, float]
@@ -138,7 +138,7 @@ class SymbolBox(Form):
         if self.block.symbol in CURVES:
             wide, high = glyphs.WIDTH, glyphs.HEIGHT
         else:
-            wide, high = _widest(formula, FORMULA), len(formula) * 17.0 + (2.0 if len(formula) > 1 else 0.0)
+            wide, high = _widest(formula, FORMULA), formula_height(formula)
         return max(wide, _widest(main, PORT)), high + MAIN * len(main) + (3.0 if main and high else 0.0)
 
     @property
@@ -183,7 +183,7 @@ class SymbolBox(Form):
             top += glyphs.HEIGHT + 3
         elif block.formula:
             yield from formula_elements(block.formula, middle, top)
-            top += len(block.formula) * 17.0 + 3
+            top += formula_height(block.formula) + 3
         yield from main_lines(block.main, middle, top + 10)
         inputs, outputs = self.columns()
         labels = list(self.labels(x, y))
@@ -210,14 +210,21 @@ def main_lines(texts: Sequence[str], middle: float, y: float) -> Iterator[str]:
         yield svg.text(text, middle, y + number * MAIN, PORT, anchor="middle", class_="port")
 
 
+def formula_height(formula: Sequence[str]) -> float:
+    """Return the height of a formula, or of a fraction with its line; of none, 0."""
+    return len(formula) * FORMULA_LINE + (2.0 if len(formula) > 1 else 0.0)
+
+
 def formula_elements(formula: Sequence[str], middle: float, top: float) -> Iterator[str]:
     """Yield a formula, or a fraction, from its top on."""
     yield svg.text(formula[0], middle, top + 13, FORMULA, anchor="middle", class_="formula")
     if len(formula) > 1:
         half = _widest(formula, FORMULA) / 2
-        line = svg.points([(middle - half, top + 17.5), (middle + half, top + 17.5)])
+        height = top + FORMULA_LINE + 0.5
+        line = svg.points([(middle - half, height), (middle + half, height)])
         yield svg.element("polyline", points=line, fill="none", stroke=INK)
-        yield svg.text(formula[1], middle, top + 31, FORMULA, anchor="middle", class_="formula")
+        last_line = top + formula_height(formula) - 5
+        yield svg.text(formula[1], middle, last_line, FORMULA, anchor="middle", class_="formula")
 
 
 def _widest(texts: Sequence[str], size: float) -> float:

@@ -9,10 +9,11 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from quadvis.output.pdf import Page, Typeface, number, pdf
-from quadvis.output.svg_pdf import BOLD, PLAIN, SVG, operators, shift, texts
+from quadvis.output.svg_pdf import BOLD, PLAIN, SVG, operators, shift, texts, typeset
 
 PAPERS = {"a4": (841.89, 595.28), "a3": (1190.55, 841.89)}  # points, the long side across
 EDGE, FOOT, FOOT_TYPE = 14.0, 16.0, 8.0  # points: free at each side; the line at the bottom and its type
+FOOT_INK = "#4d4d4d"
 LEAST = 6.0  # points: the smallest type that is legible
 LARGEST = 0.75  # points for a pixel: the size that a drawing has by itself
 SHARED = 80.0  # pixels that two sheets of one drawing have in common
@@ -150,10 +151,8 @@ def _footer(page: Page, text: str, place: str, faces: Mapping[str, Typeface]) ->
     face = faces[PLAIN]
     right = page.width - EDGE - face.width(place, FOOT_TYPE)
     for x, words in ((EDGE, text), (right, place)):
-        yield (
-            f"BT 0.3 0.3 0.3 rg /{PLAIN} {number(FOOT_TYPE)} Tf {number(x)} {number(EDGE)} Td"
-            f" <{face.hexadecimal(words)}> Tj ET"
-        )
+        begin = f"{number(x)} {number(EDGE)} Td"
+        yield typeset(words, PLAIN, FOOT_TYPE, begin, FOOT_INK, faces)
 
 
 def _faces(sheets: Sequence[Leaf], feet: Sequence[str], count: int) -> dict[str, Typeface]:

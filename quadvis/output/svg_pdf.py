@@ -53,9 +53,14 @@ def _text(element: ElementTree.Element, faces: Mapping[str, Typeface]) -> str:
     name, text, size = _face(element), element.text or "", _value(element, "font-size")
     width = faces[name].width(text, size)
     x = _value(element, "x") - {"middle": width / 2, "end": width}.get(element.get("text-anchor", ""), 0.0)
-    fill = colour(element.get("fill", "#000000"))
     place = f"1 0 0 -1 {number(x)} {number(_value(element, 'y'))} Tm"
-    return f"BT {fill} rg /{name} {number(size)} Tf {place} <{faces[name].hexadecimal(text)}> Tj ET"
+    return typeset(text, name, size, place, element.get("fill", "#000000"), faces)
+
+
+def typeset(text: str, name: str, size: float, place: str, fill: str, faces: Mapping[str, Typeface]) -> str:
+    """Return the operators that set a text in a typeface; ``place`` are those that move to its begin."""
+    face = faces[name]
+    return f"BT {colour(fill)} rg /{name} {number(size)} Tf {place} <{face.hexadecimal(text)}> Tj ET"
 
 
 def _shape(element: ElementTree.Element, path: str) -> Iterator[str]:
