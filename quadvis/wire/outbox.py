@@ -24,6 +24,7 @@ class Outbox:
         self._bytes: Counter[bytes] = Counter()
         self.dropped: Counter[bytes] = Counter()  # by connection, as long as there is one
         self.all_dropped = 0
+        self.moves = False  # whether `flush` has sent something when it was called last
 
     @property
     def waits(self) -> bool:
@@ -49,11 +50,13 @@ class Outbox:
     def flush(self) -> list[bytes]:
         """Send what can be sent now; return the connections that are gone."""
         gone = []
+        self.moves = False
         for identity, waiting in list(self._waiting.items()):
             sent: bool | None = True
             while waiting and sent:
                 sent = self._try(identity, waiting[0][0])
                 if sent:
+                    self.moves = True
                     self._bytes[identity] -= waiting.popleft()[1]
             if sent is False:
                 gone.append(identity)

@@ -37,7 +37,7 @@ from quadvis.wire.pipe import Pipe
 
 _AT_ONCE = 32  # messages of one socket before the others have their turn
 _ENOUGH = 1 << 20  # bytes that wait for the target; no further messages are taken from hosts
-_SOON = 5  # ms between two looks while something waits for a slow host
+_SOON, _SLOWLY = 1, 5  # ms between two looks while something waits for hosts; while they take nothing
 _ZAP = "inproc://zeromq.zap.01"
 _SPARE = 1 << 16  # bytes of a message of the target beyond what it sends to hosts
 _FIRST_TO_GO = "500"  # when the system lacks memory (proc(5), oom_score_adj)
@@ -115,8 +115,7 @@ class PorterProcess:
     def _turn(self) -> None:
         poller = self._patient if self._pipe.waiting else self._listening
         poller.modify(self._pipe.fileno(), zmq.POLLIN | (zmq.POLLOUT if self._pipe.waiting else 0))
-        waits = any(each.outbox.waits for each in self._entrances)
-        ready = dict(poller.poll(_SOON if waits else int(PORTER_LIFE * 1000)))
+        ready = dict(poller.poll(self._pause()))
         while (message := self._pipe.take()) is not None:
             self._obeyed[message[0]](*message[1:])
         if self._questions in ready and not self._question:
@@ -131,6 +130,13 @@ class PorterProcess:
             for identity in entrance.outbox.flush() if entrance.outbox.waits else ():
                 self._pipe.put("gone", number, identity)
         self._pipe.flush()
+
+    def _pause(self) -> int:
+        """Return how long to wait for a message (ms). libzmq does not say when a host takes data again."""
+        waiting = [each.outbox.moves for each in self._entrances if each.outbox.waits]
+        if not waiting:
+            return int(PORTER_LIFE * 1000)
+        return _SOON if any(waiting) else _SLOWLY
 
     def _pass_on(self, number: int, entrance: Entrance) -> None:
         for _ in range(_AT_ONCE):

@@ -21,7 +21,7 @@ from quadvis.wire.hosts import AuthorizedHosts, allow
 from quadvis.wire.keys import KeyPair, new_key
 from quadvis.wire.meeting import meet
 from quadvis.wire.messages import Request, pack_request
-from quadvis.wire.refusals import UnknownError
+from quadvis.wire.refusals import NoAnswerError, UnknownError
 from quadvis.wire.server import Server
 from quadvis.wire.verbs import VERBS, Verb
 from quadvis.wire.who import Who
@@ -139,6 +139,14 @@ def until(what: Callable[[], Any], timeout: float = 20.0) -> Any:
         assert time.monotonic() < end, "it did not come true"
         time.sleep(0.005)
     return found
+
+
+def after_loss(ask: Callable[[], Any]) -> Any:
+    """Ask; and again if the client was about to note that it has lost its connection."""
+    try:
+        return ask()
+    except NoAnswerError:
+        return ask()
 
 
 def resident() -> float:

@@ -29,7 +29,7 @@ from quadvis.wire.refusals import (
     WireError,
 )
 from quadvis.wire.server import Server
-from tests.quadvis.wire.rig import Echo, Rig, proxied, request, until
+from tests.quadvis.wire.rig import Echo, Rig, after_loss, proxied, request, until
 
 
 def test_a_host_asks_tunes_and_looks(rig: Rig) -> None:
@@ -175,7 +175,7 @@ def test_the_lease_survives_a_short_loss_of_the_connection(rig: Rig, tmp_path: P
             client.operate()
             proxy.cut()
             until(lambda: client._courier.state() != CONNECTED)
-            client.request("setparam", 20, values={"a": 1.0})
+            after_loss(lambda: client.request("setparam", 20, values={"a": 1.0}))
             assert client.operates and rig.lost == []
 
 
