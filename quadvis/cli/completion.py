@@ -33,7 +33,7 @@ FOLDERS = ("FOLDER",)
 
 
 def completion(parser: Parser, shell: str) -> str:
-    """Return the script of a shell: bash, zsh, tcsh or fish."""
+    """Return the script of a shell: bash, zsh, tcsh or fish. It adds to the parser what shells need."""
     for command in parser.commands.values():
         for action in (*command.places, *command.options.values()):
             if action.metavar in FILES:

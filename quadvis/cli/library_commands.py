@@ -110,9 +110,9 @@ def camera(options: argparse.Namespace) -> int:
 def completion(options: argparse.Namespace) -> int:
     """Print the script with which a shell completes words."""
     from quadvis.cli.completion import completion as script
-    from quadvis.cli.options import parser
+    from quadvis.cli.options import new_parser
 
-    print(script(parser(), options.shell), end="")
+    print(script(new_parser(), options.shell), end="")
     return 0
 
 

@@ -179,7 +179,12 @@ never leaves it."""
 
 @functools.cache
 def parser() -> Parser:
-    """Return the parser of all commands and their options, which a console asks for at every line."""
+    """Return the parser that this process has, which a console asks for at every line."""
+    return new_parser()
+
+
+def new_parser() -> Parser:
+    """Return a parser of all commands and their options."""
     made = Parser(prog="quadvis", description="Block diagrams in YAML that fly a four-rotor craft.")
     made.add_argument("--version", action="version", version=f"quadvis {__version__}")
     subparsers = made.add_subparsers(required=True, metavar="COMMAND")

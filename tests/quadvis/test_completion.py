@@ -58,3 +58,9 @@ def test_each_shell_has_a_script_with_all_commands(shell: str, capsys: pytest.Ca
 def test_another_shell_gets_a_sentence(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["completion", "bsh"]) == 2
     assert "did you mean 'bash'?" in capsys.readouterr().err
+
+
+def test_what_a_shell_needs_is_nothing_that_a_command_refuses(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["completion", "bash"])
+    capsys.readouterr()
+    assert parser().commands["describe"].places[0].choices is None

@@ -236,7 +236,7 @@ def test_a_resolved_diagram_keeps_the_solver() -> None:
     [
         ("{method: ode15s, step: 1 s}", "there is no method 'ode15s'; did you mean 'BDF'?"),
         ("{method: ode45, step: 1 s}", "there is no method 'ode45'; did you mean 'RK45'?"),
-        ("{method: radau, step: 1 s}", "did you mean 'Radau'?"),
+        ("{method: Radua, step: 1 s}", "did you mean 'Radau'?"),
         (
             "{method: ode4, step: 1 s, rtol: 1e-6}",
             "'rtol' is for a method that chooses its steps, not for ode4; leave it out, or choose one of "
