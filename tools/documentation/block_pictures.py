@@ -21,6 +21,7 @@ from quadvis.api import load_text
 from quadvis.block import Block
 from quadvis.graph.graph import Node, Wire
 from quadvis.graph.names import index_text, wire_text
+from quadvis.library.catalogue import Catalogue
 from quadvis.library.describe import example_diagram, only_checked
 from quadvis.output.figures import Figure, Panel, Trace
 from quadvis.output.plot import plot_figures
@@ -29,6 +30,11 @@ from quadvis.units import Unit, parse_units
 MOST_ELEMENTS = 12  # of a signal that is drawn; more would hide each other
 MOST_TRACES = 8
 NAMES = ("diagram.svg", "response.svg")
+
+
+def draw_block(name: str, cache: Path) -> None:
+    """Put the pictures of a block of the standard library into the cache."""
+    pictures(name, Catalogue().find(name), cache)
 
 
 def pictures(name: str, block: type[Block], cache: Path) -> dict[str, bytes]:

@@ -6,10 +6,13 @@ import importlib
 import inspect
 import os
 from collections.abc import Callable, Collection, Iterable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 from documentation.block_pages import block_page, contents, group_page
-from documentation.block_pictures import pictures
+from documentation.block_pictures import draw_block, pictures
 from documentation.diagram_pages import diagram_files, diagram_page, diagram_picture, users_of
 from documentation.error_index import error_page
 from documentation.generator import render
@@ -58,6 +61,8 @@ def build_site(
     staging = Staging(cache / "pages")
     blocks = _blocks(names)
     files = diagram_files() if names is None else []
+    if names is None and drawn is None:
+        _draw_together(blocks, files, cache / "pictures")
     for name in _write_blocks(staging, blocks, files, cache / "pictures", drawn):
         say(f"page of {name}")
     _write_diagrams(staging, files, set(blocks), cache / "pictures", drawn)
@@ -75,6 +80,22 @@ def build_site(
 def _blocks(names: Collection[str] | None) -> dict[str, type[Block]]:
     catalogue = Catalogue()
     return {name: catalogue.find(name) for name in (catalogue.names() if names is None else names)}
+
+
+def _draw_together(names: Iterable[str], files: Iterable[str], cache: Path) -> None:
+    """Put all pictures into the cache, as many at once as there are processors; diagrams take longest."""
+    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+        drawn: list[Future[Any]] = [
+            pool.submit(diagram_picture, file, cache) for file in files if _is_diagram(file)
+        ]
+        drawn += [pool.submit(draw_block, name, cache) for name in names]
+        for each in drawn:
+            each.result()
+
+
+def _is_diagram(file: str) -> bool:
+    """Return whether a file is one that can be drawn; a part alone is no diagram."""
+    return file.count("/") == 1
 
 
 def _write_blocks(
@@ -105,8 +126,7 @@ def _write_diagrams(
 ) -> None:
     for file in files:
         page = page_of(file)
-        # A part alone is no diagram.
-        is_drawn = file.count("/") == 1 and (drawn is None or file in drawn)
+        is_drawn = _is_diagram(file) and (drawn is None or file in drawn)
         picture = diagram_picture(file, cache) if is_drawn else ""
         if picture:
             staging.write(page.replace(".md", ".svg"), picture)
