@@ -10,16 +10,17 @@ from quadvis.errors import QuadvisError
 
 FOXGLOVE, PLOTJUGGLER = ENDS = ("foxglove", "plotjuggler")
 HERE = "127.0.0.1"
+FOXGLOVE_PORT, PLOTJUGGLER_PORT = 8765, 9870  # what the two programs suggest
 DEFAULTS: dict[str, dict[str, Any]] = {
-    FOXGLOVE: {"listen": HERE, "port": 8765, "tune": False},
-    PLOTJUGGLER: {"to": f"{HERE}:9870", "encoding": "json"},
+    FOXGLOVE: {"listen": HERE, "port": FOXGLOVE_PORT, "tune": False},
+    PLOTJUGGLER: {"to": f"{HERE}:{PLOTJUGGLER_PORT}", "encoding": "json"},
 }
 
-BRIDGE_HELP = """\
+BRIDGE_HELP = f"""\
 examples:
-  quadvis bridge foxglove                      # then 'Open connection' there: ws://localhost:8765
+  quadvis bridge foxglove                      # then 'Open connection' there: ws://localhost:{FOXGLOVE_PORT}
   quadvis bridge foxglove --target lab1 --signals 'craft.*,eyes.centres'
-  quadvis bridge plotjuggler                   # before or after 'UDP Server' is started there, at port 9870
+  quadvis bridge plotjuggler                   # 'UDP Server' there listens at port {PLOTJUGGLER_PORT}
 
 The bridge goes on until Ctrl-C, whatever is loaded, started or stopped meanwhile. It needs level 2 of the
 target, with --tune level 0. A stamp is the instant at which the run began, by the clock of the target, and
@@ -38,11 +39,11 @@ def add_bridge(add: Any) -> Parser:
     parser.add_argument("--signals", metavar="A,B", action="append", default=[], help=words)
     words = "foxglove: the address at which it is served; default: this machine alone, without any key"
     parser.add_argument("--listen", metavar="ADDRESS", help=words)
-    words = "foxglove: the port; default 8765, 0 for any free one"
+    words = f"foxglove: the port; default {FOXGLOVE_PORT}, 0 for any free one"
     parser.add_argument("--port", type=int, metavar="N", help=words)
     words = "foxglove: let its users change parameters"
     parser.add_argument("--tune", action="store_true", default=None, help=words)
-    words = "plotjuggler: where datagrams go; default 127.0.0.1:9870"
+    words = f"plotjuggler: where datagrams go; default {DEFAULTS[PLOTJUGGLER]['to']}"
     parser.add_argument("--to", metavar="ADDRESS:PORT", help=words)
     words = "plotjuggler: how they are written; default json"
     parser.add_argument("--encoding", choices=("json", "messagepack"), help=words)

@@ -16,6 +16,7 @@ from quadvis.engine.engine import Engine
 from quadvis.engine.events import LOCATED
 from quadvis.errors import RunError
 from quadvis.graph.graph import Constant, Graph, Node, Task, Wire
+from tests.quadvis.restored import check_repeats
 
 # A lag behind a relay with hysteresis: x runs up to the threshold and down to the other one, for ever.
 RELAY = """\
@@ -154,15 +155,7 @@ def test_an_event_that_another_one_causes_comes_at_once() -> None:
 
 
 def test_a_restored_run_has_the_same_events() -> None:
-    made = Engine(load_text(RELAY.replace("BAND", "0.05")).graph)
-    with made:
-        made.run(7)
-        snapshot = made.snapshot()
-        made.run(100)
-        once = made.memory.content()
-        made.restore(snapshot)
-        made.run(100)
-        assert made.memory.content() == once
+    check_repeats(Engine(load_text(RELAY.replace("BAND", "0.05")).graph), 7, 100)
 
 
 def test_an_event_that_fails_is_reported_with_its_block() -> None:

@@ -17,6 +17,7 @@ from quadvis.graph.graph import VARIABLE
 from quadvis.realtime.options import RealTime
 from quadvis.testing import drive
 from quadvis_blocks.signal.integrator import Integrator
+from tests.quadvis.restored import check_repeats
 
 SLOW = pytest.mark.slow
 STIFF = ("Radau", "BDF", "LSODA")
@@ -167,15 +168,7 @@ def test_both_engines_and_a_restored_run_give_the_same_bits(method: str) -> None
     native = diagram.run(engine="native")
     assert native["x.y"].tobytes() == truth.tobytes()
     assert str(native.engine) == f"native, but interpreted: the solver {method}, which is scipy's"
-    engine = Engine(diagram.graph)
-    with engine:
-        engine.run(30)
-        snapshot = engine.snapshot()
-        engine.run(40)
-        once = engine.memory.content()
-        engine.restore(snapshot)
-        engine.run(40)
-        assert engine.memory.content() == once
+    check_repeats(Engine(diagram.graph), 30, 40)
 
 
 def test_a_reset_of_a_state_begins_anew() -> None:

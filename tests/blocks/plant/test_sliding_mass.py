@@ -11,6 +11,7 @@ from quadvis.api import load_text
 from quadvis.engine.engine import Engine
 from quadvis.testing import drive
 from quadvis_blocks.plant.sliding_mass import SlidingMass
+from tests.quadvis.restored import check_repeats
 
 # A mass on a spring, on a floor with dry friction.
 SPRING = """\
@@ -134,15 +135,7 @@ def test_without_friction_it_is_two_integrators() -> None:
 
 
 def test_a_restored_run_repeats_to_the_bit() -> None:
-    engine = Engine(load_text(BELT).graph)
-    with engine:
-        engine.run(90)
-        snapshot = engine.snapshot()
-        engine.run(300)
-        once = engine.memory.content()
-        engine.restore(snapshot)
-        engine.run(300)
-        assert engine.memory.content() == once
+    check_repeats(Engine(load_text(BELT).graph), 90, 300)
 
 
 def test_both_engines_give_the_same_bits() -> None:
