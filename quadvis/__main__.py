@@ -22,6 +22,13 @@ except KeyboardInterrupt:
 
     os.write(2, b"interrupted\n")
     os._exit(130)
+except MemoryError:
+    import os
+
+    # It is quadvis.machine.failures.MEMORY; there may be too little even to import that.
+
+    os.write(2, b"there is not enough memory; free some, or raise the limit (ulimit -v)\n")
+    os._exit(1)
 
 if __name__ == "__main__":
     raise SystemExit(main())

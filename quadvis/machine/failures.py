@@ -75,11 +75,11 @@ def is_short_of_memory(error: Exception) -> bool:
         return True
     if isinstance(error, _NEVER) or not isinstance(error, _PERHAPS):
         return False
-    from mmap import mmap
-
     try:
+        from mmap import mmap  # a library of its own, which may not fit either
+
         mmap(-1, ROOM).close()
-    except (OSError, MemoryError):
+    except (ImportError, OSError, MemoryError):
         return True
     return False
 

@@ -283,7 +283,9 @@ def test_warnings_are_shown_where_they_would_be_errors(
 # Memory.
 
 
-@pytest.mark.parametrize("megabytes", mostly_slow([40, 120, 80, 20, 180, 30, 60, 100, 150, 220], slow=4))
+@pytest.mark.parametrize(
+    "megabytes", mostly_slow([40, 120, 80, 20, 18, 23, 180, 30, 60, 100, 150, 220], slow=6)
+)
 def test_little_memory_is_a_sentence(megabytes: int) -> None:
     def limit() -> None:
         resource.setrlimit(resource.RLIMIT_AS, (megabytes << 20, megabytes << 20))

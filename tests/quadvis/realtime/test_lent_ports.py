@@ -23,6 +23,7 @@ TEXT = """\
 quadvis: 1
 name: both ways
 rates: {fast: 50 Hz, slow: 10 Hz}
+overload: {action: warn}
 stop_time: 1 s
 computers: {sender: {}, hearer: {}}
 blocks:

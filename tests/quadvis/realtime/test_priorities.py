@@ -11,6 +11,7 @@ TEXT = """
 quadvis: 1
 name: two
 tasking: multi
+overload: {action: warn}
 stop_time: 1 s
 rates: {fast: 100 Hz, often: 50 Hz, slow: 10 Hz}
 computers: {near: {}, far: {FAR}}

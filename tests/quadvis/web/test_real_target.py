@@ -53,7 +53,7 @@ def test_a_page_has_all_that_it_asks_for(tmp_path: Path, monkeypatch: pytest.Mon
                     assert found["changes"] == [{"name": "law.factor", "old": 2.0, "new": 3.0}]
                     assert "lab refuses" in page.refused("setparam", values={"wave.frequency": "3 m"})
                     page.request("startprofiler")
-                    wait_for(lambda: tg.getProfilerData().profiles)
+                    wait_for(lambda: {"wave", "law"} <= timed_blocks(tg))
                     page.request("stopprofiler")
                     (timed,) = page.request("getprofilerdata")["blocks"]
                     assert {"wave", "law"} <= {each[0] for each in timed["methods"]}
@@ -69,6 +69,11 @@ def test_a_page_has_all_that_it_asks_for(tmp_path: Path, monkeypatch: pytest.Mon
                 wait_for(lambda: tg.request("scopes") == [])  # the gateway removes what a page leaves
             finally:
                 running.close()
+
+
+def timed_blocks(tg: Target) -> set[str]:
+    """Return the blocks of which the profiler has timed a call."""
+    return {each.block for report in tg.getProfilerData().profiles.values() for each in report.methods}
 
 
 def test_the_stand_in_says_what_a_target_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
