@@ -130,9 +130,11 @@ class Scripted:
     """A target with statuses that are given; one that is none does not answer."""
 
     def __init__(self, *statuses: tuple[str, float, str] | None) -> None:
-        self.statuses, self.stops = list(statuses), 0
+        self.statuses, self.stops, self.asked = list(statuses), 0, 0
 
     def status(self) -> dict[str, object]:
+        self.asked += 1
+        assert self.asked < 100, "it waits without end"
         found = self.statuses.pop(0) if len(self.statuses) > 1 else self.statuses[0]
         if found is None:
             raise QuadvisError("lab has not answered 'status' in 3 s")
@@ -193,6 +195,8 @@ def test_without_anybody_left_the_flight_ends(tmp_path: Path) -> None:
 
 ADDRESSES = {"host": "10.77.61.1", "a": "10.77.61.2", "b": "10.77.61.3"}
 AHEAD = 5000  # s by which the clock of the second machine is ahead
+# What it starts ends with it: whoever ends the target ends this.
+OWN_TIME = ("unshare", "--time", "--monotonic", str(AHEAD), "--fork", "--kill-child=SIGTERM")
 
 
 def ip(*words: str) -> None:
@@ -248,8 +252,7 @@ def test_two_machines_with_clocks_of_their_own_fly_one_diagram(
             home = tmp_path / name
             new_key(name, home)
             allow("bench", bench.public.hex(), 0, folder=home)
-            own_time = ["unshare", "--time", "--monotonic", str(AHEAD), "--fork"] if name == "b" else []
-            before = ["ip", "netns", "exec", space, *own_time]
+            before = ["ip", "netns", "exec", space, *(OWN_TIME if name == "b" else ())]
             stack.enter_context(
                 running_target("--listen", ADDRESSES[name], name=name, home=home, before=before)
             )
