@@ -10,7 +10,7 @@ import pytest
 from hypothesis import settings
 
 from quadvis.machine.processes import ONE_THREAD
-from tests.stages import longest_first
+from tests.stages import longest_first, share
 
 # As in the workers of a sweep: before numpy is imported, and for the commands under test.
 os.environ.update(ONE_THREAD)
@@ -35,9 +35,17 @@ settings.load_profile("quick")
 OPTIONAL = [name for name in ("mujoco",) if find_spec(name) is None]
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Let a gate try one share of the tests that are chosen."""
+    words = "try only one share of the tests, such as the second of five, 2/5; see tests/README.md"
+    parser.addoption("--share", metavar="K/N", default="1/1", help=words)
+
+
 @pytest.hookimpl(trylast=True)  # after pytest has brought together what shares a fixture
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Skip what needs a package that is not installed, and begin with what takes longest."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out other shares, skip what needs a missing package, and begin with what takes longest."""
+    items[:], others = share(items, config.getoption("--share"))
+    config.hook.pytest_deselected(items=others)
     for item in items:
         for name in OPTIONAL:
             if name in item.nodeid:

@@ -73,6 +73,7 @@ def test_check_says_what_desk_and_bench_share(capsys: pytest.CaptureFixture[str]
     )
 
 
+@pytest.mark.slow
 def test_a_bad_line_of_circles_fails_the_flight(tmp_path: Path) -> None:
     bad = tmp_path / "bad.yaml"
     line = "links: {circle_line: {from: vision_pc, to: target, via: serial, baud: 115200, flips: 0.001}}"

@@ -118,6 +118,7 @@ def test_a_method_of_fixed_step_leaves_tolerances_of_the_file_alone(path: Path) 
     assert quadvis.load(path, settings={"solver.atol": "1e-4"}).graph.tolerances == Tolerances(1e-8, 1e-4)
 
 
+@pytest.mark.slow
 def test_a_sweep_goes_over_methods_and_steps(path: Path) -> None:
     over = {"solver.method": ["ode1", "ode4", "RK45"], "solver.step": ["5 ms", "10 ms"]}
     lag = "block: systems.transfer_function, with: {numerator: [1], denominator: [0.1, 1]}"

@@ -465,6 +465,7 @@ def diagrams(draws: st.DrawFn) -> Drawn:
     return blocks, wires
 
 
+@pytest.mark.slow
 @settings(max_examples=5, suppress_health_check=list(HealthCheck))
 @given(diagrams())
 def test_any_diagram_is_well_drawn(diagram: Drawn) -> None:

@@ -89,6 +89,7 @@ def test_a_part_that_is_not_there_gets_a_sentence() -> None:
         part_alone(PICTURE, "pp")
 
 
+@pytest.mark.slow
 def test_every_part_of_a_flight_can_be_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     diagram = quadvis.load(ROOT / "diagrams" / "takeover.yaml", variant="robust")
     parts = {node.path.rpartition("/")[0] for node in diagram.graph.nodes} - {""}

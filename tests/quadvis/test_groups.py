@@ -170,6 +170,7 @@ def test_a_misspelt_parameter_that_nothing_takes_is_a_warning_with_the_name_that
     assert arm == "crafts/large.yaml:6:8: warning: nothing takes 'amr' of this group; did you mean 'arm'?"
 
 
+@pytest.mark.slow
 def test_a_sweep_goes_over_crafts_and_over_a_parameter_of_one() -> None:
     over = {"vehicle": ["crafts/large.yaml", "crafts/small.yaml"], "vehicle.mass": ["1 kg", "2 kg"]}
     table = quadvis.sweep("craft.yaml", over, stop_time="0.1 s", workers=1)

@@ -202,6 +202,7 @@ def runs(draw: st.DrawFn) -> tuple[list[RecordedBlock], list[tuple[int, int, lis
     return blocks, rows
 
 
+@pytest.mark.slow
 @given(runs())
 @settings(max_examples=60, deadline=None)
 def test_any_run_comes_back_bit_for_bit(

@@ -150,6 +150,7 @@ def agree(group: tuple[Any, ...]) -> None:
             assert machine(each, x, y) == answer(each.function, x, y), f"{each.__name__}({x!r}, {y!r})"
 
 
+@pytest.mark.slow
 def test_powers_have_the_bits_of_pythons():
     agree(POWERS)
 

@@ -47,6 +47,7 @@ def fresh(tmp_path, monkeypatch):
         function.bind(None)
 
 
+@pytest.mark.slow
 def test_machine_code_gives_the_same_is_kept_and_is_loaded_again(fresh):
     picture, values = np.arange(12, dtype=np.uint8).reshape(3, 4), np.array([0.1, 0.2, 0.7])
     interpreted = spread(picture, values, 3.0)

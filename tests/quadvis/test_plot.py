@@ -195,6 +195,7 @@ def test_pictures_are_png_files_of_a_readable_size(run: Run, tmp_path: Path) -> 
     assert (one == 255).all(axis=2).mean() > 0.5
 
 
+@pytest.mark.slow
 def test_without_a_folder_pictures_lie_beside_the_log(run: Run, tmp_path: Path) -> None:
     run.write(tmp_path / "flight.mcap", HOVER)
     paths = plotted_log(tmp_path / "flight.mcap")
@@ -202,6 +203,7 @@ def test_without_a_folder_pictures_lie_beside_the_log(run: Run, tmp_path: Path) 
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)
 
 
+@pytest.mark.slow
 def test_without_declared_figures_every_block_is_drawn(run: Run, sheets: Sheets, tmp_path: Path) -> None:
     run.write(tmp_path / "flight.mcap", "quadvis: 1\nname: hover\n")
     paths = plotted_log(tmp_path / "flight.mcap")

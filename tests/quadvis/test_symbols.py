@@ -104,6 +104,7 @@ def pictures(draws: st.DrawFn) -> tuple[list[DrawnBlock], list[DrawnWire]]:
     return blocks, wires
 
 
+@pytest.mark.slow
 @settings(max_examples=15, suppress_health_check=list(HealthCheck))
 @given(pictures())
 def test_any_symbols_are_well_drawn(made: tuple[list[DrawnBlock], list[DrawnWire]]) -> None:

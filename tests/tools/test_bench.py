@@ -70,6 +70,7 @@ def test_the_loop_is_in_full_motion_where_it_is_compared() -> None:
 # The programs
 
 
+@pytest.mark.slow
 def test_interpreted_blocks_do_the_tasks_right_and_are_timed() -> None:
     found = measured("quadvis_python,python_by_hand")
     assert [row["task"] for row in found] == [name for name in NAMES for _ in range(2)]
@@ -168,6 +169,7 @@ def test_loading_is_measured_beyond_an_empty_diagram(monkeypatch: pytest.MonkeyP
     assert (row.what, row.value) == ("loading 200 blocks", pytest.approx(1.98))
 
 
+@pytest.mark.slow
 def test_the_chosen_engine_is_compared_with_the_faster_one(monkeypatch: pytest.MonkeyPatch) -> None:
     taken = {"python": 3.0, "native": 2.0, "auto": 2.25}
     commands_seen: list[Sequence[str]] = []

@@ -93,6 +93,7 @@ def test_rendered_pictures_are_compared_with_the_true_poses(tmp_path):
     assert {("truth", "n_points"), ("truth", "plane"), ("n_points", "plane")} <= pairs
 
 
+@pytest.mark.slow
 def test_both_methods_of_the_paper_find_the_same_attitude(recording):
     said, _ = recording
     (pair,) = [p for p in said["differences"] if (p["first"], p["second"]) == ("n_points", "plane")]

@@ -27,6 +27,7 @@ from documentation.site_map import page_of, relinked  # noqa: E402
 BLOCKS = ("signal.derivative", "control.mixer", "hardware.sbus_out", "fmi.fmu")
 
 
+@pytest.mark.slow
 def test_two_blocks_have_their_pages_and_no_link_is_broken(tmp_path: Path) -> None:
     assert build_site(tmp_path / "site", tmp_path / "cache", names=BLOCKS) == []
     for name in BLOCKS:
@@ -44,6 +45,7 @@ def test_what_an_example_writes_is_no_picture(tmp_path: Path) -> None:
     assert [*found] == ["diagram.svg"]  # a frame is not drawn over time
 
 
+@pytest.mark.slow
 def test_what_did_not_change_is_not_made_again(tmp_path: Path) -> None:
     build_site(tmp_path / "site", tmp_path / "cache", names=BLOCKS[:1])
     kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache" / "pictures").rglob("*.svg")}

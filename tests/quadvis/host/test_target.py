@@ -304,6 +304,7 @@ def flown(tg: Target, path: Path, text: str) -> Log:
     return log
 
 
+@pytest.mark.slow
 def test_parts_of_a_log_have_the_names_of_xpc_target(tg: Target, tmp_path: Path) -> None:
     text = LOOP.replace("stop_time: 600 s", "stop_time: 0.5 s").replace("expect:", PAIR + "expect:")
     log = flown(tg, tmp_path / "loop.yaml", text)
@@ -403,6 +404,7 @@ def test_the_profiler_times_tasks_and_blocks_while_the_application_flies_on(
         assert any(step["ts"] - 1 <= call["ts"] <= step["ts"] + step["dur"] + 1 for step in steps)
 
 
+@pytest.mark.slow
 def test_a_run_is_timed_from_its_start_if_the_profiler_is_on_before(tg: Target, diagram: Path) -> None:
     tg.load(diagram)
     tg.startProfiler()
@@ -535,6 +537,7 @@ def test_a_scope_tells_what_is_wrong(tg: Target, diagram: Path) -> None:
         tg.getsignal("wave.x")
 
 
+@pytest.mark.slow
 def test_the_same_diagram_is_sent_once(tg: Target, diagram: Path) -> None:
     tg.load(diagram)
     sent: list[str] = []
@@ -651,6 +654,7 @@ def test_pictures_of_a_run_are_shown_to_who_asks_and_change_nothing(
     assert quadvis.replay(tg.fetchlog()).same
 
 
+@pytest.mark.slow
 def test_the_diagram_is_drawn_once(tg: Target, lab: Running, diagram: Path) -> None:
     tg.load(diagram)
     drawn = tg.request("drawing", deadline=60)

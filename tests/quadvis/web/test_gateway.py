@@ -448,6 +448,7 @@ def test_a_target_that_falls_silent_is_noticed_while_the_gateway_lives(
         page.next(lambda message: "beat" in message and message["heard"] < 1)
 
 
+@pytest.mark.slow
 def test_a_recording_and_a_picture_come_as_bytes(tmp_path: Path) -> None:
     root = Path(__file__).parents[3]
     target = StandIn(load(root / "diagrams" / "hover.yaml"), tmp_path)
