@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.errors import QuadvisError
+from quadvis.errors import QuadvisError, sentence
 from quadvis.scopes.package import Package
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 FINISHED = "Finished"
 POLL = 0.05  # s between two questions for the status
 ROWS = 5_000  # samples in one message
+NEWER = 20  # packages that may take the place of the one that is being fetched
 
 
 def read_package(header: Mapping[str, Any], array: Any) -> Package:
@@ -103,15 +104,22 @@ class HostScope:
 
     @property
     def package(self) -> Package:
-        """The newest whole package; QuadvisError if there is none yet."""
+        """The newest whole package; QuadvisError if there is none yet, or if newer ones come all the time."""
         pieces: list[NDArray[np.float64]] = []
-        while True:
+        sequence, newer = None, 0
+        while newer < NEWER:
             first = sum(map(len, pieces))
             found = self._connection.request("getscope", id=self._number, first=first, count=ROWS)
+            if pieces and found["sequence"] != sequence:
+                pieces, newer = [], newer + 1
+                continue
+            sequence = found["sequence"]
             rows = np.asarray(found["samples"], np.float64).reshape(-1, 1 + len(found["names"]))
             pieces.append(rows)
             if first + len(rows) >= found["count"] or not len(rows):
                 return read_package(found, np.concatenate(pieces))
+        problem = f"scope {self._number} has newer packages before one of them has come whole"
+        raise QuadvisError(sentence(problem, "take them as they come, by 'packages'"))
 
     @property
     def Data(self) -> NDArray[np.float64]:
@@ -128,10 +136,12 @@ class HostScope:
         found: queue.SimpleQueue[Package] = queue.SimpleQueue()
         topic = f"scope/{self._number}"
         parts: list[Any] = []
+        sequence: list[int] = []  # that of the package of which there are parts
 
         def take(header: Mapping[str, Any], array: Any) -> None:
-            if header["part"] == 0:
+            if header["part"] == 0 or sequence != [header["sequence"]]:
                 parts.clear()
+                sequence[:] = [header["sequence"]]
             parts.append(array)
             if header["part"] == header["parts"] - 1 and len(parts) == header["parts"]:
                 found.put(read_package(header, np.concatenate(parts)))
