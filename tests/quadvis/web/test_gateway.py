@@ -394,6 +394,25 @@ def test_a_scope_gives_every_sample_once(running: Running, target: StandIn) -> N
     assert waited_for(lambda: not target._takers[f"scope/{number}"])
 
 
+def test_a_scope_is_removed_though_its_page_was_closed_before_the_target_had_added_it(
+    running: Running, target: StandIn, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    adds, asked, goes_on = target.do_addscope, threading.Event(), threading.Event()
+
+    def add(**arguments: Any) -> Any:
+        asked.set()
+        assert goes_on.wait(20)
+        return adds(**arguments)
+
+    monkeypatch.setattr(target, "do_addscope", add)
+    with running.page() as page:
+        page.ask("addscope")
+        assert asked.wait(20)
+    assert waited_for(lambda: not running.gateway.viewers)
+    goes_on.set()
+    assert waited_for(lambda: "remscope" in target.asked and not target.scopes)
+
+
 def test_a_parameter_is_set_and_holds_from_a_tick_on(running: Running, target: StandIn) -> None:
     target.do_start()
     with running.page() as page:
