@@ -81,8 +81,9 @@ class Gateway:
             self._watch.close()
             server.close()
             await server.wait_closed()
-            while self._streams:
-                self._streams.popitem()[1]()
+            with suppress(QuadvisError):  # whoever does not answer once is not asked again
+                while self._streams:
+                    self._streams.popitem()[1]()
             self._workers.shutdown(wait=False, cancel_futures=True)
 
     # one page

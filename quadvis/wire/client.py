@@ -156,12 +156,13 @@ class Client:
         return subscription
 
     def unsubscribe(self, subscription: Subscription) -> None:
-        """Receive no more of a subscription."""
+        """Receive no more of a subscription; a target that is not connected knows of none."""
         with self._lock:
             self._forget(subscription)
             left = {topic for each in self._subscriptions for topic in each.topics}
         subscription.end(GoneError("the subscription has ended"))
-        if unused := [topic for topic in subscription.topics if topic not in left]:
+        unused = [topic for topic in subscription.topics if topic not in left]
+        if unused and self._courier.state(STREAM) == CONNECTED:
             self.request("unsubscribe", topics=unused)
 
     def close(self) -> None:

@@ -51,3 +51,11 @@ def test_who_was_refused_after_a_loss_of_the_connection_is_not_asked_for_again(c
     assert client._subscriptions == [later]
     with pytest.raises(RefusedError):
         refused.take(0)
+
+
+def test_a_subscription_can_be_ended_at_once_though_the_target_is_gone(client: Client) -> None:
+    subscription = Subscription(("state",), 10, None)
+    client._subscriptions.append(subscription)
+    client.unsubscribe(subscription)  # NoAnswerError would come after more than 3 s
+    with pytest.raises(WireError, match="has ended"):
+        subscription.take(0)
