@@ -41,5 +41,5 @@ class NewsOutlet(Outlet):
             if self._rest or self._opened.unsent():
                 self._write(self._rest, now)
                 return
-            self._taken = now  # a port with nothing to send is not stuck
+            self._refused = 0  # a port with nothing to send is not stuck
             self._write(self._sealed(self._newest() or b"", now), now)

@@ -85,7 +85,7 @@ class Outlet:
         self._rest = b""  # of what the port has taken in part
         self._free = 0  # the instant from which the line can take a frame
         self.due = 0  # the instant of the next frame
-        self._taken = 0  # the instant at which the port last took bytes
+        self._refused = 0  # the instant from which on the port has taken no bytes; 0 if it takes them
         self._safe_since = 0  # the instant of the first safe frame; 0 if the newest frame was none
         self._released = False
         self.safe_frames = 0  # how many safe frames were sent
@@ -131,7 +131,6 @@ class Outlet:
         self._frame = self._newest() or self._frame
         interval = self.port.interval
         self.due += interval if now < self.due + interval else interval * (1 + (now - self.due) // interval)
-        self._taken = self._taken or now
         with self._named():
             if self._rest or self._opened.unsent():
                 self._write(self._rest, now)
@@ -204,9 +203,11 @@ class Outlet:
         count = self._opened.write(piece) if piece else 0
         self._rest = piece[count:]
         if count:
-            self._taken = now
+            self._refused = 0
             settings = self.port.settings
             taken = settings.time(count) + (0.0 if self._rest else settings.gap)
             self._free = now + int(NANOSECONDS * taken)
-        elif now - self._taken > STUCK:
+        elif not self._refused:
+            self._refused = now
+        elif now - self._refused > STUCK:
             raise PortError("the port takes no bytes")

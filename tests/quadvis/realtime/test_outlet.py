@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from quadvis.machine.ports import PortError
+from quadvis.machine.ports import OpenPort, PortError
 from quadvis.machine.serial_port import Line
 from quadvis.realtime.outlet import STUCK, Outlet, OutputPort
 from tests.quadvis.realtime.ptys import Pty, ptys
@@ -123,6 +123,31 @@ def test_a_port_that_takes_nothing_for_a_second_is_lost(rig: Rig) -> None:
         rig.serve(STUCK / MS)
         with pytest.raises(PortError, match=r"/dev/pts/\d+: the port takes no bytes"):
             rig.serve(STUCK / MS + 10)
+
+
+def test_a_port_that_takes_nothing_once_is_not_lost_however_seldom_frames_are_due() -> None:
+    class Sometimes(OpenPort):
+        """A port that takes all, or nothing."""
+
+        def __init__(self) -> None:
+            self.taken: list[bytes] = []
+            self.full = False
+
+        def write(self, piece: bytes) -> int:
+            self.taken += [] if self.full else [piece]
+            return 0 if self.full else len(piece)
+
+        def close(self) -> None:
+            return
+
+    port, interval = Sometimes(), 2 * STUCK
+    outlet = Outlet(OutputPort("out", "port", LINE, interval, b"first", b"safe!"), lambda: None, lambda: port)
+    outlet.open()
+    for number, port.full in enumerate((False, True, False, True)):
+        outlet.serve(BEGIN + number * interval, safe=False)
+    assert port.taken == 2 * [b"first"]
+    with pytest.raises(PortError, match="the port takes no bytes"):
+        outlet.serve(BEGIN + 4 * interval, safe=False)
 
 
 def test_a_port_that_is_unplugged_is_lost(rig: Rig) -> None:
