@@ -5,6 +5,7 @@ from __future__ import annotations
 import queue
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 FINISHED = "Finished"
 POLL = 0.05  # s between two questions for the status
 ROWS = 5_000  # samples in one message
+WAITING = 1000  # packages that wait here until they are taken
 NEWER = 20  # packages that may take the place of the one that is being fetched
 
 
@@ -132,8 +134,11 @@ class HostScope:
         return self.package.times
 
     def packages(self, timeout: float = 10.0) -> Iterator[Package]:
-        """Yield the packages as they come; ends after a time (s) without one."""
-        found: queue.SimpleQueue[Package] = queue.SimpleQueue()
+        """Yield the packages as they come; ends after a time (s) without one.
+
+        For who is slow the newest `WAITING` packages wait; their numbers, `Package.sequence`, show the gap.
+        """
+        found: queue.Queue[Package] = queue.Queue(WAITING)
         topic = f"scope/{self._number}"
         parts: list[Any] = []
         sequence: list[int] = []  # that of the package of which there are parts
@@ -144,7 +149,10 @@ class HostScope:
                 sequence[:] = [header["sequence"]]
             parts.append(array)
             if header["part"] == header["parts"] - 1 and len(parts) == header["parts"]:
-                found.put(read_package(header, np.concatenate(parts)))
+                if found.full():
+                    with suppress(queue.Empty):
+                        found.get_nowait()
+                found.put_nowait(read_package(header, np.concatenate(parts)))
 
         self._connection.subscribe(topic, take)
         try:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from quadvis.errors import QuadvisError
-from quadvis.host.scope import NEWER, ROWS, HostScope
+from quadvis.host.scope import NEWER, ROWS, WAITING, HostScope
 
 HEAD = {"scope": 1, "names": ["a"], "units": ["1"], "trigger": None, "lost": 0, "tick": 1.0}
 COUNT = ROWS + 3  # samples of a package, which need two messages
@@ -62,3 +62,9 @@ def test_parts_of_two_packages_make_none() -> None:
     parts = ((0, 0), (1, 1), (2, 0), (2, 1), (3, 0), (4, 0), (4, 1), (5, 1))
     found = scope(parts=parts).packages(timeout=0.001)
     assert [(each.sequence, set(each.samples[:, 0])) for each in found] == [(2, {2.0}), (4, {4.0})]
+
+
+def test_of_packages_that_nobody_takes_the_newest_wait() -> None:
+    parts = tuple((number, part) for number in range(WAITING + 5) for part in (0, 1))
+    found = [each.sequence for each in scope(parts=parts).packages(timeout=0.001)]
+    assert found == list(range(5, WAITING + 5))
