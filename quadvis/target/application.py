@@ -238,7 +238,7 @@ class Application:
         if self.parameters.tuned:
             try:
                 self.parameters.save(self._store.set_path(self.name, AUTOSAVE))
-            except QuadvisError as error:  # such as a disk that the log has filled
+            except (QuadvisError, OSError) as error:  # such as a disk that the log has filled
                 self._say(f"the values that were tuned are not kept: {error}")
         self.scopes.end()
         self._event("stopped", problem=self.problem)

@@ -49,11 +49,12 @@ def test_a_session_is_over_whatever_fails_as_it_ends(tmp_path: Path, monkeypatch
     assert shown == ["'what hears of the end fails'"]
 
 
-def test_values_that_cannot_be_kept_are_reported_and_the_scopes_end_all_the_same() -> None:
+@pytest.mark.parametrize("error", [QuadvisError("the disk is full"), OSError("the disk is full")])
+def test_values_that_cannot_be_kept_are_reported_and_the_scopes_end_all_the_same(error: Exception) -> None:
     told: list[str] = []
 
     def save(path: object) -> None:
-        raise QuadvisError("the disk is full")
+        raise error
 
     application: Any = SimpleNamespace(
         _session=SimpleNamespace(problem="", result=None),
