@@ -133,7 +133,10 @@ class Outlet:
         self.due += interval if now < self.due + interval else interval * (1 + (now - self.due) // interval)
         with self._named():
             if self._rest or self._opened.unsent():
+                ends = bool(self._rest)
                 self._write(self._rest, now)
+                if safe and ends and not self._rest:
+                    self.hurry(now)  # the safe frame comes right behind the end of the one before
             elif self._beginning:
                 piece, self._beginning = self._beginning, b""
                 self._write(piece, now)
@@ -142,7 +145,7 @@ class Outlet:
                 self._send_safe(now)
             else:
                 self._safe_since, self._released = 0, False
-                self._write(self._sealed(self._frame, now), now)
+                self._write_frame(self._frame, now)
 
     @contextmanager
     def _named(self) -> Iterator[None]:
@@ -177,11 +180,10 @@ class Outlet:
             self._release(now)
             return
         try:
-            self._write(self._sealed(self.port.safe, now), now)
+            self.safe_frames += self._write_frame(self.port.safe, now)
         except ChannelError:  # the other channels have it
             self.safe_frames += 1
             raise
-        self.safe_frames += not self._rest
 
     def _release(self, now: int) -> None:
         """Send what comes after all frames, once."""
@@ -196,6 +198,18 @@ class Outlet:
             return frame if sealer is None else sealer.seal(frame, now)
         except Exception as error:
             raise PortError(f"a frame cannot be sealed: {error}") from error
+
+    def _write_frame(self, frame: bytes, now: int) -> bool:
+        """Write a frame; return whether all of it was taken.
+
+        One of which nothing was taken is dropped: the next one is newer, or safe.
+        """
+        sealed = self._sealed(frame, now)
+        self._write(sealed, now)
+        is_taken = not self._rest
+        if len(self._rest) == len(sealed):
+            self._rest = b""
+        return is_taken
 
     def _write(self, piece: bytes, now: int) -> None:
         """Write as much as the port takes at once."""
