@@ -247,13 +247,15 @@ class IsolatedFmu(_Common):
     def _sleep(self, seconds: float) -> None:
         """Sleep until the request is done; FmuFault if that takes too long, or if the process has ended."""
         until, words = time.monotonic() + seconds, self._words
+        poller = select.poll()  # `select.select` takes no descriptor above 1023
+        poller.register(self._answered, select.POLLIN)
         words[_SLEEPS] = 1
         while words[0] != self._count:
             left = until - time.monotonic()
             if left <= 0.0:
                 self._kill()
                 raise FmuFault(f"the FMU did not answer within {seconds:g} s and was ended")
-            ready, _, _ = select.select([self._answered], [], [], min(left, AGAIN))
+            ready = poller.poll(1000 * min(left, AGAIN))
             if ready and not os.read(self._answered, 64):
                 raise self._gone()
         words[_SLEEPS] = 0
