@@ -15,6 +15,7 @@ from quadvis.bridge.blocks import BlockSamples, bridged_blocks, chosen_names, ch
 from quadvis.errors import QuadvisError
 from quadvis.output.recording import RecordedBlock
 from quadvis.output.stretch import NANOSECONDS
+from quadvis.wire.refusals import NoAnswerError
 from quadvis.wire.verbs import VERBS, check_level
 
 LOOK = 1.0  # s from one look at the target to the next
@@ -124,11 +125,16 @@ class Follower:
         self._put(None)
 
     def close(self) -> None:
-        """Remove the scopes."""
-        self._end_events()
-        while self._feeds:
-            with suppress(QuadvisError):
-                self._drop(next(iter(self._feeds)))
+        """Remove the scopes; a target that does not answer once is not asked again."""
+        with suppress(NoAnswerError):
+            self._end_events()
+            while self._feeds:
+                try:
+                    self._drop(next(iter(self._feeds)))
+                except NoAnswerError:
+                    raise
+                except QuadvisError:  # it is gone with its application
+                    continue
 
     def _put(self, item: Any) -> None:
         try:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from quadvis.bridge.follower import FollowedTarget
 from quadvis.errors import QuadvisError
+from quadvis.wire.finite import finite
 
 READ_ONLY = "this bridge changes no parameters; start it with --tune"
 
@@ -27,7 +27,7 @@ class BridgedParameters:
             found = self._target.request("getparam", names=[])
         except QuadvisError:
             return {}
-        return {name: plain(value) for name, value in found.items() if not names or name in names}
+        return {name: finite(value, str) for name, value in found.items() if not names or name in names}
 
     def set(self, values: Mapping[str, Any]) -> None:
         """Give parameters values; QuadvisError if one is refused, and then all stay as they are."""
@@ -37,12 +37,3 @@ class BridgedParameters:
             if value is None:
                 raise QuadvisError(f"the parameter '{name}' cannot be removed; give it a value")
         self._target.request("setparam", values=dict(values))
-
-
-def plain(value: Any) -> Any:
-    """Return a value as JSON can have it: infinity and NaN as texts."""
-    if isinstance(value, dict):
-        return {name: plain(each) for name, each in value.items()}
-    if isinstance(value, list):
-        return [plain(each) for each in value]
-    return str(value) if isinstance(value, float) and not math.isfinite(value) else value

@@ -34,12 +34,15 @@ def run_on_target(diagram: Diagram, log: Path | None, options: argparse.Namespac
 
     with Target(options.target) as tg, tg.operator():
         tg.load(diagram, engine=options.engine)
-        tg.start()
         try:
+            tg.start()
             _wait(tg, diagram)
         except KeyboardInterrupt:
-            tg.stop()
-            _bring(tg, log)
+            state = tg.Status
+            if state in ("running", "stopping"):
+                tg.stop()
+            if state in ("running", "stopping", "stopped"):  # else it has not begun, and has no log
+                _bring(tg, log)
             raise
         found = tg.status()
         place = _bring(tg, log)
@@ -65,8 +68,8 @@ def run_on_several(diagram: Diagram, log: Path | None, options: argparse.Namespa
         targets = {name: met[place] for name, place in places.items()}
         several = stack.enter_context(Several(diagram, targets))
         several.load(options.engine)
-        several.start()
         try:
+            several.start()
             with ProgressLine(diagram.duration) as progress:
                 several.wait(progress, progress.say)
         except KeyboardInterrupt:

@@ -54,8 +54,7 @@ class SavedFmu:
 
     def __del__(self) -> None:
         if self.number:
-            with suppress(Exception):
-                self.owner.forget(self.number)
+            self.owner.forget(self.number)
 
 
 class RunningFmu(Protocol):
@@ -82,7 +81,10 @@ class RunningFmu(Protocol):
         """Go back to a state."""
 
     def forget(self, number: int) -> None:
-        """Free a state in the memory of the FMU."""
+        """Let a state in the memory of the FMU be freed at the next `save` or `restore`.
+
+        Any thread may say so at any time, such as while a step is under way.
+        """
 
     def close(self) -> None:
         """End it."""
@@ -95,6 +97,7 @@ class _Common:
 
     def __init__(self, setup: UnitSetup, folder: Path) -> None:
         self._setup, self._folder = setup, folder
+        self._forgotten: list[int] = []
 
     def ask(self, request: int) -> None:
         """Begin a request."""
@@ -106,6 +109,7 @@ class _Common:
 
     def save(self) -> SavedFmu:
         """Return the state at this instant."""
+        self._free()
         self.ask(SAVE)
         self.answer()
         if not self._setup.serialises:
@@ -115,6 +119,7 @@ class _Common:
 
     def restore(self, saved: SavedFmu) -> None:
         """Go back to a state."""
+        self._free()
         if self._setup.serialises:
             (self._folder / "state").write_bytes(saved.data)
         elif saved.owner is not self:
@@ -126,10 +131,15 @@ class _Common:
         self.answer()
 
     def forget(self, number: int) -> None:
-        """Free a state in the memory of the FMU."""
-        struct.pack_into("q", self.buffer, NUMBER, number)
-        self.ask(FORGET)
-        self.answer()
+        """Let a state be freed later: nobody knows what is under way when Python finds it unused."""
+        self._forgotten.append(number)
+
+    def _free(self) -> None:
+        while self._forgotten:
+            struct.pack_into("q", self.buffer, NUMBER, self._forgotten.pop())
+            self.ask(FORGET)
+            with suppress(FmuFault):
+                self.answer()
 
     def open(self) -> None:
         """Load and initialise it."""
@@ -237,13 +247,15 @@ class IsolatedFmu(_Common):
     def _sleep(self, seconds: float) -> None:
         """Sleep until the request is done; FmuFault if that takes too long, or if the process has ended."""
         until, words = time.monotonic() + seconds, self._words
+        poller = select.poll()  # `select.select` takes no descriptor above 1023
+        poller.register(self._answered, select.POLLIN)
         words[_SLEEPS] = 1
         while words[0] != self._count:
             left = until - time.monotonic()
             if left <= 0.0:
                 self._kill()
                 raise FmuFault(f"the FMU did not answer within {seconds:g} s and was ended")
-            ready, _, _ = select.select([self._answered], [], [], min(left, AGAIN))
+            ready = poller.poll(1000 * min(left, AGAIN))
             if ready and not os.read(self._answered, 64):
                 raise self._gone()
         words[_SLEEPS] = 0

@@ -5,12 +5,13 @@ from __future__ import annotations
 import queue
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.errors import QuadvisError
+from quadvis.errors import QuadvisError, sentence
 from quadvis.scopes.package import Package
 
 if TYPE_CHECKING:
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 FINISHED = "Finished"
 POLL = 0.05  # s between two questions for the status
 ROWS = 5_000  # samples in one message
+WAITING = 1000  # packages that wait here until they are taken
+NEWER = 20  # packages that may take the place of the one that is being fetched
 
 
 def read_package(header: Mapping[str, Any], array: Any) -> Package:
@@ -103,15 +106,22 @@ class HostScope:
 
     @property
     def package(self) -> Package:
-        """The newest whole package; QuadvisError if there is none yet."""
+        """The newest whole package; QuadvisError if there is none yet, or if newer ones come all the time."""
         pieces: list[NDArray[np.float64]] = []
-        while True:
+        sequence, newer = None, 0
+        while newer < NEWER:
             first = sum(map(len, pieces))
             found = self._connection.request("getscope", id=self._number, first=first, count=ROWS)
+            if pieces and found["sequence"] != sequence:
+                pieces, newer = [], newer + 1
+                continue
+            sequence = found["sequence"]
             rows = np.asarray(found["samples"], np.float64).reshape(-1, 1 + len(found["names"]))
             pieces.append(rows)
             if first + len(rows) >= found["count"] or not len(rows):
                 return read_package(found, np.concatenate(pieces))
+        problem = f"scope {self._number} has newer packages before one of them has come whole"
+        raise QuadvisError(sentence(problem, "take them as they come, by 'packages'"))
 
     @property
     def Data(self) -> NDArray[np.float64]:
@@ -124,17 +134,25 @@ class HostScope:
         return self.package.times
 
     def packages(self, timeout: float = 10.0) -> Iterator[Package]:
-        """Yield the packages as they come; ends after a time (s) without one."""
-        found: queue.SimpleQueue[Package] = queue.SimpleQueue()
+        """Yield the packages as they come; ends after a time (s) without one.
+
+        For who is slow the newest `WAITING` packages wait; their numbers, `Package.sequence`, show the gap.
+        """
+        found: queue.Queue[Package] = queue.Queue(WAITING)
         topic = f"scope/{self._number}"
         parts: list[Any] = []
+        sequence: list[int] = []  # that of the package of which there are parts
 
         def take(header: Mapping[str, Any], array: Any) -> None:
-            if header["part"] == 0:
+            if header["part"] == 0 or sequence != [header["sequence"]]:
                 parts.clear()
+                sequence[:] = [header["sequence"]]
             parts.append(array)
             if header["part"] == header["parts"] - 1 and len(parts) == header["parts"]:
-                found.put(read_package(header, np.concatenate(parts)))
+                if found.full():
+                    with suppress(queue.Empty):
+                        found.get_nowait()
+                found.put_nowait(read_package(header, np.concatenate(parts)))
 
         self._connection.subscribe(topic, take)
         try:

@@ -98,15 +98,24 @@ class Several:
         )
 
     def start(self) -> None:
-        """Let all begin at one instant, and keep their ticks at one pace from then on."""
+        """Let all begin at one instant, and keep their ticks at one pace from then on.
+
+        If one cannot, the others are stopped, and QuadvisError says why.
+        """
         self._first = self._all(lambda name, target: _offset(target, PINGS))
         self.offsets = dict(self._first)
         instant = time.monotonic_ns() + int(LEAD * 1e9)
-        self._all(
-            lambda name, target: target.request(
-                "start", at=instant + self._first[name].offset, deadline=LOADING
-            )
-        )
+
+        def begin(name: str, target: Target) -> QuadvisError | None:
+            try:
+                target.request("start", at=instant + self._first[name].offset, deadline=LOADING)
+            except QuadvisError as error:
+                return error
+            return None
+
+        if errors := [error for error in self._all(begin).values() if error is not None]:
+            self._all(_tried(_stop))
+            raise errors[0]
         threading.Thread(target=self._align, name="clocks", daemon=True).start()
 
     def stop(self) -> None:

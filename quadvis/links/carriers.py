@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 from typing import Any, Protocol
 
@@ -11,6 +12,8 @@ from quadvis.links.link import MEMORY, SERIAL, Link
 from quadvis.links.serial_line import SerialLine
 from quadvis.links.udp import UdpSocket
 from quadvis.machine.mailbox import Arrival, Mailbox
+
+WAITING = 4096  # frames that are kept of a sender whose clock is ahead, the newest
 
 
 class Carrier(Protocol):
@@ -91,7 +94,7 @@ class FrameCarrier:
         self._message, self._line, self.notes = link.message, line, notes
         self._decoder = Decoder(link.message)
         self._sequence = 0
-        self._waiting: list[Arrival] = []  # whole, and sent too late for the last tick
+        self._waiting: deque[Arrival] = deque(maxlen=WAITING)  # whole, and sent too late for the last tick
 
     @property
     def lost(self) -> int:
@@ -115,9 +118,10 @@ class FrameCarrier:
                 if self._waiting and arrival.stamp <= self._waiting[-1].stamp:
                     self._waiting.clear()  # the sender has begun anew
                 self._waiting.append(arrival)
-        ready = [arrival for arrival in self._waiting if arrival.stamp < before]
-        del self._waiting[: len(ready)]  # stamps only rise
-        return ready[-1] if ready else None
+        ready = None
+        while self._waiting and self._waiting[0].stamp < before:  # stamps only rise
+            ready = self._waiting.popleft()
+        return ready
 
     def close(self) -> None:
         """Close the line."""

@@ -16,6 +16,8 @@ from quadvis.machine.ports import PortError
 from quadvis.machine.processes import launching
 from quadvis.native.choice import Announce
 from quadvis.realtime.guardian import (
+    FAREWELL,
+    LAST,
     Alarm,
     GuardianSetup,
     Guarding,
@@ -130,15 +132,13 @@ class Guard:
                 return []
         finally:
             self._lifeline.release()
-        shared = SharedPorts()
-        commands = [port for port in self._ports if not port.news]
-        return [sentence for port in commands for sentence in _in_its_place(port, shared)]
+        return _in_its_place([port for port in self._ports if not port.news])
 
     def _ends(self) -> bool:
         """Let its process end, orderly if possible; return whether it was."""
         self._say(Order.CLOSE)
-        held = max([port.held for port in self._ports], default=0) / NANOSECONDS
-        self.process.join(0 if self._lost else END + held)
+        parting = max([port.parting for port in self._ports], default=0) / NANOSECONDS
+        self.process.join(0 if self._lost else END + parting)
         if self.process.exitcode == 0:
             return True
         self.process.kill()
@@ -157,15 +157,38 @@ class Guard:
             self._link.send(what)
 
 
-def _in_its_place(port: OutputPort, shared: SharedPorts) -> list[str]:
-    """Send a safe frame in the guardian's place; return what went wrong."""
-    taken, open_port = shared.taken(port)
-    outlet = Outlet(taken, lambda: None, open_port)
-    try:
-        outlet.open()
-        outlet.serve(time.monotonic_ns(), safe=True)
-    except PortError as error:
-        return [f"block '{port.block}': its safe values could not be sent: {error}"]
-    finally:
+def _in_its_place(ports: Sequence[OutputPort]) -> list[str]:
+    """Send the last safe frames in the guardian's place; return what went wrong, in sentences.
+
+    No port waits for another one: a device may take its time to start, or to be released.
+    """
+    shared, wrong, waiting = SharedPorts(), [], []
+    for port in ports:
+        taken, open_port = shared.taken(port)
+        outlet = Outlet(taken, lambda: None, open_port)
+        try:
+            outlet.open()
+            waiting.append(outlet)
+        except PortError as error:
+            wrong.append(_unsafe(outlet, error))
+    opened = list(waiting)
+    until = time.monotonic_ns() + LAST + max([port.parting for port in ports], default=0)
+    while waiting and (now := time.monotonic_ns()) < until:
+        for outlet in list(waiting):
+            try:
+                outlet.serve(now, safe=True)
+            except PortError as error:
+                wrong.append(_unsafe(outlet, error))
+                outlet.close()
+            if outlet.has_its_farewell(FAREWELL):
+                waiting.remove(outlet)
+        due = min([outlet.due for outlet in waiting], default=now)
+        time.sleep(min(max(0, due - time.monotonic_ns()), until - now) / NANOSECONDS)
+    wrong += [_unsafe(outlet, "the time was too short") for outlet in waiting if not outlet.safe_frames]
+    for outlet in opened:
         outlet.finish(time.monotonic_ns())
-    return []
+    return wrong
+
+
+def _unsafe(outlet: Outlet, why: object) -> str:
+    return f"block '{outlet.port.block}': its safe values could not be sent: {why}"

@@ -39,7 +39,7 @@ from quadvis.realtime.system import Grants, ask_all
 LONGEST_LOOK, SHORTEST_LOOK = 10_000_000, 1_000_000  # ns between two looks at the loops
 LOOKS = 8  # at a loop in the time that it is allowed to be silent
 FAREWELL = 3  # safe frames at least, before the ports are closed
-LAST = NANOSECONDS  # ns that these may take
+LAST = NANOSECONDS  # ns that these may take, once the device has started
 PLACES = 3  # of an outbox
 OUTBOX = Mailbox.size(LONGEST, PLACES)  # words
 
@@ -153,7 +153,7 @@ class Guardian:
         self._vigil = Vigil(supervisor_lifeline(setup.words), setup.standing.priority)
         shortest = min([patience.allowed // LOOKS for patience in setup.patiences], default=LONGEST_LOOK)
         self._look_every = min(max(shortest, SHORTEST_LOOK), LONGEST_LOOK)
-        self._held = max([port.held for port in setup.ports], default=0)
+        self._parting = max([port.parting for port in setup.ports], default=0)
         self._partly: list[Outlet] = []  # whose loss has been reported
         self.safe = self._paused = False
         self._closing = 0  # the instant at which it was told to close
@@ -213,7 +213,7 @@ class Guardian:
         if not self._closing:
             return False
         served = all(outlet.has_its_farewell(FAREWELL) for outlet in self._outlets)
-        return served or now - self._closing > LAST + self._held
+        return served or now - self._closing > LAST + self._parting
 
     def _watch(self) -> None:
         """Look at the loops and at the lives of everybody."""

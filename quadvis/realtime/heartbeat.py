@@ -70,12 +70,12 @@ class Heartbeat:
     def look(self) -> Sign:
         """Return what the loop does."""
         words, now = self._control, self._now()
-        start = words[control.START] + words[control.SHIFT]
-        begun, done = words[control.BEGUN], words[control.DONE]
+        start, begun, done = words[control.START], words[control.BEGUN], words[control.DONE]
         if words[control.END] or words[control.SAFE] or words[control.LEFT] or self._has_died:
             return Sign.ENDS
         if not start:
             return Sign.WELL
+        start += words[control.SHIFT]
         if done != self._done or not self._seen:
             self._done, self._seen = done, now
         last = start + begun if begun else max(start + self.patience.first, self._seen)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from quadvis.machine.mailbox import Mailbox
-from quadvis.machine.ports import PortError
 from quadvis.realtime.outlet import Outlet
 
 
@@ -38,11 +37,9 @@ class NewsOutlet(Outlet):
         self.due = now + self.port.interval
         if safe:
             return
-        try:
+        with self._named():
             if self._rest or self._opened.unsent():
                 self._write(self._rest, now)
                 return
-            self._taken = now  # a port with nothing to send is not stuck
+            self._refused = 0  # a port with nothing to send is not stuck
             self._write(self._sealed(self._newest() or b"", now), now)
-        except PortError as error:
-            raise type(error)(f"{self.port.path}: {error}") from error

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 from quadvis.block import NewsDevice, Output, Sealer
@@ -36,6 +36,11 @@ class OutputPort:
     news: bool = False
     shared: bool = False
 
+    @property
+    def parting(self) -> int:
+        """How long (ns) its last safe frames may take to begin, or to end: it may be starting, or be held."""
+        return round(NANOSECONDS * self.settings.settle) + self.held
+
     @staticmethod
     def of(device: Output | NewsDevice, block: str, path: str, shared: bool = False) -> OutputPort:
         """Return the port of a device."""
@@ -61,6 +66,7 @@ class OutputPort:
 class Outlet:
     """Sends frames to a port, one every interval on a grid of its own; PortError if the port is lost.
 
+    Whatever else a driver raises is such an error, too, so that it keeps no other port from its frames.
     ``newest`` returns the newest frame; None before the first one, or if it cannot be read now. ``open_port``
     opens the port if its settings do not.
     """
@@ -79,10 +85,10 @@ class Outlet:
         self._rest = b""  # of what the port has taken in part
         self._free = 0  # the instant from which the line can take a frame
         self.due = 0  # the instant of the next frame
-        self._taken = 0  # the instant at which the port last took bytes
+        self._refused = 0  # the instant from which on the port has taken no bytes; 0 if it takes them
         self._safe_since = 0  # the instant of the first safe frame; 0 if the newest frame was none
         self._released = False
-        self._safe_frames = 0
+        self.safe_frames = 0  # how many safe frames were sent
 
     @property
     def is_open(self) -> bool:
@@ -92,17 +98,19 @@ class Outlet:
     def open(self) -> None:
         """Open the port."""
         opens = self._open_port
-        self._opened = self.port.settings.open(self.port.path) if opens is None else opens()
+        with self._foreign():
+            self._opened = self.port.settings.open(self.port.path) if opens is None else opens()
 
     def close(self) -> None:
         """Close the port."""
-        if self._opened is not None:
-            self._opened.close()
-            self._opened = None
+        opened, self._opened = self._opened, None
+        if opened is not None:
+            with suppress(Exception):  # of a driver: there is nothing more to be sent
+                opened.close()
 
     def finish(self, now: int) -> None:
         """Send what comes after all frames, and close the port."""
-        with suppress(PortError):
+        with suppress(PortError), self._foreign():
             self._release(now)
         self.close()
 
@@ -114,7 +122,7 @@ class Outlet:
         """Return whether so many safe frames were sent, or those of the time for which it is held."""
         if not self.is_open or self._released:
             return True
-        return not self.port.held and self._safe_frames >= frames
+        return not self.port.held and self.safe_frames >= frames
 
     def serve(self, now: int, *, safe: bool) -> None:
         """Send what is due: the safe frame, or the newest, or before the first one the initial frame."""
@@ -123,10 +131,12 @@ class Outlet:
         self._frame = self._newest() or self._frame
         interval = self.port.interval
         self.due += interval if now < self.due + interval else interval * (1 + (now - self.due) // interval)
-        self._taken = self._taken or now
-        try:
+        with self._named():
             if self._rest or self._opened.unsent():
+                ends = bool(self._rest)
                 self._write(self._rest, now)
+                if safe and ends and not self._rest:
+                    self.hurry(now)  # the safe frame comes right behind the end of the one before
             elif self._beginning:
                 piece, self._beginning = self._beginning, b""
                 self._write(piece, now)
@@ -135,9 +145,26 @@ class Outlet:
                 self._send_safe(now)
             else:
                 self._safe_since, self._released = 0, False
-                self._write(self._sealed(self._frame, now), now)
+                self._write_frame(self._frame, now)
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        """Name the port in what goes wrong with it."""
+        try:
+            with self._foreign():
+                yield
         except PortError as error:
             raise type(error)(f"{self.port.path}: {error}") from error
+
+    @contextmanager
+    def _foreign(self) -> Iterator[None]:
+        """Let any other error of a driver be one of the port."""
+        try:
+            yield
+        except PortError:
+            raise
+        except Exception as error:
+            raise PortError(f"the driver has failed: {type(error).__name__}: {error}") from error
 
     def _settles(self, now: int) -> bool:
         """Return whether the device has had the time to start; else the first frame is due when it has."""
@@ -153,11 +180,10 @@ class Outlet:
             self._release(now)
             return
         try:
-            self._write(self._sealed(self.port.safe, now), now)
+            self.safe_frames += self._write_frame(self.port.safe, now)
         except ChannelError:  # the other channels have it
-            self._safe_frames += 1
+            self.safe_frames += 1
             raise
-        self._safe_frames += not self._rest
 
     def _release(self, now: int) -> None:
         """Send what comes after all frames, once."""
@@ -173,15 +199,29 @@ class Outlet:
         except Exception as error:
             raise PortError(f"a frame cannot be sealed: {error}") from error
 
+    def _write_frame(self, frame: bytes, now: int) -> bool:
+        """Write a frame; return whether all of it was taken.
+
+        One of which nothing was taken is dropped: the next one is newer, or safe.
+        """
+        sealed = self._sealed(frame, now)
+        self._write(sealed, now)
+        is_taken = not self._rest
+        if len(self._rest) == len(sealed):
+            self._rest = b""
+        return is_taken
+
     def _write(self, piece: bytes, now: int) -> None:
         """Write as much as the port takes at once."""
         assert self._opened is not None
         count = self._opened.write(piece) if piece else 0
         self._rest = piece[count:]
         if count:
-            self._taken = now
+            self._refused = 0
             settings = self.port.settings
             taken = settings.time(count) + (0.0 if self._rest else settings.gap)
             self._free = now + int(NANOSECONDS * taken)
-        elif now - self._taken > STUCK:
+        elif not self._refused:
+            self._refused = now
+        elif now - self._refused > STUCK:
             raise PortError("the port takes no bytes")

@@ -236,7 +236,10 @@ class Application:
         assert session is not None
         self.problem, self.result = session.problem, session.result
         if self.parameters.tuned:
-            self.parameters.save(self._store.set_path(self.name, AUTOSAVE))
+            try:
+                self.parameters.save(self._store.set_path(self.name, AUTOSAVE))
+            except (QuadvisError, OSError) as error:  # such as a disk that the log has filled
+                self._say(f"the values that were tuned are not kept: {error}")
         self.scopes.end()
         self._event("stopped", problem=self.problem)
 

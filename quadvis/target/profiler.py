@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ class Profiler:
         self._helm: Helm | None = None
         self._lock = threading.Lock()
         self._steps: dict[tuple[str, str], list[Steps]] = {}  # by computer and task
+        self._counts: Counter[tuple[str, str]] = Counter()  # how many steps these are
         self._blocks: dict[str, BlockTimes] = {}  # by computer
 
     def follow(self, helm: Helm) -> None:
@@ -56,6 +58,7 @@ class Profiler:
 
     def _clear(self) -> None:
         self._steps.clear()
+        self._counts.clear()
         self._blocks.clear()
 
     def _look(self) -> None:
@@ -68,10 +71,10 @@ class Profiler:
         if not self._is_on or not len(times):
             return
         with self._lock:
-            kept = self._steps.setdefault((computer, task), [])
-            room = MOST - sum(map(len, kept))
+            room = MOST - self._counts[computer, task]
             if room > 0:
-                kept.append(times[:room].copy())
+                self._steps.setdefault((computer, task), []).append(times[:room].copy())
+                self._counts[computer, task] += min(room, len(times))
 
     def facts(self, tick: float) -> dict[str, Any]:
         """Return what there is, without single steps and calls; ``tick`` is the base tick (s).
@@ -84,8 +87,8 @@ class Profiler:
                 "on": self._is_on,
                 "tick": tick,
                 "tasks": [
-                    {"computer": computer, "task": task, "steps": sum(map(len, kept))}
-                    for (computer, task), kept in self._steps.items()
+                    {"computer": computer, "task": task, "steps": self._counts[computer, task]}
+                    for computer, task in self._steps
                 ],
                 "blocks": [
                     {"computer": computer, "cost": report.cost, "offset": offset,

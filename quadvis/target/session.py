@@ -7,6 +7,7 @@ import threading
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from pathlib import Path
 
 from quadvis.diagram.diagram import Diagram
@@ -111,11 +112,14 @@ class Session:
             self.problem = surroundings(error) or traceback.format_exc()
         finally:
             if not self.helm.is_begun:
-                self.log.unlink(missing_ok=True)
+                with suppress(OSError):
+                    self.log.unlink(missing_ok=True)
             if not self.ready.done():
                 self.ready.set_exception(QuadvisError(self.problem or "it was stopped before it was ready"))
-            self._ended()
-            self.over.set_result(None)
+            try:
+                self._ended()
+            finally:
+                self.over.set_result(None)  # whatever failed: else nothing could be started any more
 
     def _open(
         self, path: str | Path, blocks: Sequence[RecordedBlock], facts: Mapping[str, str]

@@ -81,8 +81,9 @@ class Gateway:
             self._watch.close()
             server.close()
             await server.wait_closed()
-            while self._streams:
-                self._streams.popitem()[1]()
+            with suppress(QuadvisError):  # whoever does not answer once is not asked again
+                while self._streams:
+                    self._streams.popitem()[1]()
             self._workers.shutdown(wait=False, cancel_futures=True)
 
     # one page
@@ -186,14 +187,21 @@ class Gateway:
             elif "deadline" in request.arguments:
                 raise QuadvisError("a page has no 'deadline'")
             work = partial(self.target.request, request.verb, **request.arguments)
-        found: Any = await self._loop.run_in_executor(self._workers, work)
-        if request.verb == "addscope":
-            viewer.scopes.add(found)
-        return found
+            if request.verb == "addscope":
+                work = partial(self._add, viewer, work)
+        return await self._loop.run_in_executor(self._workers, work)
+
+    def _add(self, viewer: Viewer, work: Callable[[], Any]) -> Any:
+        """Add a scope for a page, in the thread of a worker: the page may be gone by then."""
+        number = work()
+        viewer.scopes.add(number)
+        if viewer not in self.viewers:
+            self._remove({number})
+        return number
 
     def _remove(self, scopes: set[int]) -> None:
         """Remove the scopes that a page has left."""
-        for number in scopes:
+        for number in list(scopes):
             with suppress(QuadvisError):  # they are gone with their application, or the page removed them
                 self.target.request("remscope", ids=[number])
 

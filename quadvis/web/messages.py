@@ -18,6 +18,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from quadvis.errors import QuadvisError
+from quadvis.wire.finite import finite
 
 MOST_TEXT = 64_000  # bytes of a message from a page
 MOST_HEADS = 64  # topics whose headers are kept
@@ -40,21 +41,14 @@ def text(value: Mapping[str, Any]) -> str:
     try:
         return _ENCODER.encode(value)
     except ValueError:
-        return json.dumps(_plain(value), separators=(",", ":"))
+        return json.dumps(finite(value, _number), separators=(",", ":"))
     except TypeError:
-        return json.dumps(_plain(value), separators=(",", ":"), default=str)
+        return json.dumps(finite(value, _number), separators=(",", ":"), default=str)
 
 
-def _plain(value: Any) -> Any:
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, Mapping):
-        return {str(key): _plain(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
-    return value
+def _number(value: float) -> str:
+    """Return a number that is not finite as JavaScript's Number reads it."""
+    return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
 
 
 def packed(head: Mapping[str, Any], data: bytes) -> bytes:

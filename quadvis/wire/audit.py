@@ -116,15 +116,18 @@ class Audit:
         self._size = os.fstat(self._descriptor).st_size
 
     def _rotate(self) -> None:
+        """Begin a new file; if the system refuses that, the next line tries it again."""
         names = [
             self.path,
             *(self.path.with_suffix(f".{n}{self.path.suffix}") for n in range(1, self._files + 1)),
         ]
-        for older, newer in zip(names[:0:-1], names[-2::-1], strict=True):
-            with suppress(FileNotFoundError):
-                newer.replace(older)
-        os.close(self._descriptor)
+        if self.path.exists():  # else it was renamed by a call that could not make the new one
+            for older, newer in zip(names[:0:-1], names[-2::-1], strict=True):
+                with suppress(FileNotFoundError):
+                    newer.replace(older)
+        full = self._descriptor
         self._open()
+        os.close(full)  # only now: whoever opens a file meanwhile must not get this number
 
 
 def _short(value: Any) -> Any:

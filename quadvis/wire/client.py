@@ -151,17 +151,18 @@ class Client:
         try:
             self.request("subscribe", topics=list(topics))
         except WireError:
-            self._subscriptions.remove(subscription)
+            self._forget(subscription)
             raise
         return subscription
 
     def unsubscribe(self, subscription: Subscription) -> None:
-        """Receive no more of a subscription."""
+        """Receive no more of a subscription; a target that is not connected knows of none."""
         with self._lock:
-            self._subscriptions.remove(subscription)
+            self._forget(subscription)
             left = {topic for each in self._subscriptions for topic in each.topics}
         subscription.end(GoneError("the subscription has ended"))
-        if unused := [topic for topic in subscription.topics if topic not in left]:
+        unused = [topic for topic in subscription.topics if topic not in left]
+        if unused and self._courier.state(STREAM) == CONNECTED:
             self.request("unsubscribe", topics=unused)
 
     def close(self) -> None:
@@ -226,9 +227,23 @@ class Client:
             try:
                 each.put(data)
             except Exception as error:  # of a callback; the lease must be renewed all the same
-                with self._lock:
-                    self._subscriptions.remove(each)
+                self._forget(each)
                 each.end(WireError(f"the callback for {data.topic} failed: {type(error).__name__}: {error}"))
+                _show(error)
+
+    def _forget(self, subscription: Subscription) -> None:
+        """Hand nothing more to a subscription, which may have ended by itself."""
+        with self._lock:
+            if subscription in self._subscriptions:
+                self._subscriptions.remove(subscription)
+
+    def _resubscribed(self, asking: Sequence[Subscription], future: Future[Reply]) -> None:
+        """End the subscriptions that have been refused; later ones are none of them."""
+        error = None if future.cancelled() else future.result().error
+        if error is not None:
+            for each in asking:
+                self._forget(each)
+                each.end(error)
 
     def _changed(self, socket: str, state: str) -> None:
         if socket == CONTROL and state == LOST:
@@ -242,7 +257,7 @@ class Client:
             with self._lock:
                 asking = [*self._subscriptions]
             if topics := sorted({topic for each in asking for topic in each.topics}):
-                self.send("subscribe", topics=topics).add_done_callback(partial(_resubscribed, asking))
+                self.send("subscribe", topics=topics).add_done_callback(partial(self._resubscribed, asking))
 
     def _fail(self, error: WireError) -> None:
         with self._lock:
@@ -287,9 +302,7 @@ class Client:
         self._on_lost(error)
 
 
-def _resubscribed(asking: Sequence[Subscription], future: Future[Reply]) -> None:
-    """End the subscriptions that have been refused; later ones are none of them."""
-    error = None if future.cancelled() else future.result().error
-    if error is not None:
-        for each in asking:
-            each.end(error)
+def _show(error: Exception) -> None:
+    """Show what a callback has raised, as Python does it for a thread that ends by it."""
+    trace = error.__traceback__
+    threading.excepthook(threading.ExceptHookArgs((type(error), error, trace, threading.current_thread())))

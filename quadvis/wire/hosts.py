@@ -77,6 +77,8 @@ class AuthorizedHosts:
         except DiagramError as error:
             hosts = ()
             faults.extend(error.faults)
+        except OSError:  # it has been removed meanwhile; the next look sees what is there then
+            hosts, self._seen = (), (-1,)
         self._hosts = {host.public: host for host in hosts}
         self.faults = tuple(faults)
         return True

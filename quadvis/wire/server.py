@@ -27,6 +27,7 @@ from quadvis.wire.keys import KeyPair, checked_name
 from quadvis.wire.lease import Lease
 from quadvis.wire.porter import Key, Porter
 from quadvis.wire.ports import HeldPath, ListeningSocket, listeners, local_folder
+from quadvis.wire.refusals import BadError
 from quadvis.wire.verbs import CONTROL, STREAM
 from quadvis.wire.waker import Waker
 from quadvis.wire.who import Who
@@ -139,8 +140,15 @@ class Server:
         self.close()
 
     def publish(self, topic: str, header: Mapping[str, Any], array: Any = None) -> None:
-        """Send data of a topic to all who have subscribed and may see it; it never waits, see `feed.Feed`."""
-        self._feed.publish(topic, header, array)
+        """Send data of a topic to all who have subscribed and may see it; it never waits, see `feed.Feed`.
+
+        Data that is too long is counted and reported here: a flight must not end by what hosts want to see.
+        """
+        try:
+            self._feed.publish(topic, header, array)
+        except BadError as error:
+            self.counts.add("unsent")
+            self._say(f"data of '{topic}' cannot be sent: {error}")
 
     def wants(self, topic: str) -> bool:
         """Return whether anybody has subscribed to a topic, so that its data is worth being made."""

@@ -13,6 +13,7 @@ from quadvis.api import load_text
 from quadvis.engine.engine import Engine
 from quadvis.engine.stability import Marks, StatePole, poles, stable_to, too_large
 from quadvis.errors import RunError
+from tests.quadvis.oscillators import van_der_pol
 from tests.stages import mostly_slow
 
 FALL = """\
@@ -26,20 +27,6 @@ blocks:
   fall: {block: signal.gain, rate: continuous, with: {factor: -0.2 1/s}, in: {u: slow.y}}
   slow: {block: signal.integrator, in: {u: fall.y}}
 """
-VAN_DER_POL = """\
-quadvis: 1
-name: van der Pol
-solver: {method: ode4, step: STEP}
-stop_time: 20 ms
-blocks:
-  law:
-    block: math.expression
-    rate: continuous
-    with: {y: mu * (1 - x * x) * v - w * x, mu: 1000 1/s, w: 1 1/s^2}
-    in: {x: x.y, v: v.y}
-  v: {block: signal.integrator, in: {u: law.y}}
-  x: {block: signal.integrator, with: {initial: 2}, in: {u: v.y}}
-"""
 ESCAPE = """\
 quadvis: 1
 name: escape
@@ -49,6 +36,10 @@ blocks:
   law: {block: math.expression, rate: continuous, with: {y: k * x * x, k: 1 1/s}, in: {x: x.y}}
   x: {block: signal.integrator, with: {initial: 1}, in: {u: law.y}}
 """
+
+
+def oscillation(step: str) -> str:
+    return van_der_pol(f"{{method: ode4, step: {step}}}", "20 ms")
 
 
 def fall(method: str, step: str) -> str:
@@ -115,8 +106,8 @@ def test_an_overflow_in_a_stiff_equation_names_the_pole() -> None:
         r"'v', whose fastest pole is at -3000 1/s \(ode4 is stable up to 928 us\); make the step smaller, or"
     )
     with pytest.raises(RunError, match=words):
-        load_text(VAN_DER_POL.replace("STEP", "5 ms")).run()
-    load_text(VAN_DER_POL.replace("STEP", "0.5 ms")).run()
+        load_text(oscillation("5 ms")).run()
+    load_text(oscillation("0.5 ms")).run()
 
 
 def test_an_equation_that_escapes_by_itself_is_no_fault_of_the_step() -> None:
@@ -138,7 +129,7 @@ def test_check_accuracy_names_the_pole_only_beyond_the_limit(step: str) -> None:
 
 
 def test_marks_find_the_cause_where_it_began_and_keep_few() -> None:
-    engine = Engine(load_text(VAN_DER_POL.replace("STEP", "5 ms")).graph)
+    engine = Engine(load_text(oscillation("5 ms")).graph)
     interpreter = engine._interpreter
     marks = Marks(interpreter)
     with engine:

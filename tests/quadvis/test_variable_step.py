@@ -17,6 +17,7 @@ from quadvis.graph.graph import VARIABLE
 from quadvis.realtime.options import RealTime
 from quadvis.testing import drive
 from quadvis_blocks.signal.integrator import Integrator
+from tests.quadvis.oscillators import van_der_pol
 from tests.quadvis.restored import check_repeats
 
 SLOW = pytest.mark.slow
@@ -43,20 +44,7 @@ blocks:
   y: {block: signal.integrator, in: {u: law.b}}
   z: {block: signal.integrator, in: {u: law.c}}
 """
-VAN_DER_POL = """\
-quadvis: 1
-name: van der Pol
-solver: {method: METHOD, step: 10 s, rtol: 1e-7, atol: 1e-9}
-stop_time: 1000 s
-blocks:
-  law:
-    block: math.expression
-    rate: continuous
-    with: {y: mu * (1 - x * x) * v - w * x, mu: 1000 1/s, w: 1 1/s^2}
-    in: {x: x.y, v: v.y}
-  v: {block: signal.integrator, in: {u: law.y}}
-  x: {block: signal.integrator, with: {initial: 2}, in: {u: v.y}}
-"""
+VAN_DER_POL = van_der_pol("{method: METHOD, step: 10 s, rtol: 1e-7, atol: 1e-9}", "1000 s")
 # A ladder of three resistors and capacitors, with time constants from 1 us to 1 s.
 LADDER = """\
 quadvis: 1

@@ -468,6 +468,22 @@ def test_a_state_in_the_memory_of_the_fmu_serves_as_well() -> None:
         del snapshot
 
 
+def test_an_fmu_has_a_process_of_its_own_also_where_a_thousand_files_are_open() -> None:
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if before[1] < 2000:
+        pytest.skip("this user may not open so many files")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(2000, before[0]), before[1]))
+    files = [os.dup(2) for _ in range(1024)]
+    try:
+        assert drive(made(models.INTEGRATOR, 2, "process"), rate="10 Hz", u=[1.0] * 3).x[-1] > 0.0
+    finally:
+        for each in files:
+            os.close(each)
+        resource.setrlimit(resource.RLIMIT_NOFILE, before)
+
+
 def test_the_file_must_be_the_one_that_was_checked(tmp_path: Path) -> None:
     path = tmp_path / "x.fmu"
     path.write_bytes(Path(fmu(models.STAIR)).read_bytes())

@@ -11,6 +11,7 @@ from quadvis.bridge.blocks import BlockSamples
 from quadvis.bridge.follower import Follower
 from quadvis.errors import QuadvisError
 from quadvis.output.recording import RecordedBlock
+from quadvis.wire.refusals import NoAnswerError
 from tests.processes import wait_for
 from tests.quadvis.bridge.scripted import BEGAN, ScriptedTarget, following
 
@@ -43,6 +44,34 @@ def test_each_task_has_a_scope_which_is_removed_at_the_end() -> None:
         wait_for(lambda: end.samples)
         assert end.samples[0].stamps.tolist() == [BEGAN + 100_000_000]
     assert target.scopes == {} and end.shown == [("scripted", ["/craft", "/law", "/eyes/detector"])]
+
+
+def test_a_target_that_is_gone_is_asked_once_at_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    target = ScriptedTarget()
+
+    def silent(ids: list[int]) -> None:
+        raise NoAnswerError("lab does not answer")
+
+    with following(target, Kept(), said=[]) as follower:
+        follower.want(["/craft", "/eyes/detector"])
+        wait_for(lambda: target.scope_of("craft.position") and target.scope_of("eyes/detector.found"))
+        monkeypatch.setattr(target, "do_remscope", silent)
+    assert [verb for verb, _ in target.calls].count("remscope") == 1
+
+
+def test_a_scope_that_is_gone_already_keeps_no_other_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    target = ScriptedTarget()
+    removes = target.do_remscope
+
+    def remove(ids: list[int]) -> None:
+        removes(ids)
+        raise QuadvisError("there is no such scope")
+
+    monkeypatch.setattr(target, "do_remscope", remove)
+    with following(target, Kept(), said=[]) as follower:
+        follower.want(["/craft", "/eyes/detector"])
+        wait_for(lambda: target.scope_of("craft.position") and target.scope_of("eyes/detector.found"))
+    assert target.scopes == {}
 
 
 def test_a_scope_that_was_interrupted_or_removed_comes_back() -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from quadvis.errors import QuadvisError
-from quadvis.links.carriers import open_receiver, open_sender
+from quadvis.links.carriers import WAITING, FrameCarrier, open_receiver, open_sender
 from quadvis.links.frame import encode
 from quadvis.links.link import MEMORY, UDP
 from quadvis.links.serial_line import SerialLine
@@ -71,6 +71,19 @@ def test_a_serial_sender_and_receiver_meet_on_a_line(ends: tuple[int, int, str])
     os.write(master, encode(LINK.message, 0, 300, PAYLOAD))
     assert until(lambda: receiver.receive(10**9)) == (300, PAYLOAD)
     receiver.close()
+
+
+def test_of_a_sender_whose_clock_is_far_ahead_the_newest_frames_are_kept_and_no_others() -> None:
+    class Frames:
+        """A line on which one frame comes after the other, all of them at once."""
+
+        def read(self) -> Iterator[bytes]:
+            yield b"".join(encode(LINK.message, k, 10**15 + k, PAYLOAD) for k in range(WAITING + 10))
+
+    carrier = FrameCarrier(LINK, Frames())  # type: ignore[arg-type]
+    assert carrier.receive(0) is None
+    assert len(carrier._waiting) == WAITING
+    assert carrier._waiting[-1].stamp == 10**15 + WAITING + 9
 
 
 def _ready(descriptor: int) -> bool:

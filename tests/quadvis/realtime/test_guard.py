@@ -6,12 +6,14 @@ import multiprocessing
 import os
 import signal
 import sys
+from dataclasses import dataclass
 from typing import Any
 
 import pytest
 
 from quadvis.diagram.sections.on_host_loss import SAFE
 from quadvis.errors import RunError
+from quadvis.machine.ports import Card, OpenPort
 from quadvis.machine.serial_port import Line
 from quadvis.realtime.guard import LOST, Guard
 from quadvis.realtime.guardian import Standing, outboxes, words_for
@@ -20,6 +22,8 @@ from tests.processes import wait_for
 from tests.quadvis.realtime.ptys import Pty, ptys
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="ports are Linux's")
+
+MS = 10**6
 
 
 def started(*lines: Pty) -> tuple[Guard, Any, list[OutputPort]]:
@@ -66,6 +70,60 @@ def test_a_guardian_that_is_lost_is_replaced_by_the_supervisor_port_by_port() ->
         (unsafe,) = guard.close()
         assert unsafe.startswith("block 'out1': its safe values could not be sent: ")
         assert line.read().endswith(b"safe!")
+
+
+@dataclass(frozen=True)
+class Broken(Card):
+    """The settings of a card whose driver fails in its own way."""
+
+    def open(self, port: str) -> OpenPort:
+        raise OSError(19, "no such device")
+
+
+def lost(*ports: OutputPort) -> Guard:
+    """Return a guardian of ports that has ended without a word."""
+    context = multiprocessing.get_context("spawn")
+    guard = Guard(context, context.RawArray("q", words_for(len(ports))), [], SAFE, Standing())
+    guard._ports, guard._started, guard._lost = ports, True, True
+    guard.process = Ended()  # type: ignore[assignment]
+    return guard
+
+
+class Ended:
+    """A process that was killed."""
+
+    exitcode = -9
+
+    def join(self, timeout: float | None = None) -> None:
+        return
+
+    def kill(self) -> None:
+        return
+
+
+def test_in_its_place_a_device_that_starts_and_one_with_a_beginning_get_their_safe_frames() -> None:
+    with ptys(2) as (one, two):
+        slow = OutputPort("slow", one.path, Line(10**6, settle=0.05), MS, b"first", b"safe!")
+        greeted = OutputPort("greeted", two.path, Line(10**6), MS, b"first", b"safe!", beginning=b"hello")
+        assert lost(slow, greeted).close() == []
+        assert (one.read(), two.read()) == (3 * b"safe!", b"hello" + 3 * b"safe!")
+
+
+def test_in_its_place_a_device_that_is_held_has_safe_frames_for_its_time_and_is_released() -> None:
+    with ptys(1) as (line,):
+        port = OutputPort("held", line.path, Line(10**6), MS, b"first", b"safe!", ending=b"bye", held=20 * MS)
+        assert lost(port).close() == []
+        assert line.read().endswith(2 * b"safe!" + b"bye")
+
+
+def test_in_its_place_a_driver_that_fails_in_its_own_way_keeps_no_other_port_from_its_safe_frames() -> None:
+    with ptys(1) as (line,):
+        broken = OutputPort("card", "card", Broken(), MS, b"first", b"safe!")
+        whole = OutputPort("out", line.path, Line(10**6), MS, b"first", b"safe!")
+        (unsafe,) = lost(broken, whole).close()
+        why = "the driver has failed: OSError: [Errno 19] no such device"
+        assert unsafe == f"block 'card': its safe values could not be sent: {why}"
+        assert line.read() == 3 * b"safe!"
 
 
 @pytest.mark.slow

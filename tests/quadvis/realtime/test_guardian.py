@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from multiprocessing import Pipe
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from quadvis.machine.ports import Card, ChannelError, OpenPort
 from quadvis.machine.serial_port import Line
 from quadvis.realtime import control
 from quadvis.realtime.guardian import (
+    LAST,
     Alarm,
     Guardian,
     GuardianSetup,
@@ -34,6 +36,7 @@ from quadvis.realtime.heartbeat import Patience
 from quadvis.realtime.lifeline import Lifeline
 from quadvis.realtime.options import RealTime
 from quadvis.realtime.outlet import Outlet, OutputPort
+from quadvis.realtime.schedule import NANOSECONDS
 from tests.processes import wait_for
 from tests.quadvis.realtime.ptys import Pty, ptys
 
@@ -335,6 +338,50 @@ def test_a_channel_that_fails_keeps_no_other_from_its_safe_value(rig: Any) -> No
     made.guardian.run()
     assert card.written[-3:] == [(0, 3), (1, 4), (-1, 0)]
     assert made.alarms() == []
+
+
+class Failing(OpenRelays):
+    """The card of a driver that fails in its own way, first as it is written to, and then as it is closed."""
+
+    def write(self, piece: bytes) -> int:
+        raise RuntimeError("the driver is confused")
+
+    def close(self) -> None:
+        raise RuntimeError("the driver is confused")
+
+
+def test_a_driver_that_fails_in_its_own_way_keeps_no_other_port_from_its_safe_frames(rig: Any) -> None:
+    made = rig()
+    port = OutputPort("relays", "card", Relays([], []), 5 * MS, b"\1\2", b"\3\4")
+    made.guardian._outlets.insert(0, Outlet(port, lambda: b"\5\6", lambda: Failing()))
+    made.guardian._outlets[0].open()
+    made.until_wire(b"safe!", b"safe!")
+    why = "card: the driver has failed: RuntimeError: the driver is confused"
+    assert made.alarms() == [Alarm(why, "relays")]
+
+
+def test_a_device_that_still_starts_has_its_safe_frames_before_its_port_is_closed(monkeypatch: Any) -> None:
+    now = NANOSECONDS
+    monkeypatch.setattr("quadvis.realtime.guardian.time", SimpleNamespace(monotonic_ns=lambda: now))
+    with ptys(1) as (line,):
+        port = OutputPort("board", line.path, Line(10**6, settle=2.0), 5 * MS, b"first", b"safe!")
+        words = np.zeros(words_for(1), np.int64)
+        host_ends = threading.Event()
+        Rig.live(supervisor_lifeline(words), host_ends)
+        link, theirs = Pipe()
+        guardian = Guardian(GuardianSetup((port,), words, (), theirs, os.getpid(), SAFE, Standing()))
+        assert guardian.open()
+        link.send(Order.CLOSE)
+        guardian.look()
+        now += LAST + MS
+        guardian.look()
+        assert (guardian._finished, line.read()) == (False, b"")
+        for _ in range(3):
+            now += LAST
+            guardian.look()
+        assert (guardian._finished, line.read()) == (True, 3 * b"safe!")
+        guardian._finish()
+        host_ends.set()
 
 
 def test_it_closes_the_ports_when_everything_else_has_ended(rig: Any) -> None:

@@ -48,6 +48,12 @@ def test_before_the_start_a_loop_may_be_silent() -> None:
     assert Loop().look(10**6) is Sign.WELL
 
 
+def test_before_the_start_a_loop_may_be_silent_though_its_ticks_are_to_be_due_later() -> None:
+    loop = Loop()
+    loop.words[control.SHIFT] = 1000
+    assert [loop.look(instant) for instant in (0, 10**6)] == [Sign.WELL, Sign.WELL]
+
+
 def test_a_step_that_does_not_end_hangs_after_two_periods() -> None:
     loop = Loop(startup=0).start()
     for instant in range(20, 100, 10):

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from quadvis.machine.ports import PortError
+from quadvis.machine.ports import OpenPort, PortError
 from quadvis.machine.serial_port import Line
 from quadvis.realtime.outlet import STUCK, Outlet, OutputPort
 from tests.quadvis.realtime.ptys import Pty, ptys
@@ -123,6 +123,66 @@ def test_a_port_that_takes_nothing_for_a_second_is_lost(rig: Rig) -> None:
         rig.serve(STUCK / MS)
         with pytest.raises(PortError, match=r"/dev/pts/\d+: the port takes no bytes"):
             rig.serve(STUCK / MS + 10)
+
+
+class Narrow(OpenPort):
+    """A port that takes so many bytes at once as it has ``room`` for."""
+
+    def __init__(self) -> None:
+        self.taken: list[bytes] = []
+        self.room = 100
+
+    def write(self, piece: bytes) -> int:
+        count = min(self.room, len(piece))
+        self.taken += [piece[:count]] if count else []
+        return count
+
+    def close(self) -> None:
+        return
+
+
+def narrow(interval: int, frame: bytes | None = None) -> tuple[Outlet, Narrow]:
+    """Return an outlet at such a port, open, for frames with an interval (ns)."""
+    port = Narrow()
+    outlet = Outlet(
+        OutputPort("out", "port", LINE, interval, b"first", b"safe!"), lambda: frame, lambda: port
+    )
+    outlet.open()
+    return outlet, port
+
+
+def test_a_port_that_takes_nothing_once_is_not_lost_however_seldom_frames_are_due() -> None:
+    interval = 2 * STUCK
+    outlet, port = narrow(interval)
+    for number, port.room in enumerate((100, 0, 100, 0)):
+        outlet.serve(BEGIN + number * interval, safe=False)
+    assert port.taken == 2 * [b"first"]
+    with pytest.raises(PortError, match="the port takes no bytes"):
+        outlet.serve(BEGIN + 4 * interval, safe=False)
+
+
+def test_a_command_of_which_the_port_took_nothing_does_not_come_before_the_safe_frame() -> None:
+    outlet, port = narrow(10 * MS, b"going")
+    port.room = 0
+    outlet.serve(BEGIN, safe=False)
+    outlet.serve(BEGIN + 10 * MS, safe=True)
+    assert (port.taken, outlet.safe_frames) == ([], 0)
+    port.room = 100
+    outlet.serve(BEGIN + 20 * MS, safe=True)
+    assert (port.taken, outlet.safe_frames) == ([b"safe!"], 1)
+
+
+def test_the_safe_frame_comes_right_behind_the_rest_of_a_command() -> None:
+    interval = 1000 * MS
+    outlet, port = narrow(interval, b"going")
+    port.room = 2
+    outlet.serve(BEGIN, safe=False)
+    port.room = 100
+    outlet.hurry(BEGIN + MS)
+    outlet.serve(BEGIN + 5 * MS, safe=True)
+    assert outlet.due < BEGIN + 15 * MS
+    outlet.serve(outlet.due, safe=True)
+    assert port.taken == [b"go", b"ing", b"safe!"]
 
 
 def test_a_port_that_is_unplugged_is_lost(rig: Rig) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
 import socket
@@ -392,6 +393,46 @@ def test_a_scope_gives_every_sample_once(running: Running, target: StandIn) -> N
     assert rows.shape == (20, 2) and np.allclose(np.diff(rows[:, 0]), 0.01)
     assert np.allclose(rows[:, 1], np.sin(2 * np.pi * rows[:, 0]), atol=1e-9)
     assert waited_for(lambda: not target._takers[f"scope/{number}"])
+
+
+def test_it_ends_without_an_error_though_the_target_is_gone(
+    target: StandIn, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+
+    def subscribe(topic: str, take: object) -> Any:
+        def end() -> None:
+            asked.append(topic)
+            raise QuadvisError("bench does not answer")
+
+        return end
+
+    async def serve() -> None:
+        async with gateways.Gateway(target).serving():
+            pass
+
+    monkeypatch.setattr(target, "subscribe", subscribe)
+    asyncio.run(serve())
+    assert len(asked) == 1  # each question may take seconds
+
+
+def test_a_scope_is_removed_though_its_page_was_closed_before_the_target_had_added_it(
+    running: Running, target: StandIn, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    adds, asked, goes_on = target.do_addscope, threading.Event(), threading.Event()
+
+    def add(**arguments: Any) -> Any:
+        asked.set()
+        assert goes_on.wait(20)
+        return adds(**arguments)
+
+    monkeypatch.setattr(target, "do_addscope", add)
+    with running.page() as page:
+        page.ask("addscope")
+        assert asked.wait(20)
+    assert waited_for(lambda: not running.gateway.viewers)
+    goes_on.set()
+    assert waited_for(lambda: "remscope" in target.asked and not target.scopes)
 
 
 def test_a_parameter_is_set_and_holds_from_a_tick_on(running: Running, target: StandIn) -> None:

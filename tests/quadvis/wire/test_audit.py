@@ -87,3 +87,30 @@ def test_a_full_disk_is_counted(tmp_path: Path) -> None:
     audit.note("here")
     assert audit.lost == 1
     audit.close()
+
+
+def test_a_new_file_that_cannot_be_made_costs_neither_older_ones_nor_files_of_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a" / "audit.jsonl"
+    audit = Audit(path, longest=200, files=3)
+    for number in range(4):
+        audit.note(f"{number} {100 * '-'}")
+    before = {each.read_text() for each in path.parent.iterdir()}
+
+    def refuse(*_: object) -> int:
+        raise OSError(24, "Too many open files")
+
+    with monkeypatch.context() as patched:
+        patched.setattr("quadvis.wire.audit.os.open", refuse)
+        for _ in range(5):
+            audit.note(100 * "x")
+    assert audit.lost == 5
+    other = (tmp_path / "other").open("w+")
+    audit.note("goes on")
+    assert [line["note"] for line in lines(path)] == ["goes on"]
+    assert {each.read_text() for each in path.parent.iterdir() if each != path} <= before
+    assert len(list(path.parent.iterdir())) == 4
+    audit.close()
+    assert other.read() == ""
+    other.close()

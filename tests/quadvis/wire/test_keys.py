@@ -155,6 +155,22 @@ def test_a_list_that_others_can_change_lets_nobody_in(folder: Path) -> None:
     assert not list(hosts) and "other users can change this file" in str(hosts.faults[0])
 
 
+def test_a_list_that_is_removed_while_it_is_read_lets_nobody_in_until_it_is_back(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    allow("anna", KEY, 3)
+    hosts = AuthorizedHosts()
+    allow("bob", OTHER, 3)
+
+    def removed(path: Path, faults: object) -> None:
+        raise FileNotFoundError(path)
+
+    with monkeypatch.context() as patched:
+        patched.setattr("quadvis.wire.hosts.read_hosts", removed)
+        assert hosts.refresh() and not list(hosts)
+    assert hosts.refresh() and [host.name for host in hosts] == ["anna", "bob"]
+
+
 def test_a_target_is_pinned_and_another_key_is_refused_with_both_fingerprints(folder: Path) -> None:
     known = KnownTargets()
     key, other = bytes.fromhex(KEY), bytes.fromhex(OTHER)

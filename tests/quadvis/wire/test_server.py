@@ -348,6 +348,15 @@ def test_ports_that_are_taken_are_a_sentence(rig: Rig) -> None:
         server.listen("127.0.0.1", rig.port, insecure=True)
 
 
+def test_data_that_is_too_long_is_counted_and_ends_nothing(rig: Rig) -> None:
+    rig.key("anna", 3)
+    scope = rig.client().subscribe("scope/1")
+    rig.server.publish("scope/1", {}, np.zeros(600_000))
+    rig.server.publish("scope/1", {"n": 2})
+    found = scope.take(20)
+    assert (found.header, found.number, rig.server.counts["unsent"]) == ({"n": 2}, 2, 1)
+
+
 def test_publishing_and_closing_work_from_any_thread(rig: Rig) -> None:
     rig.key("anna", 3)
     state = rig.client().subscribe("state", size=10_000)
