@@ -220,15 +220,16 @@ class Guardian:
         self._supervisor.look()
         self._applications.look()
         self._vital.look()
-        host_lost = self._supervisor.any_ended or self._vigil.has_ended()
+        # Each life is looked at whatever is known already: the end of one that is not looked at keeps it awake.
+        host_lost = self._vigil.has_ended() or self._supervisor.any_ended
         if (host_lost and self._setup.on_host_loss == SAFE) or self._vital.any_ended:
             self._make_safe()
         if self.told_to_end and not self.safe:
             self._make_safe(Alarm("the guardian was told to end"))
         for heart in self._hearts:
             heart.hold_on(self._setup.standing.priority)
-        signs = [(heart.look(), heart) for heart in self._hearts] if not self.safe else []
-        kinds = {sign for sign, _ in signs}
+        signs = [(heart.look(), heart) for heart in self._hearts]
+        kinds = set() if self.safe else {sign for sign, _ in signs}
         if Sign.ENDS in kinds:
             self._make_safe()
         for sign, heart in signs:
@@ -286,11 +287,15 @@ class Guardian:
         now = time.monotonic_ns()
         due = min([outlet.due for outlet in self._outlets if outlet.is_open], default=now + LONGEST_LOOK)
         until = min(due, now + self._look_every)
+        select.select(self._sources, [], [], max(0, until - now) / NANOSECONDS)
+
+    @property
+    def _sources(self) -> list[Any]:
+        """What becomes readable when something happens."""
         sources: list[Any] = [*self._supervisor.descriptors, *self._applications.descriptors]
         sources += self._vigil.descriptors
         sources += [descriptor for heart in self._hearts for descriptor in heart.descriptors]
-        sources += [self._link] if self._listening else []
-        select.select(sources, [], [], max(0, until - now) / NANOSECONDS)
+        return sources + ([self._link] if self._listening else [])
 
 
 def guard(setup: GuardianSetup) -> None:

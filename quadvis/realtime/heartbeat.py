@@ -71,7 +71,7 @@ class Heartbeat:
         """Return what the loop does."""
         words, now = self._control, self._now()
         start, begun, done = words[control.START], words[control.BEGUN], words[control.DONE]
-        if words[control.END] or words[control.SAFE] or words[control.LEFT] or self._has_died:
+        if self._has_died or words[control.END] or words[control.SAFE] or words[control.LEFT]:
             return Sign.ENDS
         if not start:
             return Sign.WELL

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import subprocess
 import sys
 from dataclasses import dataclass
 from typing import Any
@@ -54,6 +55,22 @@ def test_frames_come_from_its_own_process_until_it_is_closed() -> None:
         assert (guard.close(), guard.process.exitcode) == ([], 0)
         assert line.read().endswith(3 * b"safe!")
         assert guard.close() == []
+
+
+ENDS_EARLY = """
+import sys
+from types import SimpleNamespace
+from tests.quadvis.realtime.test_guard import started
+guard, _, ports = started(SimpleNamespace(path=sys.argv[1]))
+guard.open(ports, print)
+"""
+
+
+@pytest.mark.slow
+def test_a_supervisor_that_ends_without_closing_it_does_not_wait_for_ever() -> None:
+    with ptys(1) as (line,):
+        subprocess.run([sys.executable, "-c", ENDS_EARLY, line.path], check=True, timeout=60)
+        assert b"first" in line.read() and line.read().endswith(3 * b"safe!")
 
 
 @pytest.mark.slow

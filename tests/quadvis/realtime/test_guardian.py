@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import select
 import subprocess
 import sys
 import threading
@@ -183,6 +184,24 @@ def leave(made: Rig) -> None:
 
 def lose_host(made: Rig) -> None:
     made.supervisor.kill()
+
+
+@pytest.mark.parametrize("first", [order, end, leave, lose_host])
+def test_no_end_keeps_a_guardian_awake_that_is_safe_already(rig: Any, first: Any) -> None:
+    made = rig()
+    made.follow()
+    made.control[control.START] = time.monotonic_ns() + 10**15  # so that the lifeline of the loop is watched
+    made.guardian.look()
+    first(made)
+    made.until(lambda: made.guardian.safe)
+    made.loop_ends.set()
+    made.host_ends.set()
+    made.supervisor.kill()
+    made.application.kill()
+    awake = made.guardian._sources
+    wait_for(lambda: len(select.select(awake, [], [], 0)[0]) >= 3)
+    made.guardian.look()
+    assert select.select(made.guardian._sources, [], [], 0)[0] == []
 
 
 @pytest.mark.parametrize("cause", [kill, end_thread, order, end, leave, lose_host])
