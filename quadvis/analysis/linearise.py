@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from quadvis.analysis.cut import with_breaks
-from quadvis.analysis.loops import AnalysisError, blocks_on_loops, hyperperiod
+from quadvis.analysis.loops import AnalysisError, blocks_on_loops, full, hyperperiod
 from quadvis.analysis.probe import STEP, Channel, Matrix, Positions, Probe, Vector, silence
 from quadvis.analysis.progress import announce
 from quadvis.analysis.state import Columns, find_state, slope, stacked
@@ -87,7 +87,8 @@ def _linearised(graph: Graph, blocks: set[str], cuts: Sequence[Cut], at: float, 
     engine = Engine(graph)
     silence(engine)
     tasks = {node.task for node in graph.nodes if node.path in blocks}
-    ticks = int(at / graph.tick) + hyperperiod(graph, tasks) * (len(engine.memory.floats) if blocks else 1)
+    runs = len(engine.memory.floats) if blocks else 1
+    ticks = int(full(graph, blocks, at) / graph.tick) + runs * hyperperiod(graph, tasks)
     use(engine, choose(engine, ticks, wanted, announce))
     with engine:
         announce("running to the operating point")
