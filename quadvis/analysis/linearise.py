@@ -125,7 +125,7 @@ def _linearise(probe: Probe) -> Linear:
             linear = _lifted(probe, places, columns)
             _check(probe, places, linear.a)
             return _without_idle(linear)
-        a = stacked(columns, places)[0]
+        a = stacked(columns, places, len(probe.channels))[0]
         probe.move(places, _solved(np.eye(len(places)) - a, residual))
     raise _unsettled(probe, places, residual)
 
@@ -151,7 +151,7 @@ def _is_continuous(probe: Probe, places: Positions) -> bool:
 
 def _lifted(probe: Probe, places: Positions, columns: Columns) -> Linear:
     count, none = len(probe.channels), places[:0]
-    a, c = stacked(columns, places)
+    a, c = stacked(columns, places, count)
     b, d = np.zeros((len(places), count)), np.zeros((count, count))
     for column, channel in enumerate(probe.channels):
         if channel.read_only:
