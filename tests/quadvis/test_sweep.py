@@ -741,3 +741,10 @@ def test_a_picture_of_runs_without_numbers_is_refused_before_they_run(
     picture: dict[str, Any] = {option: tmp_path / "sweep.png"}
     with pytest.raises(QuadvisError, match="neither 'summary' nor 'expect'"):
         quadvis.sweep(path, {"size": ["1 m", "2 m", "3 m"]}, design=design, runs=runs, **picture)
+
+
+def test_a_notebook_shows_a_table_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "loop.yaml"
+    path.write_text(LOOP)
+    table = quadvis.sweep(path, {"size": ["1 m", "2 m"]}, workers=1)
+    assert repr(table) == f"<Table of loop: 2 runs, {len(table)} columns>"

@@ -84,6 +84,10 @@ def test_a_continuous_transfer_is_its_closed_form(motor: Analysis, name: str) ->
     assert [motor.transfers[name].at(omega) for omega in GRID] == approx(FORMS[name](1j * GRID), rel=1e-6)
 
 
+def test_a_notebook_shows_an_analysis_in_one_line(motor: Analysis) -> None:
+    assert repr(motor) == "<Analysis of motor: 3 states, stable, 1 cut>"
+
+
 def test_the_names_are_those_of_the_signals(motor: Analysis) -> None:
     system = motor.transfer("load")
     assert (system.input_labels, system.output_labels) == (["voltage:u[1]"], ["motor:y"])
