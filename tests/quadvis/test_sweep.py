@@ -213,6 +213,7 @@ def test_what_does_not_go_together_is_told_before_anything_runs(
 
 def test_the_numbers_are_those_of_closed_forms_in_the_units_of_the_columns(here: list[int]) -> None:
     table = quadvis.sweep("loop.yaml", {"size": ["1 m", "50 cm"], "law.factor": [1, 3]})
+    assert repr(table) == f"<Table of loop: 4 runs, {len(table)} columns>"
     size, factor = np.array([1.0, 1.0, 0.5, 0.5]), np.array([1, 3, 1, 3])
     np.testing.assert_array_equal(table["size [m]"], size)
     np.testing.assert_array_equal(table["law.factor"], factor)
@@ -741,10 +742,3 @@ def test_a_picture_of_runs_without_numbers_is_refused_before_they_run(
     picture: dict[str, Any] = {option: tmp_path / "sweep.png"}
     with pytest.raises(QuadvisError, match="neither 'summary' nor 'expect'"):
         quadvis.sweep(path, {"size": ["1 m", "2 m", "3 m"]}, design=design, runs=runs, **picture)
-
-
-def test_a_notebook_shows_a_table_in_one_line(tmp_path: Path) -> None:
-    path = tmp_path / "loop.yaml"
-    path.write_text(LOOP)
-    table = quadvis.sweep(path, {"size": ["1 m", "2 m"]}, workers=1)
-    assert repr(table) == f"<Table of loop: 2 runs, {len(table)} columns>"
