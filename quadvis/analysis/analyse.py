@@ -32,7 +32,7 @@ from quadvis.diagram.loop_requirements import (
     RequiredTransfer,
 )
 from quadvis.diagram.sections.cuts import Cut
-from quadvis.errors import DiagramError
+from quadvis.errors import DiagramError, counted
 from quadvis.errors.caller import as_given
 from quadvis.graph.graph import Graph
 from quadvis.native.choice import AUTO
@@ -56,6 +56,10 @@ class Analysis:
     loops: Mapping[str, Loop]
     transfers: Transfers
     limits: Limits
+
+    def __repr__(self) -> str:
+        states, stable = counted(len(self.linear.states), "state"), "stable" if self.stable else "not stable"
+        return f"<Analysis of {self.diagram.name}: {states}, {stable}, {counted(len(self.loops), 'cut')}>"
 
     @property
     def period(self) -> float:

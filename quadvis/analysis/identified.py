@@ -18,6 +18,7 @@ from quadvis.output.statistics import finite
 from quadvis.units import Unit, format_quantity
 
 SECOND = Unit.parse("s")
+MOST_DELAYS = 60  # periods of the grid: the longest dead time that is sought
 WHITE = 0.3  # a larger correlation of neighbouring residuals is remarked on
 
 
@@ -30,7 +31,8 @@ class Identified:
     is the dead time (s), ``unit`` that of the output over the input. ``fit`` (percent, NRMSE) is that on the
     samples that were not fitted, ``fit_own`` on those that were; ``samples`` are their numbers. ``noise`` is
     the standard deviation of the residuals, ``colour`` the correlation of neighbouring ones. ``simulated``
-    are times (s), the output as recorded, and as the model has it.
+    are times (s), the output as recorded, and as the model has it: NaN where it answers to inputs before
+    the recording. ``longest`` says that no longer dead time was sought.
     """
 
     names: tuple[str, str]
@@ -46,6 +48,7 @@ class Identified:
     colour: float
     samples: tuple[int, int]
     simulated: tuple[Vector, Vector, Vector]
+    longest: bool = False
 
     def __repr__(self) -> str:
         kind = "discrete" if self.period else "continuous"
@@ -105,6 +108,11 @@ class Identified:
         )
         if self.delay:
             yield f"delay: {format_quantity(self.delay, SECOND)}"
+        if self.longest:
+            yield (
+                f"no delay of more than {MOST_DELAYS} samples is sought, and it may be longer: take fewer "
+                "samples, such as by 'quadvis export LOG --every 1s -o FILE.csv'"
+            )
         yield (
             f"fit: {self.fit:.2f} % of {self.samples[1]} samples that were not fitted, "
             f"{self.fit_own:.2f} % of the {self.samples[0]} others"

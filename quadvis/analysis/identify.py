@@ -21,7 +21,7 @@ from typing import Protocol
 import numpy as np
 
 from quadvis.analysis.experiment import Experiment
-from quadvis.analysis.identified import Identified
+from quadvis.analysis.identified import MOST_DELAYS, Identified
 from quadvis.analysis.probe import Matrix, Vector
 from quadvis.analysis.progress import announce
 from quadvis.analysis.systems import library
@@ -29,7 +29,6 @@ from quadvis.errors import QuadvisError, counted, quoted
 from quadvis.output.recording import Recording
 
 VALIDATION = 1.0 / 3.0  # of the recording: the share at its end that judges the model
-MOST_DELAYS = 60  # periods
 ROUNDS = 8  # of Steiglitz and McBride
 SLOWEST = 64  # times slower than the output: the slowest rate of an ARX model
 STARTS = 3  # from which the search goes on
@@ -130,11 +129,16 @@ class Stretched:
         """The number of recorded outputs."""
         return int(self.output.size)
 
+    def unknown(self, lag: int) -> int:
+        """Return how many recorded outputs lie in a dead time (periods) from the beginning on."""
+        return -(-lag // self.data.stride)
+
     def columns(self, denominator: Vector, lag: int) -> Matrix:
         """Return what the output is a linear combination of: one column for each coefficient but the poles'.
 
         They are the answers to the input for each power of the numerator, highest first, a constant, and the
-        decays of the initial state. ``denominator`` (order,) leaves out the leading 1.
+        decays of the initial state. ``denominator`` (order,) leaves out the leading 1. The rows of the first
+        ``lag`` periods are 0: what they answer to was before the recording.
         """
         form, data = self.form, self.data
         below = np.concatenate([[1.0], denominator])
@@ -147,9 +151,10 @@ class Stretched:
             found = [lfilter(above, poles, u) for above, poles in filters]
             poles = filters[-1][1]
             pulse = np.zeros(self.size)
-            pulse[0] = 1.0
+            pulse[lag] = 1.0
             decays = [lfilter(row, poles, pulse) for row in np.eye(form.order)]
         columns = np.column_stack([*found, np.ones(self.size), *decays])[data.seen]
+        columns[: self.unknown(lag)] = 0.0
         return np.asarray(np.nan_to_num(np.clip(columns, -HUGE, HUGE), nan=HUGE), np.float64)
 
 
@@ -167,18 +172,19 @@ def _sampled(form: ModelForm, power: int, below: Vector, period: float) -> tuple
 
 
 def _projected(stretch: Stretched, denominator: Vector, lag: int) -> tuple[Vector, Vector]:
-    """Return the best linear coefficients for a denominator, and what is left of the output."""
-    columns = stretch.columns(denominator, lag)
+    """Return the best linear coefficients for a denominator, and what they leave of the known output."""
+    columns, output = stretch.columns(denominator, lag), stretch.output.copy()
+    output[: stretch.unknown(lag)] = 0.0
     sizes = np.abs(columns).max(axis=0)
     sizes[sizes == 0.0] = 1.0
-    found = np.linalg.lstsq(columns / sizes, stretch.output, rcond=1e-12)[0] / sizes
-    return found, stretch.output - columns @ found
+    found = np.linalg.lstsq(columns / sizes, output, rcond=1e-12)[0] / sizes
+    return found, output - columns @ found
 
 
 def _cost(stretch: Stretched, denominator: Vector, lag: int) -> float:
-    """Return the squared error that is left with a denominator."""
+    """Return the mean squared error that is left with a denominator."""
     rest = _projected(stretch, denominator, lag)[1]
-    return float(rest @ rest)
+    return float(rest @ rest) / max(1, rest.size - stretch.unknown(lag))
 
 
 def _search(stretch: Stretched, lag: int, starts: list[Vector]) -> Vector:
@@ -209,8 +215,20 @@ def _best_delay(stretch: Stretched) -> tuple[int, Vector]:
     for _, lag, start in likely:
         denominator = _search(stretch, lag, [start, *_starts(stretch, lag, 4)])
         found.append((_cost(stretch, denominator, lag), lag, denominator))
-    _, lag, denominator = min(found, key=lambda trial: trial[0])
-    return lag, denominator
+    best = min(found, key=lambda trial: trial[0])
+    while (beside := _beside(stretch, best)) is not best:
+        best = beside
+    return best[1:]
+
+
+def _beside(stretch: Stretched, best: tuple[float, int, Vector]) -> tuple[float, int, Vector]:
+    """Return what a dead time of one period less or more finds, or the best if it is no better."""
+    trials = [best]
+    for lag in (best[1] - 1, best[1] + 1):
+        if 0 <= lag <= min(MOST_DELAYS, stretch.size // 4):
+            denominator = _search(stretch, lag, [best[2]])
+            trials.append((_cost(stretch, denominator, lag), lag, denominator))
+    return min(trials, key=lambda trial: trial[0])
 
 
 def _starts(stretch: Stretched, lag: int, slowest: int = SLOWEST) -> Iterator[Vector]:
@@ -274,9 +292,11 @@ def _result(whole: Stretched, fitted: Stretched, lag: int, denominator: Vector) 
     form, data = whole.form, whole.data
     linear, rest = _projected(fitted, denominator, lag)
     deviations = _deviations(fitted, lag, denominator, linear, rest)
-    ways = form.zeros + 1
+    ways, known = form.zeros + 1, fitted.unknown(lag)
     simulated = whole.columns(denominator, lag) @ linear
-    beyond = fitted.seen if whole.seen - fitted.seen >= 2 else 0
+    simulated[:known] = math.nan
+    rest = rest[known:]
+    beyond = fitted.seen if whole.seen - fitted.seen >= 2 else known
     return Identified(
         names=data.names,
         unit=data.unit,
@@ -286,15 +306,16 @@ def _result(whole: Stretched, fitted: Stretched, lag: int, denominator: Vector) 
         delay=lag * data.period,
         period=data.period if form.discrete else 0.0,
         fit=_fit(whole.output[beyond:], simulated[beyond:]),
-        fit_own=_fit(fitted.output, fitted.output - rest),
+        fit_own=_fit(fitted.output[known:], fitted.output[known:] - rest),
         noise=math.sqrt(float(rest @ rest) / max(1, rest.size - form.count)),
         colour=_colour(rest),
-        samples=(fitted.seen, whole.seen - fitted.seen),
+        samples=(rest.size, whole.seen - fitted.seen),
         simulated=(
             data.begin + data.period * np.arange(float(whole.size))[data.seen],
             whole.output,
             simulated,
         ),
+        longest=lag == MOST_DELAYS,
     )
 
 
@@ -324,7 +345,7 @@ def _deviations(stretch: Stretched, lag: int, denominator: Vector, linear: Vecto
         problem = f"the recording does not determine {counted(form.order + ways, 'coefficient')}"
         name = quoted(stretch.data.names[0])
         raise QuadvisError(f"{problem}; take a lower order, or let {name} move at more frequencies")
-    variance = float(rest @ rest) / max(1, rest.size - form.count)
+    variance = float(rest @ rest) / max(1, rest.size - stretch.unknown(lag) - form.count)
     found = np.sqrt(variance * ((turned / singular[:, None]) ** 2).sum(axis=0)) / sizes
     return np.asarray(found, np.float64)
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from quadvis.analysis.cut import with_breaks
-from quadvis.analysis.loops import AnalysisError, blocks_on_loops, hyperperiod
+from quadvis.analysis.loops import AnalysisError, blocks_on_loops, full, hyperperiod
 from quadvis.analysis.probe import STEP, Channel, Matrix, Positions, Probe, Vector, silence
 from quadvis.analysis.progress import announce
 from quadvis.analysis.state import Columns, find_state, slope, stacked
@@ -87,7 +87,8 @@ def _linearised(graph: Graph, blocks: set[str], cuts: Sequence[Cut], at: float, 
     engine = Engine(graph)
     silence(engine)
     tasks = {node.task for node in graph.nodes if node.path in blocks}
-    ticks = int(at / graph.tick) + hyperperiod(graph, tasks) * (len(engine.memory.floats) if blocks else 1)
+    runs = len(engine.memory.floats) if blocks else 1
+    ticks = int(full(graph, blocks, at) / graph.tick) + runs * hyperperiod(graph, tasks)
     use(engine, choose(engine, ticks, wanted, announce))
     with engine:
         announce("running to the operating point")
@@ -124,7 +125,7 @@ def _linearise(probe: Probe) -> Linear:
             linear = _lifted(probe, places, columns)
             _check(probe, places, linear.a)
             return _without_idle(linear)
-        a = stacked(columns, places)[0]
+        a = stacked(columns, places, len(probe.channels))[0]
         probe.move(places, _solved(np.eye(len(places)) - a, residual))
     raise _unsettled(probe, places, residual)
 
@@ -150,7 +151,7 @@ def _is_continuous(probe: Probe, places: Positions) -> bool:
 
 def _lifted(probe: Probe, places: Positions, columns: Columns) -> Linear:
     count, none = len(probe.channels), places[:0]
-    a, c = stacked(columns, places)
+    a, c = stacked(columns, places, count)
     b, d = np.zeros((len(places), count)), np.zeros((count, count))
     for column, channel in enumerate(probe.channels):
         if channel.read_only:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from math import lcm
+from collections.abc import Iterable, Iterator, Sequence, Set
+from fractions import Fraction
+from math import isfinite, lcm
 from typing import Any
 
+import numpy as np
+
 from quadvis.errors import QuadvisError
-from quadvis.graph.graph import Graph, Task
+from quadvis.graph.graph import Graph, Node, Task
 
 LONGEST = 20_000  # ticks of the longest hyperperiod
+WAITS = ("delay", "latency")  # the parameters (s) that say how long a value waits in a block
 
 
 class AnalysisError(QuadvisError):
@@ -24,6 +28,28 @@ def hyperperiod(graph: Graph, tasks: Iterable[Task]) -> int:
         problem = f"the rates of the loop repeat only after {time:g} s, {span} ticks"
         raise AnalysisError(f"{problem}; choose rates that fit into each other")
     return span
+
+
+def full(graph: Graph, blocks: Set[str], at: float) -> Fraction:
+    """Return the first time (s) from ``at`` on at which all that waits in these blocks has begun to come out.
+
+    Before that a dead time looks like a wire that leads nowhere.
+    """
+    waits = (wait for node in graph.nodes if node.path in blocks for wait in _waits(node))
+    return max([Fraction(at), *waits])
+
+
+def _waits(node: Node) -> Iterator[Fraction]:
+    """Yield how long (s) values wait in a block, with two of its periods to come and go."""
+    interface = node.block.interface
+    if not any(declared.signal.scalar == "float64" for declared in interface.outputs.values()):
+        return
+    for name in WAITS:
+        param = interface.params.get(name)
+        if param is not None and param.unit == "s" and param.signal.scalar == "float64":
+            waits = float(np.max(getattr(node.block, name)))
+            if isfinite(waits):
+                yield Fraction(waits) + 2 * node.task.period
 
 
 def instants_of(graph: Graph) -> set[tuple[str, str]]:

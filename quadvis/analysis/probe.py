@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadvis.analysis.cut import break_path
-from quadvis.analysis.loops import hyperperiod, instants_of
+from quadvis.analysis.loops import full, hyperperiod, instants_of
 from quadvis.diagram.sections.cuts import Cut
 from quadvis.engine.engine import Engine
 from quadvis.engine.layout import TIME, Placed
@@ -87,7 +86,7 @@ class Probe:
         self.loop = blocks or {node.path for node in self.graph.nodes}
         self.tasks = {node.task for node in self.graph.nodes if node.path in self.loop}
         self.span = hyperperiod(self.graph, self.tasks)
-        begin = max([Fraction(at), *(task.offset for task in self.tasks)])
+        begin = max([full(self.graph, self.loop, at), *(task.offset for task in self.tasks)])
         engine.run(self.span * -(-begin // (self.span * self.graph.tick)))
         self.parts = fix_conditions(engine)
         self._still = standing_still(self.graph, engine)

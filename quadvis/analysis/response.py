@@ -16,7 +16,7 @@ import numpy as np
 
 from quadvis.analysis.margins import Complexes, grid_between
 from quadvis.analysis.probe import Matrix, Vector
-from quadvis.analysis.steps import SLOW, Modes, StepResponse, step_response
+from quadvis.analysis.steps import SLOW, Modes, StepResponse, rates_of, step_response
 from quadvis.analysis.systems import instant_names, library, named_system
 from quadvis.diagram.sections.transfers import Transfer
 from quadvis.output.statistics import finite
@@ -51,7 +51,7 @@ class Response:
     @cached_property
     def poles(self) -> Complexes:
         """The poles of the states on the way (1/s), slowest first; those that die in a period left out."""
-        rates = self.modes.rates
+        rates = rates_of(np.linalg.eigvals(self.matrices[0]), self.period)
         rates = rates[rates.real * self.period > math.log(1e-4)]
         return rates[np.argsort(-rates.real, kind="stable")]
 
@@ -64,7 +64,8 @@ class Response:
     def modes(self) -> Modes:
         """How each pole answers a step."""
         a, b, c, d = self.matrices
-        return Modes.of(a, b.sum(axis=1), c, d.sum(axis=1), self.period)
+        gain = float(np.abs(self.values).max())
+        return Modes.of(a, b.sum(axis=1), c, d.sum(axis=1), self.period, gain)
 
     @property
     def top(self) -> float:

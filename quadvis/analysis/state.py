@@ -41,12 +41,12 @@ def find_state(probe: Probe) -> tuple[Positions, Columns]:
                 reached.update(changed.tolist())
         fresh = np.array(sorted(reached - known), np.intp)
         known |= reached
-    return _observable(np.array(sorted(columns), np.intp), columns), columns
+    return _observable(np.array(sorted(columns), np.intp), columns, len(probe.channels)), columns
 
 
-def _observable(places: Positions, columns: Columns) -> Positions:
+def _observable(places: Positions, columns: Columns, channels: int) -> Positions:
     """Drop, until no more can be dropped, the slots on which no channel and no remaining slot depends."""
-    a, c = stacked(columns, places)
+    a, c = stacked(columns, places, channels)
     left = np.arange(places.size)
     while left.size:
         matter = (a[np.ix_(left, left)] != 0.0).any(axis=0) | (c[:, left] != 0.0).any(axis=0)
@@ -122,11 +122,11 @@ def _lasting(probe: Probe, places: Positions, rounds: int) -> Positions:
     return _changed(probe, changed, probe.after(places[:0], 0.0, count=rounds)[0])
 
 
-def stacked(columns: Columns, places: Positions) -> tuple[Matrix, Matrix]:
+def stacked(columns: Columns, places: Positions, channels: int) -> tuple[Matrix, Matrix]:
     """Return the derivatives of the state and of the channels by the state."""
     a = [columns[place][0][places] for place in places.tolist()]
     c = [columns[place][1] for place in places.tolist()]
-    return np.reshape(a, (len(a), len(a))).T, np.reshape(c, (len(a), -1 if c else 0)).T
+    return np.reshape(a, (len(a), len(a))).T, np.reshape(c, (len(a), channels)).T
 
 
 @np.errstate(invalid="ignore", over="ignore")  # a parameter may be infinite, and a signal NaN

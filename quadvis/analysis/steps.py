@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from quadvis.analysis.systems import library
 
 SLOW = 1e-6  # 1/s; a pole that is slower is an integrator's
 FAINT = 1e-7  # of the largest part of the answer: a smaller one is noise
-DONE = 1e-4  # of the answer: what remains when the curve ends
+DONE = 1e-4  # of the answer, or of its end if that is less: what remains when the curve ends
 DENSITY = 60  # points in the time constant, or in 1/(2 pi) of the period, of the fastest part that is left
 SEGMENT = 100
 MOST = 400_000  # instants of a curve
@@ -30,31 +31,43 @@ Matrices = tuple[Matrix, Matrix, Matrix, Matrix]
 Curve = Iterator[tuple[Vector, Vector]]
 
 
+def rates_of(poles: NDArray[Any], period: float) -> NDArray[np.complex128]:
+    """Return poles as rates (1/s): of a sampled system their logarithms over the period, of 0 -inf."""
+    with np.errstate(divide="ignore", invalid="ignore"):  # -inf + 0j over a number
+        found = np.log(poles.astype(complex)) / period if period else poles
+    return np.asarray(found, np.complex128)
+
+
 @dataclass(frozen=True)
 class Modes:
     """The poles of a system, as rates (1/s), and how strong each is in the answer to a step.
 
-    The rate of a pole of a sampled system is its logarithm over the period, -inf for a pole at 0.
+    ``size`` is that of the answer. Those of poles that nearly coincide, such as the many at 0 of a dead time,
+    are much stronger than the answer, and nearly cancel each other.
     """
 
     rates: NDArray[np.complex128]
     strengths: Vector
+    size: float
 
     @staticmethod
-    def of(a: Matrix, b: Vector, c: Matrix, d: Vector, period: float) -> Modes:
-        """Return the modes of x' = a x + b, y = c x + d, or of x+ = a x + b if the period is not 0."""
+    def of(a: Matrix, b: Vector, c: Matrix, d: Vector, period: float, gain: float) -> Modes:
+        """Return the modes of x' = a x + b, y = c x + d, or of x+ = a x + b if the period is not 0.
+
+        ``gain`` is the largest one of the system.
+        """
         if not len(a):
-            return Modes(np.zeros(0, complex), np.zeros(0))
+            return Modes(np.zeros(0, complex), np.zeros(0), gain)
         poles, vectors = np.linalg.eig(a)
         driven = np.abs(np.linalg.lstsq(vectors, b.astype(complex), rcond=None)[0])
         parts = driven * np.abs(c @ vectors).max(axis=0)
-        with np.errstate(divide="ignore"):
-            rates = np.log(poles.astype(complex)) / period if period else poles.astype(complex)
+        rates = rates_of(poles, period)
         slow = np.abs(rates) < SLOW
         gaps = np.where(slow, 1.0, np.abs(1.0 - poles) if period else np.abs(poles))
         strengths = parts / gaps
-        faint = FAINT * max(float(strengths.max()), float(np.abs(d).max()))
-        return Modes(rates, np.where(strengths > faint, strengths, 0.0))
+        size = min(float(strengths.max()), gain)
+        faint = FAINT * max(size, float(np.abs(d).max()))
+        return Modes(rates, np.where(strengths > faint, strengths, 0.0), size)
 
     @property
     def integrate(self) -> bool:
@@ -156,7 +169,7 @@ def step_response(
 
     The arguments are those of `quadvis.analysis.response.Response`; ``final`` is the end of the answer.
     """
-    size = float(modes.strengths.max(initial=0.0)) or 1.0
+    size = min(modes.size, abs(final) or math.inf) or 1.0
     if not modes.settle:
         return StepResponse(np.zeros(0), np.zeros(0), math.nan, bool(period))
     curve = (_sampled if period else _continuous)(matrices, period, times, modes, DONE * size)

@@ -204,6 +204,8 @@ class Builder:
             if name not in declared:
                 is_setting = name not in flat.spec.parameter_places
                 remedy = remedy_for(name, flat.parameters, declared, replaces=is_setting)
+                if name in kind.interface.inputs:
+                    remedy = "it is an input; write it under 'in'"
                 self.faults.add(flat.place(name), f"{flat.spec.kind} has no parameter '{name}'", remedy)
                 whole = False
                 continue

@@ -126,6 +126,8 @@ class WireCheck:
                     self._fault(draft, draft.place, *not_taken(port, draft.kind))
                 elif port not in inputs:
                     remedy = remedy_for(port, draft.connections, inputs)
+                    if port in draft.interface.params:
+                        remedy = "it is a parameter; write it under 'with'"
                     self._fault(draft, connection.place, f"{draft.kind} has no input '{port}'", remedy)
                 elif isinstance(wire, Wire) and wire.block in self.drafts:
                     link = DraftWire(draft, port, connection, wire, inputs[port])

@@ -3,10 +3,13 @@
 A solver takes its own steps up to the next tick of a task that is not continuous; between them it is
 interpolated. At a tick at which anything has changed that the derivatives read (a sampled signal, a
 parameter, a state that an update or a reset has set) it begins anew. So no step goes across a change.
+Where a continuous block reads the time, no step is longer than the distance of two ticks: at rest a solver
+takes ever longer ones, and would not see a bump of the road.
 """
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -36,6 +39,7 @@ class VariableSolver:
         self._program, self._memory = program, memory
         self._states = np.array(program.states, np.intp)
         self._watched = _watched(program)
+        self._longest = float(program.period) if _is_timed(program) else math.inf
         self._rhythms = [(task.every, task.offset) for task in program.tasks if not task.continuous]
         self._solver: Any = None
         self._between: Callable[[float], Vector] | None = None  # the interpolant of the last step
@@ -81,7 +85,8 @@ class VariableSolver:
         made = getattr(integrate, self._program.solver)
         rtol, atol = self._program.tolerances
         try:
-            return made(lambda t, x: rates(float(t), x), time, state, bound, rtol=rtol, atol=atol)
+            options = {"rtol": rtol, "atol": atol, "max_step": self._longest}
+            return made(lambda t, x: rates(float(t), x), time, state, bound, **options)
         except ValueError as error:  # a slope is not finite
             raise NoStep(str(error)) from error
 
@@ -103,6 +108,12 @@ class VariableSolver:
         if self._between is None:
             self._between = solver.dense_output()
         return np.asarray(self._between(time), np.float64)
+
+
+def _is_timed(program: Program) -> bool:
+    """Return whether the derivatives depend on the time itself."""
+    ops: tuple[Op, ...] = (*program.minor, *program.derivatives)
+    return any(slot.position == TIME.position for op in ops for slot in op.sources)
 
 
 def _watched(program: Program) -> NDArray[np.intp]:

@@ -81,7 +81,7 @@ _MEANT = {
     "signal.dead_zone": "deadband",
     "signal.backlash": "play",
     "signal.relay": "hysteresis schmitt schmitttrigger bangbang",
-    "signal.quantizer": "quantize quantiser",
+    "signal.quantizer": "quantize quantiser quantization quantisation",
     "signal.friction": "coulombfriction coulombandviscousfriction",
     "plant.sliding_mass": "stickslip stiction massonbelt masswithfriction masswithstopandfriction",
     "signal.lookup_1d": "lookup lookuptable 1dlookuptable lookuptable1d interpolate interp1",
@@ -89,6 +89,7 @@ _MEANT = {
     "signal.unit_delay": "memory onestepdelay",
     "signal.delay": "samplesdelay delaysamples zn",
     "signal.transport_delay": "deadtime timedelay puredelay",
+    "signal.derivative": "discretederivative differentiator differentiate",
     "signal.rate_limiter": "slewrate slewratelimiter",
     "signal.discrete_integrator": "discretetimeintegrator",
     "signal.trapezoidal_integrator": "tustinintegrator trapezoidal",
@@ -122,7 +123,7 @@ _MEANT = {
     "sources.chirp": "chirpsignal sweep",
     "sources.prbs": "pseudorandombinarysequence",
     "sources.uniform_noise": "uniformrandomnumber random",
-    "systems.pid": "pidcontroller discretepidcontroller pi pd pidcontroller2dof pid2",
+    "systems.pid": "pidcontroller discretepidcontroller pi pd pidcontroller2dof pid2 antiwindup windup",
     "systems.state_space": "ss ltiss discretestatespace statespacemodel",
     "systems.zero_pole_gain": "zeropole zpk discretezeropole polezero",
     "systems.butterworth": "butter analogfilterdesign lowpassfilter highpassfilter bandpassfilter",
@@ -143,7 +144,8 @@ _MEANT = {
     "rotation.attitude_from_rates": "attitudeintegrator quaternionintegrator",
     "plant.rigid_body": "6dof sixdof rigidbody 6dofquaternion 6dofeulerangles multirotor",
     "plant.bicycle": "car vehicle ackermann bicyclemodel kinematicbicycle",
-    "systems.transfer_function": "transferfcn transferfunction tf ltisiso discretetransferfcn discretefilter",
+    "systems.transfer_function": "transferfcn transferfunction tf ltisiso discretetransferfcn discretefilter "
+    "leadlag leadcompensator lagcompensator",
 }  # fmt: skip
 _STANDS_FOR: dict[str, list[str]] = {}
 for _ours, _theirs in _MEANT.items():

@@ -99,6 +99,8 @@ def sweep(
             check_output(picture, PLOT, made.inputs)
     refuse_devices(diagram.graph)
     found = quantities(diagram)
+    if not found:
+        _refuse_pictures(plot, sensitivity)
     rule = StopRule(until, found, drawn) if until is not None else None
     make = TableMaker(diagram.name, drawn, found, len(diagram.loop_requirements))
     chosen = choose(Engine(diagram.graph), diagram.ticks * drawn.runs, engine, announce).engine
@@ -133,6 +135,16 @@ def sweep(
 
         draw_sensitivity(table, Path(sensitivity), made.inputs)
     return table
+
+
+def _refuse_pictures(plot: str | Path | None, sensitivity: str | Path | None) -> None:
+    """Refuse pictures of a sweep whose runs have no numbers."""
+    for picture, option in ((plot, "plot"), (sensitivity, "sensitivity")):
+        if picture is not None:
+            problem = f"{as_given(f'--{option}', option)} has nothing to draw"
+            raise QuadvisError(
+                f"{problem}: the diagram has neither 'summary' nor 'expect'; give it a summary"
+            )
 
 
 def _refuse_large(output: str | Path | None, runs: int) -> bool:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadvis.errors import QuadvisError
+from quadvis.errors import QuadvisError, counted
 from quadvis.machine.files import Kind, write_output
 from quadvis.sweeps.axes import GRID, SEED
 from quadvis.sweeps.designs import Design
@@ -49,6 +49,9 @@ class Table(Mapping[str, NDArray[Any]]):
         self.name, self.design, self.quantities = name, design, tuple(quantities)
         self.rows, self.columns, self.wall, self.margins = rows, columns, wall, margins
         self.note = ""
+
+    def __repr__(self) -> str:
+        return f"<Table of {self.name}: {counted(self.runs, 'run')}, {counted(len(self), 'column')}>"
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.columns[name]

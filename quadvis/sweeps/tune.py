@@ -18,7 +18,7 @@ import numpy as np
 from quadvis.diagram.sections.analyse import Limit
 from quadvis.diagram.settings import Files, Given
 from quadvis.engine.engine import Engine
-from quadvis.errors import QuadvisError, quoted, suggestion
+from quadvis.errors import QuadvisError, counted, quoted, suggestion
 from quadvis.errors.caller import as_given
 from quadvis.graph.devices import refuse_devices
 from quadvis.library.catalogue import OwnBlocks
@@ -58,6 +58,10 @@ class TuneResult:
     ranges: tuple[Limit, ...]
     seeds: int
     trials: tuple[Trial, ...]
+
+    def __repr__(self) -> str:
+        found = f"{self.quantity.label} {self.best.found:.4g} {self.quantity.unit}".rstrip()
+        return f"<TuneResult of {self.diagram}: {found} in {counted(len(self.trials), 'trial')}>"
 
     @property
     def own(self) -> Trial | None:

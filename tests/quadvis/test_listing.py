@@ -48,6 +48,11 @@ def test_own_blocks_are_loaded_and_broken_ones_reported(tmp_path: Path) -> None:
     [
         ("transport", "signal.transport_delay"),
         ("Dead Time", "signal.transport_delay"),
+        ("anti-windup", "systems.pid"),
+        ("anti windup", "systems.pid"),
+        ("lead lag", "systems.transfer_function"),
+        ("discrete derivative", "signal.derivative"),
+        ("quantization", "signal.quantizer"),
         ("dead-time", "signal.transport_delay"),
         ("Mux", "signal.concatenate"),
         ("RelationalOperator", "logic.compare"),

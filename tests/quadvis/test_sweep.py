@@ -213,6 +213,7 @@ def test_what_does_not_go_together_is_told_before_anything_runs(
 
 def test_the_numbers_are_those_of_closed_forms_in_the_units_of_the_columns(here: list[int]) -> None:
     table = quadvis.sweep("loop.yaml", {"size": ["1 m", "50 cm"], "law.factor": [1, 3]})
+    assert repr(table) == f"<Table of loop: 4 runs, {len(table)} columns>"
     size, factor = np.array([1.0, 1.0, 0.5, 0.5]), np.array([1, 3, 1, 3])
     np.testing.assert_array_equal(table["size [m]"], size)
     np.testing.assert_array_equal(table["law.factor"], factor)
@@ -726,3 +727,18 @@ def test_a_run_that_has_not_all_of_a_window_is_a_row_that_does_not_pass(here: li
     Path("loop.yaml").write_text(LOOP.replace("within: 150 cm", "before: 0.9 s, within: 10 m"))
     assert quadvis.sweep("loop.yaml", {"seed": range(2)}).passed
     assert not quadvis.sweep("loop.yaml", {"seed": range(2)}, stop_time="0.5 s")["passed"].any()
+
+
+@pytest.mark.parametrize(
+    ("option", "design", "runs"),
+    [("plot", "grid", None), ("plot", "random", 3), ("sensitivity", "random", 100)],
+)
+def test_a_picture_of_runs_without_numbers_is_refused_before_they_run(
+    tmp_path: Path, option: str, design: str, runs: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "loop.yaml"
+    path.write_text(LOOP.partition("expect:")[0])
+    monkeypatch.setattr(sweeping, "_performed", lambda *_: pytest.fail("it has begun to run"))
+    picture: dict[str, Any] = {option: tmp_path / "sweep.png"}
+    with pytest.raises(QuadvisError, match="neither 'summary' nor 'expect'"):
+        quadvis.sweep(path, {"size": ["1 m", "2 m", "3 m"]}, design=design, runs=runs, **picture)

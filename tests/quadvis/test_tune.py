@@ -78,6 +78,7 @@ def test_no_more_trials_than_asked_for(valley: str) -> None:
         valley, "distance.max", {"x": "0..10 m"}, most=5, progress=lambda *trials: seen.append(trials)
     )
     assert len(result.trials) == len(seen) == 5
+    assert repr(result) == f"<TuneResult of valley: distance.max {result.best.found:.4g} cm in 5 trials>"
     assert all(best.found <= trial.found for trial, best in seen)
 
 

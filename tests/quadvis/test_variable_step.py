@@ -260,3 +260,23 @@ def test_a_block_alone_can_be_driven_by_it() -> None:
     assert drive(Integrator(), u=[1.0, 1.0, 1.0], rate="10 Hz", solver="RK45").y == pytest.approx(
         [0, 0.1, 0.2]
     )
+
+
+@pytest.mark.parametrize("method", VARIABLE)
+def test_a_solver_at_rest_sees_a_short_push(method: str) -> None:
+    """x' = u, a triangle of 0.1 s and height 1 after 5 s of rest: x ends at its area."""
+    result = load_text(f"""
+quadvis: 1
+name: push
+solver: {{method: {method}, step: 20 ms, rtol: 1e-6, atol: 1e-9}}
+stop_time: 6 s
+blocks:
+  push:
+    block: sources.table
+    with:
+      times: {{value: [0, 5, 5.05, 5.1], unit: s}}
+      values: [[0], [0], [1], [0]]
+      interpolation: linear
+  x: {{block: signal.integrator, in: {{u: "push.y[0]"}}}}
+""").run(engine="python")
+    assert result["x.y"][-1] == pytest.approx(0.05, rel=1e-3)

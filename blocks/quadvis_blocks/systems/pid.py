@@ -21,6 +21,7 @@ class Pid(Block):
     ``free = kp (b r - m) + ki integral(r - m) + kd s / (filter_time s + 1) (c r - m)``, with the reference r
     and the measurement m; ``y`` is this within the limits. With c = 0, the default, a step of the reference
     does not kick the derivative; b = c = 1 is the textbook's PID on the error. ``filter_time`` is 1/N.
+    With the times of the standard form, ``ki = kp / Ti`` and ``kd = kp Td``.
     At a rate the integrals, that of the filter too, are sums: of the samples up to the last one (forward), up
     to the present one (backward), or of means (trapezoidal). ``continuous`` leaves them to the solver and
     needs no ``rate``.

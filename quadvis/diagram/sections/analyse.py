@@ -22,7 +22,7 @@ ANALYSE_KEYS = ("at", "cuts", "transfer", "limits")
 LIMIT_KEYS = ("vary", "from", "to")
 LISTS = ANALYSE_KEYS[1:]
 NOTHING: Mapping[str, tuple[str, ...] | Unknown] = {key: () for key in LISTS}
-AT = 3.0  # s, long enough for most queues to be full
+AT = 3.0  # s; where something waits for longer in the loop, the steady state is sought later
 
 
 class Limit(NamedTuple):

@@ -247,3 +247,29 @@ def test_what_is_not_white_is_remarked_on() -> None:
     data = experiment(1, ([4.0], [1, 0.4, 4.0]), noise=0.01)
     found = identify(data, input="u", output="y", order=1)
     assert any("the residuals are not white" in line for line in found.lines())
+
+
+def from_rest(delay: int, count: int, stride: int = 1) -> ForeignSignals:
+    """Return a recording without noise that begins at rest, while the input is not 0 from its start on."""
+    u = np.repeat(np.random.default_rng(4).choice([-2.0, 4.0], count // 10), 10)
+    above, below, _ = cont2discrete(([2.0], [1.0, 4.0]), PERIOD)
+    y = lfilter(above[0], below, np.concatenate([np.zeros(delay), u[: u.size - delay]]))
+    return recording(PERIOD * np.arange(u.size), u, y, stride)
+
+
+@pytest.mark.parametrize(("stride", "after"), mostly_slow([(1, 0.2), (3, 0.2), (1, 0.0)]))
+def test_what_answers_to_inputs_before_the_recording_is_not_fitted(stride: int, after: float) -> None:
+    recorded = from_rest(7, 120 * stride, stride)
+    found = identify(recorded, input="u", output="y", order=1, delay=True, after=after)
+    assert found.delay == approx(7 * PERIOD)
+    assert (*found.numerator, found.denominator[1]) == (approx(2.0, rel=1e-9), approx(4.0, rel=1e-9))
+    assert (found.fit, found.fit_own) == (approx(100.0, abs=1e-6), approx(100.0, abs=1e-6))
+    assert np.isnan(found.simulated[2]).sum() == -(-7 // stride)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("delay", "longest"), [(59, False), (80, True)])
+def test_a_dead_time_that_may_be_longer_than_what_is_sought_is_remarked_on(delay: int, longest: bool) -> None:
+    found = identify(from_rest(delay, 600), input="u", output="y", order=1, delay=True)
+    assert found.delay == approx(min(delay, 60) * PERIOD)
+    assert any("it may be longer" in line for line in found.lines()) == longest

@@ -1,3 +1,4 @@
+import math
 from fractions import Fraction
 
 import control
@@ -11,6 +12,7 @@ from quadvis.analysis import linearise
 from quadvis.analysis.loops import AnalysisError
 from quadvis.analysis.probe import Positions, Probe
 from quadvis.analysis.state import Columns, find_state
+from quadvis.api import load_text
 from quadvis.block import Block, In, Out, State
 from quadvis.engine.engine import Engine
 from quadvis.graph.graph import Graph, Node, Task, Wire
@@ -406,3 +408,27 @@ GUARDED = [("blackout", None), ("landing", "robust"), ("takeover", "robust"), ("
 def test_a_hover_under_the_failsafe_is_stable(name: str, variant: str | None) -> None:
     analysis = quadvis.load(DIAGRAMS / f"{name}.yaml", variant=variant).analyse()
     assert analysis.stable and not [state for state in analysis.linear.states if "stamp" in state]
+
+
+def test_a_loop_at_a_limit_whose_law_stands_still_has_no_state_and_any_margin() -> None:
+    analysis = load_text("""
+quadvis: 1
+name: stuck
+rates: {control: 20 Hz}
+solver: {method: ode4, step: 10 ms}
+stop_time: 1 s
+blocks:
+  never: {block: logic.compare, rate: control, in: {a: 1, b: 0}}
+  law: {block: signal.gain, rate: control, when: never.y, in: {u: {from: x.y, across: sample}}}
+  fall:
+    block: math.expression
+    rate: continuous
+    with: {y: k * (u - 1), k: 1 1/s}
+    in: {u: {from: law.y, across: hold}}
+  x: {block: signal.integrator, with: {lower: 0}, in: {u: fall.y}}
+analyse:
+  cuts: {law: law.y}
+""").analyse()
+    margins = analysis.loops["law"].margins
+    assert analysis.linear.states == ()
+    assert (margins.gain_up, margins.delay, analysis.stable) == (math.inf, math.inf, True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import json
 import math
 from pathlib import Path
@@ -81,6 +82,10 @@ def test_a_continuous_transfer_is_its_closed_form(motor: Analysis, name: str) ->
     assert system(1j * GRID) == approx(FORMS[name](1j * GRID), rel=1e-6)
     assert system.nstates == {"plant": 2, "filtered": 4}.get(name, 3)
     assert [motor.transfers[name].at(omega) for omega in GRID] == approx(FORMS[name](1j * GRID), rel=1e-6)
+
+
+def test_a_notebook_shows_an_analysis_in_one_line(motor: Analysis) -> None:
+    assert repr(motor) == "<Analysis of motor: 3 states, stable, 1 cut>"
 
 
 def test_the_names_are_those_of_the_signals(motor: Analysis) -> None:
@@ -449,3 +454,91 @@ def test_more_transfers_come_by_the_command_line_and_are_drawn(tmp_path: Path, c
     drawn += [f"{kind}-{file_name('motor.u,motor.y')}" for kind in ("bode", "step")]
     names = {file.name for file in (tmp_path / "p").iterdir()}
     assert names == {f"motor-{name}.png" for name in drawn}
+
+
+# A plant with a dead time under PI, all at one rate; a step of the reference goes through the dead time last.
+DEAD_TIME = """
+quadvis: 1
+name: dead_time
+params: {delay: 4 s, kp: 0.5, ki: 0.1 1/s}
+rates: {control: 5 Hz}
+stop_time: 1 s
+blocks:
+  wanted: {block: sources.constant, rate: control, with: {value: 0}}
+  pi:
+    block: systems.pid
+    rate: control
+    with: {kp: $kp, ki: $ki, method: backward}
+    in: {reference: wanted.y, measurement: READ}
+  plant:
+    block: systems.transfer_function
+    rate: control
+    with: {numerator: [2], denominator: [5, 1], method: zoh}
+    in: {u: pi.y}
+  late: {block: signal.transport_delay, rate: control, with: {delay: $delay}, in: {u: plant.y}}
+  later: {block: signal.gain, rate: control, in: {u: late.y}}
+analyse:
+  cuts: {control: pi.y}
+  transfer: {reference: [wanted.y, later.y]}
+"""
+
+
+def dead_time(gain: float) -> control.TransferFunction:
+    """Return the loop of `DEAD_TIME` without its dead time."""
+    z = control.tf([1, 0], [1], 0.2)
+    law = gain * (0.5 + 0.1 * 0.2 * z / (z - 1))
+    return law * control.sample_system(control.tf([2], [5, 1]), 0.2, "zoh")
+
+
+@pytest.mark.parametrize("gain", [0.4, 0.8, 3.0])
+def test_a_dead_time_that_is_longer_than_the_time_of_the_steady_state_is_in_the_loop(gain: float) -> None:
+    gains = f"kp: {0.5 * gain}, ki: {0.1 * gain}"
+    text = DEAD_TIME.replace("READ", "late.y").replace("kp: 0.5, ki: 0.1", gains)
+    found = load_text(text).analyse()
+    opened = dead_time(gain) * control.tf([1], [1] + 20 * [0], 0.2)
+    assert found.stable == (largest_pole(opened) < 1.0) == (gain < 3.0)
+    if found.stable:
+        margins = found.loops["control"].margins
+        crossed = complex(opened(np.exp(0.2j * margins.crossover)))
+        assert abs(crossed) == approx(1.0, abs=1e-6)
+        assert margins.phase_lag == approx(math.pi + cmath.phase(crossed), abs=1e-6)
+        assert largest_pole(margins.gain_up * opened) == approx(1.0, abs=1e-6)
+
+
+def largest_pole(opened: control.TransferFunction) -> float:
+    """Return the magnitude of the largest pole of a loop that is closed."""
+    return float(np.abs(control.feedback(opened).poles()).max())
+
+
+@pytest.mark.parametrize("delay", [1.0, 4.0])
+def test_a_step_through_a_dead_time_behind_the_loop_takes_the_time_of_python_control(delay: float) -> None:
+    """The many poles at 0 of the dead time are no part of the answer."""
+    text = DEAD_TIME.replace("READ", "plant.y").replace("delay: 4 s", f"delay: {delay} s")
+    step = load_text(text).analyse().transfers["reference"].step
+    closed = control.feedback(dead_time(1.0))
+    alone = control.step_info(closed, T=np.arange(0.0, 60.0, 0.2))
+    assert step.rise_time == approx(alone["RiseTime"], abs=1e-9)
+    assert step.settling_time == approx(alone["SettlingTime"] + delay, abs=1e-9)
+    assert 100.0 * step.overshoot == approx(alone["Overshoot"], abs=1e-3)
+
+
+def test_a_step_that_ends_far_below_its_height_settles_when_it_is_there() -> None:
+    """(s + 0.001) / ((s + 1) (s + 2)): 0.0005 + 0.999 exp(-t) - 0.9995 exp(-2 t)."""
+    text = """
+quadvis: 1
+name: lead
+solver: {method: ode4, step: 10 ms}
+stop_time: 1 s
+blocks:
+  force: {block: sources.constant, rate: continuous, with: {value: 0}}
+  lead:
+    block: systems.transfer_function
+    with: {numerator: [1, 0.001], denominator: [1, 3, 2]}
+    in: {u: force.y}
+analyse:
+  transfer: {lead: [force.y, lead.y]}
+"""
+    step = load_text(text).analyse().transfers["lead"].step
+    time = np.linspace(5.0, 15.0, 1_000_001)
+    away = np.abs(0.999 * np.exp(-time) - 0.9995 * np.exp(-2.0 * time)) >= 0.02 * 0.0005
+    assert step.settling_time == approx(time[np.flatnonzero(away)[-1]], abs=1e-3)
