@@ -117,7 +117,13 @@ def set_parameters(options: argparse.Namespace) -> int:
         name, equals, value = text.partition("=")
         if not equals:
             raise QuadvisError(f"{quoted(text)} gives no value; write NAME=VALUE")
-        values[name.strip()] = value.strip()
+        name = name.strip()
+        if not name or not value.strip():
+            lacking = "value" if name else "name"
+            raise QuadvisError(f"{quoted(text)} gives no {lacking}; write NAME=VALUE")
+        if name in values:
+            raise QuadvisError(f"{quoted(name)} is given twice; give it one value")
+        values[name] = value.strip()
     with _target(options) as tg:
         _print_changes(tg, tg.tune(values))
     return 0
@@ -125,8 +131,10 @@ def set_parameters(options: argparse.Namespace) -> int:
 
 def scope(options: argparse.Namespace) -> int:
     """Acquire samples of signals, and print them as a picture, or write them."""
-    from quadvis.cli.scope_view import acquire, live, written
+    from quadvis.cli.scope_view import acquire, check_place, live, written
 
+    if options.output:
+        check_place(Path(options.output))
     with _target(options) as tg:
         settings = _scope_settings(options)
         if options.live:
@@ -163,6 +171,11 @@ def sets(options: argparse.Namespace) -> int:
 
 def profile(options: argparse.Namespace) -> int:
     """Start or stop the profiler, or print what it has found, and write it as a trace."""
+    if options.output:
+        from quadvis.machine.files import check_output
+        from quadvis.run.trace import TRACE
+
+        check_output(options.output, TRACE)
     with _target(options) as tg:
         if options.seconds is not None:
             _show_profile(tg.profile(options.seconds), options.output)
