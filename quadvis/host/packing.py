@@ -23,10 +23,11 @@ def pack(
     """Return a diagram as a bundle, and the paths of its files by their SHA-256.
 
     Files lie in the bundle as they lie beside the diagram. QuadvisError if one is named by an absolute path,
-    or if a block's code lies beside the diagram: a target runs what is installed there.
+    if one is code, or if a block's code lies beside the diagram: a target runs what is installed there.
     """
     from quadvis.run.played_files import played_files
 
+    _check_code(diagram)
     folder = diagram.path.parent
     names = {**_listed(diagram), **played_files(diagram)}
     names = {name: digest for name, digest in names.items() if not name.startswith(PREFIX)}
@@ -59,6 +60,15 @@ def pack(
         tuple(computers),
     )
     return ApplicationBundle.read(bundle.plain()), paths
+
+
+def _check_code(diagram: Diagram) -> None:
+    """Refuse a diagram with code that no target takes, such as an FMU."""
+    for node in diagram.graph.nodes:
+        if node.block.brings_code:
+            name = Path(getattr(node.block, node.block.brings_code)).name
+            problem = f"block '{node.path}' runs the machine code of {quoted(name)}, which no target takes"
+            raise QuadvisError(f"{problem}; fly it with 'quadvis run FILE --real-time'")
 
 
 def _listed(diagram: Diagram) -> Mapping[str, str]:
