@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quadvis.cli.given import FAILED
 from quadvis.cli.shown import print_json
-from quadvis.errors import QuadvisError, quoted
+from quadvis.errors import QuadvisError, closest, quoted
 
 if TYPE_CHECKING:
     from quadvis.host.profiler import ProfilerData
@@ -55,7 +55,10 @@ def load(options: argparse.Namespace) -> int:
             )  # fmt: skip
             tg.load(diagram, engine=options.engine, name=options.name, computers=options.computer)
         else:
-            tg.load(what)
+            tg.load(
+                what, variant=options.variant, settings=options.set, params=options.params,
+                stop_time=options.stop_time, name=options.name, computers=options.computer,
+            )  # fmt: skip
         print(f"{tg.name}: {tg.Application} is loaded, {tg.Status}")
     return 0
 
@@ -228,8 +231,17 @@ def _outcome(found: Mapping[str, Any]) -> int:
     return 0
 
 
-def _value(tg: Target, name: str, parameters: set[str]) -> Any:
-    return tg.getparam(name) if name in parameters else tg.getsignal(name)
+def _value(tg: Target, name: str, parameters: Collection[str]) -> Any:
+    """Return the value of a parameter, of a block or of more, or of a signal."""
+    if name in parameters:
+        return tg.getparam(name)
+    try:
+        return tg.getsignal(name)
+    except QuadvisError as error:
+        try:
+            return tg.getparam(name)  # of a part, or of the diagram
+        except QuadvisError as other:
+            raise (other if closest(name, parameters) else error) from None
 
 
 def _print_changes(tg: Target, found: Mapping[str, Any]) -> None:

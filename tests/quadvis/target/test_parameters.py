@@ -59,3 +59,15 @@ def test_what_is_infinite_by_default_may_be_written_so(path: Path) -> None:
             quadvis.load(path, settings={"sum.upper": text})
     with pytest.raises(QuadvisError, match="'inf N' does not begin with a number"):
         quadvis.load(path, settings={"push.value": "inf N"})
+
+
+def test_a_parameter_of_the_diagram_has_the_value_of_the_blocks_that_have_it(path: Path) -> None:
+    path.write_text(
+        LOOP.replace("blocks:", "params: {push: 1 N}\nblocks:").replace("value: 1 N", "value: $push")
+    )
+    parameters = Parameters(quadvis.load(path))
+    assert parameters.text(*parameters.find("push")) == "1.0 N"
+    parameters.took(new_values(quadvis.load(path), {"push": "2 N"}))
+    assert parameters.text(*parameters.find("push")) == "2.0 N"
+    with pytest.raises(QuadvisError, match="there is no parameter 'pusch'; did you mean 'push'"):
+        parameters.find("pusch")
