@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
+from quadvis.block.block import OWN_MODULES
 from quadvis.errors import QuadvisError, quoted
 from quadvis.machine.shipped import PREFIX, named_file
 from quadvis.target.admission import sources_of
@@ -63,8 +64,11 @@ def pack(
 
 
 def _check_code(diagram: Diagram) -> None:
-    """Refuse a diagram with code that no target takes, such as an FMU."""
+    """Refuse a diagram with code that no target takes: that of blocks beside it, or of an FMU."""
     for node in diagram.graph.nodes:
+        if type(node.block).__module__.startswith(OWN_MODULES):
+            problem = f"block '{node.path}' is of the code beside the diagram, which no target takes"
+            raise QuadvisError(f"{problem}; install {node.kind} there and here as a library")
         if node.block.brings_code:
             name = Path(getattr(node.block, node.block.brings_code)).name
             problem = f"block '{node.path}' runs the machine code of {quoted(name)}, which no target takes"
