@@ -33,7 +33,11 @@ def target(options: argparse.Namespace) -> int:
 def _install(options: argparse.Namespace) -> int:
     from quadvis.target.unit import unit_text, write_unit
 
-    text = unit_text(options.name, listen=options.listen, startup=options.startup, cpu=options.cpu)
+    if options.until_idle is not None:
+        raise QuadvisError("--until-idle is for a target that is started by hand; with install, leave it out")
+    text = unit_text(
+        options.name, listen=options.listen, folder=options.folder, startup=options.startup, cpu=options.cpu
+    )
     if options.output == "-":
         print(text, end="")
     else:
