@@ -32,15 +32,17 @@ def acquire(tg: Target, signals: Sequence[str], settings: Mapping[str, Any], tim
     scope = tg.addscope("host", signals=signals, **settings)
     try:
         scope.start()
-        if tg.status()["Status"] != "running":
-            print(
-                f"{tg.name} runs no application: waiting {timeout:g} s for one", file=sys.stderr, flush=True
-            )
+        _say_if_nothing_runs(tg, f"waiting {timeout:g} s for one")
         for package in scope.packages(timeout):
             return package
         raise QuadvisError(_why(tg, scope.facts(), timeout))
     finally:
         scope.remove()
+
+
+def _say_if_nothing_runs(tg: Target, words: str) -> None:
+    if tg.status()["Status"] != "running":
+        print(f"{tg.name} runs no application: {words}", file=sys.stderr, flush=True)
 
 
 def _why(tg: Target, facts: Mapping[str, Any], timeout: float) -> str:
@@ -59,6 +61,7 @@ def live(tg: Target, signals: Sequence[str], settings: Mapping[str, Any]) -> Non
     drawn = 0.0
     try:
         scope.start()
+        _say_if_nothing_runs(tg, "waiting for one, until Ctrl-C")
         for package in scope.packages(1e9):
             kept.append(package)
             while sum(len(each.times) for each in kept) - len(kept[0].times) >= count:
