@@ -27,6 +27,7 @@ from quadvis.block.output import Output, Sealer
 from quadvis.block.random import fill_normal, fill_uniform, normal, normal_like, random_signs, uniform
 from quadvis.block.signals import ANY, NO_FRAME, SCALARS, Frame, Shape, SignalType, Sizes
 from quadvis.block.sizes import parameter_sizes, units_of
+from quadvis.block.unlike import unlike_sizes
 from quadvis.errors import OutOfRange
 from quadvis.machine.capture import CaptureRequest
 from quadvis.machine.ports import Card, ChannelError, OpenPort, PortError, PortSettings, Waiting
@@ -41,5 +42,5 @@ __all__ = [
     "Waiting", "Work", "all_finite", "clip", "copied", "element", "entry_name", "fill_normal",
     "fill_uniform", "inward", "normal", "normal_like", "parameter_sizes", "passed", "random_signs",
     "reached", "saturated", "uniform",
-    "units_of", "zeros_like",
+    "units_of", "unlike_sizes", "zeros_like",
 ]  # fmt: skip

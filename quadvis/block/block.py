@@ -17,6 +17,7 @@ import numpy as np
 
 from quadvis.block.declare import ParameterError, entry_name
 from quadvis.block.interface import PORTS, Interface, arguments_of_ports, interface_of
+from quadvis.block.unlike import unlike_sizes
 from quadvis.errors import QuadvisError, sentence, suggestion
 from quadvis.machine.inputs import file_digest, read_once
 from quadvis.machine.source_line import file_of, source_line
@@ -148,12 +149,23 @@ class Block:
         for name, param in declared.items():
             self.__dict__[name] = param.given(parameters.get(name))
         self._kept: dict[str, Any] = {}  # results of `read_file`, by parameter
-        self.check()
+        self._check()
         self._digests = {
             param.name: file_digest(getattr(self, param.name))
             for param in self.interface.files_read
             if param.name not in self._kept and os.path.isfile(getattr(self, param.name))
         }
+
+    def _check(self) -> None:
+        """Check the values; one that fails on values that do not fit together has this as its sentence."""
+        try:
+            self.check()
+        except QuadvisError:
+            raise
+        except Exception as error:
+            if (unlike := unlike_sizes(self)) is not None:
+                raise unlike from error
+            raise
 
     def check(self) -> None:
         """Raise ParameterError for values that make a run impossible, so that `quadvis check` finds them.

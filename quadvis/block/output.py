@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Protocol
 
 from quadvis.block.declare import Initial, ParameterError
 from quadvis.block.device import LineDevice
+from quadvis.block.unlike import unlike_sizes
 from quadvis.errors import sentence
 from quadvis.units import format_quantity, parse_period, read_quantity
 from quadvis.units.unit import Unit
@@ -134,7 +135,8 @@ class Output(LineDevice):
         except ParameterError:
             raise
         except Exception as error:
-            raise ParameterError(parameter, f"{parameter} gives no frame: {error}") from error
+            wrong = ParameterError(parameter, f"{parameter} gives no frame: {error}")
+            raise unlike_sizes(self) or wrong from error
         taken, line = self.settings.time(count) + self.settings.gap, self.settings
         if taken > self.interval:
             named = self.rate if self.rate in self.interface.params else self.port_parameter

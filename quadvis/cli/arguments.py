@@ -84,10 +84,7 @@ def _checked(parser: Parser, words: Sequence[str]) -> list[str]:
     further = [place for place in parser.places if place.nargs == "?"]
     further += [place for place in parser.places if place.nargs in ("*", "+")] * (len(placed) - len(needed))
     for place, word in zip([*needed, *further], placed, strict=False):
-        if place.choices is not None and word not in place.choices:
-            named = [str(each) for each in place.choices]
-            remedy = suggestion(word, named) or f"choose from {', '.join(map(quoted, named))}"
-            raise QuadvisError(sentence(f"{_name(place)} cannot be {quoted(word)}", remedy))
+        _check_choice(place, _name(place), word)
         _check_value(place, _name(place), word)
     given = {word.partition("=")[0] for word in found}
     lacking = [
@@ -130,7 +127,18 @@ def _option(parser: Parser, word: str, waiting: list[str]) -> list[str]:
     if not equals or value == "--":
         raise QuadvisError(f"{name} needs a value; write {name} {_name(action)}")
     _check_value(action, name, value)
+    _check_choice(action, name, value)
     return [f"{action.option_strings[0]}={value}"]
+
+
+def _check_choice(action: argparse.Action, name: str, value: str) -> None:
+    """Refuse what is none of the values that an argument has, if they are listed."""
+    if action.choices is None:
+        return
+    named = [str(each) for each in action.choices]
+    if value not in named:
+        remedy = suggestion(value, named) or f"choose from {', '.join(map(quoted, named))}"
+        raise QuadvisError(sentence(f"{name} cannot be {quoted(value)}", remedy))
 
 
 def _check_value(action: argparse.Action, name: str, value: str) -> None:

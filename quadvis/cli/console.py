@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import shlex
 import sys
 from contextlib import suppress
@@ -20,9 +21,6 @@ ENDS = ("exit", "quit", "bye")
 
 def run_console(target: Target) -> int:
     """Do the commands that are typed, on one target, until the end of the input."""
-    from quadvis.cli.arguments import understood
-    from quadvis.cli.options import parser
-
     with suppress(ImportError):
         import readline  # noqa: F401 - gives `input` a history
     prompt = f"{target.name}> " if sys.stdin.isatty() else ""
@@ -41,10 +39,7 @@ def run_console(target: Target) -> int:
             continue
         code = 0
         try:
-            words = shlex.split(line)
-            if words[0] not in COMMANDS:
-                raise QuadvisError(f"write one of {', '.join(COMMANDS)}, or exit")
-            options = understood(parser(), words)
+            options = _read(line, target.name)
             options.connected = _Kept(target)
             code = int(options.command(options))
         except KeyboardInterrupt:
@@ -54,6 +49,23 @@ def run_console(target: Target) -> int:
             code = getattr(error, "exit_code", 2)
         except SystemExit:  # the help of a command
             pass
+
+
+def _read(line: str, name: str) -> argparse.Namespace:
+    """Return a line's command with its options; QuadvisError if it is none, or means another target."""
+    from quadvis.cli.arguments import understood
+    from quadvis.cli.options import parser
+
+    try:
+        words = shlex.split(line)
+    except ValueError:
+        raise QuadvisError("a quotation mark or a backslash has no other half; write it in pairs") from None
+    if words[0] not in COMMANDS:
+        raise QuadvisError(f"write one of {', '.join(COMMANDS)}, or exit")
+    options = understood(parser(), words)
+    if options.target not in (None, name):
+        raise QuadvisError(f"this console is that of {name}; leave --target out, or open another console")
+    return options
 
 
 class _Kept:

@@ -27,6 +27,7 @@ def run(options: argparse.Namespace) -> int:
     from quadvis.machine.status_line import ProgressLine
     from quadvis.run.report import summary_lines
     from quadvis.run.session import run as run_diagram
+    from quadvis.run.trace import TRACE
 
     if options.target is not None or options.on:
         from quadvis.cli.run_on_target import check_options, run_on_several, run_on_target
@@ -34,6 +35,8 @@ def run(options: argparse.Namespace) -> int:
         check_options(options)
     real_time = _real_time(options)
     diagram = load_diagram(options, stop_time=options.stop_time, seed=options.seed)
+    if options.profile:
+        check_output(options.profile, TRACE, diagram.inputs)
     log = log_path(options.log, diagram)
     print_warnings(diagram, options)
     if options.target is not None:

@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from quadvis.errors import QuadvisError
-from quadvis.machine.files import Kind, write_output
+from quadvis.machine.files import PNG, Kind, check_output, write_output
 from quadvis.scopes.package import Package
 
 if TYPE_CHECKING:
     from quadvis.host.target import Target
 
-CSV = Kind("the table")
+CSV = Kind("the table", (b"time [s],",))
+KINDS = {".csv": CSV, ".png": PNG}  # by the end of the file's name
 LIVE = 0.1  # s between two pictures
 HEIGHT = 16  # lines of a picture
 
@@ -31,15 +32,17 @@ def acquire(tg: Target, signals: Sequence[str], settings: Mapping[str, Any], tim
     scope = tg.addscope("host", signals=signals, **settings)
     try:
         scope.start()
-        if tg.status()["Status"] != "running":
-            print(
-                f"{tg.name} runs no application: waiting {timeout:g} s for one", file=sys.stderr, flush=True
-            )
+        _say_if_nothing_runs(tg, f"waiting {timeout:g} s for one")
         for package in scope.packages(timeout):
             return package
         raise QuadvisError(_why(tg, scope.facts(), timeout))
     finally:
         scope.remove()
+
+
+def _say_if_nothing_runs(tg: Target, words: str) -> None:
+    if tg.status()["Status"] != "running":
+        print(f"{tg.name} runs no application: {words}", file=sys.stderr, flush=True)
 
 
 def _why(tg: Target, facts: Mapping[str, Any], timeout: float) -> str:
@@ -58,6 +61,7 @@ def live(tg: Target, signals: Sequence[str], settings: Mapping[str, Any]) -> Non
     drawn = 0.0
     try:
         scope.start()
+        _say_if_nothing_runs(tg, "waiting for one, until Ctrl-C")
         for package in scope.packages(1e9):
             kept.append(package)
             while sum(len(each.times) for each in kept) - len(kept[0].times) >= count:
@@ -82,8 +86,16 @@ def shown(samples: Package) -> str:
     return panel(samples, width, min(HEIGHT, lines - 3), colours=shows_colours(sys.stdout))
 
 
+def check_place(path: Path) -> None:
+    """Raise QuadvisError if samples cannot be written there: before they are waited for."""
+    if path.suffix not in KINDS:
+        raise QuadvisError(f"cannot write samples as '{path}': give a name that ends in .csv or .png")
+    check_output(path, KINDS[path.suffix])
+
+
 def written(samples: Package, path: Path) -> str:
     """Write samples as a table, .csv, or as a picture, .png; return the path."""
+    check_place(path)
     if path.suffix == ".csv":
         text = io.StringIO()
         rows = csv.writer(text, lineterminator="\n")
@@ -91,10 +103,8 @@ def written(samples: Package, path: Path) -> str:
         rows.writerow(["time [s]", *units])
         rows.writerows(np.column_stack((samples.times, samples.samples)).tolist())
         write_output(path, CSV, text.getvalue())
-    elif path.suffix == ".png":
-        _picture(samples, path)
     else:
-        raise QuadvisError(f"cannot write samples as '{path}': give a name that ends in .csv or .png")
+        _picture(samples, path)
     return str(path)
 
 
@@ -117,7 +127,7 @@ def _picture(samples: Package, path: Path) -> None:
     picture = io.BytesIO()
     figure.savefig(picture, format="png", dpi=120)
     pyplot.close(figure)
-    write_output(path, Kind("the picture", (b"\x89PNG",)), picture.getvalue())
+    write_output(path, PNG, picture.getvalue())
 
 
 def _named(samples: Package) -> list[tuple[str, str]]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quadvis.cli.given import FAILED
 from quadvis.cli.shown import print_json
-from quadvis.errors import QuadvisError, quoted
+from quadvis.errors import QuadvisError, closest, quoted
 
 if TYPE_CHECKING:
     from quadvis.host.profiler import ProfilerData
@@ -33,7 +33,11 @@ def target(options: argparse.Namespace) -> int:
 def _install(options: argparse.Namespace) -> int:
     from quadvis.target.unit import unit_text, write_unit
 
-    text = unit_text(options.name, listen=options.listen, startup=options.startup, cpu=options.cpu)
+    if options.until_idle is not None:
+        raise QuadvisError("--until-idle is for a target that is started by hand; with install, leave it out")
+    text = unit_text(
+        options.name, listen=options.listen, folder=options.folder, startup=options.startup, cpu=options.cpu
+    )
     if options.output == "-":
         print(text, end="")
     else:
@@ -55,7 +59,10 @@ def load(options: argparse.Namespace) -> int:
             )  # fmt: skip
             tg.load(diagram, engine=options.engine, name=options.name, computers=options.computer)
         else:
-            tg.load(what)
+            tg.load(
+                what, variant=options.variant, settings=options.set, params=options.params,
+                stop_time=options.stop_time, name=options.name, computers=options.computer,
+            )  # fmt: skip
         print(f"{tg.name}: {tg.Application} is loaded, {tg.Status}")
     return 0
 
@@ -117,7 +124,13 @@ def set_parameters(options: argparse.Namespace) -> int:
         name, equals, value = text.partition("=")
         if not equals:
             raise QuadvisError(f"{quoted(text)} gives no value; write NAME=VALUE")
-        values[name.strip()] = value.strip()
+        name = name.strip()
+        if not name or not value.strip():
+            lacking = "value" if name else "name"
+            raise QuadvisError(f"{quoted(text)} gives no {lacking}; write NAME=VALUE")
+        if name in values:
+            raise QuadvisError(f"{quoted(name)} is given twice; give it one value")
+        values[name] = value.strip()
     with _target(options) as tg:
         _print_changes(tg, tg.tune(values))
     return 0
@@ -125,8 +138,10 @@ def set_parameters(options: argparse.Namespace) -> int:
 
 def scope(options: argparse.Namespace) -> int:
     """Acquire samples of signals, and print them as a picture, or write them."""
-    from quadvis.cli.scope_view import acquire, live, written
+    from quadvis.cli.scope_view import acquire, check_place, live, written
 
+    if options.output:
+        check_place(Path(options.output))
     with _target(options) as tg:
         settings = _scope_settings(options)
         if options.live:
@@ -163,6 +178,11 @@ def sets(options: argparse.Namespace) -> int:
 
 def profile(options: argparse.Namespace) -> int:
     """Start or stop the profiler, or print what it has found, and write it as a trace."""
+    if options.output:
+        from quadvis.machine.files import check_output
+        from quadvis.run.trace import TRACE
+
+        check_output(options.output, TRACE)
     with _target(options) as tg:
         if options.seconds is not None:
             _show_profile(tg.profile(options.seconds), options.output)
@@ -215,8 +235,17 @@ def _outcome(found: Mapping[str, Any]) -> int:
     return 0
 
 
-def _value(tg: Target, name: str, parameters: set[str]) -> Any:
-    return tg.getparam(name) if name in parameters else tg.getsignal(name)
+def _value(tg: Target, name: str, parameters: Collection[str]) -> Any:
+    """Return the value of a parameter, of a block or of more, or of a signal."""
+    if name in parameters:
+        return tg.getparam(name)
+    try:
+        return tg.getsignal(name)
+    except QuadvisError as error:
+        try:
+            return tg.getparam(name)  # of a part, or of the diagram
+        except QuadvisError as other:
+            raise (other if closest(name, parameters) else error) from None
 
 
 def _print_changes(tg: Target, found: Mapping[str, Any]) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 from quadvis.cli import target_commands as commands
 from quadvis.cli.arguments import Parser
 from quadvis.cli.bridge import add_bridge
+from quadvis.cli.tool import waiting_time
 
 Add = Callable[..., Parser]
 
@@ -73,7 +74,7 @@ def _target_options(parser: Parser) -> None:
     parser.add_argument("--folder", metavar="FOLDER", help=words)
     parser.add_argument("--startup", metavar="APP", help="load and start this application at once")
     words = "end when nothing is loaded and nobody has asked for anything for so long (s)"
-    parser.add_argument("--until-idle", metavar="S", type=float, help=words)
+    parser.add_argument("--until-idle", metavar="S", type=waiting_time, help=words)
     words = "write a systemd unit that starts the target at boot, with these options"
     parser.add_argument("action", nargs="?", choices=("install",), metavar="install", help=words)
     words = "with install: the processors that the target may use"
@@ -91,5 +92,5 @@ def _scope_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--trigger", metavar="'SLOPE SIGNAL'", help=words)
     parser.add_argument("--level", type=float, default=0.5, metavar="X", help="of the trigger; default 0.5")
     parser.add_argument("--pre", type=int, default=0, metavar="N", help="samples before the trigger")
-    parser.add_argument("--timeout", type=float, default=60.0, metavar="S", help="default 60 s")
+    parser.add_argument("--timeout", type=waiting_time, default=60.0, metavar="S", help="default 60 s")
     parser.add_argument("--output", "-o", metavar="PATH", help="write a table, .csv, or a picture, .png")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -14,6 +15,7 @@ from quadvis.machine.exits import ended, listen
 from quadvis.machine.interrupts import end_orderly
 
 _Section = TypeVar("_Section")
+_LONGEST = 1e9  # s
 _COUNT = re.compile("[1-9][0-9]{0,8}")
 _DIMENSIONS = re.compile("([1-9][0-9]{0,3})[xX]([1-9][0-9]{0,3})")
 
@@ -51,6 +53,17 @@ def positive(text: str) -> int:
     if _COUNT.fullmatch(text) is None:
         raise argparse.ArgumentTypeError(f"{quoted(text)} is not a whole number from 1 on")
     return int(text)
+
+
+def waiting_time(text: str) -> float:
+    """Read a time to wait (s), for an option's ``type``."""
+    try:
+        found = float(text)
+    except ValueError:
+        found = math.nan
+    if not 0.0 <= found <= _LONGEST:
+        raise argparse.ArgumentTypeError(f"{quoted(text)} is no number of seconds from 0 to {_LONGEST:g}")
+    return found
 
 
 def dimensions(text: str) -> tuple[int, int]:

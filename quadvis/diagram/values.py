@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -21,6 +23,7 @@ class Bare:
 
 
 BARE = Bare()
+_INFINITE = re.compile(r"([+-]?)inf(?:\s+(.+))?")
 OpenUnits = tuple[Unit | Bare | None, ...]  # of the elements; None is a 0 without unit, which fits any
 
 
@@ -41,7 +44,31 @@ def read_parameter(param: Param, node: YamlNode, diagram: Path | None = None) ->
         return node.text(), ()
     if param.choices:
         return node.choice(param.choices), ()
-    return read_value(param.signal, param.units, node)
+    return read_numbers(param, param.units, node)
+
+
+def read_numbers(param: Param, units: Sequence[Unit], node: YamlNode) -> tuple[Any, OpenUnits]:
+    """Return what `read_value` does; an infinite default may also be written as it is shown, "-inf m".
+
+    So the values in force, which parameter sets keep, can all be given again.
+    """
+    infinite = _default_infinity(param, node)
+    if infinite is None:
+        return read_value(param.signal, units, node)
+    if not infinite.value:
+        return param.default, (None,) if any(unit.variables for unit in units) else ()
+    return param.default, read_value(param.signal, units, infinite)[1]
+
+
+def _default_infinity(param: Param, node: YamlNode) -> YamlScalar | None:
+    """Return 1 with the unit of an infinite value, or "" if it has no unit; None if it is no such default."""
+    if not isinstance(param.default, float) or not math.isinf(param.default):
+        return None
+    match = _INFINITE.fullmatch(node.value.strip()) if isinstance(node, YamlScalar) else None
+    if match is None or (match[1] == "-") != (param.default < 0):
+        return None
+    one = f"1 {match[2]}" if match[2] else ""
+    return YamlScalar(one, True, node.file, node.line, node.column, node.key)
 
 
 def file_fault(

@@ -79,8 +79,7 @@ class Acceptance:
         accepted = self._blocks[path].interface.params[name].accept(value)
         shape, wanted = np.shape(accepted), tunable.slot.shape
         if shape not in ((), wanted):
-            sizes = [" x ".join(map(str, each)) or "one" for each in (wanted, shape)]
-            raise ParameterError(name, f"{name} has {sizes[0]} values in this run, got {sizes[1]}")
+            raise ParameterError(name, f"{name} has {_size(wanted)} in this run, got {_size(shape)}")
         return accepted
 
     def _given(self, path: str, name: str, block: Block) -> Any:
@@ -94,6 +93,13 @@ class Acceptance:
         if any(name in block.interface.params for block in self._blocks.values()) and mine:
             return f"'{wanted}' cannot be tuned", f"block '{path}' can be tuned in {', '.join(mine)}"
         return f"'{wanted}' is no parameter that can be tuned", suggestion(wanted, self.names)
+
+
+def _size(shape: Sequence[int]) -> str:
+    """Return a shape in words."""
+    if tuple(shape) == (1,):
+        return "a list of one value"
+    return f"{' x '.join(map(str, shape))} values" if shape else "one value"
 
 
 class Tuning:

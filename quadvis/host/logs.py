@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quadvis.errors import QuadvisError
+from quadvis.machine.files import LOG, check_output, open_output
 from quadvis.wire.limits import PIECE
 
 if TYPE_CHECKING:
@@ -40,13 +41,15 @@ class TargetLogs:
         return list(self._request("logs"))
 
     def copy(self, name: str, place: Path) -> Path:
-        """Copy a log to a path."""
-        with place.open("wb") as file:
+        """Copy a log to a path, where there may be another log; QuadvisError if there is another file."""
+        check_output(place, LOG)
+        piece = self._request("getlog", name=name, offset=0, count=PIECE)  # of no log nothing is written
+        with open_output(place, LOG) as file:
             while True:
-                piece = self._request("getlog", name=name, offset=file.tell(), count=PIECE)
                 file.write(piece["data"])
                 if not piece["data"] or file.tell() >= piece["size"]:
                     return place
+                piece = self._request("getlog", name=name, offset=file.tell(), count=PIECE)
 
     def newest_name(self) -> str:
         """Return the name of the newest log; QuadvisError if there is none."""

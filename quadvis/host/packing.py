@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
+from quadvis.block.block import OWN_MODULES
 from quadvis.errors import QuadvisError, quoted
 from quadvis.machine.shipped import PREFIX, named_file
 from quadvis.target.admission import sources_of
@@ -23,10 +24,11 @@ def pack(
     """Return a diagram as a bundle, and the paths of its files by their SHA-256.
 
     Files lie in the bundle as they lie beside the diagram. QuadvisError if one is named by an absolute path,
-    or if a block's code lies beside the diagram: a target runs what is installed there.
+    if one is code, or if a block's code lies beside the diagram: a target runs what is installed there.
     """
     from quadvis.run.played_files import played_files
 
+    _check_code(diagram)
     folder = diagram.path.parent
     names = {**_listed(diagram), **played_files(diagram)}
     names = {name: digest for name, digest in names.items() if not name.startswith(PREFIX)}
@@ -59,6 +61,18 @@ def pack(
         tuple(computers),
     )
     return ApplicationBundle.read(bundle.plain()), paths
+
+
+def _check_code(diagram: Diagram) -> None:
+    """Refuse a diagram with code that no target takes: that of blocks beside it, or of an FMU."""
+    for node in diagram.graph.nodes:
+        if type(node.block).__module__.startswith(OWN_MODULES):
+            problem = f"block '{node.path}' is of the code beside the diagram, which no target takes"
+            raise QuadvisError(f"{problem}; install {node.kind} there and here as a library")
+        if node.block.brings_code:
+            name = Path(getattr(node.block, node.block.brings_code)).name
+            problem = f"block '{node.path}' runs the machine code of {quoted(name)}, which no target takes"
+            raise QuadvisError(f"{problem}; fly it with 'quadvis run FILE --real-time'")
 
 
 def _listed(diagram: Diagram) -> Mapping[str, str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from quadvis.errors import sentence, suggestion
+from quadvis.errors import QuadvisError, quoted, sentence, suggestion
 from quadvis.host.logs import PARTS
 from quadvis.units import Unit, format_quantity
 
@@ -36,6 +36,27 @@ def known(name: str) -> str:
     problem = f"a target has no '{name}'"
     remedy = f"write one of {', '.join(found)}" if found else suggestion(name, _BY_ALIAS)
     raise AttributeError(sentence(problem, remedy))
+
+
+def number_of(name: str, value: Any) -> float:
+    """Return a number that a property is to have, which may be infinite; QuadvisError if it is none."""
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise QuadvisError(f"'{name}' cannot be {quoted(value)}; give a number") from None
+
+
+def seconds(name: str, value: Any) -> float:
+    """Return a time (s) that a property is to have: a number, or a text such as "30 s"."""
+    try:
+        return number_of(name, value)
+    except QuadvisError:
+        if not isinstance(value, str):
+            raise
+    from quadvis.diagram.times import read_duration
+    from quadvis.document import YamlScalar
+
+    return float(read_duration(YamlScalar(value, False, name, 0, 0)))
 
 
 def shown(name: str, value: Any) -> str:

@@ -73,6 +73,8 @@ class HostScope:
     def set(self, **properties: Any) -> None:
         """Set several properties at once; all of them hold or none."""
         given = {name: value for name, value in properties.items() if name != "signals" or value}
+        if signals := given.get("signals"):
+            given["signals"] = [signals] if isinstance(signals, str) else list(signals)
         if given:
             self._connection.operate("setscope", id=self._number, values=given)
 

@@ -10,13 +10,20 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from quadvis.errors import QuadvisError
+from quadvis.errors import QuadvisError, quoted
+from quadvis.errors.caller import as_given
 from quadvis.host.connection import HostConnection, connect
 from quadvis.host.logs import TargetLogs
-from quadvis.host.properties import PART_NAMES, PROPERTIES, known, shown
+from quadvis.host.properties import PART_NAMES, PROPERTIES, known, number_of, seconds, shown
 from quadvis.host.scope import HostScope
 from quadvis.machine.columns import table
 from quadvis.wire.limits import PIECE
+
+# What a diagram can be given when it is loaded: as an option, and as an argument.
+_OF_DIAGRAMS = (
+    ("--variant", "variant"), ("--set", "settings"), ("--params", "params"), ("--stop-time", "stop_time"),
+    ("--name", "name"), ("--computer", "computers"),
+)  # fmt: skip
 
 if TYPE_CHECKING:
     import numpy as np
@@ -114,12 +121,12 @@ class Target:
     def __setattr__(self, name: str, value: Any) -> None:
         meant = known(name)
         if meant in ("StopTime", "SampleTime"):
-            self._connection.operate("settime", deadline=LOADING, **{meant: float(value)})
+            self._connection.operate("settime", deadline=LOADING, **{meant: seconds(name, value)})
         elif meant == "ViewMode":
-            number = None if str(value).lower() == "all" else int(value)
+            number = None if str(value).lower() == "all" else int(number_of(name, value))
             self._connection.operate("setview", id=number)
         elif meant == "MaxLogSamples":
-            self._connection.operate("setlog", deadline=LOADING, MaxLogSamples=float(value))
+            self._connection.operate("setlog", deadline=LOADING, MaxLogSamples=number_of(name, value))
         else:
             raise AttributeError(
                 f"'{name}' of a target cannot be set; StopTime, SampleTime, MaxLogSamples and ViewMode can"
@@ -149,17 +156,26 @@ class Target:
         variant: str | None = None,
         settings: Given = (),
         params: Files = (),
+        stop_time: str | None = None,
         engine: str = "auto",
         name: str | None = None,
         computers: Sequence[str] = (),
     ) -> Target:
         """Load a diagram, or an application that the target keeps under a name, in place of the one there.
 
-        ``computers`` are those of the diagram that this target is to be; none means all of them.
+        ``computers`` are those of the diagram that this target is to be; none means all of them. QuadvisError
+        if an application is to be another one than it is kept as.
         """
         application = str(what)
+        if not isinstance(what, str | Path) and not hasattr(what, "graph"):
+            raise QuadvisError(
+                f"a target loads a path, a diagram, or an application's name, not {quoted(what)}"
+            )
         if not isinstance(what, str) or what.endswith((".yaml", ".yml")):
-            application = self._send(_loaded(what, variant, settings, params), name, engine, computers)
+            diagram = _loaded(what, variant, settings, params, stop_time)
+            application = self._send(diagram, name, engine, computers)
+        else:
+            _check_kept(what, variant, settings, params, stop_time, name, computers)
         self._connection.operate("load", application=application, deadline=LOADING)
         return self
 
@@ -336,13 +352,18 @@ class Target:
     # scopes
 
     def addscope(
-        self, type: str = "host", number: int | None = None, *, signals: Sequence[str] = (), **settings: Any
+        self,
+        type: str = "host",
+        number: int | None = None,
+        *,
+        signals: str | Sequence[str] = (),
+        **settings: Any,
     ) -> HostScope:
         """Add a scope: ``host``, ``target`` or ``file``; return it. Settings are xPC's, see `HostScope`."""
         number = int(self._connection.operate("addscope", id=number, type=type))
         scope = HostScope(self._connection, number)
         try:
-            scope.set(signals=list(signals), **settings)
+            scope.set(signals=signals, **settings)
         except QuadvisError:
             scope.remove()
             raise
@@ -384,12 +405,23 @@ class Target:
         return self._logs.samples(signal, first, count, decimation)
 
 
-def _loaded(what: str | Path | Diagram, variant: str | None, settings: Given, params: Files) -> Diagram:
+def _loaded(
+    what: str | Path | Diagram, variant: str | None, settings: Given, params: Files, stop_time: str | None
+) -> Diagram:
     if not isinstance(what, str | Path):
         return what
     from quadvis.diagram.load import load
 
-    return load(what, variant=variant, settings=settings, params=params)
+    return load(what, variant=variant, settings=settings, params=params, stop_time=stop_time)
+
+
+def _check_kept(application: str, *given: Any) -> None:
+    """Refuse what an application that is kept has already."""
+    for value, (option, argument) in zip(given, _OF_DIAGRAMS, strict=True):
+        if value:
+            named = as_given(option, argument)
+            problem = f"the application {quoted(application)} is loaded as it is kept, without {named}"
+            raise QuadvisError(f"{problem}; name the file of the diagram, or leave {named} out")
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -150,13 +150,13 @@ class Devices:
 
 
 def guards_all(part: Graph) -> bool:
-    """Return whether a graph has output devices, and besides them nothing that needs safe values."""
+    """Return whether a graph has nothing that needs safe values besides output devices, if it has any."""
     writers = [
         node.block
         for node in part.nodes
         if "write" in node.block.interface.arguments or type(node.block).write_safe is not Block.write_safe
     ]
-    return bool(writers) and all(isinstance(block, Output) or block.harmless for block in writers)
+    return all(isinstance(block, Output) or block.harmless for block in writers)
 
 
 def _shared(outputs: Mapping[str, LineDevice], inputs: Mapping[str, LineDevice]) -> set[str]:

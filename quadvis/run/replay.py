@@ -140,7 +140,8 @@ def _loaded(log: Log, folder: str | Path | None, own_blocks: OwnBlocks, settings
             replace(fault, place=replace(fault.place, file=f"{log.path}: diagram")) if own else fault
             for fault, own in zip(error.faults, mine, strict=True)
         )
-        if folder is None:
+        given = as_given("--set", "settings")
+        if folder is None and any(fault.place.file != given for fault in error.faults):
             option = as_given("--folder", "folder")
             found.add_note(f"the log says that its diagram stood in '{where}'; {option} names another folder")
         raise found from None

@@ -10,7 +10,7 @@ from quadvis.diagram.diagram import Diagram
 from quadvis.diagram.knobs import Knob
 from quadvis.diagram.parameters import read_constant
 from quadvis.diagram.settings import read_setting
-from quadvis.diagram.values import read_value
+from quadvis.diagram.values import read_numbers
 from quadvis.engine.tuning import NewValue
 from quadvis.errors import Faults, Place, QuadvisError, known, quoted, sentence, suggestion
 from quadvis.graph.graph import Index, Node
@@ -121,4 +121,4 @@ def _value(node: Node, param: Param, name: str, value: Any) -> Any:
     written = read_constant(read_setting(value, param.name, Place(name)), faults)
     faults.check()
     assert known(written)
-    return read_value(param.signal, node.units[param.name], written)[0]
+    return read_numbers(param, node.units[param.name], written)[0]

@@ -94,12 +94,17 @@ class Parameters:
         return param.choices[value] if param.choices else value
 
     def find(self, name: str) -> tuple[str, str]:
-        """Return the block and the parameter that a name means; QuadvisError if there is none."""
+        """Return the block and the parameter that a name means; QuadvisError if there is none.
+
+        A parameter of a part or of the diagram means the first parameter of a block that has its value.
+        """
+        names, knobs = self.names, self._diagram.knobs
+        if name not in names and (knob := knobs.get(name)) is not None and knob.targets:
+            return knob.targets[0]
         path, _, parameter = name.rpartition(".")
-        if name not in self.names:
-            raise QuadvisError(
-                sentence(f"there is no parameter {quoted(name)}", suggestion(name, self.names))
-            )
+        if name not in names:
+            remedy = suggestion(name, [*names, *knobs])
+            raise QuadvisError(sentence(f"there is no parameter {quoted(name)}", remedy))
         return path, parameter
 
     def _all(self) -> Iterator[tuple[Node, str, Param]]:

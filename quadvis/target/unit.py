@@ -8,6 +8,7 @@ from pathlib import Path
 
 from quadvis.errors import QuadvisError
 from quadvis.machine.files import Kind, write_output
+from quadvis.wire.keys import checked_name
 
 FOLDER = Path("/etc/systemd/system")
 UNIT = Kind("the systemd unit", (b"[Unit]",), rb"^ExecStart=")
@@ -15,16 +16,23 @@ WATCHDOG = 10  # s
 
 
 def unit_text(
-    name: str, *, listen: str | None = None, startup: str | None = None, cpu: str | None = None
+    name: str,
+    *,
+    listen: str | None = None,
+    folder: str | None = None,
+    startup: str | None = None,
+    cpu: str | None = None,
 ) -> str:
     """Return the unit of a target with this name; ``cpu`` is as in "1" or "1,2".
 
     The limits let the loops have SCHED_FIFO and lock their memory without further rights. systemd starts the
     target again if it ends or hangs.
     """
-    command = [sys.executable, "-m", "quadvis", "target", "--name", name]
+    command = [sys.executable, "-m", "quadvis", "target", "--name", checked_name(name)]
     if listen:
         command += ["--listen", listen]
+    if folder:
+        command += ["--folder", str(Path(folder).absolute())]
     if startup:
         command += ["--startup", startup]
     lines = [
@@ -36,7 +44,7 @@ def unit_text(
         "[Service]",
         "Type=notify",
         "NotifyAccess=main",
-        f"ExecStart={shlex.join(command)}",
+        f"ExecStart={_line(command)}",
         "Restart=on-failure",
         f"WatchdogSec={WATCHDOG}",
         "KillMode=control-group",  # "mixed" kills the guardian at once when the target has died
@@ -56,6 +64,11 @@ def unit_text(
     ]
     kept = [line for number, line in enumerate(lines) if line or (number and lines[number - 1])]
     return "\n".join(kept) + "\n"
+
+
+def _line(command: list[str]) -> str:
+    """Return a command as systemd reads it, to which % and $ mean something in quotes, too."""
+    return shlex.join(command).replace("%", "%%").replace("$", "$$")
 
 
 def write_unit(text: str, name: str, path: str | None) -> str:

@@ -302,7 +302,7 @@ def test_an_array_keeps_its_size() -> None:
     made = alone(Triple(), {}, {"n": 3}, Fraction(1, 10))
     with made:
         (tunable,) = made.program.tunables
-        with pytest.raises(ParameterError, match="values has 3 values in this run, got 4"):
+        with pytest.raises(ParameterError, match="values has 3 values in this run, got 4 values"):
             made.tuning.set(tunable.path, "values", [1, 2, 3, 4])
         made.tuning.set(tunable.path, "values", [4, 5, 6])
         made.run(1)

@@ -131,3 +131,17 @@ def test_the_command_prints_a_table_and_writes_a_trace(
     assert all(event["dur"] >= 0 and event["ts"] >= 0 for event in calls)
     assert main(["run", "timed.yaml", "--log", "", "--profile", ""]) == 0
     assert "profile: " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("place", ["missing/trace.json", "timed.yaml", "notes.json"])
+def test_a_place_where_no_trace_can_go_is_refused_before_the_run(
+    place: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("timed.yaml").write_text(TEXT)
+    Path("notes.json").write_text("{}")
+    assert main(["run", "timed.yaml", "--profile", place]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith(f"cannot write the trace '{place}': ")
+    assert not Path("runs").exists()

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import Out, Param, ParameterError
+from quadvis.block import Out, Param, ParameterError, unlike_sizes
 from quadvis_blocks.hardware._cards.devices import CardInput
 from quadvis_blocks.hardware._cards.frames import MICRO, ChannelKind
 from quadvis_blocks.hardware._cards.ports import CardChannel
@@ -49,6 +49,8 @@ class AdcIn(CardInput):
     def check(self) -> None:
         """Refuse wrong channels and ranges without a width."""
         super().check()
+        if (unlike := unlike_sizes(self)) is not None:
+            raise unlike
         if not self.ranges.all():
             raise ParameterError("ranges", "ranges must be different from 0 V, element by element")
 

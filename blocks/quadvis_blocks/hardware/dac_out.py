@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadvis.block import In, Initial, Out, Param, ParameterError, Safe, State
+from quadvis.block import In, Initial, Out, Param, ParameterError, Safe, State, unlike_sizes
 from quadvis_blocks.hardware._cards.devices import CardOutput
 from quadvis_blocks.hardware._cards.frames import MICRO, ChannelKind
 from quadvis_blocks.hardware._cards.ports import CardChannel
@@ -73,6 +73,8 @@ class DacOut(CardOutput):
                 )
         if len(self.at_lowest) != len(self.at_highest):
             raise ParameterError("at_highest", "at_highest must be given if at_lowest is, and only then")
+        if (unlike := unlike_sizes(self)) is not None:
+            raise unlike
         ranges = [OUTPUT_RANGES[code] for code in self.ranges]
         bottom, top = np.array([found[:2] for found in ranges]).T
         words = ", ".join(map(str, dict.fromkeys(ranges)))

@@ -17,6 +17,7 @@ from quadvis.block import ParameterError
 from quadvis.cli import main
 from quadvis.errors import QuadvisError, RunError
 from quadvis.export.package import OPTIONS
+from quadvis.host.packing import pack
 from quadvis.testing import check_block, drive
 from quadvis_blocks.fmi.fmu import Fmu
 from tests.fmus.builder import needs_gcc
@@ -246,7 +247,12 @@ base: loop.yaml
 blocks: {{law: {{block: fmi.fmu, rate: slow, with: {{file: law.fmu, isolation: {isolation}}}}}}}
 """
     )
-    ours, other = whole.run(), quadvis.load(tmp_path / "other.yaml").run()
+    loaded = quadvis.load(tmp_path / "other.yaml")
+    with pytest.raises(
+        QuadvisError, match=r"'law' runs the machine code of 'law.fmu', which no target takes"
+    ):
+        pack(loaded)
+    ours, other = whole.run(), loaded.run()
     for name in ("plant.y", "law.command", "law.late"):
         assert np.array_equal(ours[name], other[name]), name
 

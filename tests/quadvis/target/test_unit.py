@@ -49,6 +49,22 @@ def test_a_unit_starts_at_boot_is_watched_and_may_use_real_time() -> None:
     assert "CPUAffinity" not in plain["Service"] and "After" not in plain["Unit"]
 
 
+def test_a_unit_has_the_folder_and_a_name_that_the_target_takes() -> None:
+    service = entries(unit_text("lab1", folder="/srv/50% of $HOME/ü"))["Service"]
+    assert "%% of $$HOME" in service["ExecStart"]
+    words = shlex.split(service["ExecStart"].replace("%%", "%").replace("$$", "$"))
+    assert parser().parse_args(words[3:]).folder == "/srv/50% of $HOME/ü"
+    for name in ("a b", "ä", "a/b", ""):
+        with pytest.raises(QuadvisError, match="cannot be a name"):
+            unit_text(name)
+
+
+def test_an_option_that_a_unit_does_not_have_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["target", "install", "--until-idle", "3", "-o", "-"]) == 2
+    said = capsys.readouterr()
+    assert (said.out, said.err.partition(" is for")[0]) == ("", "--until-idle")
+
+
 def test_wrong_processors_are_refused() -> None:
     with pytest.raises(QuadvisError, match="numbers of processors"):
         unit_text("lab1", cpu="one")
