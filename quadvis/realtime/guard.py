@@ -71,8 +71,8 @@ class Guard:
             standing,
             readers or {},
         )
-        # A daemon is told to end if this process ends without `close`, such as for lack of memory; for any other
-        # one Python would wait, and it for us.
+        # A daemon is told to end if this process ends without `close`, such as for lack of memory. For any
+        # other process Python would wait, and it for us.
         self.process: BaseProcess = context.Process(target=guard, args=(setup,), name="guardian", daemon=True)
         self._started = self._lost = False
 

@@ -220,7 +220,7 @@ class Guardian:
         self._supervisor.look()
         self._applications.look()
         self._vital.look()
-        # Each life is looked at whatever is known already: the end of one that is not looked at keeps it awake.
+        # Each life is looked at, whatever is known already: an end that is not looked at keeps it awake.
         host_lost = self._vigil.has_ended() or self._supervisor.any_ended
         if (host_lost and self._setup.on_host_loss == SAFE) or self._vital.any_ended:
             self._make_safe()
