@@ -114,6 +114,7 @@ def replay(options: argparse.Namespace) -> int:
 def sweep(options: argparse.Namespace) -> int:
     """Run a diagram many times, with the values of a design; 1 if a run fails."""
     from quadvis.sweeps.summary import SweepLine, read_quantiles, sweep_lines
+    from quadvis.sweeps.sweep import IfAny
     from quadvis.sweeps.sweep import sweep as run_sweep
 
     several = len(options.variant) > 1
@@ -122,8 +123,9 @@ def sweep(options: argparse.Namespace) -> int:
     name = f"{default_name(options, one)}-sweep.csv"
     table_path = Path(options.output or runs_folder("table", "-o") / name)
     quantiles = read_quantiles(options.quantiles) if options.quantiles is not None else None
-    plot = table_path.parent / f"{table_path.stem}.png" if options.plot is None else Path(options.plot)
-    if options.plot and plot.suffix != ".png":
+    beside = IfAny(table_path.parent / f"{table_path.stem}.png")
+    plot: str = beside if options.plot is None else options.plot
+    if plot and Path(plot).suffix != ".png":
         raise QuadvisError(f"cannot write the plot '{plot}': give a name that ends in .png")
     if options.sensitivity is not None and Path(options.sensitivity).suffix != ".png":
         raise QuadvisError(f"cannot write the plot '{options.sensitivity}': give a name that ends in .png")
@@ -135,12 +137,12 @@ def sweep(options: argparse.Namespace) -> int:
             workers=options.workers, cluster=options.cluster, output=options.output or table_path,
             timings=options.timings, resume=options.resume,
             engine=options.engine, announce=progress.say,
-            plot=None if options.plot == "" else plot, sensitivity=options.sensitivity, logs=options.logs,
+            plot=plot or None, sensitivity=options.sensitivity, logs=options.logs,
             own_blocks=own_blocks(options), progress=progress,
         )  # fmt: skip
     print("\n".join(sweep_lines(table, terminal_width(), quantiles)))
     print(f"table: {table_path}")
-    if options.plot != "":
+    if plot and table.quantities:
         print(f"plot: {plot}")
     if options.sensitivity is not None:
         print(f"sensitivity: {options.sensitivity}")

@@ -12,7 +12,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import Any, NoReturn
 
 from quadvis.errors import QuadvisError
 from quadvis.errors.caller import command_words
@@ -23,6 +23,7 @@ FAILED, REFUSED, INTERRUPTED, PIPE_BROKEN = 1, 2, 130, 141
 AGAIN = 0.01  # s until a dropped interruption is repeated
 
 _ctrl_c = False  # True after Ctrl-C
+_short_of_memory = False  # True after a command for which there was too little
 
 
 class OutputError(QuadvisError):
@@ -68,8 +69,8 @@ def ended(command: Callable[[], int], name: str = "", enough: int = PIPE_BROKEN)
 
     ``enough`` is the exit code if the reader of the output has seen enough and has ended.
     """
-    global _ctrl_c
-    _ctrl_c = False
+    global _ctrl_c, _short_of_memory
+    _ctrl_c = _short_of_memory = False
     with _streams(), command_words():
         try:
             code = _flushed(command)
@@ -85,6 +86,16 @@ def ended(command: Callable[[], int], name: str = "", enough: int = PIPE_BROKEN)
             prefix = f"{name}: " if name else ""
             print(f"{prefix}{words}", *getattr(error, "__notes__", ()), sep="\n", file=sys.stderr)
         return code
+
+
+def leave(code: int) -> NoReturn:
+    """End the process with an exit code.
+
+    For lack of memory at once: an orderly end of Python would fail again and again, and print each time how.
+    """
+    if _short_of_memory:
+        os._exit(code)
+    raise SystemExit(code)
 
 
 def _flushed(command: Callable[[], int]) -> int:
@@ -104,7 +115,9 @@ def _ending(error: BaseException) -> tuple[str, int]:
         return "interrupted", INTERRUPTED
     if isinstance(error, QuadvisError):
         return str(error), error.exit_code
+    global _short_of_memory
     words = surroundings(error)
+    _short_of_memory = words == MEMORY
     return words, FAILED if words == MEMORY else REFUSED
 
 

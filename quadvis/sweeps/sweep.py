@@ -31,6 +31,10 @@ MOST_IN_FILE = 100_000  # runs of a table that is one file; a larger one is a fo
 Progress = Callable[[int, int, int], None]  # takes the numbers of runs: finished, all, not passed
 
 
+class IfAny(str):
+    """The file of a picture that is left out if the runs have no numbers to draw."""
+
+
 def sweep(
     path: str | Path,
     over: Over,
@@ -100,6 +104,7 @@ def sweep(
     refuse_devices(diagram.graph)
     found = quantities(diagram)
     if not found:
+        plot = None if isinstance(plot, IfAny) else plot
         _refuse_pictures(plot, sensitivity)
     rule = StopRule(until, found, drawn) if until is not None else None
     make = TableMaker(diagram.name, drawn, found, len(diagram.loop_requirements))

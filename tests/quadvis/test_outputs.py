@@ -141,6 +141,9 @@ def test_every_command_writes_again_what_it_wrote(project: Path) -> None:
         assert main(["sweep", "loop.yaml", "--over", "seed=0", "--workers", "1", "--logs", "logs"]) == 0
     assert read_log("x.mcap").complete
     assert not list(Path().glob("**/.*"))
+    assert list(Path().glob("**/*-sweep.csv")) and not list(
+        Path().glob("**/*-sweep.png")
+    )  # it has no numbers
 
 
 @pytest.mark.parametrize("how", ["same", "symbolic", "hard"])

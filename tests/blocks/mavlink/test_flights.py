@@ -257,7 +257,7 @@ def test_if_the_guardian_is_lost_the_supervisor_sends_signed_safe_set_points_in_
         wait_for(lambda: fake.of("SET_ATTITUDE_TARGET")[-1][1].thrust == 0.0 and fake.heard)
         time.sleep(0.1)
     last = [(each.type_mask, each.thrust) for _, each in fake.of("SET_ATTITUDE_TARGET")][-4:]
-    assert last == [(7, 0.25), (199, 0.0), (128, 0.75), (199, 0.0)]
+    assert last == [(7, 0.25), (128, 0.75), (199, 0.0), (199, 0.0)]
     assert all(each.get_signed() for _, each in fake.heard) and not fake.of("BAD_DATA")
 
 
