@@ -9,6 +9,7 @@ from quadvis.version import __version__
 if TYPE_CHECKING:
     from quadvis.analysis.identify import identify
     from quadvis.api import Diagram, load
+    from quadvis.errors import QuadvisError
     from quadvis.host.target import Target
     from quadvis.output.log_reader import Log, read_log
     from quadvis.realtime.options import RealTime
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Diagram",
     "Log",
+    "QuadvisError",
     "RealTime",
     "Target",
     "__version__",
@@ -36,6 +38,7 @@ _HOMES = {
     "identify": "analysis.identify",
     "load": "api",
     "Log": "output.log_reader",
+    "QuadvisError": "errors",
     "read_log": "output.log_reader",
     "RealTime": "realtime.options",
     "replay": "run.replay",
