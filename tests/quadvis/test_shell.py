@@ -300,6 +300,11 @@ def test_little_memory_is_a_sentence(megabytes: int) -> None:
     assert done.stderr.count("\n") == (0 if done.returncode == 0 else 1)
 
 
+def test_the_sentence_for_which_nothing_can_be_imported_is_that_of_all_others() -> None:
+    start = Path(shell.__file__).parents[1] / "__main__.py"
+    assert f"{MEMORY}\\n" in start.read_text(encoding="utf-8")
+
+
 # Ctrl-C.
 
 
